@@ -396,6 +396,21 @@ def test_what_cannot_be_exported_gets_a_sentence(tmp_path, options, says):
     assert not (tmp_path / "law").exists()
 
 
+def test_an_export_says_which_law_it_takes_where_nobody_chose(tmp_path):
+    """The scenario has a `controller` of its base beside those that it compares."""
+    said: list[str] = []
+    for chosen in ("", "velocity_vector"):
+        request = workflow.Request(
+            tmp_path / f"law-{chosen}", ["simulation.duration=1"], chosen, c=True, fmu=False,
+            platforms=["linux64"], say=said.append,
+        )  # fmt: skip
+        workflow.export(HARDWARE / "boat.yaml", request)
+    notes = [one for one in said if one.startswith("exporting")]
+    assert notes == [
+        "exporting `controller`; --controller chooses among velocity_vector, momentum_vector"
+    ]
+
+
 def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, monkeypatch):
     with pytest.raises(UsageError, match=r"is no exported law: it has no law\.json"):
         check(tmp_path)
@@ -415,6 +430,14 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     monkeypatch.setattr(link, "find_spec", lambda name: None)
     with pytest.raises(UsageError, match=r"no linker for .*podusv\[export\]"):
         link.shared_library({}, link.this_machine(), objects.PLATFORMS[link.this_machine()])
+    monkeypatch.undo()
+    monkeypatch.setattr(link.shutil, "which", lambda name: None)
+    monkeypatch.setattr(link, "find_spec", lambda name: None)
+    said: list[str] = []
+    request = workflow.Request(tmp_path / "law", ["control.period=0.1"], say=said.append)
+    with pytest.raises(UsageError, match=r"no linker for .*--no-fmu exports without"):
+        workflow.export(Path(SOURCE), request)
+    assert said == []  # before anything is computed
 
 
 @pytest.mark.parametrize("table", ["", "time\n", "time\nzero\n", "time\n0\n0,1\n", "time,x\n0,1\n"])

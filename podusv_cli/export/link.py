@@ -21,8 +21,8 @@ MACHINES = {
     ("Windows", "AMD64"): "win64", ("Darwin", "x86_64"): "darwin64",
 }  # fmt: skip
 NO_ZIG = (
-    "there is no linker for {0}: install zig with pip install 'podusv[export]', or export --c, "
-    "whose object files a compiler of your own links"
+    "there is no linker for {0}: install a C compiler, or zig with pip install "
+    "'podusv[export]'; --no-fmu exports without a linker"
 )
 
 
@@ -31,14 +31,14 @@ def shared_library(files: Mapping[str, bytes], name: str, platform: Platform) ->
 
     Raises UsageError where no linker is there, or it fails.
     """
-    linker = _linker(name, platform)
+    command = linker(name, platform)
     with TemporaryDirectory() as folder:
         for file, content in files.items():
             (Path(folder) / file).write_bytes(content)
         sources = [file for file in files if not file.endswith(".h")]
         out = f"law{platform.library}"
         done = subprocess.run(
-            [*linker, *OPTIONS, "-o", out, *sources, "-lm"], cwd=folder, capture_output=True,
+            [*command, *OPTIONS, "-o", out, *sources, "-lm"], cwd=folder, capture_output=True,
             text=True, check=False,
         )  # fmt: skip
         if done.returncode:
@@ -51,7 +51,8 @@ def this_machine() -> str:
     return MACHINES.get((platform_of_python.system(), platform_of_python.machine()), "")
 
 
-def _linker(name: str, platform: Platform) -> Sequence[str]:
+def linker(name: str, platform: Platform) -> Sequence[str]:
+    """The command that links for a platform. Raises UsageError where there is none."""
     if find_spec("ziglang") and platform.zig:
         return (sys.executable, "-m", "ziglang", "cc", "-target", platform.zig)
     if name == this_machine() and (compiler := shutil.which("cc")):

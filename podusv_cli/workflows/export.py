@@ -17,7 +17,7 @@ from podusv_cli.export import c, objects
 from podusv_cli.export.check import ABOUT, FMU, SAMPLES
 from podusv_cli.export.fmu import fmu
 from podusv_cli.export.law import ExportedLaw
-from podusv_cli.export.link import this_machine
+from podusv_cli.export.link import linker, this_machine
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
@@ -25,7 +25,7 @@ from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.workflows.execute import Stopwatch, simulated
-from podusv_cli.workflows.run import single
+from podusv_cli.workflows.run import others, single
 
 IN_FMU = ("linux64", "win64", "aarch64-linux")  # where none is asked for and zig is there
 
@@ -61,6 +61,8 @@ def export(config: Path, request: Request) -> Path:
             "simulation.duration=100 [s]"
         )
     with RunWriter(request.to, force=request.force) as writer:
+        if names := ", ".join(others(loaded, request.controller)):
+            request.say(f"exporting `controller`; --controller chooses among {names}")
         request.say("simulating the run that the law is checked against")
         run = simulated(law.scenario, Stopwatch())
         if run.status == "interrupted":
@@ -110,7 +112,7 @@ def _notes(run: Recording, of_run: bool) -> Iterator[str]:
 
 
 def _linked(request: Request) -> Mapping[str, objects.Platform]:
-    """The platforms of the FMU. Raises UsageError for one that has no libraries."""
+    """The platforms of the FMU. Raises UsageError for one without libraries or a linker."""
     names = request.platforms or (IN_FMU if find_spec("ziglang") else (this_machine(),))
     if "" in names:
         raise UsageError(
@@ -123,6 +125,8 @@ def _linked(request: Request) -> Mapping[str, objects.Platform]:
             f"{alone[0]} has no shared libraries, so an FMU cannot hold the law for it; export it "
             "with --no-fmu"
         )
+    for name, platform in found.items():
+        linker(name, platform)
     return found
 
 

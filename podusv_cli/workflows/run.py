@@ -70,9 +70,14 @@ def run_loaded(
         figures=DRAWN if request.figures else (), argv=request.argv, noticed=noticed,
         compiling=request.compiling,
     )  # fmt: skip
+    return replace(execute(task, progress, watch), others=others(loaded, request.controller))
+
+
+def others(loaded: Loaded, label: str = "") -> tuple[str, ...]:
+    """The `controllers` of a scenario of which `single` takes its `controller`, unchosen."""
     several = loaded.scenario.controllers  # one may be the `controller` under a name
-    all_run = request.controller or list(several.values()) == [loaded.scenario.controller]
-    return replace(execute(task, progress, watch), others=() if all_run else tuple(several))
+    alone = label or list(several.values()) == [loaded.scenario.controller]
+    return () if alone else tuple(several)
 
 
 def single(loaded: Loaded, label: str = "") -> Scenario:
