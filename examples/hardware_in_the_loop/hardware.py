@@ -26,8 +26,13 @@ def steer(session, address, wait=None):
 
 
 if __name__ == "__main__":
-    session = podusv.open_session(sys.argv[1])
+    if len(sys.argv) != 4:
+        sys.exit("usage: python hardware.py SCENARIO HOST PORT")
+    scenario, host, port = sys.argv[1:]
+    address = socket.gethostbyname(host), int(port)
+    session = podusv.open_session(scenario)
     try:
-        print(steer(session, (sys.argv[2], int(sys.argv[3]))), "demands lost")
+        lost = steer(session, address)
+        print(f"{lost} of {round(session.observe().time / session.period)} demands lost")
     finally:
         print(session.close())

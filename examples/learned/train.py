@@ -1,5 +1,7 @@
 """Train a policy by an evolution strategy: `python train.py SEED FILE`, five minutes on two cores.
 
+SEED is a whole number, FILE what the policy is written to; it needs podusv[gym].
+
 In every generation 32 pairs of networks, mirrored about the mean, steer the same four drawn runs.
 Ranks of their costs give the direction in which the mean goes (Salimans et al. 2017,
 arXiv:1703.03864, algorithm 2), with the steps of Adam. The result does not depend on how many
@@ -101,6 +103,8 @@ def save(network, file):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit("usage: python train.py SEED FILE")
     seed, file = sys.argv[1:]
     with Pool(PROCESSES) as processes:
         save(trained(np.random.default_rng(int(seed)), processes), file)
