@@ -1,6 +1,7 @@
 """The law `policy`: its network, what it sees, and the file that its weights come from."""
 
 import base64
+import json
 import math
 from pathlib import Path
 
@@ -121,6 +122,11 @@ def test_a_run_has_its_weights_in_its_folder():
     assert run.scenario.controller.content == base64.b64encode(packed(symmetric())).decode()
 
 
+def raw(header, numbers=b""):
+    text = json.dumps(header).encode()
+    return len(text).to_bytes(8, "little") + text + numbers
+
+
 def layers(**changes):
     return packed(drawn([8, 4, 2]) | {name.replace("_", "."): t for name, t in changes.items()})
 
@@ -128,6 +134,11 @@ def layers(**changes):
 BAD = {
     "no file of the format": (b"hello, this is text", "is no safetensors file"),
     "empty": (b"", "is no safetensors file"),
+    "header beyond its end": (bytes([3]) + bytes(7) + b"{}", "is no safetensors file"),
+    "numbers of no tensor": (layers() + b"  ", "its header does not fit its numbers; save it aga"),
+    "numbers of two tensors": (
+        raw({name: {"dtype": "F64", "shape": [2], "data_offsets": [0, 16]} for name in "ab"},
+            bytes(16)), "its header does not fit its numbers"),
     "cut off": (layers()[:-8], "the file ends within 2.bias"),
     "not finite": (layers(**{"2_bias": np.array([1.0, np.nan])}), "2.bias has a number that is n"),
     "other input": (layers(**{"0_weight": np.ones((4, 6))}), r"0.weight has shape \(4, 6\), must "
@@ -140,6 +151,13 @@ BAD = {
     "mean": (packed(drawn([8, 2]) | {"mean": np.zeros(7)}), r"mean has shape \(7,\), must be \(8,"),
     "half a layer": (packed({"0.weight": np.ones((2, 8))}), "0.bias is missing"),
     "no layers": (packed({"mean": np.ones(8)}), "must have the layers of one network, found none"),
+    "nothing between": (layers(**{"0_weight": np.zeros((0, 8))}),
+                        r"0.weight has shape \(0, 8\), which has no num"),
+    "no numbers, and huge": (
+        raw({"0.weight": {"dtype": "F32", "shape": [2**70, 0], "data_offsets": [0, 0]}}),
+        "0.weight has shape .* which has no numbers"),
+    "one number in two ways": (layers(**{"00_bias": np.ones(4)}), "'00.bias' is no tensor of a po"),
+    "a number of 5000 digits": (layers(**{5000 * "1" + "_bias": np.ones(4)}), "is no tensor of a"),
     "two networks": (packed({f"{part}.{name}": tensor for part in ("pi", "vf")
                              for name, tensor in drawn([8, 2]).items()}), "found 'pi.' and 'vf.'"),
     "something else": (layers(log_std=np.ones(2)), "'log.std' is no tensor of a policy"),

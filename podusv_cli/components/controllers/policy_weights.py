@@ -21,7 +21,7 @@ from podusv_cli.core.kernel import Vector
 LENGTH = 8  # bytes of the header's length
 KINDS: dict[str, np.dtype[Any]] = {"F32": np.dtype("<f4"), "F64": np.dtype("<f8")}
 # As torch names what its Sequential holds
-LAYER = re.compile(r"(?P<of>.+\.)?(?P<number>\d+)\.(weight|bias)")
+LAYER = re.compile(r"(?P<of>.+\.)?(?P<number>0|[1-9][0-9]{0,3})\.(weight|bias)")
 
 
 class Network(NamedTuple):
@@ -49,21 +49,27 @@ class Header(BaseModel, extra="allow"):
 
 def tensors(data: bytes) -> dict[str, Vector]:
     """The tensors of a safetensors file by name. Raises ValueError."""
-    size = int.from_bytes(data[:LENGTH], "little")
+    begin = LENGTH + int.from_bytes(data[:LENGTH], "little")
     try:
-        header = Header.model_validate_json(data[LENGTH : LENGTH + size])
+        header = Header.model_validate_json(data[LENGTH:begin] if begin <= len(data) else b"")
     except ValidationError:
         raise ValueError(
             "is no safetensors file; write it with safetensors.numpy.save_file"
         ) from None
-    numbers = data[LENGTH + size :]
-    return {name: _numbers(name, one, numbers) for name, one in header.__pydantic_extra__.items()}
+    numbers, told = data[begin:], header.__pydantic_extra__
+    found = {name: _numbers(name, one, numbers) for name, one in told.items()}
+    pieces = sorted(one.data_offsets for one in told.values())
+    if [0, *(end for _, end in pieces)] != [*(first for first, _ in pieces), len(numbers)]:
+        raise ValueError("its header does not fit its numbers; save it again")
+    return found
 
 
 def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
     begin, end = tensor.data_offsets
     if tensor.dtype not in KINDS:
         raise ValueError(f"{name} has numbers {tensor.dtype}; save it as {' or '.join(KINDS)}")
+    if not math.prod(tensor.shape):
+        raise ValueError(f"{name} has shape {tensor.shape}, which has no numbers")
     kind = KINDS[tensor.dtype]
     if end > len(numbers) or end - begin != math.prod(tensor.shape) * kind.itemsize:
         raise ValueError(f"the file ends within {name}, or its header does not fit; save it again")
