@@ -196,6 +196,12 @@ REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
         {"controller": {"kind": "pid"}, VARIED: {"controller.K_Pu": {"uniform": [1.0, 2.0]}}}, {},
         "sweep.vary.controller.K_Pu draws controller.K_Pu, and in an environment the controller",
     ),
+    "limits of one axis": ({}, {"limits": 8.0}, r"limits are 8\.0; give .* as in limits=\(8"),
+    "limits below 0": ({}, {"limits": (8.0, -2.5)}, r"limits are \(8\.0, -2\.5\); give"),
+    "limits in words": ({}, {"limits": "ab"}, "limits are 'ab'; give"),
+    "a path without a timetable": (
+        {"path": {"kind": "legs", "points": [[0, 0], [20, 0], [20, 20]]}}, {},
+        "runs of this scenario do not gather 'iae' .* take e_ct_integral"),
     "no period": ({"control.period": 0.0}, {}, "for how long does a demand hold"),
 }  # fmt: skip
 
@@ -206,6 +212,42 @@ def test_what_no_environment_can_be_made_of_is_a_sentence(make, case):
     changes, options, says = REFUSED[case]
     with pytest.raises(UsageError, match=says):
         make(SCENARIO, changes, **options)
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.0, "8"])
+def test_a_count_of_environments_is_a_whole_number_from_one_on(count):
+    with pytest.raises(UsageError, match=f"count is {count!r}; give a whole number from 1 on"):
+        several(count)
+
+
+def test_seeds_are_whole_numbers_from_0_on():
+    env, many = single(), several(2)
+    one, _ = env.reset(seed=np.int64(3))
+    for seeds in (np.int64(3), [3, 4], np.array([3, 4])):
+        np.testing.assert_array_equal(many.reset(seed=seeds)[0][0], one)
+    for wrong in (-1, 1.5, "a"):
+        says = f"the seed is {wrong!r}; give a whole number from 0 on"
+        for made, seed in ((env, wrong), (many, wrong), (many, [0, wrong])):
+            with pytest.raises(UsageError, match=says):
+                made.reset(seed=seed)
+    sobol = single(**{"sweep.design": "sobol"})
+    with pytest.raises(UsageError, match="4294967296; Sobol' points have numbers up to"):
+        sobol.reset(seed=2**32)
+
+
+def test_a_run_that_ends_with_a_reward_beyond_all_numbers_is_terminated():
+    """The square of a demand of 1e200 is infinite; those of other runs are not."""
+    free = {"actuator": {"kind": "ideal"}, "vessel": {"preset": "paper"}}
+    given: dict[str, Any] = {"reward": "effort_u", "limits": (1e300, 1e300)}
+    one, many = podusv.gym.Env(SCENARIO, free, **given), podusv.gym.VectorEnv(
+        SCENARIO, free, count=2, **given
+    )  # fmt: skip
+    one.reset(seed=0)
+    many.reset(seed=0)
+    assert one.step((1e200, 1e200))[1:4] == (-math.inf, True, False)
+    _, gained, dead, cut, _ = many.step(np.array([[1e200, 1e200], [1.0, 1.0]]))
+    assert (gained[0], list(dead), list(cut)) == (-math.inf, [True, False], [False, True])
+    assert -1.0 < gained[1] < 0.0
 
 
 def test_a_reward_that_is_not_defined_at_every_instant_is_a_sentence():

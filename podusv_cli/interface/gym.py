@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.study.check import gathered_metrics, sweep_faults
-from podusv_cli.studies.study.draws import SWEEP, drawn, draws
+from podusv_cli.studies.study.draws import SOBOL_BITS, SWEEP, drawn, draws
 
 try:
     import gymnasium
@@ -50,16 +51,33 @@ class Task:
         self.sweep = whole.sweep or Sweep(draws=1)
         self._check_sweep()
         self.scenario, self.period = waiting(whole, period)
+        self.reward, self.limits = self._known(reward), self._limits(limits)
+
+    def _known(self, reward: str) -> str:
         known = gathered_metrics(self.scenario)
+        if reward in self.scenario.known_metrics() and reward not in known:
+            raise UsageError(
+                f"podusv.gym: runs of this scenario do not gather {reward!r} on their way; where a "
+                "path is followed, take e_ct_integral in place of iae"
+            )
         if reward not in known:
             told = unknown(f"reward {reward!r}", reward, known, "podusv list")
             raise UsageError(f"podusv.gym: {told}")
-        self.reward, self.limits = reward, np.array(limits or self.scenario.actuator.limits())
-        if not np.isfinite(self.limits).all():
+        return reward
+
+    def _limits(self, given: Limits | None) -> Vector:
+        limits = numbers(self.scenario.actuator.limits() if given is None else given)
+        if limits.shape != (OUTPUTS,) or not (limits >= 0.0).all():
+            raise UsageError(
+                f"podusv.gym: the limits are {given!r}; give the largest surge force and yaw "
+                "moment, as in limits=(8.0, 2.5) [N, N m]"
+            )
+        if not np.isfinite(limits).all():
             raise UsageError(
                 "podusv.gym: the actuator does not say how large a demand may be; give "
                 "limits=(8.0, 2.5) [N, N m]"
             )
+        return limits
 
     def _check_sweep(self) -> None:
         if self.sweep.grid:
@@ -75,6 +93,17 @@ class Task:
                         f"controller is learned; take it out with sweep.vary: {{{name}: null}}"
                     )
 
+    def seed(self, given: Any) -> int:
+        """A seed, which is the number of a draw. Raises UsageError."""
+        if (number := whole(given)) < 0:
+            raise UsageError(f"podusv.gym: the seed is {given!r}; give a whole number from 0 on")
+        if not self.sweep.independent and number >= 2**SOBOL_BITS:
+            raise UsageError(
+                f"podusv.gym: the seed is {number}; Sobol' points have numbers up to "
+                f"{2**SOBOL_BITS - 1}"
+            )
+        return number
+
     def drawn(self, seed: int | None, random: np.random.Generator) -> Scenario:
         """The scenario with the draw of a study whose number is the seed, or with one of no study.
 
@@ -86,9 +115,12 @@ class Task:
         draw = next(draws(sweep, int(random.integers(2**53)), 1, LEARNING))
         return drawn(self.scenario, sweep.vary, draw)
 
-    def check_reward(self, gathered: Vector | float, time: float) -> None:
-        """Raise UsageError for a metric that is not defined at this time [s]."""
-        if not np.isfinite(gathered).all():
+    def check_reward(self, gathered: Vector | float, alive: Flags | bool, time: float) -> None:
+        """Raise UsageError for a metric that is not defined at this time [s].
+
+        It may be infinite for a run whose numbers are not finite any more.
+        """
+        if (np.isnan(gathered) | np.isinf(gathered) & alive).any():
             raise UsageError(
                 f"podusv.gym: the metric {self.reward} is not defined at {time:g} s; a reward "
                 "needs one that is at every instant, such as iae"
@@ -154,6 +186,7 @@ class Env(gymnasium.Env[Vector, Vector]):
         self, *, seed: int | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:  # fmt: skip
         """Begin a run; see the class. `options` change nothing."""
+        seed = None if seed is None else self._task.seed(seed)
         super().reset(seed=seed)
         scenario = self._task.drawn(seed, self.np_random)
         self._session = Session(scenario, self._task.period, self._march)
@@ -171,9 +204,9 @@ class Env(gymnasium.Env[Vector, Vector]):
             raise UsageError("podusv.gym: the episode is over; call reset")
         after = session.step(action)
         gathered = session.metric(task.reward)
-        task.check_reward(gathered, after.time)
-        reward, self._gathered = self._gathered - gathered, gathered
         ended = after.status == "diverged", after.status == "finished"
+        task.check_reward(gathered, not ended[0], after.time)
+        reward, self._gathered = self._gathered - gathered, gathered
         return self._seen(), reward, *ended, {"time": after.time}
 
     def _seen(self) -> Vector:
@@ -200,10 +233,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         period: float | None = None, reward: str = "iae", limits: Limits | None = None,
     ) -> None:  # fmt: skip
         """No episode has begun."""
-        if count < 1:
-            raise UsageError(f"podusv.gym: count is {count}; must be 1 or more")
+        if (number := whole(count)) < 1:
+            raise UsageError(f"podusv.gym: count is {count!r}; give a whole number from 1 on")
         self._task = task = Task(source, changes, period, reward, limits)
-        self.num_envs = count
+        self.num_envs = count = number
         self.single_action_space = task.action_space()
         self.single_observation_space = task.observation_space()
         self.action_space = batch_space(self.single_action_space, count)
@@ -227,7 +260,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:
         """Begin a run in every environment; `options` change nothing."""
-        seeds = _seeds(seed, self.num_envs)
+        seeds = self._seeds(seed)
         super().reset(seed=seeds[0])
         self._marches = self._begun(range(self.num_envs), seeds)
         return self._observed()
@@ -256,7 +289,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         rewards = np.zeros(self.num_envs)
         for march in self._marches:
             gathered = self._metrics.one(self._task.reward, march.seen())
-            self._task.check_reward(gathered, march.time)
+            self._task.check_reward(gathered, march.alive, march.time)
             rewards[march.places] = self._gathered[march.places] - gathered
             self._gathered[march.places] = gathered
         return rewards
@@ -287,10 +320,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
     def _checked(self, actions: Vector) -> Vector:
         if not self._marches:
             raise UsageError("podusv.gym: no episode has begun; call reset first")
-        try:
-            demands = np.asarray(actions, float)
-        except (TypeError, ValueError):
-            demands = np.zeros(0)
+        demands = numbers(actions)
         if demands.shape != (self.num_envs, OUTPUTS):
             raise UsageError(
                 f"podusv.gym: the actions have shape {demands.shape}; give {self.num_envs} rows of "
@@ -304,13 +334,33 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
             )
         return demands
 
+    def _seeds(self, given: Any) -> Sequence[int | None]:
+        """A seed for every environment. Raises UsageError."""
+        if given is None:
+            return [None] * self.num_envs
+        if not np.ndim(given):
+            first = self._task.seed(given)
+            return range(first, first + self.num_envs)
+        each = list(given)
+        if len(each) != self.num_envs:
+            raise UsageError(
+                f"podusv.gym: {len(each)} seeds for {self.num_envs} environments; give "
+                f"{self.num_envs}"
+            )
+        return [None if one is None else self._task.seed(one) for one in each]
 
-def _seeds(seed: int | Sequence[int | None] | None, count: int) -> Sequence[int | None]:
-    """A seed for every environment. Raises UsageError."""
-    if seed is None:
-        return [None] * count
-    if isinstance(seed, int):
-        return range(seed, seed + count)
-    if len(seed) != count:
-        raise UsageError(f"podusv.gym: {len(seed)} seeds for {count} environments; give {count}")
-    return seed
+
+def whole(given: Any) -> int:
+    """A whole number as Python's own; -1 for what is none."""
+    try:
+        return index(given)
+    except TypeError:
+        return -1
+
+
+def numbers(given: Any) -> Vector:
+    """Numbers as an array; an empty one for what are none."""
+    try:
+        return np.asarray(given, float)
+    except (TypeError, ValueError):
+        return np.zeros(0)
