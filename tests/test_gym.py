@@ -2,6 +2,7 @@
 
 import math
 import re
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,8 @@ def test_without_a_seed_no_draw_of_the_study_comes_up():
     assert len(set(starts)) == 30
     assert judged.isdisjoint(starts)
     assert min(starts) < -6.0 < 6.0 < max(starts)
+    task, first = env._task, SimpleNamespace(integers=lambda most: 0)
+    assert task.drawn(None, first).start.x not in judged  # also with the number of a study's draw
     again = single()
     again.reset(seed=7)
     again.reset()
@@ -142,6 +145,37 @@ def test_environments_side_by_side_have_the_bits_of_single_ones(reward):
     assert len(np.unique(seen[:, 0])) == 11
     _, gained, *_ = many.step(np.zeros((11, 2)))
     assert (gained < 0.0).all() or reward != "iae"
+
+
+SEEN: dict[str, dict[str, Any]] = {
+    "an estimate": {"measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}},
+    "legs": {"path": {"kind": "legs", "points": [[0, 0], [6, 0], [6, 6]]}, "start.y": 0.0,
+             "sweep.vary": {"path.speed": None, "start.x": {"uniform": [0.0, 9.0]}}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SEEN)
+def test_an_estimate_and_a_target_on_legs_are_seen_side_by_side_as_alone(case):
+    """On legs some runs are past the first corner, and others are before it."""
+    given = {"reward": "peak_tau_u"}
+    many = podusv.gym.VectorEnv(SCENARIO, SEEN[case], count=5, **given)
+    ones = [podusv.gym.Env(SCENARIO, SEEN[case], **given) for _ in range(5)]
+    many.reset(seed=0)
+    for i, one in enumerate(ones):
+        one.reset(seed=i)
+    for _ in range(20):
+        seen, *_ = many.step(np.full((5, 2), 2.0))
+        np.testing.assert_array_equal(seen, [one.step((2.0, 2.0))[0] for one in ones])
+    assert len({tuple(one.session.observe().target[2:4]) for one in ones}) > 1
+
+
+def test_what_was_seen_stays_as_it_was():
+    many = several(2)
+    seen, info = many.reset(seed=0)
+    before, times = seen.copy(), info["time"].copy()
+    many.step(np.ones((2, 2)))
+    np.testing.assert_array_equal(seen, before)
+    np.testing.assert_array_equal(info["time"], times)
 
 
 def test_where_one_diverges_the_others_of_its_march_are_truncated():

@@ -16,6 +16,8 @@ from podusv_cli.components.controllers.policy_weights import tensors
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import bundle, call
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.tune import Tune
+from podusv_cli.studies.tuning.space import AROUND, gains
 
 STATE = np.array([1.0, -2.0, 0.7, 0.4, -0.1, 0.2])
 TARGET = np.array([4.0, 3.0, 0.5, -0.2, 9.0, 9.0])
@@ -59,9 +61,14 @@ def test_abeam_to_starboard_is_a_quarter_turn():
 
 @pytest.mark.parametrize("activation", ["tanh", "relu"])
 @pytest.mark.parametrize("squash", ["tanh", "clip"])
-@pytest.mark.parametrize("sizes", [[8, 2], [8, 5, 2], [8, 16, 12, 2], [8, 3, 7, 6, 2]], ids=str)
+@pytest.mark.parametrize(
+    "sizes", [[8, 2], [8, 5, 2], [8, 16, 12, 2], [8, 3, 7, 6, 3, 4, 2]], ids=str
+)
 def test_a_network_is_what_numpy_makes_of_its_layers(activation, squash, sizes):
-    """Widths differ from layer to layer; the kernel has all hidden layers as wide as the widest."""
+    """Widths differ from layer to layer; the kernel has all hidden layers as wide as the widest.
+
+    The layers of the deepest are 0, 2, 4, 6, 8 and 10.
+    """
     random = np.random.default_rng(1)
     given = drawn(sizes) | {"mean": random.normal(size=8), "scale": random.uniform(0.5, 4.0, 8)}
     law = Policy(
@@ -103,6 +110,17 @@ def test_layers_of_a_module_with_a_name_are_read():
         demand(Policy(content=content(given))),
         demand(Policy(content=content(drawn([8, 4, 2])))),
     )
+
+
+def test_base64_may_have_lines():
+    whole = content(drawn([8, 2]))
+    lines = "\n".join(whole[i : i + 76] for i in range(0, len(whole), 76))
+    np.testing.assert_array_equal(demand(Policy(content=lines)), demand(Policy(content=whole)))
+
+
+def test_a_search_for_gains_leaves_the_limits_of_the_demand_as_they_are():
+    base, law = podusv.load("podusv:mu_2017/corrected.yaml"), Policy(content=content(drawn([8, 2])))
+    assert gains(law, "policy", base, Tune(space={AROUND: 4.0})) == ()
 
 
 def scenario(data: bytes) -> Scenario:
