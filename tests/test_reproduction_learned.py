@@ -37,6 +37,18 @@ def test_the_page_has_the_study_s_comparison_with_velocity_vector():
     ) in " ".join(PAGE.split())
 
 
+def test_the_page_says_where_velocity_vector_is_better():
+    pairs = pd.read_csv(STUDY / "pairs.csv").query("a == 'policy' and b == 'velocity_vector'")
+    settled, calm = (pairs.set_index("metric").loc[name] for name in ("z_e_steady", "tv_tau_u"))
+    words = " ".join(PAGE.split())
+    assert (
+        f"larger in {100 * settled.b_wins:.1f} % of the draws, by a factor of {settled.ratio:.2f} "
+        f"[{settled.ratio_low:.2f}, {settled.ratio_high:.2f}] in the median"
+    ) in words
+    assert f"{calm.ratio:.1f} times the variation of" in words
+    assert f"in {100 * calm.a_wins:.1f} % of the draws it is calmer" in words
+
+
 @pytest.mark.parametrize("period", [0.0, 0.2])
 def test_the_shipped_policy_follows_the_paper_s_target_without_turning_round(period):
     """Its training is over at 80 s; the circle turns the vessel once."""
