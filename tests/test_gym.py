@@ -316,11 +316,6 @@ def test_an_action_that_is_no_demand_is_a_sentence_and_nothing_is_lost():
         many.reset(seed=[1, 2, 3])
 
 
-def test_no_environments_at_all_are_a_sentence():
-    with pytest.raises(UsageError, match="count is 0; must be 1 or more"):
-        several(0)
-
-
 def test_what_cannot_march_side_by_side_is_a_sentence(monkeypatch):
     monkeypatch.setattr("podusv_cli.interface.gym.why_alone", lambda *given: "a part prints")
     with pytest.raises(UsageError, match=r"side by side \(a part prints\); take Gymnasium's SyncV"):
