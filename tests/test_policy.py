@@ -15,6 +15,7 @@ from podusv_cli.components.controllers.policy import INPUTS, OBSERVED, Policy, o
 from podusv_cli.components.controllers.policy_weights import tensors
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import bundle, call
+from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.studies.tuning.space import AROUND, gains
@@ -143,6 +144,13 @@ def test_a_run_has_its_weights_in_its_folder():
 def raw(header, numbers=b""):
     text = json.dumps(header).encode()
     return len(text).to_bytes(8, "little") + text + numbers
+
+
+def test_a_page_shows_the_length_and_the_end_of_weights_in_place_of_them():
+    whole = content(symmetric())
+    assert value_text(whole) == f"{len(whole):,} characters that end in {whole[-8:]}"
+    assert value_text("a" * 64) == "a" * 64  # a digest
+    assert value_text("words " * 100) == "words " * 100
 
 
 def layers(**changes):

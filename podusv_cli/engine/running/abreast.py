@@ -40,10 +40,9 @@ def in_lanes(
 class Abreast:
     """The march of at most `LANES` runs, some instants at a time; no log is kept.
 
-    `demand` are the first numbers of the law's table at `at`; what is written to them acts from
-    the next instant on. `look(x, target, signals)` is a kernel that writes `size` numbers of the
-    state, as a law is given it, and the target. Arrays have a column a run. `alive` says which runs
-    have finite numbers so far.
+    What is written into `law_table` acts from the next instant on. `look(x, target, signals)` is a
+    kernel that writes `size` numbers about the state, as a law is given it, and the target. Arrays
+    have a column a run. `alive` says which runs have finite numbers so far.
     """
 
     def __init__(
@@ -55,10 +54,8 @@ class Abreast:
         self.grid, self.reached, self.alive = grid, 0, np.ones(len(runs), bool)
         self._lanes = Lanes.of([run.vectors for run in runs], layout)
         self._march = advance(self._lanes, grid.step)
-        c, target, view = (
-            Vectors(*self._lanes.vectors),
-            *map(room, (len(TARGET) * LANES, size * LANES)),
-        )
+        c, target = Vectors(*self._lanes.vectors), room(len(TARGET) * LANES)
+        view = room(size * LANES)
         given = c.s[layout.estimate * LANES :]
         _, path, names = next(iter(entries(runs[0].loop, Observer())))
         shared = alike(runs[0].loop, Observer())["path"]
