@@ -198,8 +198,6 @@ TABLE: dict[str, list[Row]] = {
      "test_times_in_seconds_stay_when_the_step_is_halved"),
     ("errors > 0.0 and not gap > errors", "errors > 0.0 and not gap < errors",
      "test_a_ranking_that_holds_changes_or_is_too_close"),
-    ("lambda scenario, _: scenario.control.period > 0", "lambda scenario, _: False",
-     "test_dop853_is_skipped_with_a_reason"),
 ],
 "optimum": [
     ("h / 8.0 * (f0 - f1)", "h / 6.0 * (f0 - f1)",

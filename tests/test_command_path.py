@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 from conftest import PAPER, POD, SMOOTH_START, Constant, adrift, corrected, last_state, run
+from continuous import continuous
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw
@@ -20,7 +21,6 @@ from podusv_cli.components.paths.line import Line
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
-from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.engine.step.grid import TimeGrid
 
 START = (0.0, 0.0, 0.0, 0.4, 0.0, 0.0)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from command_samples import Said
 from conftest import PACKAGE
+from continuous import continuous
 from findings_samples import BARE, CONFIGS, PLAIN, codes, finding, late, log, scene, simulated
 
 from podusv_cli.components.controllers.velocity_loop import Loop
 from podusv_cli.core.finding import Finding
-from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.findings.finding import merged, preflight
 from podusv_cli.findings.outcome import saturated
 from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from command_samples import BASE
 from conftest import VESSELS, corrected, run
+from continuous import continuous
 from findings_samples import scene
 from law_samples import STEADY
 from scipy.integrate import solve_ivp
@@ -35,7 +36,6 @@ from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
-from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.findings import stability
 from podusv_cli.metrics.margins import OF_LOOP

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import corrected, run
+from continuous import continuous
+from dop853 import integrate
 from findings_samples import CONFIGS, scene
 
 from podusv_cli.cli.verify import _in_order
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.engine.running.continuous import continuous
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.verification.dop853 import integrate, why_skipped
 from podusv_cli.verification.ranking import ranking
 from podusv_cli.verification.richardson import estimate, estimate_position
 from podusv_cli.verification.step_halving import refined, run_level
@@ -106,11 +106,11 @@ def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth):
 
 def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth):
     """Against DOP853, which knows nothing of the three runs."""
-    assert not smooth.dop853.skipped
-    true = math.dist(smooth.levels[0].position, smooth.dop853.position)
+    other = integrate(scene(*SMOOTH))
+    true = math.dist(smooth.levels[0].position, other.position)
     assert smooth.estimates[POSITION].error == pytest.approx(true, rel=0.2)
     assert true > 1e-9  # or there would be nothing to estimate
-    assert smooth.distances()["iae"] < 1e-6
+    assert smooth.levels[0].metrics["iae"] == pytest.approx(other.iae, rel=1e-6)
 
 
 @pytest.mark.slow
@@ -123,27 +123,11 @@ def test_dop853_starts_anew_where_the_path_jumps():
         for switch in (3.005, 50)
     )  # fmt: skip
     other = integrate(jumping)
-    assert other.skipped == ""
     # The engine's step across the jump has its first stage before it: order one, and no more.
     gaps = [math.dist(run_level(jumping, n).position, other.position) for n in (1, 3)]
     assert gaps[0] / gaps[1] == pytest.approx(4.0, rel=0.1)
     assert gaps[1] < 1e-4
     assert math.dist(integrate(smooth).position, other.position) > 0.05
-
-
-@pytest.mark.parametrize(
-    ("overrides", "reason"),
-    [
-        (["measurement={kind: sensors}", "estimator={kind: ekf}"], "works with measurements"),
-        (DIFFERENCE, "takes samples"),
-        (("control.period=0.01", "controller={kind: pid}"), "held"),
-        (("actuator={kind: saturated}",), "limits the law"),
-        (("controller.Gamma_r=4000",), "does not reach its end"),
-    ],
-)
-def test_dop853_is_skipped_with_a_reason(overrides, reason):
-    scenario = scene(*overrides, "simulation.duration=3")
-    assert reason in why_skipped(scenario, [run_level(scenario, 0)])
 
 
 def test_the_continuous_loop_is_the_engines():

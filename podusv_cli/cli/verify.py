@@ -87,7 +87,7 @@ def _show_run(label: str, run: RunVerification, done: Verification) -> None:
     for level in run.levels:
         if level.message:
             echo(f"at {level.step:.6g} s: {level.message}")
-    echo(_dop853(run), "")
+    echo("")
 
 
 def _cells(e: Estimate, tolerance: float) -> list[str]:
@@ -95,13 +95,6 @@ def _cells(e: Estimate, tolerance: float) -> list[str]:
     order = "-" if math.isnan(e.order) else f"{e.order:.1f}"
     error = "-" if math.isinf(e.relative) else f"{e.relative:.1e}"
     return [*values, order, error, "converged" if e.converged(tolerance) else "not converged"]
-
-
-def _dop853(run: RunVerification) -> str:
-    if run.dop853.skipped:
-        return f"DOP853 skipped: {run.dop853.skipped}"
-    gaps = ", ".join(f"{name} {gap:.1e}" for name, gap in run.distances().items())
-    return f"relative difference to DOP853: {gaps} ({run.dop853.evaluations} evaluations)"
 
 
 def _show_rankings(rankings: dict[str, Ranking]) -> None:

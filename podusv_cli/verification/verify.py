@@ -1,4 +1,4 @@
-"""Verification of a scenario's numbers: step halving, Richardson's error, DOP853, rankings."""
+"""Verification of a scenario's numbers: step halving, Richardson's error, rankings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any
 
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.verification.dop853 import Dop853Result, integrate, why_skipped
 from podusv_cli.verification.ranking import Ranking, ranking
 from podusv_cli.verification.richardson import Estimate, estimate, estimate_position
 from podusv_cli.verification.step_halving import Level, Progress, run_level
@@ -20,30 +19,16 @@ POSITION = "end_position"  # verified like a metric
 
 @dataclass(frozen=True)
 class RunVerification:
-    """The verification of one run; `length` [m] of the hull is the scale of positions."""
+    """The verification of one run."""
 
     levels: list[Level]
     estimates: dict[str, Estimate]
-    dop853: Dop853Result
-    length: float
-
-    def distances(self) -> dict[str, float]:
-        """Differences to DOP853 at the scenario's step, relative to length and IAE."""
-        first, other = self.levels[0], self.dop853
-        if other.skipped:
-            return {}
-        return {
-            POSITION: math.dist(first.position, other.position) / self.length,
-            "iae": abs(first.metrics["iae"] - other.iae) / other.iae if other.iae else 0.0,
-        }
 
     def unconverged(self, tolerance: float) -> list[str]:
         """Names of numbers that are not converged; only `status` where a run did not finish."""
         if any(level.status != "finished" for level in self.levels):
             return ["status"]
-        names = [n for n, e in self.estimates.items() if not e.converged(tolerance)]
-        apart = [f"{n} (DOP853)" for n, gap in self.distances().items() if not gap <= tolerance]
-        return names + apart
+        return [n for n, e in self.estimates.items() if not e.converged(tolerance)]
 
     def as_json(self, tolerance: float) -> dict[str, Any]:
         """The verification as plain data, with NaN and infinity."""
@@ -57,11 +42,9 @@ class RunVerification:
             }
             for name, e in self.estimates.items()
         }
-        gaps, reason = self.distances(), self.dop853.skipped
         return {
             "status": [level.status for level in self.levels],
             "numbers": numbers,
-            "dop853": {"left_out": reason} if reason else {"relative_difference": gaps},
         }
 
 
@@ -126,17 +109,15 @@ def check(scenario: Scenario, progress: Progress | None = None) -> RunVerificati
     """Verify one run."""
     work = [2.0**n for n in range(LEVELS)]  # a halved step costs twice as much
     levels = [
-        run_level(scenario, n, _part(progress, sum(work[:n]), work[n], 2 * sum(work)))
+        run_level(scenario, n, _part(progress, sum(work[:n]), work[n], sum(work)))
         for n in range(LEVELS)
     ]
-    reason, length = why_skipped(scenario, levels), scenario.vessel.length
-    tick = _part(progress, 1.0, 1.0, 2.0)
-    other = Dop853Result(skipped=reason) if reason else integrate(scenario, tick)
-    estimates = {POSITION: estimate_position([level.position for level in levels], length)}
+    positions = [level.position for level in levels]
+    estimates = {POSITION: estimate_position(positions, scenario.vessel.length)}
     names = dict.fromkeys(name for level in levels for name in level.metrics)
     for name in names:
         estimates[name] = estimate([level.metrics.get(name, math.nan) for level in levels])
-    return RunVerification(levels, estimates, other, length)
+    return RunVerification(levels, estimates)
 
 
 def _part(progress: Progress | None, begin: float, size: float, whole: float) -> Progress | None:
