@@ -37,14 +37,9 @@ def _weighing(law: Any, case: Case, V: float, v: float) -> float:
     return growth(momentum_vector_polynomial(*at))
 
 
-ALIKE = 0.01  # of a number; optimal gains bear a smaller difference
-REMEDIES = {
-    "schedule": "take a larger trust, or smaller Q0 and k_b0",
-    "lqr": "take gains: schedule, or smaller Q0 and k_b0",
-}  # by the key `gains`
-LOOPS: dict[type[Any], tuple[Growth, Callable[[Any], str]]] = {
-    VelocityVector: (_inverting, lambda law: "take momentum_vector, which pays for it under loads"),
-    MomentumVector: (_weighing, lambda law: REMEDIES[law.gains]),
+LOOPS: dict[type[Any], tuple[Growth, str]] = {
+    VelocityVector: (_inverting, "take momentum_vector, which pays for it under loads"),
+    MomentumVector: (_weighing, "take a larger trust, or smaller Q0 and k_b0"),
 }
 
 
@@ -68,32 +63,5 @@ def sway_answers_yaw(case: Case) -> Sentences:
         yield (
             f"sway answers yaw with p_eff = (m11 V - Y_r)/(m22 V) = {p_eff:.3g} at V = {V:.3g} m/s:"
             f" on a straight line the law, told exactly, grows at {grows:.2g} 1/s and swings for "
-            f"ever; {remedy(law)}, or more speed"
-        )
-
-
-@before(
-    "optimal-elsewhere", about="controller.gains", meaning="gains optimal for another hull",
-    condition="gains: lqr, and the simulated vessel's p_eff, sway damping or yaw inertia differ "
-    "from the nominal one's by more than 1 %",
-    remedy="take gains: schedule, with trust: 1.8 for a hull that is known less well, or tell the "
-    "law the vessel",
-    law=MomentumVector,
-)  # fmt: skip
-def optimal_elsewhere(case: Case) -> Sentences:
-    """Of drawn hulls +-30 % many are unstable with these gains (docs/theory.md)."""
-    scenario = case.scenario
-    law, true, told = scenario.controller, scenario.vessel, scenario.nominal
-    if not (isinstance(law, MomentumVector) and law.gains == "lqr"):
-        return
-    u, v, _ = case.reference.working.tolist()
-    speed = max(math.hypot(u, v), law.V_m)
-    (p, d), (at, damping) = (sway_answer(hull, speed, v) for hull in (told, true))
-    if not np.allclose([at, damping, true.m33], [p, d, told.m33], rtol=ALIKE):
-        yield (
-            "gains: lqr are optimal for the nominal vessel, and the simulated one has p_eff = "
-            f"{at:.3g}, d = {damping:.3g} 1/s and m33 = {true.m33:.3g} kg m2 in place of {p:.3g}, "
-            f"{d:.3g} 1/s and {told.m33:.3g} kg m2 at {speed:.3g} m/s; the loop may be unstable "
-            "there; take gains: schedule, with trust: 1.8 for a hull that is known less well, or "
-            "tell the law the vessel"
+            f"ever; {remedy}, or more speed"
         )

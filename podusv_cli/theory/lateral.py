@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from podusv_cli.components.controllers.momentum_optimal import yaw_gains
-from podusv_cli.components.controllers.momentum_schedule import resting_gain
+from podusv_cli.components.controllers.momentum_schedule import resting_gain, schedule
 from podusv_cli.components.controllers.momentum_schedule import sway_answer as momentum_answer
 from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
@@ -112,9 +111,9 @@ def momentum_vector_gains(
     """What the law takes p and d for, and its gains at the speed V [m/s] and load sway v [m/s]."""
     k = bundle(law.constants_with(vessel))
     answer = momentum_answer(V, v, v, 0.0, 0.0, k)
-    eta, k_b, S, Q_per_S = yaw_gains(answer, V, k)
+    eta, k_b = schedule(answer, k)
     k_b = min(k_b, resting_gain(0.0, V, k))
-    return SwayAnswer(*answer), MomentumGains(eta, k_b, Q_per_S * S, S, k_b * k.x_n / V)
+    return SwayAnswer(*answer), MomentumGains(eta, k_b, k.Q, k.S, k_b * k.x_n / V)
 
 
 def growth(polynomial: Vector) -> float:

@@ -23,11 +23,11 @@ from podusv_cli.components.controllers.momentum_adaptation import (
     answer_force,
 )
 from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
-from podusv_cli.components.controllers.momentum_optimal import weights, yaw_gains
 from podusv_cli.components.controllers.momentum_schedule import (
     neutral,
     pace,
     paced,
+    schedule,
     sway_answer,
 )
 from podusv_cli.components.controllers.observer import B_R, B_V, V_HAT, observe
@@ -79,14 +79,9 @@ class MomentumVector(VelocitySteering):
     S0: float = value(4.4, "1/s", "gain of the yaw rate", gt=0)
     k_b0: float = value(0.5, "1/s", "largest gain of the distance across the path", gt=0)
     T_v: float = value(1.8, "s", "time over which the loads' sway is predicted", ge=0)
-    gains: Literal["schedule", "lqr"] = value(
-        "schedule", "", "gains that bear sway that answers yaw up to trust times as told "
-        "(schedule), or the optimal ones for sway that answers exactly as told, which err by "
-        "little on a known hull and may make another one unstable (lqr)",
-    )  # fmt: skip
     trust: float = value(
-        1.25, "", "how many times as much as told sway may answer yaw; more is safer and slower; "
-        "without effect on gains: lqr", ge=1,
+        1.25, "", "how many times as much as told sway may answer yaw; more is safer and slower",
+        ge=1,
     )  # fmt: skip
     gamma: float = value(
         0.2, "1/s", "how fast it learns by how much more sway answers yaw; 0: never", ge=0
@@ -106,7 +101,6 @@ class MomentumVector(VelocitySteering):
         """With the neutral point, the gains at its pace and the yaw rate that N_m allows."""
         own = neutral(nominal, self.thrust_lever)
         own |= paced(nominal.m33, self.N_m, self.Q0, self.S0)
-        own |= weights(own["Q"], own["S"], own["pace"] * self.k_b0)
         own["fastest"] = min(self.r_m, math.sqrt(self.N_m / nominal.m33))
         return super().constants_with(nominal) | own
 
@@ -128,16 +122,16 @@ class MomentumVector(VelocitySteering):
         V_a, V_b = at.t_a + along.kappa * at.e_a, at.t_b + along.kappa * at.e_b
         V = max(math.sqrt(V_a * V_a + V_b * V_b), k.V_m)
         more = memory[MORE] * k.m22 / k.neutral_mass
-        gains = yaw_gains(sway_answer(V, v, v_l, at.turn, more, k), V, k)
+        gains = schedule(sway_answer(V, v, v_l, at.turn, more, k), k)
         wanted = guidance(x, at, along, min(gains.k_b, at.k_p), k)
 
         v_l_rate = load_sway_rate(wanted.a, v_l, at.turn, memory, k)
         v_s = v_l + gains.eta * (v + k.x_n * (r - at.turn) - v_l) + k.T_v / k.pace * v_l_rate
         bow = aim(wanted, v_s, k)
         g = min(1.0, bow.speed / k.V_m)
-        bend = gains.Q_per_S * bow.chi_e / k.fastest
-        r_d = g * gains.Q_per_S * bow.chi_e / math.sqrt(1.0 + bend * bend) + at.turn
-        tau[1] = moment_for(gains.S * (r_d - r), x, memory, k)
+        bend = k.Q_per_S * bow.chi_e / k.fastest
+        r_d = g * k.Q_per_S * bow.chi_e / math.sqrt(1.0 + bend * bend) + at.turn
+        tau[1] = moment_for(k.S * (r_d - r), x, memory, k)
         signals[0] = surge_demand(x, memory, wanted, bow, k, tau)
         signals[1], signals[2], signals[3] = r_d, v_s, bow.chi_e
         observe(x, memory, tau, k, rate)
