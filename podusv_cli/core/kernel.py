@@ -150,11 +150,15 @@ def absent(name: str) -> Callable[[], None]:
     return none
 
 
-def taking(function: Any, arguments: Sequence[str]) -> Any:
-    """A kernel that takes all of these arguments and passes `function` those that it names."""
-    passed = ", ".join(taken(function, arguments))
+def taking(function: Any, arguments: Sequence[str], named: Any = None) -> Any:
+    """A kernel that takes all of these arguments and passes `function` those that it names.
+
+    With `named` it passes `named(k)` for the constants k. Raises LawError as `taken`.
+    """
+    passed = ", ".join("named(k)" if a == "k" and named else a for a in taken(function, arguments))
     text = f"def adapter({', '.join(arguments)}):\n    kernel({passed})"
-    scope: dict[str, Any] = {"kernel": function, "__name__": function.__module__, TEXT: text}
+    scope: dict[str, Any] = {"kernel": function, "named": named, TEXT: text}
+    scope["__name__"] = function.__module__
     exec(compile(text, "arguments of a kernel", "exec"), scope)  # noqa: S102
     return kernel(scope["adapter"])
 

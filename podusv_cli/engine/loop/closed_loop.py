@@ -38,44 +38,8 @@ LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
 
 
 @kernel
-def _see_nothing(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    pass
-
-
-@kernel
-def _no_place(t: float, x: Vector, s: Vector, place: Vector, k: Any, table: Vector) -> None:
-    pass
-
-
-@kernel
-def _no_sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector) -> None:
-    pass
-
-
-@kernel
-def _ignore_loads(
-    t: float, memory: Vector, demand: Vector, tau: Vector, k: Any, table: Vector, rate: Vector
-) -> None:
-    pass
-
-
-@kernel
-def _no_measurement(
-    t: float, instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector
-) -> None:
-    pass
-
-
-@kernel
-def _no_correction(t: float, seen: Vector, state: Vector, k: Any, table: Vector) -> None:
-    pass
-
-
-@kernel
-def _no_estimate(
-    t: float, seen: Vector, tau: Vector, state: Vector, k: Any, table: Vector, rate: Vector
-) -> None:
-    pass
+def nothing() -> None:
+    """Stands for a part that a loop does not have: a kernel takes those arguments that it names."""
 
 
 AT_START = (0.0,)  # s
@@ -89,7 +53,7 @@ class Observer:
     in `differing`.
     """
 
-    watch: Callable[..., None] = _see_nothing
+    watch: Callable[..., None] = nothing
     size: int = 1
     differing: frozenset[str] = frozenset()
 
@@ -289,11 +253,11 @@ def entries(
     steer = law_of_rounded(law.law) if rounded else law.law
     take = sample_of_rounded(law.sample) if rounded and law.takes_samples() else law.sample
     # What does nothing reads no constants: its machine code is the same for every law.
-    sample = (take, constants) if law.takes_samples() else (_no_sample, ())
+    sample = (take, constants) if law.takes_samples() else (nothing, ())
     told = law.wants_loads()
-    after_saturation = (law.after_saturation, constants) if told else (_ignore_loads, ())
+    after_saturation = (law.after_saturation, constants) if told else (nothing, ())
     yield "path", path.evaluate, tuple(loop.path_constants(recall))
-    locate = (path.locate, tuple(loop.path_constants(recall))) if path.follows else (_no_place, ())
+    locate = (path.locate, tuple(loop.path_constants(recall))) if path.follows else (nothing, ())
     yield "locate", *locate
     loads = tuple(recall(disturbance.constants_with, loop.vessel))
     yield "disturbance", disturbance.kernel_with(loop.vessel), loads
@@ -308,9 +272,9 @@ def entries(
 def _seeing(loop: ClosedLoop, recall: Recall) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
     """What `entries` has of measurement and estimator."""
     measurement, estimator = loop.measurement, loop.estimator
-    sense = measurement.sense if loop.measured else _no_measurement
-    correct = estimator.correct if loop.measured else _no_correction
-    follow = estimator.follow if loop.measured else _no_estimate
+    sense = measurement.sense if loop.measured else nothing
+    correct = estimator.correct if loop.measured else nothing
+    follow = estimator.follow if loop.measured else nothing
     yield "measurement", sense, tuple(recall(measurement.constants_with, 1.0, 0))
     constants = tuple(recall(estimator.constants_with, loop.nominal))
     yield "correct", correct, constants

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.core.kernel import LANES, Vector, taken, unpacker
+from podusv_cli.core.kernel import LANES, Vector, taking, unpacker
 
 NUMBER, WHOLE = c_double, c_int64
 NUMBERS = ("t", "instant", "weight", "again", "stage")
@@ -39,14 +39,12 @@ PROTOTYPES: dict[str, Any] = {
     part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments.split()))
     for part, arguments in SIGNATURES.items()
 }
-RIGHT_HAND_SIDE = ("path", "disturbance", "law", "actuator", "after_saturation", "follow")
 ADVANCE = CFUNCTYPE(
     WHOLE, *PROTOTYPES.values(), WHOLE, WHOLE, NUMBER, POINTER(VECTOR), POINTER(WHOLE)
 )
 RATES_ALONG = CFUNCTYPE(
-    None, *(PROTOTYPES[part] for part in RIGHT_HAND_SIDE),
-    WHOLE, VECTOR, VECTOR, POINTER(VECTOR), POINTER(WHOLE),
-)  # fmt: skip
+    None, *PROTOTYPES.values(), WHOLE, VECTOR, VECTOR, POINTER(VECTOR), POINTER(WHOLE)
+)
 # The same where every number of a vector is one number a lane.
 LANE_VECTOR = POINTER(NUMBER * LANES)
 LANE_PROTOTYPES: dict[str, Any] = {
@@ -66,11 +64,7 @@ def bind(part: str, inner: Any, names: tuple[str, ...], alike: Set[str] = frozen
     Those in `alike` are the same in all runs that march side by side. Raises LawError for a kernel
     that names an argument which the part does not have.
     """
-    arguments = SIGNATURES[part].split()
-    passed = ", ".join("named(k)" if a == "k" else a for a in taken(inner, arguments))
-    scope: dict[str, Any] = {"kernel": inner, "named": unpacker(names, alike)}
-    exec(f"def {part}_entry({', '.join(arguments)}):\n    kernel({passed})", scope)  # noqa: S102
-    return scope[f"{part}_entry"]
+    return taking(inner, SIGNATURES[part].split(), unpacker(names, alike))
 
 
 def pointer(vector: Vector) -> Any:

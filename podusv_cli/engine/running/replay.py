@@ -119,13 +119,12 @@ def rates_replay(
 def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
     """`rk4.rates_along` of this loop less its functions."""
     parts = list(entries(loop, Observer()))
-    chosen = [part for part in parts if part[0] in signatures.RIGHT_HAND_SIDE]
     if not compiled:
-        adapters = [signatures.bind(*part) for part in chosen]
+        adapters = [signatures.bind(*part) for part in parts]
         return lambda *rest: rk4.rates_along(*adapters, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    adapters = [compile.entry(*part) for part in chosen]
+    adapters = [compile.entry(*part) for part in parts]
     run = compile.routine(compile.Piece(rk4.rates_along, signatures.RATES_ALONG))
 
     def compiled_run(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from podusv_cli.engine.running.check import asked, check_law
 from podusv_cli.engine.running.watch import Ending, Word, watch
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Layout, Vectors
+from podusv_cli.engine.step.layout import Layout, Parts, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
 March = Callable[[int, int], int]  # over instants first .. last - 1, see `rk4.advance`
@@ -89,10 +88,8 @@ def marcher(
     It is compiled if need be. The vectors have to outlive the march.
     """
     if not compiled:
-        plain: Any = partial(
-            rk4.advance_plainly, *(signatures.bind(*part) for part in entries(loop, observer))
-        )
-        return lambda c, n, h: lambda first, last: int(plain(first, last, h, c, n))
+        p = Parts(*(signatures.bind(*part) for part in entries(loop, observer)))
+        return lambda c, n, h: lambda first, last: rk4.advance_plainly(p, first, last, h, c, n)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     parts, march = [*entries(loop, observer)], compile.Piece(rk4.advance, signatures.ADVANCE)

@@ -16,18 +16,8 @@ from podusv_cli.core.kernel import (
     lanes_any,
     tail,
 )
-from podusv_cli.engine.step.layout import STOP, Function
-from podusv_cli.engine.step.relay import begin_step
-from podusv_cli.engine.step.rk4 import (
-    finite,
-    load,
-    measure,
-    named_layout,
-    named_vectors,
-    rates,
-    step,
-)
-from podusv_cli.engine.step.sampled import perceive, sample_and_hold
+from podusv_cli.engine.step.layout import STOP, Function, Parts
+from podusv_cli.engine.step.rk4 import arrive, finite, named_layout, named_vectors, observed, step
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
 
@@ -86,29 +76,20 @@ def advance_lanes(
     A lane whose numbers are not finite goes on without an effect on the others. Returns the first
     instant that was not begun, or at which no lane was left, or `last`.
     """
+    p = Parts(
+        path, locate, disturbance, law, sample, actuator, after, measurement, correct, follow,
+        observe,
+    )  # fmt: skip
     c, n = named_vectors(vectors), named_layout(layout)
     for k in range(first, last):
         if under_way[STOP] != 0.0:
             return k
         under_way[0] = k
-        t = k * h
-        again = k > first and t == (k - 1) * h + h  # see `rk4.instant`
-        if n.relayed > 0:
-            begin_step(k, t, c.relay)
-        load(t, c.s, disturbance, c, n, again, False)
-        if n.measured > 0:
-            perceive(k, t, measurement, correct, c, n)
-        if n.follows > 0:
-            locate(t, tail(c.s, n.estimate), c.s, tail(c.s, n.place), c.path, c.path_table)
-        if n.sample_every > 0 or n.hold_every > 0:
-            sample_and_hold(k, t, h, path, law, sample, after, c, n)
-        rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
-        measure(c.s, c.row)
+        arrive(k, first, h, p, c, n)
         lost = not (finite(n.states, c.s) and finite(n.columns, c.row))
         if lanes_any(lost) and end_lanes(k, lost, c, n, size, under_way, ends) == 0:
             return k
-        weight = 0.5 * h if k == 0 or k == n.steps else h
-        observe(t, weight, c.s, c.row, c.observer, c.seen)
+        observed(k, h, p, c, n)
         if k < n.steps:
-            step(t, h, path, disturbance, law, actuator, after, follow, c, n)
+            step(k * h, h, p, c, n)
     return last

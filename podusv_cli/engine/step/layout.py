@@ -10,6 +10,22 @@ from podusv_cli.core.kernel import Vector, kernel
 Function = Callable[..., None]
 
 
+class Parts(NamedTuple):
+    """The functions that the loop calls, in the order of `signatures.SIGNATURES`."""
+
+    path: Function
+    locate: Function
+    disturbance: Function
+    law: Function
+    sample: Function
+    actuator: Function
+    after: Function
+    measurement: Function
+    correct: Function
+    follow: Function
+    observe: Function
+
+
 class Layout(NamedTuple):
     """Sizes, offsets and periods of a closed loop, all whole numbers."""
 

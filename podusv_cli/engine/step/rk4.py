@@ -24,6 +24,7 @@ from podusv_cli.engine.step.layout import (
     STOP,
     Function,
     Layout,
+    Parts,
     Vectors,
     shifted,
 )
@@ -50,41 +51,33 @@ def through_water(s: Vector, flow: Vector, x: Vector) -> None:
 
 
 @kernel
-def drive(
-    t: float, s: Vector, ds: Vector, demand: Vector, actuator: Function, c: Vectors, n: Layout
-) -> None:
+def drive(t: float, s: Vector, ds: Vector, demand: Vector, p: Parts, c: Vectors, n: Layout) -> None:
     """The actuator's loads, rates and signals, from the vessel's motion through the water."""
     row, x = c.row, s
     if n.flow > 0:
         x = scratch(6)
         through_water(s, tail(row, n.flow), x)
-    actuator(
+    p.actuator(
         t, x, tail(s, 6), demand, c.actuator, c.actuator_table,
         tail(row, n.tau), tail(ds, 6), tail(row, n.flags),
     )  # fmt: skip
 
 
 @kernel
-def load(
-    t: float, s: Vector, disturbance: Function, c: Vectors, n: Layout, again: bool, stage: bool
-) -> None:
+def load(t: float, s: Vector, p: Parts, c: Vectors, n: Layout, again: bool, stage: bool) -> None:
     """Put the disturbance at t and s into the row; in a stage within a step its load is enough.
 
     `again`: the evaluation before was at this very t, so what depends on time alone is in the row.
     """
     if not (again and n.load_of_time == 1):
-        disturbance(
+        p.disturbance(
             t, s, c.disturbance, c.disturbance_table, tail(c.row, n.b),
             1.0 if again else 0.0, 1.0 if stage else 0.0,
         )  # fmt: skip
 
 
 @kernel
-def rates(
-    t: float, s: Vector, ds: Vector,
-    path: Function, law: Function, actuator: Function, after: Function, follow: Function,
-    c: Vectors, n: Layout, again: bool,
-) -> None:  # fmt: skip
+def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, again: bool) -> None:
     """Right-hand side of the closed loop at time t, whose load is in the row; fills the row.
 
     `again` as in `load`.
@@ -93,29 +86,29 @@ def rates(
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
     given = tail(s, n.estimate)  # the state that the law is given
-    p, table, work = c.law, c.law_table, c.work
+    k, table, work = c.law, c.law_table, c.work
     if not again or n.follows > 0:
-        path(t, given, tail(s, n.place), c.path, c.path_table, row)
+        p.path(t, given, tail(s, n.place), c.path, c.path_table, row)
     if n.hold_every > 0 and n.update_first > 0:
         for i in range(n.states - n.memory):
             memory_rate[i] = 0.0
     elif n.hold_every > 0:
         held = c.held
-        law(
-            shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), p, table,
+        p.law(
+            shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), k, table,
             tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
         )  # fmt: skip
     else:
-        law(t, given, memory, row, p, table, demand, memory_rate, tail(row, n.signals), work)
+        p.law(t, given, memory, row, k, table, demand, memory_rate, tail(row, n.signals), work)
     wanted = demand
     if n.relayed > 0:
         pass_on(demand, c.relay)
         wanted = tail(c.relay, GIVEN)
-    drive(t, s, ds, wanted, actuator, c, n)
+    drive(t, s, ds, wanted, p, c, n)
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
-        after(t, memory, demand, tau, p, table, memory_rate)
+        p.after(t, memory, demand, tau, k, table, memory_rate)
     if n.measured > 0:
-        follow(
+        p.follow(
             t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate)
         )  # fmt: skip
     plant(s, tau, b, coefficients(c.vessel), ds)
@@ -129,25 +122,21 @@ def measure(s: Vector, row: Vector) -> None:
 
 
 @kernel
-def step(
-    t: float, h: float,
-    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    follow: Function, c: Vectors, n: Layout,
-) -> None:  # fmt: skip
+def step(t: float, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
     s, count = c.s, n.states
     k1 = c.stages
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
     shifted(count, s, 0.5 * h, k1, y)
-    load(t + 0.5 * h, y, disturbance, c, n, False, True)
-    rates(t + 0.5 * h, y, k2, path, law, actuator, after, follow, c, n, False)
+    load(t + 0.5 * h, y, p, c, n, False, True)
+    rates(t + 0.5 * h, y, k2, p, c, n, False)
     shifted(count, s, 0.5 * h, k2, y)
-    load(t + 0.5 * h, y, disturbance, c, n, True, True)
-    rates(t + 0.5 * h, y, k3, path, law, actuator, after, follow, c, n, True)
+    load(t + 0.5 * h, y, p, c, n, True, True)
+    rates(t + 0.5 * h, y, k3, p, c, n, True)
     shifted(count, s, h, k3, y)
-    load(t + h, y, disturbance, c, n, False, True)
-    rates(t + h, y, k4, path, law, actuator, after, follow, c, n, False)
+    load(t + h, y, p, c, n, False, True)
+    rates(t + h, y, k4, p, c, n, False)
     for i in range(count):
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
@@ -174,32 +163,40 @@ def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
 
 
 @kernel
-def instant(
-    k: int, first: int, h: float, path: Function, locate: Function, disturbance: Function,
-    law: Function, sample: Function, actuator: Function, after: Function, measurement: Function,
-    correct: Function, follow: Function, observe: Function, c: Vectors, n: Layout,
-) -> bool:  # fmt: skip
-    """Measure, sample, evaluate, observe and log instant k; whether all its numbers are finite."""
+def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
+    """Measure, sample and evaluate instant k."""
     t = k * h
-    c.under_way[0] = k
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
     if n.relayed > 0:
         begin_step(k, t, c.relay)
-    load(t, c.s, disturbance, c, n, again, False)
+    load(t, c.s, p, c, n, again, False)
     if n.measured > 0:
-        perceive(k, t, measurement, correct, c, n)
+        perceive(k, t, p.measurement, p.correct, c, n)
     if n.follows > 0:
-        locate(t, tail(c.s, n.estimate), c.s, tail(c.s, n.place), c.path, c.path_table)
+        p.locate(t, tail(c.s, n.estimate), c.s, tail(c.s, n.place), c.path, c.path_table)
     if n.sample_every > 0 or n.hold_every > 0:
-        sample_and_hold(k, t, h, path, law, sample, after, c, n)
-    rates(t, c.s, c.stages, path, law, actuator, after, follow, c, n, again)
+        sample_and_hold(k, t, h, p.path, p.law, p.sample, p.after, c, n)
+    rates(t, c.s, c.stages, p, c, n, again)
     measure(c.s, c.row)
+
+
+@kernel
+def observed(k: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
+    """Show instant k to the observer, with its weight in an integral."""
+    weight = 0.5 * h if k == 0 or k == n.steps else h
+    p.observe(k * h, weight, c.s, c.row, c.observer, c.seen)
+
+
+@kernel
+def instant(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> bool:
+    """Evaluate, observe and log instant k; whether all its numbers are finite."""
+    c.under_way[0] = k
+    arrive(k, first, h, p, c, n)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
-    weight = 0.5 * h if k == 0 or k == n.steps else h
-    observe(t, weight, c.s, c.row, c.observer, c.seen)
+    observed(k, h, p, c, n)
     if k % n.log_every == 0:
-        write_row(k, t, c, n)
+        write_row(k, k * h, c, n)
     return True
 
 
@@ -214,39 +211,30 @@ def advance(
 
     Returns the first instant that is not finite, or that was not begun, or `last`.
     """
+    p = Parts(
+        path, locate, disturbance, law, sample, actuator, after, measurement, correct, follow,
+        observe,
+    )  # fmt: skip
     c, n = named_vectors(vectors), named_layout(layout)
     for k in range(first, last):
-        if c.under_way[STOP] != 0.0:
-            return k
-        if not instant(
-            k, first, h, path, locate, disturbance, law, sample, actuator, after, measurement,
-            correct, follow, observe, c, n,
-        ):  # fmt: skip
+        if c.under_way[STOP] != 0.0 or not instant(k, first, h, p, c, n):
             return k
         if k < n.steps:
-            step(k * h, h, path, disturbance, law, actuator, after, follow, c, n)
+            step(k * h, h, p, c, n)
     return last
 
 
-def advance_plainly(
-    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
-    actuator: Function, after: Function, measurement: Function, correct: Function,
-    follow: Function, observe: Function,
-    first: int, last: int, h: float, c: Vectors, n: Layout,
-) -> int:  # fmt: skip
+def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: Layout) -> int:
     """`advance` as plain Python, whose `math` raises where machine code gives no number."""
     for k in range(first, last):
         try:
-            if c.under_way[STOP] != 0.0 or not instant(
-                k, first, h, path, locate, disturbance, law, sample, actuator, after, measurement,
-                correct, follow, observe, c, n,
-            ):  # fmt: skip
+            if c.under_way[STOP] != 0.0 or not instant(k, first, h, p, c, n):
                 return k
         except (ArithmeticError, ValueError):
             return k
         try:
             if k < n.steps:
-                step(k * h, h, path, disturbance, law, actuator, after, follow, c, n)
+                step(k * h, h, p, c, n)
         except (ArithmeticError, ValueError):
             c.s[:] = math.nan
     return last
@@ -272,20 +260,24 @@ def evaluate_all(
 
 @kernel
 def rates_along(
-    path: Function, disturbance: Function, law: Function, actuator: Function, after: Function,
-    follow: Function, count: int, logged: Vector, out: Vector, vectors: Any, layout: Any,
+    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
+    actuator: Function, after: Function, measurement: Function, correct: Function,
+    follow: Function, observe: Function,
+    count: int, logged: Vector, out: Vector, vectors: Any, layout: Any,
 ) -> None:  # fmt: skip
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
+    p = Parts(
+        path, locate, disturbance, law, sample, actuator, after, measurement, correct, follow,
+        observe,
+    )  # fmt: skip
     c, n = named_vectors(vectors), named_layout(layout)
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
         if n.relayed > 0:
             c.relay[BEGAN] = here[0]
-        load(here[0], tail(here, 1), disturbance, c, n, False, False)
-        rates(
-            here[0], tail(here, 1), there, path, law, actuator, after, follow, c, n, False
-        )  # fmt: skip
+        load(here[0], tail(here, 1), p, c, n, False, False)
+        rates(here[0], tail(here, 1), there, p, c, n, False)
         measure(tail(here, 1), c.row)
         for j in range(n.columns):
             there[n.states + j] = c.row[j]
