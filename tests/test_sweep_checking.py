@@ -17,7 +17,7 @@ from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
 from podusv_cli.studies.study.cells import MOST, cells
 from podusv_cli.studies.study.check import singles, sweep_faults
 from podusv_cli.studies.study.draws import DrawError, drawn, draws
-from podusv_cli.studies.study.invalid import _has_ranges_only, invalid_draws
+from podusv_cli.studies.study.invalid import invalid_draws
 
 ROOT = Path(__file__).parents[1]
 BASE = """\
@@ -236,13 +236,6 @@ def test_all_draws_that_a_run_could_not_take_are_counted(text: str) -> None:
         assert (found.first, found.reason) == (first, reasons[first])
 
 
-def test_sections_with_checks_of_their_own_are_known() -> None:
-    scenario = swept("  {}\n").scenario
-    parts = ("start", "disturbance", "vessel", "controller")
-    found = {part: _has_ranges_only(type(getattr(scenario, part))) for part in parts}
-    assert found == {"start": True, "disturbance": True, "vessel": False, "controller": False}
-
-
 @pytest.mark.slow
 def test_validate_tells_the_size_of_the_study(podusv: Command, tmp_path: Path) -> None:
     file = tmp_path / "a.yaml"
@@ -251,7 +244,8 @@ def test_validate_tells_the_size_of_the_study(podusv: Command, tmp_path: Path) -
     done = podusv("validate", str(file))
     assert done.code == 0
     assert "runs of the study: 9,000 (laws: 2, cells: 3, draws: 1,500)\n" in done.out
-    share = r"invalid draws: \d+ of 1,500 \(1\d\.\d\d%\); draw \d+: sweep.vary.vessel.m: "
+    share = r"invalid draws: \d+ of 333 \(1\d\.\d\d%\); the first of 1,500; draw \d+: "
+    share += "sweep.vary.vessel.m: "
     assert re.search(share + r"vessel.m = -\d.*; must be a number above 0 \[kg\]", done.out)
     file.write_text(BASE + vary("vessel.mm: {angle: all}"))
     assert podusv("validate", str(file)).code == 2

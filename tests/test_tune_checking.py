@@ -126,7 +126,7 @@ def test_a_law_without_numbers_has_no_gains(tmp_path):
     made = planned(tmp_path)
     assert [gain.key for gain in made.gains["toy"]] == ["gain", "other", "unread"]
     assert made.gains["bare"] == ()
-    lines = list(made.in_words({"toy": 0.1, "bare": 0.1}, 2))
+    lines = list(made.in_words())
     assert "bare has no gains and is kept as it is" in lines
     assert lines[-1].startswith("runs of the search: 128 (budget 64 for each law, repeats: 2)")
     assert made.runs_wanted() == {"toy": (128, 36), "bare": (0, 12)}

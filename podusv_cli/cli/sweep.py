@@ -76,7 +76,6 @@ def run(
         request = Request(
             changes, out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed, trust,
             seconds(until), part_of(shard), line.say, line.warn,
-            None if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
     for refused in done.refused:

@@ -39,12 +39,12 @@ def tune(
     Optuna (podusv[tune]).
     """
     from podusv_cli.workflows import tune as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.many_runs import Request
+    from podusv_cli.workflows.many_runs import Request, silent
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
             assign or (), out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed,
-            trust, say=line.say, begin=None if quiet or as_json else line.note,
+            trust, say=line.say, begin=silent if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:

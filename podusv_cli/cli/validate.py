@@ -47,7 +47,6 @@ def validate(
     parse_claims(loaded)
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
-    # All is computed before the first line, since timing the runs of a study checks the laws.
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
     findings = examined(scenario)
     for single in scenario.singles().values():
@@ -70,10 +69,9 @@ def _tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
 
 
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
-    """How many runs the study has, which draws the scenario cannot take, and what it all takes."""
-    from podusv_cli.process.workers import available_workers
+    """How many runs the study has, and which draws the scenario cannot take."""
     from podusv_cli.studies.study.check import unjudged
-    from podusv_cli.studies.study.estimate import check_fits, estimate, pilot
+    from podusv_cli.studies.study.estimate import check_fits
     from podusv_cli.studies.study.invalid import check_draws
     from podusv_cli.studies.study.plan import plan
     from podusv_cli.studies.tuning.plan import TunePlan
@@ -81,19 +79,15 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
 
     made = plan(loaded)
     check_fits(made, default_folder(loaded.scenario))
-    draws, places = sweep.draws, [(law, cell.index) for law in made.laws for cell in made.cells]
     counted = (
-        f"runs of the study: {len(places) * draws:,} "
-        f"(laws: {len(made.laws)}, cells: {len(made.cells)}, draws: {draws:,})"
+        f"runs of the study: {len(made.laws) * len(made.cells) * sweep.draws:,} "
+        f"(laws: {len(made.laws)}, cells: {len(made.cells)}, draws: {sweep.draws:,})"
     )
-    paces, cores = pilot(made), available_workers()
-    need = estimate(made, paces, dict.fromkeys(places, draws), cores)
     remark = unjudged(loaded.scenario)
-    lines = [counted, check_draws(made).in_words(), *need.in_words(), *filter(None, [remark])]
+    lines = [counted, check_draws(made).in_words(), *filter(None, [remark])]
     if not loaded.scenario.tune:
         return lines
-    seconds = {law: pace for (law, _), pace in paces.items()}
-    search = TunePlan(loaded.scenario).in_words(seconds, cores)
+    search = TunePlan(loaded.scenario).in_words()
     return ["as a study, by podusv sweep:", *lines, "as a search, by podusv tune:", *search]
 
 

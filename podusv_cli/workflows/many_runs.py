@@ -53,7 +53,7 @@ class Request:
     shard: Shard = WHOLE
     say: Tell = silent  # what is done beside the runs
     warn: Tell = silent  # is told what is odd, and no error
-    begin: Tell | None = None  # is told what the missing runs need
+    begin: Tell = silent  # is told of a search before its first run
 
 
 def loaded_for(

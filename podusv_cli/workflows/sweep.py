@@ -19,7 +19,7 @@ from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
 from podusv_cli.studies.study import outputs
 from podusv_cli.studies.study.check import sweep_faults, unjudged
 from podusv_cli.studies.study.dispatch import Engine, Gaps, Tally, Tell, dispatch
-from podusv_cli.studies.study.estimate import check_fits, estimate, pilot
+from podusv_cli.studies.study.estimate import check_fits
 from podusv_cli.studies.study.invalid import check_draws
 from podusv_cli.studies.study.joining import mixture
 from podusv_cli.studies.study.keep import contradiction, found, unmade
@@ -121,7 +121,7 @@ def _marched(
     try:
         return dispatch(
             store, told, engine, seconds=request.seconds, part=request.shard,
-            begin=partial(_announce, store, request, engine.workers),
+            begin=partial(_announce, store, request),
         )  # fmt: skip
     except KeyboardInterrupt as stop:
         made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
@@ -131,18 +131,12 @@ def _marched(
         session.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
-def _announce(store: Store, request: Request, workers: int, missing: Gaps) -> None:
-    """Warn of mixed machines and of invalid draws, and tell what the missing runs need."""
-    made = store.plan
+def _announce(store: Store, request: Request, missing: Gaps) -> None:
+    """Warn of mixed machines and of invalid draws."""
     if missing and (mixed := mixture(store.folder)):
         request.warn(mixed)
-    if missing and (invalid := check_draws(made)).count:
+    if missing and (invalid := check_draws(store.plan)).count:
         request.warn(invalid.in_words())
-    if request.begin and missing:
-        request.say("timing some runs of every law")
-        paces = pilot(made, partial(compiling, request))
-        need = estimate(made, paces, missing, workers, figures=request.figures)
-        request.begin(*need.in_words())
 
 
 def _is_whole(store: Store) -> bool:

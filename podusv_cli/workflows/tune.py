@@ -96,8 +96,7 @@ def _tuned(
     plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     stamp = started.isoformat(timespec="seconds")
     place.write(folder, plan, told, stamp, scenario_texts(loaded))
-    if request.begin:
-        request.begin(f"{plan.size}; in {folder}")
+    request.begin(f"{plan.size}; in {folder}")
     with engine_for(request, folder, plan.scenario, digest(plan.base.identity)) as engine:
         results = _simulated(plan, folder, request, started, engine, tell)
     return replace(_written(results, folder, request), refused=refused(engine))

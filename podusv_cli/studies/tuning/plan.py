@@ -9,7 +9,6 @@ from typing import Any
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.quantities import time_in_words
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
@@ -29,8 +28,6 @@ from podusv_cli.studies.tuning.space import Gain, gains
 TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep's own
 # Settings that change no trial: more of them continues a search.
 OPEN = ("budget", "validate", "repeats")
-# Rough costs [s]: of a trial for Optuna, processes and files; of what comes before and after.
-TRIAL, AROUND = 0.1, 4.0
 ENOUGH = 10  # whole trials for each gain; with fewer, repeats end in different places
 Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
 
@@ -99,8 +96,8 @@ class TunePlan:
             for law, found in self.gains.items()
         }  # fmt: skip
 
-    def in_words(self, paces: Mapping[str, float], workers: int) -> Iterator[str]:
-        """The gains of every law, and what the search takes at these seconds a run."""
+    def in_words(self) -> Iterator[str]:
+        """The gains of every law, and how many runs there are."""
         for law, found in self.gains.items():
             if found:
                 names = ", ".join(gain.key for gain in found)
@@ -108,11 +105,7 @@ class TunePlan:
             else:
                 yield f"{law} has no gains and is kept as it is"
         yield "gains that change no run are left out when the search begins"
-        wanted, tune = self.runs_wanted(), self.tune
-        time = sum(sum(counts) * paces.get(law, 0.0) for law, counts in wanted.items())
-        time += TRIAL * sum(search for search, _ in wanted.values()) / tune.train
-        cores = f"{workers} core{'s' if workers > 1 else ''}"
-        yield f"{self.size}; about {time_in_words(time / workers + AROUND)} on {cores}"
+        yield self.size
 
     def _few(self, gains: int) -> str:
         """What to say of a budget that is small for so many gains."""
