@@ -16,12 +16,11 @@ from tune_samples import planned, searched, toy, tuned
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.study.unit import UnitResult
 from podusv_cli.studies.tuning import sampler, trials
-from podusv_cli.studies.tuning.figures import sketches
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.sampler import Sampler
 from podusv_cli.studies.tuning.search import Search, _far
 from podusv_cli.studies.tuning.space import Gain
-from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial, best, front
+from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial, best
 from podusv_cli.studies.tuning.validation import chosen
 
 BUDGET = 64
@@ -90,7 +89,7 @@ def test_the_first_trial_has_the_published_gains(done):
 
 
 def test_an_objective_is_told_with_its_unit(done):
-    assert done.results.label(0) == "median(effort_u) [N2 s]"
+    assert done.results.label == "median(effort_u) [N2 s]"
 
 
 def test_repeats_differ(done):
@@ -171,28 +170,10 @@ def test_an_inequality_is_respected(done, tmp_path):
     """The best gain is 3, and only gains up to about 1.6 hold the inequality."""
     changes = ("tune.repeats=1", "tune.budget=120", "tune.subject_to=[median(effort_u) >= 0.4]")
     (bound,) = searched(tmp_path, *changes)
-    assert best(done.results.trials["toy"][0]).values[0] < 0.1
+    assert best(done.results.trials["toy"][0]).value < 0.1
     winner = best(bound.trials)
     assert winner.excess == 0.0
-    assert 0.4 <= winner.values[0] < 0.7
-
-
-@pytest.mark.slow
-def test_two_objectives_give_a_front(optuna, tmp_path):
-    made = tuned(
-        tmp_path, "tune.objective=[median(effort_u), median(iae)]", "tune.repeats=1",
-        "tune.budget=80",
-    )  # fmt: skip
-    (found,) = made.results.trials["toy"]
-    points = np.array(sorted(trial.values for trial in front(found)))
-    assert len(points) >= 2
-    assert (np.diff(points[:, 0]) > 0).all()
-    assert (np.diff(points[:, 1]) < 0).all()
-    assert made.results.winner("toy").values in [trial.values for trial in front(found)]
-    (front_of,) = [one for one in sketches(made.results) if one.name == "front"]
-    assert front_of.draw().axes
-    assert sum(trial.runs for trial in found) == 80
-    assert "second_objective_after" in pd.read_csv(made.folder / "laws.csv").columns
+    assert 0.4 <= winner.value < 0.7
 
 
 @pytest.mark.slow
@@ -206,7 +187,7 @@ def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path
     (found,) = searched(tmp_path, "tune.repeats=1")
     refused = [trial for trial in found.trials if trial.gains["gain"] >= 2]
     assert refused
-    assert all(trial.failures == 1.0 and trial.values == (math.inf,) for trial in refused)
+    assert all(trial.failures == 1.0 and trial.value == math.inf for trial in refused)
     assert found.spent == 64
     assert best(found.trials).gains["gain"] < 2
 
@@ -253,8 +234,8 @@ def test_a_scenario_without_the_key_is_refused(optuna, podusv, tmp_path):
     assert "has no key `tune`" in err
 
 
-def made_up(number, value, *, excess=0.0, status=FINISHED, other=()):
-    return Trial(number, 0, {}, 4, status, (value, *other), (excess,), (value, *other), 0.0)
+def made_up(number, value, *, excess=0.0, status=FINISHED):
+    return Trial(number, 0, {}, 4, status, value, (excess,), value, 0.0)
 
 
 def test_the_best_trial_holds_inequalities_first_and_is_finished():
@@ -268,22 +249,11 @@ def test_the_best_trial_holds_inequalities_first_and_is_finished():
     assert chosen(winners) == 2, "of the winners of all repeats, by their places"
 
 
-def test_of_a_front_the_middle_is_taken():
-    found = [
-        made_up(0, 0.0, other=(10.0,)), made_up(1, 2.0, other=(2.0,)),
-        made_up(2, 10.0, other=(0.0,)), made_up(3, 3.0, other=(3.0,)),
-        made_up(4, -1.0, other=(-1.0,), excess=1.0),
-    ]  # fmt: skip
-    assert [trial.number for trial in front(found)] == [0, 1, 2]
-    assert best(found).number == 1
-
-
-def test_a_trial_is_far_worse_only_by_all_objectives():
-    assert _far((2.0,), (3.01,))
-    assert not _far((2.0,), (3.0,))
-    assert _far((2.0,), (math.inf,))
-    assert not _far((math.inf,), (math.inf,))
-    assert not _far((2.0, 2.0), (9.0, 2.5))
+def test_a_trial_is_far_worse_by_more_than_half():
+    assert _far(2.0, 3.01)
+    assert not _far(2.0, 3.0)
+    assert _far(2.0, math.inf)
+    assert not _far(math.inf, math.inf)
 
 
 @pytest.mark.parametrize(("excess", "met"), [(0.0, 0), (0.1, 1)])
@@ -307,9 +277,9 @@ def test_trials_that_have_not_ended_keep_others_away(optuna):
     has a trial under way."""
 
     def asked(batches: tuple[int, ...]):
-        sampler = Sampler([Gain("gain", 1.0, 0.1, 10.0)], 1, [1])
+        sampler = Sampler([Gain("gain", 1.0, 0.1, 10.0)], [1])
         tried = sampler.ask(0, 8)
-        sampler.tell([[(trial["gain"] - 3.0) ** 2] for trial in tried], [[]] * 8)
+        sampler.tell([(trial["gain"] - 3.0) ** 2 for trial in tried], [[]] * 8)
         return [sampler.ask(batch, 1) for batch in batches][-1]
 
     assert asked((1, 2)) != asked((2,))
@@ -318,9 +288,7 @@ def test_trials_that_have_not_ended_keep_others_away(optuna):
 def test_trials_read_back_with_infinite_numbers(tmp_path):
     (tmp_path / trials.FOLDER).mkdir()
     found = [
-        Trial(
-            0, 0, {"a": 0.1 + 0.2, "b": "word", "n": 3}, 4, FINISHED, (math.inf,), (), (1.0,), 1.0
-        )
+        Trial(0, 0, {"a": 0.1 + 0.2, "b": "word", "n": 3}, 4, FINISHED, math.inf, (), 1.0, 1.0)
     ]
     trials.write(tmp_path, "pid-0", found)
     assert trials.read(tmp_path, "pid-0") == found

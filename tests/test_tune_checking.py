@@ -43,7 +43,6 @@ def plan(*changes: str) -> TunePlan:
         ("tune.objective=iae", "no statistic of all draws; write median(...)"),
         ("tune.objective=1 + 2", "is a number, whatever the gains are"),
         ("tune.objective=share(iae)", "unknown statistic 'share'"),
-        ("tune.objective=[median(iae), median(ise), failures]", "objective: one or two, found 3"),
         ("tune.objective=median(iae / 0)", "'iae / 0': divides by zero"),
         ("tune.objective=median(iae) / -0.0", "divides by zero"),
         ("tune.objective=median(iae / (ise - ise))", "is no finite number, whatever the runs are"),

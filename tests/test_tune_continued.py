@@ -85,7 +85,7 @@ def test_a_folder_without_its_scenario_says_how_to_go_on(tmp_path, monkeypatch):
 
 def validation(folder, gain):
     """The store of the fresh draws for a gain that was found."""
-    found = Trial(0, 0, {"gain": gain}, 4, FINISHED, (1.0,), (), (1.0,), 0.0)
+    found = Trial(0, 0, {"gain": gain}, 4, FINISHED, 1.0, (), 1.0, 0.0)
     plan = planned(folder)
     made = plan.variant(contestants(plan, {"toy": [found]}), VALIDATE, 12)
     return Store(folder / FOLDER, made)

@@ -30,7 +30,7 @@ def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(rati
             "rank_after": [2, 1, 3, None],
         }),
         searches=pairs(ratio, *ends), shown=["iae"],
-        plan=SimpleNamespace(tune=SimpleNamespace(objectives=["median(iae)"]), metrics=METRICS),
+        plan=SimpleNamespace(tune=SimpleNamespace(objective="median(iae)"), metrics=METRICS),
     )  # fmt: skip
     (unranked,) = remarks._unsettled(results)
     assert unranked.endswith(": lost")

@@ -68,9 +68,7 @@ def _report(done: Tuned) -> None:
     ]  # fmt: skip
     ratios = "ratio, after / before"
     head = ["law", "rank", "better than", "before", "after", ratios, "failed", "repeats"]
-    echo(
-        f"{' and '.join(results.plan.tune.objectives)} on {results.plan.tune.validate} fresh draws:"
-    )
+    echo(f"{results.plan.tune.objective} on {results.plan.tune.validate} fresh draws:")
     echo_table(head, rows)
     for text in remarks(results):
         echo(text)

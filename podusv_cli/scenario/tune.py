@@ -68,10 +68,10 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
         validate: int = value(  # type: ignore[assignment]
             500, "", "other draws, on which found gains are reported", ge=1, le=10**7
         )
-        objective: str | tuple[str, ...] = value(
+        objective: str = value(
             "median(iae)",
             "",
-            "what is to be small, as an expression over draws; two of them give a Pareto front",
+            "what is to be small, as an expression over draws",
         )
         subject_to: tuple[str, ...] = value((), "", "inequalities over draws that have to hold")
         space: dict[str, float | Range] = value(
@@ -84,15 +84,8 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
             3, "", "searches of each law that differ in the tuner's random numbers", ge=1, le=100
         )
 
-        @property
-        def objectives(self) -> tuple[str, ...]:
-            """The one or two expressions."""
-            return (self.objective,) if isinstance(self.objective, str) else self.objective
-
         @model_validator(mode="after")
         def _sound(self) -> Self:
-            if not 1 <= len(self.objectives) <= 2:
-                raise ValueError(f"objective: one or two, found {len(self.objectives)}")
             for name, content in self.space.items():
                 if name == AROUND and (not isinstance(content, float) or content <= 1.0):
                     raise ValueError("space.around: must be a number above 1, such as 10.0")

@@ -178,7 +178,7 @@ def _leaders(searches: Sequence[Search]) -> str:
     found: dict[str, float] = {}
     for search in searches:
         if search.trials:
-            value = best(search.trials).values[0]
+            value = best(search.trials).value
             found[search.law] = min(value, found.get(search.law, value))
     leaders = ", ".join(f"{law} {value:.4g}" for law, value in found.items())
     return f"best on the training draws: {leaders}" if found else "no gains are tried yet"

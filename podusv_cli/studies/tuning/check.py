@@ -54,12 +54,10 @@ def _budget(tune: Tune) -> Faults:
 
 def _expressions(scenario: Scenario, tune: Tune) -> Faults:
     metrics = {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
-    one = isinstance(tune.objective, str)
-    for place, text in enumerate(tune.objectives):
-        try:
-            parse_objective(text, metrics)
-        except ExpressionError as error:
-            yield ("tune", "objective", *(() if one else (place,))), str(error)
+    try:
+        parse_objective(tune.objective, metrics)
+    except ExpressionError as error:
+        yield ("tune", "objective"), str(error)
     for place, text in enumerate(tune.subject_to):
         try:
             parse_inequality(text, metrics)

@@ -18,14 +18,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from podusv_cli.core import escaping
-from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.shown import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study.figures import ratios
 from podusv_cli.studies.tuning.results import Results
 from podusv_cli.studies.tuning.space import Gain, units_of
-from podusv_cli.studies.tuning.trials import FINISHED, front
+from podusv_cli.studies.tuning.trials import FINISHED
 
 ROW, FRAME = 0.2, 0.75  # inches: a row of a chart, and what is around the rows
 ACROSS = 4  # small panels in a row
@@ -40,12 +39,12 @@ SMALL: dict[str, Any] = {"fontsize": 6.5}
 def sketches(results: Results) -> Iterator[Sketch]:
     """The figures that there are numbers for."""
 
-    objective = results.plan.tune.objectives[0]
+    objective = results.plan.tune.objective
     yield Sketch(
         "validation",
         f"{objective} on the fresh draws, before (hollow) and after the search (filled), with "
         f"{100 * results.level:g} % intervals",
-        partial(before_and_after, results.laws, results.label(0)),
+        partial(before_and_after, results.laws, results.label),
     )
     if len(results.effort):
         yield Sketch(
@@ -65,7 +64,7 @@ def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
         "history",
         f"best {objective} on the training draws so far, a curve for each repeat: the curves begin "
         "with the scenario's gains; one rises where a trial holds the inequalities better",
-        partial(history, results.history, results.label(0)),
+        partial(history, results.history, results.label),
     )
     rows = results.pairs[(results.pairs["when"] == "tuning")]
     rows = rows[rows.metric == (results.shown[0])]
@@ -76,8 +75,6 @@ def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
             "and before in the same fresh draw, with its interval; below 1 is better",
             partial(ratios, rows),
         )
-    if len(results.plan.objectives) > 1:
-        yield _front(results)
     if len(results.importance):
         yield Sketch(
             "importance",
@@ -90,27 +87,10 @@ def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
         yield _slices(results, law, objective)
 
 
-def _front(results: Results) -> Sketch:
-
-    points = {
-        law: np.array(sorted(t.values for trials in all_ for t in front(trials))).reshape(-1, 2)
-        for law, all_ in results.trials.items()
-    }
-    taken = {law: results.winner(law).values for law in results.winners}
-    first = {law: all_[0][0].values for law, all_ in results.trials.items()}
-    labels = results.label(0), results.label(1)
-    return Sketch(
-        "front",
-        "Pareto front of the training draws: trials that no other trial of the law is better than "
-        "in both objectives; a star is what was taken, a cross are the scenario's gains",
-        partial(pareto, points, taken, first, labels),
-    )
-
-
 def _slices(results: Results, law: str, objective: str) -> Sketch:
     tried = pd.DataFrame(
         [
-            {**trial.gains, "objective": trial.values[0], "repeat": repeat,
+            {**trial.gains, "objective": trial.value, "repeat": repeat,
              "whole": trial.status == FINISHED}
             for repeat, trials in enumerate(results.trials[law]) for trial in trials
         ]
@@ -122,7 +102,7 @@ def _slices(results: Results, law: str, objective: str) -> Sketch:
         "the gain that was found, the broken one the scenario's",
         partial(
             slices, tried, results.plan.gains[law], results.winner(law).gains,
-            results.label(0), units_of(results.plan.laws[law]),
+            results.label, units_of(results.plan.laws[law]),
         ),
     )  # fmt: skip
 
@@ -193,26 +173,6 @@ def history(trials: pd.DataFrame, label: str) -> Figure:
                 linestyle=style, linewidth=0.9, label=escaping.figure(str(law)) if not i else None,
             )  # fmt: skip
     axes.set(xlabel="simulated runs of a search", ylabel=f"best {escaping.figure(label)} so far")
-    legend(figure)
-    return figure
-
-
-def pareto(
-    fronts: Mapping[str, Vector], taken: Mapping[str, Sequence[float]],
-    first: Mapping[str, Sequence[float]], labels: tuple[str, str],
-) -> Figure:  # fmt: skip
-    """The front of every law, what was taken, and where the scenario's gains are."""
-    figure = new_figure(COLUMNS, 3.2)
-    axes = figure.add_subplot()
-    for place, (law, points) in enumerate(fronts.items()):
-        colour, _, marker = nth_style(place)
-        axes.plot(
-            *points.T, marker=marker, markersize=3.0, color=colour, linewidth=0.8,
-            label=escaping.figure(law),
-        )  # fmt: skip
-        axes.plot(*taken[law], marker="*", markersize=9.0, color=colour, linestyle="none")
-        axes.plot(*first[law], marker="x", markersize=5.0, color=colour, linestyle="none")
-    axes.set(xlabel=escaping.figure(labels[0]), ylabel=escaping.figure(labels[1]))
     legend(figure)
     return figure
 

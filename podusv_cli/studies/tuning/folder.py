@@ -20,7 +20,7 @@ from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.results import Results
 
 TUNE, TUNED = "tune.json", "tuned.yaml"
-FORMAT = 2
+FORMAT = 3
 
 
 def check(folder: Path) -> None:
@@ -147,5 +147,5 @@ def tuned_yaml(results: Results) -> bytes:
 def _told(results: Results) -> str:
     tune = results.plan.tune
     searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
-    what = " and ".join(tune.objectives)
+    what = tune.objective
     return f"Gains that podusv tune found for least {what} ({', '.join(searches)})."

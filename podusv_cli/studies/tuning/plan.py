@@ -73,9 +73,9 @@ class TunePlan:
         return self.scenario.known_metrics()
 
     @cached_property
-    def objectives(self) -> list[Any]:
-        """The trees of the objectives."""
-        return [parse_objective(text, self.metrics) for text in self.tune.objectives]
+    def objective(self) -> Any:
+        """The tree of the objective."""
+        return parse_objective(self.tune.objective, self.metrics)
 
     @cached_property
     def inequalities(self) -> list[Inequality]:

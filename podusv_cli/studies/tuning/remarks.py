@@ -34,7 +34,7 @@ def _answer(results: Results) -> Iterator[str]:
     for row in rows:
         if {row["a"], row["b"]} == {best, second}:
             yield (
-                f"{best} has the least {results.plan.tune.objectives[0]} in the median of its "
+                f"{best} has the least {results.plan.tune.objective} in the median of its "
                 f"searches; the ratio of the median {results.plan.metrics[results.shown[0]].row} "
                 f"({results.shown[0]}) of {row['a']} and "
                 f"{row['b']} over searches and draws is {Interval.of(row, 'ratio'):.3f}: "
@@ -90,7 +90,7 @@ def _unsound(results: Results) -> Iterator[str]:
         ]  # fmt: skip
         if broken:
             yield f"{law}: no trial held {' and '.join(broken)} on the training draws"
-        elif not math.isfinite(trial.values[0]):
+        elif not math.isfinite(trial.value):
             yield f"{law}: every trial failed on most draws; its gains mean nothing"
 
 

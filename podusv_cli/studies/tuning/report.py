@@ -15,7 +15,7 @@ from podusv_cli.studies.study.sessions import sessions
 from podusv_cli.studies.study.statistics import Interval, digits
 from podusv_cli.studies.study.words import in_words
 from podusv_cli.studies.tuning.remarks import remarks
-from podusv_cli.studies.tuning.results import OBJECTIVES, Results
+from podusv_cli.studies.tuning.results import Results
 from podusv_cli.studies.tuning.space import units_of
 
 FEW = 15  # pairs that are shown at once
@@ -34,7 +34,7 @@ def page(
         scenario=plan.scenario,
         sweep=plan.scenario.sweep,
         tune=plan.tune,
-        objectives=" and ".join(plan.tune.objectives),
+        objective=plan.tune.objective,
         laws=list(_laws(results)),
         remarks=remarks(results),
         words={name: about.row for name, about in plan.metrics.items()},
@@ -77,9 +77,8 @@ def turned(row: Any, name: str) -> str:
 
 
 def intervals(row: Any, when: str) -> str:
-    """Every objective with its interval."""
-    names = [f"{name}_{when}" for name in OBJECTIVES]
-    return " and ".join(f"{Interval.of(row, name)}" for name in names if name in row)
+    """The objective with its interval."""
+    return f"{Interval.of(row, f'objective_{when}')}"
 
 
 def percent(row: Any, name: str) -> str:

@@ -38,7 +38,6 @@ ALWAYS = (
     "z_e_steady",
     "e_ct_rms",
 )  # metrics that the tables have beside those of the objective
-OBJECTIVES = ("objective", "second_objective")  # columns
 VARIATION = "tv_tau_u"
 MARGIN = 0.01  # relative, of pairs
 PARTS = 8  # of the trials; importances are computed without each, to see how sure they are
@@ -71,7 +70,7 @@ class Results:
     @cached_property
     def shown(self) -> list[str]:
         """The metrics of the tables."""
-        trees = [*self.plan.objectives, *(one.tree for one in self.plan.inequalities)]
+        trees = [self.plan.objective, *(one.tree for one in self.plan.inequalities)]
         told = [name for tree in trees for name in named(tree, self.plan.metrics)]
         return [n for n in dict.fromkeys([*told, *ALWAYS]) if n in self.runs.metrics]
 
@@ -155,8 +154,7 @@ class Results:
             runs = self.met(name)
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
             told |= failed.columns(f"failed_{when}")
-            for i, tree in enumerate(self.plan.objectives):
-                told |= self.objective(runs, tree).columns(f"{OBJECTIVES[i]}_{when}")
+            told |= self.objective(runs, self.plan.objective).columns(f"objective_{when}")
         found = self.pairs
         own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
         own = own[own.metric == self.shown[0]]
@@ -199,7 +197,7 @@ class Results:
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every repeat's winner, or of a law that is kept."""
         return [
-            evaluate(self.plan.objectives[0], self.met(name), self.plan.metrics)
+            evaluate(self.plan.objective, self.met(name), self.plan.metrics)
             for name in self._searched(law)
         ]
 
@@ -273,15 +271,16 @@ class Results:
                 kept = [one for place, one in enumerate(trials) if place % PARTS != part]
                 if len(kept) >= FEWEST * (PARTS - 1) / PARTS:
                     found = importances(
-                        self.plan.gains[law], [t.gains for t in kept], [t.values[0] for t in kept]
+                        self.plan.gains[law], [t.gains for t in kept], [t.value for t in kept]
                     )
                     if found:
                         yield found
 
-    def label(self, place: int) -> str:
-        """An objective with its unit, where it is a statistic of one metric."""
-        text, tree = self.plan.tune.objectives[place], self.plan.objectives[place]
-        match tree:
+    @property
+    def label(self) -> str:
+        """The objective with its unit, where it is a statistic of one metric."""
+        text = self.plan.tune.objective
+        match self.plan.objective:
             case ast.Call(args=[ast.Name(id=name), *_]) if unit := self.plan.metrics[name].unit:
                 return f"{text} [{unit}]"
         return text
@@ -313,12 +312,11 @@ def _history(law: str, repeat: int, trials: Sequence[Trial]) -> Iterator[dict[st
     for trial in trials:
         spent += trial.runs
         if trial.status == FINISHED:
-            leader = min(leader, (trial.excess, trial.values[0]))
-        others = dict(zip(OBJECTIVES[1:], trial.values[1:], strict=False))
+            leader = min(leader, (trial.excess, trial.value))
         yield {
             "law": law, "repeat": repeat, "trial": trial.number, "batch": trial.batch,
             "status": trial.status, "runs": trial.runs, "spent": spent,
-            "objective": trial.values[0], **others, "failures": trial.failures,
+            "objective": trial.value, "failures": trial.failures,
             "excess": trial.excess, "best": leader[1],
             "gains": " ".join(f"{key}={number}" for key, number in trial.gains.items()),
         }  # fmt: skip

@@ -19,7 +19,6 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.studies.tuning.space import Gain
 
 STARTUP = 8  # trials before TPE takes over from random numbers: the first batch
-POPULATION = 24  # of NSGA-II
 WORST = 1e30  # what a sampler is told in place of infinity
 Values = Sequence[float]
 
@@ -37,11 +36,10 @@ def optuna() -> Any:
 class Sampler:
     """The trials of one search as Optuna sees them, in memory."""
 
-    def __init__(self, gains: Sequence[Gain], objectives: int, seed: Sequence[Any]) -> None:
+    def __init__(self, gains: Sequence[Gain], seed: Sequence[Any]) -> None:
         """`seed` is what the random numbers depend on, beside the number of a batch."""
         self._optuna, self._gains, self._seed = optuna(), gains, seed
-        self._several = objectives > 1
-        self._study = self._optuna.create_study(directions=["minimize"] * objectives)
+        self._study = self._optuna.create_study()
         self._asked: list[Any] = []
         own = {gain.key: self._first(gain) for gain in gains}
         self._study.enqueue_trial({k: v for k, v in own.items() if v is not None})
@@ -56,20 +54,18 @@ class Sampler:
             asked[0] = {gain.key: gain.own for gain in self._gains}
         return asked
 
-    def tell(self, values: Sequence[Values], excesses: Sequence[Values]) -> None:
-        """The objectives of the trials asked last, and by how much inequalities do not hold."""
+    def tell(self, values: Values, excesses: Sequence[Values]) -> None:
+        """The objective of the trials asked last, and by how much inequalities do not hold."""
         with _quiet():
-            for trial, numbers, over in zip(self._asked, values, excesses, strict=True):
-                for place, number in enumerate(over):
-                    trial.set_constraint(str(place), _finite(number))
-                self._study.tell(trial, [_finite(number) for number in numbers])
+            for trial, number, over in zip(self._asked, values, excesses, strict=True):
+                for place, excess in enumerate(over):
+                    trial.set_constraint(str(place), _finite(excess))
+                self._study.tell(trial, _finite(number))
 
     def _made(self, batch: int) -> Any:
         text = json.dumps([*self._seed, batch])
         seed = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
         samplers = self._optuna.samplers
-        if self._several:
-            return samplers.NSGAIISampler(population_size=POPULATION, seed=seed)
         return samplers.TPESampler(
             n_startup_trials=STARTUP, multivariate=True, constant_liar=True, seed=seed
         )

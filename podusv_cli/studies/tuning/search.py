@@ -53,7 +53,7 @@ class Search:
         self.plan, self.law, self.repeat, self._folder = plan, law, repeat, folder
         assert plan.scenario.sweep
         seed = [plan.scenario.sweep.seed, repeat, law]
-        self._sampler = Sampler(plan.gains[law], len(plan.objectives), seed)
+        self._sampler = Sampler(plan.gains[law], seed)
         self.trials: list[Trial] = []
         self._kept = trials.read(folder, self.name)
         self._batch = 0
@@ -167,12 +167,12 @@ class Search:
         trials.write(self._folder, self.name, self.trials)
 
     def _is_over(self, one: Attempt) -> bool:
-        """Whether a trial is pruned: a sound one of earlier batches is far better by all."""
+        """Whether a trial is pruned: a sound one of earlier batches is far better."""
         if not self.trials or one.met < self.first:
             return False
-        values = self._values(self._first(one))
+        value = self._value(self._first(one))
         sound = [t for t in self.trials if t.status == FINISHED and t.excess == 0.0]
-        return any(_far(trial.first, values) for trial in sound)
+        return any(_far(trial.first, value) for trial in sound)
 
     def _made(self) -> Iterator[Trial]:
         tune = self.plan.tune
@@ -180,13 +180,13 @@ class Search:
             runs, met = self._runs(one), one.met
             status = FINISHED if met == tune.train else CUT if one.draws < tune.train else PRUNED
             yield Trial(
-                len(self.trials) + place, self._batch, one.gains, met, status, self._values(runs),
+                len(self.trials) + place, self._batch, one.gains, met, status, self._value(runs),
                 tuple(excess(text, runs, self.plan.metrics) for text in self.plan.inequalities),
-                self._values(self._first(one)), float(np.mean(runs.failed)),
+                self._value(self._first(one)), float(np.mean(runs.failed)),
             )  # fmt: skip
 
     def _told(self, made: Sequence[Trial]) -> None:
-        self._sampler.tell([t.values for t in made], [t.excesses for t in made])
+        self._sampler.tell([t.value for t in made], [t.excesses for t in made])
         self.trials += made
         self._batch += 1
 
@@ -198,11 +198,10 @@ class Search:
         metrics, failed = self._runs(one)
         return Outcomes({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
 
-    def _values(self, runs: Outcomes) -> tuple[float, ...]:
-        return tuple(evaluate(tree, runs, self.plan.metrics) for tree in self.plan.objectives)
+    def _value(self, runs: Outcomes) -> float:
+        return evaluate(self.plan.objective, runs, self.plan.metrics)
 
 
-def _far(best: Sequence[float], values: Sequence[float]) -> bool:
-    """Whether every value is worse than the best by more than half of it."""
-    pairs = zip(best, values, strict=True)
-    return all(value > good + (WORSE - 1.0) * abs(good) for good, value in pairs)
+def _far(best: float, value: float) -> bool:
+    """Whether a value is worse than the best by more than half of it."""
+    return value > best + (WORSE - 1.0) * abs(best)

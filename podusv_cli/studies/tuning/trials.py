@@ -12,8 +12,8 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import files, json_files
 
 FOLDER = "trials"
-FORMAT = 1
-VECTORS = ("values", "excesses", "first")
+FORMAT = 2
+VECTORS = ("excesses",)
 FINISHED, PRUNED, CUT = "finished", "pruned", "cut"
 
 
@@ -23,7 +23,7 @@ class Trial:
 
     `status` is `finished`; `pruned` after a part of the draws; or `cut`, where the budget was used
     up. Only finished trials can win. `excesses` say by how much each inequality does not hold.
-    `first` are the objectives over the first part of the draws, by which trials are pruned.
+    `first` is the objective over the first part of the draws, by which trials are pruned.
     """
 
     number: int
@@ -31,9 +31,9 @@ class Trial:
     gains: Mapping[str, Any]
     runs: int
     status: str
-    values: tuple[float, ...]
+    value: float
     excesses: tuple[float, ...]
-    first: tuple[float, ...]
+    first: float
     failures: float
 
     @property
@@ -61,6 +61,7 @@ def read(folder: Path, name: str) -> list[Trial]:
 
 def _trial(told: dict[str, Any]) -> Trial:
     numbers: dict[str, Any] = {name: tuple(map(_number, told[name])) for name in VECTORS}
+    numbers |= {name: _number(told[name]) for name in ("value", "first")}
     return Trial(**(told | numbers))
 
 
@@ -70,41 +71,7 @@ def _number(told: float | None) -> float:
 
 
 def best(trials: Sequence[Trial]) -> Trial:
-    """The finished trial that wins: inequalities first, then the objective; an early one of equals.
-
-    Of several objectives, the one of the Pareto front that is nearest to its ideal corner.
-    """
+    """The finished trial that wins: inequalities first, then the objective, then the earlier."""
     finished = [trial for trial in trials if trial.status == FINISHED]
     least = min(trial.excess for trial in finished)
-    sound = [trial for trial in finished if trial.excess == least]
-    return min(sound, key=lambda t: t.values[0]) if len(sound[0].values) == 1 else _middle(sound)
-
-
-def front(trials: Sequence[Trial]) -> list[Trial]:
-    """The finished trials that hold all inequalities and that no other is better than."""
-    sound = [t for t in trials if t.status == FINISHED and t.excess == 0.0]
-    return [
-        one for one in sound
-        if all(map(math.isfinite, one.values)) and not any(_beats(o, one) for o in sound)
-    ]  # fmt: skip
-
-
-def _beats(one: Trial, other: Trial) -> bool:
-    pairs = list(zip(one.values, other.values, strict=True))
-    return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)
-
-
-def _middle(sound: Sequence[Trial]) -> Trial:
-    """Of the front, the one whose worse objective is least, each scaled to the front's extent."""
-    found = front(sound)
-    if not found:
-        return sound[0]
-    columns = list(zip(*(trial.values for trial in found), strict=True))
-    ends = [(min(column), max(column)) for column in columns]
-
-    def away(trial: Trial) -> float:
-        """The larger distance from the ideal corner."""
-        pairs = zip(trial.values, ends, strict=True)
-        return float(max((value - low) / ((high - low) or 1.0) for value, (low, high) in pairs))
-
-    return min(found, key=away)
+    return min((t for t in finished if t.excess == least), key=lambda t: t.value)
