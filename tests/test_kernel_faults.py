@@ -14,7 +14,7 @@ import pytest
 
 import podusv_cli
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.kernel import is_kernel, kernel
+from podusv_cli.core.kernel import _globals_read, is_kernel, kernel
 from podusv_cli.engine.machine.kernel_faults import (
     check_arguments,
     check_kernel,
@@ -147,3 +147,12 @@ def test_an_argument_that_may_only_be_read_is_not_written_at_any_time() -> None:
     with pytest.raises(LawError, match=r"it writes x\[2\], which it may only read"):
         check_arguments(writing, ("x", "memory", "target", "table"))
     check_arguments(writing, ("memory", "target", "table"))
+
+
+def test_the_globals_of_code_are_those_of_its_instructions():
+    """With more than 128 names, too, where an argument needs two instructions."""
+    names = [f"name_{i}" for i in range(300)]
+    code = compile(" + ".join(f"{name}.of.{name}" for name in names), "", "eval")
+    inside = compile("lambda: " + " + ".join(names), "", "eval").co_consts[0]
+    assert _globals_read(inside) == set(names)
+    assert _globals_read(code) == set()  # read by name, not from globals

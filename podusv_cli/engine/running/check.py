@@ -43,26 +43,28 @@ def check_law(loop: ClosedLoop) -> None:
     if loop.path.follows:
         check_kernel(loop.path.locate)
     with np.errstate(all="ignore"):
-        asked(describe(loop.path), loop.path.table)
-        asked(describe(loop.path), loop.first_target, OF_NUMBERS)
-        asked(describe(loop.controller), partial(_check_declared, loop))
-        asked(describe(loop.controller), partial(_ask, loop), OF_NUMBERS)
+        asked(partial(describe, loop.path), loop.path.table)
+        asked(partial(describe, loop.path), loop.first_target, OF_NUMBERS)
+        asked(partial(describe, loop.controller), partial(_check_declared, loop))
+        asked(partial(describe, loop.controller), partial(_ask, loop), OF_NUMBERS)
     check_arguments(law, READ)
 
 
-def asked(part: str, ask: Callable[[], object], left: tuple[type[Exception], ...] = ()) -> None:
+def asked(
+    part: Callable[[], str], ask: Callable[[], object], left: tuple[type[Exception], ...] = ()
+) -> None:
     """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
     work = Work(lambda: int(ask() is None))
     work.finish()
     if isinstance(work.error, NoKernel):
-        raise LawError(f"{part}: {work.error}") from work.error
+        raise LawError(f"{part()}: {work.error}") from work.error
     if isinstance(work.error, LawError):
         raise work.error
     if work.result is None and not isinstance(work.error, left):
         fault = _constant(work.error) or work.fault()
         if FLOAT_AS_COUNT in str(work.error):
             fault += "; constants are floats: write int(k.count)"
-        message = f"{part}, evaluated once before the run: {fault}"
+        message = f"{part()}, evaluated once before the run: {fault}"
         raise LawError(message) from work.error
 
 

@@ -75,7 +75,7 @@ def ready(
     """
     check_law(loop)
     loop.check_fit(grid.step)
-    asked("the closed loop", partial(vectors_of, loop, loop.layout(grid), observer, grid))
+    asked(lambda: "the closed loop", partial(vectors_of, loop, loop.layout(grid), observer, grid))
     marcher(loop, observer, compiled, compiling)
 
 
