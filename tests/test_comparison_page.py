@@ -1,9 +1,7 @@
 """The HTML report, from numbers planted by hand."""
 
-import math
 from dataclasses import replace
 
-import pandas as pd
 import pytest
 from comparison_samples import FRAME, scenario, verdicts
 from drawn_samples import recording, shown
@@ -78,14 +76,15 @@ def test_the_report_has_the_table_with_numbers_to_the_right():
 def test_many_runs_stand_below_each_other_a_few_numbers_to_a_table():
     labels = [f"a_long_label_of_a_run_{i}" for i in range(report.MANY + 1)]
     names = [name for name in METRICS if name != "law_ns"]
-    frame = table.table({label: dict.fromkeys(names, 1.0) for label in labels})
-    told = section("comparison", table=frame)
+    runs = {label: dict.fromkeys(names, 1.0) for label in labels}
+    told = section("comparison", table=table.table(runs))
     tables = told.all("table")
     assert [row[0] for row in tables[0].rows()[1:]] == labels
     assert max(len(row) for one in tables for row in one.rows()) <= report.FEW + 1
     shown = [code.text for one in tables for code in one.all("code")]
     assert sorted(shown) == sorted(names)
-    few = section("comparison", table=frame[labels[: report.MANY]])
+    del runs[labels[-1]]
+    few = section("comparison", table=table.table(runs))
     assert "Below each column's heading" in told.text
     assert "Below each row's name" in few.text
     assert few.all("table")[0].rows()[0][2:] == labels[: report.MANY]
@@ -129,14 +128,18 @@ def test_the_answer_says_who_is_best_in_what():
     assert second.text == f"{effort.capitalize()}: 3 J. Best in 1 further number."
     assert third.text == f"{effort.capitalize()}: 1 J."
     assert first.all("abbr")[0].attributes["title"] == f"{METRICS['energy'].meaning} [J]"
-    assert "Nothing to rank" in section("answer", table=FRAME[["a", "lost"]]).text
+    assert (
+        "Nothing to rank"
+        in section(
+            "answer", table=table.table({label: FRAME.of(label) for label in ("a", "lost")})
+        ).text
+    )
 
 
 def test_equal_numbers_and_measured_times_are_no_ranking():
-    numbers = {"iae": [1.0, 1.0 + 1e-9], "ise": [2.0, math.nan], "law_ns": [1.0, 2.0]}
-    frame = pd.DataFrame.from_dict(numbers, orient="index", columns=["a", "b"])
-    assert table.leaders(frame) == {"a": [], "b": []}
-    frame.loc["rmse"] = [2.0, 1.0]
+    a, b = ({"iae": 1.0, "law_ns": 1.0}, {"iae": 1.0 + 1e-9, "law_ns": 2.0})
+    assert table.leaders(table.table({"a": {**a, "ise": 2.0}, "b": b})) == {"a": [], "b": []}
+    frame = table.table({"a": {**a, "rmse": 2.0}, "b": {**b, "rmse": 1.0}})
     assert table.leaders(frame) == {"a": [], "b": ["rmse"]}
 
 

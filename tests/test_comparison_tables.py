@@ -85,11 +85,20 @@ def test_where_a_law_keeps_a_standoff_to_be_nearer_is_not_better():
 
 
 def test_csv_has_units_first_and_ratios_last():
-    full = table.with_ratios(FRAME)
-    assert list(full) == ["unit", "a", "b", "c", "lost", "b/a", "c/a", "lost/a"]
-    assert full.loc["iae", ["b/a", "c/a"]].tolist() == [0.5, 2.0]
-    assert full.loc["energy", ["b/a", "lost/a"]].isna().all()
-    assert table.as_csv(FRAME).splitlines()[1] == "iae,m s,4.0,2.0,8.0,,0.5,2.0,"
+    head, *rows = (line.split(",") for line in table.as_csv(FRAME).splitlines())
+    assert head == ["metric", "unit", "a", "b", "c", "lost", "b/a", "c/a", "lost/a"]
+    iae, energy, _ = sorted(rows, key=lambda row: ["iae", "energy", "law_ns"].index(row[0]))
+    assert energy == ["energy", "J", "0.0", "3.0", "1.0", "", "", "", ""]  # nothing over 0
+    assert iae == ["iae", "m s", "4.0", "2.0", "8.0", "", "0.5", "2.0", ""]
+    below = table.as_csv(table.table({"a": {"iae": -2.0}, "b": {"iae": math.inf}}))
+    assert below.splitlines()[1] == "iae,m s,-2.0,inf,-inf"  # numbers, and no formulas
+
+
+def test_a_comparison_is_a_frame_of_pandas_in_python():
+    frame = FRAME.frame()
+    assert (frame.index.name, list(frame.columns)) == ("metric", ["a", "b", "c", "lost"])
+    assert frame.loc["iae", ["a", "b", "c"]].tolist() == [4.0, 2.0, 8.0]
+    assert frame["lost"].isna().all()
 
 
 def test_markdown_tells_how_runs_ended():

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -102,7 +103,7 @@ def test_no_heading_and_no_cell_of_a_csv_file_is_a_formula():
 
 
 def test_the_tables_of_a_comparison_hold_no_label_that_is_more_than_text():
-    frame = FRAME[["a", "lost"]].set_axis([EVIL, "=b"], axis=1)
+    frame = table.table({EVIL: FRAME.of("a"), "=b": FRAME.of("lost")})
     head = next(csv.reader(io.StringIO(table.as_csv(frame))))
     assert head[2:] == [escaping.csv(EVIL), "'=b", f"'=b/{escaping.visible(EVIL)}"]
     for text in (table.as_markdown(frame, {EVIL: EVIL}), table.as_latex(frame)):
@@ -133,7 +134,7 @@ def test_every_text_of_the_report_is_text():
     plain = page()
     text = page(
         title=odd, endings={odd: odd}, differences={odd: {odd: odd}},
-        table=FRAME.set_axis([odd, *FRAME.columns[1:]], axis=1),
+        table=replace(FRAME, columns=(odd, *FRAME.columns[1:])),
         figures=[report.Picture(odd, odd, b"<svg/>", odd)], provenance={odd: odd},
     )  # fmt: skip
     assert not nasty(text)

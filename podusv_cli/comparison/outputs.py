@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-import pandas as pd
-
 from podusv_cli.comparison import chase, claims, report, table, traces
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
@@ -45,7 +43,7 @@ class Result:
     entries: Sequence[Entry]
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
-    table: pd.DataFrame
+    table: table.Table
     verdicts: Sequence[claims.RunsVerdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
@@ -69,8 +67,8 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
 
     Clock readings have a file of their own, so that all others come out the same every time.
     """
-    clocked = result.table.index.isin(CLOCKED)
-    lasting, times = result.table[~clocked], table.numbers(result.table[clocked])
+    lasting = result.table.only(result.table.rows.keys() - CLOCKED)
+    times = table.numbers(result.table.only(CLOCKED))
     judged = [verdict for verdict in result.verdicts if not verdict.timed]
     timed = [verdict for verdict in result.verdicts if verdict.timed]
     forms: dict[str, Callable[[], bytes]] = {

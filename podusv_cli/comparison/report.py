@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import inspect
+import itertools
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import pandas as pd
-
 from podusv_cli.comparison import chase, settings, stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
-from podusv_cli.comparison.table import Row, leaders, rows
+from podusv_cli.comparison.table import Row, Table, leaders, rows
 from podusv_cli.comparison.traces import PIECES
 from podusv_cli.core.component import Component
 from podusv_cli.core.finding import Finding
@@ -42,7 +41,7 @@ class Story:
     endings: Mapping[str, str]  # how each run ended
     differences: Mapping[str, Mapping[str, Any]]
     noticed: Sequence[Finding]
-    table: pd.DataFrame
+    table: Table
     verdicts: Sequence[RunsVerdict]
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
     figures: Sequence[Picture]
@@ -104,12 +103,13 @@ def _standings(story: Story, rows: Sequence[Row]) -> dict[str, Standing]:
     """Every run that finished, by label; the rows are those that a reader sees first."""
     best = leaders(story.table, story.metrics, story.unsettled)
     told = {}
-    for label in story.table.columns[story.table.notna().any()]:
-        numbers = ((metric, story.table[label][metric.name]) for metric, _ in rows[:FACTS])
+    for label in itertools.compress(story.table.columns, story.table.finished):
+        own = story.table.of(label)
+        numbers = ((metric, own[metric.name]) for metric, _ in rows[:FACTS])
         facts = [_fact(metric, number) for metric, number in numbers if metric.name not in CLOCKED]
         names = best.get(label, [])
         first = [name for name in names if story.metrics[name].headline]
-        told[str(label)] = Standing([*filter(None, facts)], first, len(names) - len(first))
+        told[label] = Standing([*filter(None, facts)], first, len(names) - len(first))
     return told
 
 

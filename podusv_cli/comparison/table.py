@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping
-from typing import NamedTuple
-
-import pandas as pd
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 from podusv_cli.core import escaping, quantities
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.storage import csv_files
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 METRIC = "metric"
 HEAD = ("", "unit")  # before the runs
@@ -34,63 +36,102 @@ class Row(NamedTuple):
     texts: list[str]
 
 
+@dataclass(frozen=True)
+class Table:
+    """A number for every metric (`rows`, by name) and run (`columns`), NaN where there is none."""
+
+    columns: tuple[str, ...]
+    rows: Mapping[str, tuple[float, ...]]
+
+    def of(self, label: str) -> dict[str, float]:
+        """The numbers of a run, by metric."""
+        place = self.columns.index(label)
+        return {name: numbers[place] for name, numbers in self.rows.items()}
+
+    def only(self, names: Collection[str]) -> Table:
+        """The table of these metrics alone."""
+        return Table(self.columns, {n: row for n, row in self.rows.items() if n in names})
+
+    @property
+    def finished(self) -> list[bool]:
+        """Which runs have any number; a run that did not finish has none."""
+        return [any(not math.isnan(x) for x in self.of(label).values()) for label in self.columns]
+
+    def frame(self) -> pd.DataFrame:
+        """The table as pandas has it, for Python and notebooks."""
+        import pandas as pd  # slow to import
+
+        frame = pd.DataFrame.from_dict(
+            dict(self.rows), orient="index", columns=list(self.columns), dtype=float
+        )
+        return frame.rename_axis(METRIC)
+
+
 def table(
     metrics: Mapping[str, Mapping[str, float]], known: Mapping[str, Metric] = METRICS
-) -> pd.DataFrame:
+) -> Table:
     """Metrics by label as a table: one row per metric that is known, one column per run."""
     names = [name for name in known if any(name in numbers for numbers in metrics.values())]
-    rows = {name: [numbers.get(name, math.nan) for numbers in metrics.values()] for name in names}
-    frame = pd.DataFrame.from_dict(rows, orient="index", columns=list(metrics), dtype=float)
-    return frame.rename_axis(METRIC)
+    rows = {
+        name: tuple(float(numbers.get(name, math.nan)) for numbers in metrics.values())
+        for name in names
+    }
+    return Table(tuple(metrics), rows)
 
 
-def numbers(frame: pd.DataFrame) -> dict[str, dict[str, float | None]]:
+def numbers(frame: Table) -> dict[str, dict[str, float | None]]:
     """The table as plain data: numbers (or None) by metric and run."""
     return {
-        str(name): {str(label): None if math.isnan(x) else float(x) for label, x in row.items()}
-        for name, row in frame.iterrows()
+        name: {
+            label: None if math.isnan(x) else x for label, x in zip(frame.columns, row, strict=True)
+        }
+        for name, row in frame.rows.items()
     }
 
 
-def with_ratios(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> pd.DataFrame:
-    """The table with units, and a column of ratios to the first run for each further run."""
-    first = frame.columns[0]
-    full = frame.copy()
-    full.insert(0, "unit", [known[name].unit for name in frame.index])
-    for label in frame.columns[1:]:
-        full[f"{label}/{first}"] = frame[label] / frame[first].where(frame[first] != 0)
-    return full
-
-
-def as_csv(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> str:
+def as_csv(frame: Table, known: Mapping[str, Metric] = METRICS) -> str:
     """The table as CSV, in full precision, with ratios last."""
-    return csv_files.text(with_ratios(frame, known).reset_index())
+    first = frame.columns[0]
+    heads = [METRIC, "unit", *frame.columns, *(f"{one}/{first}" for one in frame.columns[1:])]
+    lines = (
+        [name, known[name].unit, *map(_blank, [*row, *(_ratio(x, row[0]) for x in row[1:])])]
+        for name, row in frame.rows.items()
+    )
+    return csv_files.lines([heads, *lines])
 
 
-def rows(
-    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
-) -> list[Row]:
+def _blank(number: float) -> float | str:
+    """The number, and an empty cell where there is none."""
+    return "" if math.isnan(number) else number
+
+
+def _ratio(number: float, first: float) -> float:
+    return number / first if first else math.nan
+
+
+def rows(frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()) -> list[Row]:
     """All rows, those that a reader sees first before the others; best numbers marked with *.
 
     `unsettled` are the runs that do not end at their target; they are never the best.
     """
-    found, unranked = [], _unranked(frame, known)
-    whole = frame.notna().any()  # a run that did not finish has no metric
-    for name, numbers in frame.iterrows():
-        best = math.nan if name in unranked else numbers.drop(list(unsettled)).min()
-        first, metric = numbers.iloc[0], known[str(name)]
-        never = numbers.index[whole & numbers.isna()] if metric.happens else ()
+    found, unranked, finished = [], _unranked(frame, known), frame.finished
+    out = [label in unsettled for label in frame.columns]
+    for name, numbers in frame.rows.items():
+        ranked = [x for x, off in zip(numbers, out, strict=True) if not (off or math.isnan(x))]
+        best = math.nan if name in unranked else min(ranked, default=math.nan)
+        first, metric = numbers[0], known[name]
         texts = [
-            "never" if label in never else "no limit" if metric.margin and math.isinf(number) else
-            _cell(number, first, math.nan if label in unsettled else best, i)
-            for i, (label, number) in enumerate(numbers.items())
+            "never" if metric.happens and finished[i] and math.isnan(number) else
+            "no limit" if metric.margin and math.isinf(number) else
+            _cell(number, first, math.nan if out[i] else best, i)
+            for i, number in enumerate(numbers)
         ]  # fmt: skip
         found.append(Row(metric, texts))
     return sorted(found, key=lambda row: not row.metric.headline)
 
 
 def cells(
-    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+    frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
 ) -> list[list[str]]:
     """The rows as text: what the metric is, unit, a text a run, and the metric's name."""
     return [
@@ -99,40 +140,43 @@ def cells(
     ]
 
 
-def head(frame: pd.DataFrame) -> list[str]:
+def head(frame: Table) -> list[str]:
     """What stands above the `cells`."""
-    return [*HEAD, *map(str, frame.columns), LAST]
+    return [*HEAD, *frame.columns, LAST]
 
 
-def _unranked(frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS) -> list[str]:
+def _unranked(frame: Table, known: Mapping[str, Metric] = METRICS) -> list[str]:
     """Metrics in which no run is marked best.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
     Smaller margins are worse.
     """
-    has_both = {"iae", "iae_e"} <= set(frame.index)
-    standoff = has_both and bool((frame.loc["iae"].gt(frame.loc["iae_e"])).any())
+    both = zip(frame.rows.get("iae", ()), frame.rows.get("iae_e", ()), strict=False)
+    standoff = any(iae > beyond for iae, beyond in both)
     return [
         name
-        for name in frame.index
+        for name in frame.rows
         if name in CLOCKED or known[name].margin or (standoff and known[name].counts_standoff)
     ]
 
 
 def leaders(
-    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+    frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
 ) -> dict[str, list[str]]:
     """The metrics in which each run is best; equal numbers and measured times rank nobody.
 
     Neither do `unsettled` runs, which do not end at their target.
     """
-    ranked = frame.drop(index=_unranked(frame, known), columns=list(unsettled))
-    best: dict[str, list[str]] = {str(label): [] for label in ranked.columns}
-    for name, numbers in ranked.iterrows():
-        shown = numbers.dropna().map(_shown)
-        if shown.nunique() > 1:
-            for label in shown.index[shown == _shown(numbers.min())]:
-                best[str(label)].append(str(name))
+    unranked = _unranked(frame, known)
+    best: dict[str, list[str]] = {one: [] for one in frame.columns if one not in unsettled}
+    for name, numbers in frame.rows.items():
+        paired = zip(frame.columns, numbers, strict=True)
+        ranked = {label: x for label, x in paired if label in best and not math.isnan(x)}
+        shown = {label: _shown(x) for label, x in ranked.items()}
+        if name not in unranked and len({*shown.values()}) > 1:
+            least = _shown(min(ranked.values()))
+            for label in (label for label, text in shown.items() if text == least):
+                best[label].append(name)
     return best
 
 
@@ -150,7 +194,7 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
 
 
 def as_markdown(
-    frame: pd.DataFrame, endings: Mapping[str, str], known: Mapping[str, Metric] = METRICS,
+    frame: Table, endings: Mapping[str, str], known: Mapping[str, Metric] = METRICS,
     unsettled: Names = (),
 ) -> str:  # fmt: skip
     """The table in Markdown, followed by the reasons why runs did not finish."""
@@ -173,9 +217,7 @@ def as_markdown(
     )
 
 
-def as_latex(
-    frame: pd.DataFrame, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
-) -> str:
+def as_latex(frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()) -> str:
     """The table in LaTeX: symbols or words, decimal points aligned, the best of a row in bold.
 
     Every number takes two columns, before and from its decimal point on; a run but the first has a
@@ -183,7 +225,7 @@ def as_latex(
     """
     spans = [2, *[3] * (len(frame.columns) - 1)]
     labels = (
-        rf"\multicolumn{{{span}}}{{c}}{{{escaping.latex(str(label))}}}"
+        rf"\multicolumn{{{span}}}{{c}}{{{escaping.latex(label)}}}"
         for span, label in zip(spans, frame.columns, strict=True)
     )
     lines = [" & ".join([*HEAD, *labels])]

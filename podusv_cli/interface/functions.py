@@ -119,7 +119,7 @@ def compare(
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
     claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
     failed = {label: text for label, text in done.result.endings.items() if text}
-    return Comparison(done.folder, _compared(done), done.result.table, claims, failed)
+    return Comparison(done.folder, _compared(done), done.result.table.frame(), claims, failed)
 
 
 def optimum(
