@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.shown import Shown
 from podusv_cli.figures.tracks import bounds
 from podusv_cli.pages.page import environment
@@ -27,8 +29,8 @@ def chase(runs: Sequence[Shown]) -> dict[str, Any]:
     (west, east), (south, north) = bounds(moving)
     half = max(run.length for run in moving) / 2  # a hull reaches beyond its track
     return {
-        "box": [_rounded(edge) for edge in (west - half, south - half, east + half, north + half)],
-        "end": _rounded(max(run.end for run in moving), DIGITS["time"]),
+        "box": _rounded((west - half, south - half, east + half, north + half)),
+        "end": _rounded([max(run.end for run in moving)], DIGITS["time"])[0],
         "runs": [_track(run) for run in moving],
     }
 
@@ -63,15 +65,16 @@ def _track(run: Shown) -> dict[str, Any]:
         "beam": run.scenario.vessel.beam,
         "standoff": approach.standoff if approach else 0.0,
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
-        "legs": [[_rounded(x) for x in axis] for axis in legs.T],
+        "legs": [_rounded(axis) for axis in legs.T],
         **{
-            name: [_rounded(x, DIGITS.get(name, MILLIMETRES)) for x in run.signal(name)[rows]]
+            name: _rounded(run.signal(name)[rows], DIGITS.get(name, MILLIMETRES))
             for name in names
             if run.has(name)
         },
     }
 
 
-def _rounded(number: float, digits: int = MILLIMETRES) -> float | None:
-    """The number in the room that the page has for it; None for none."""
-    return None if np.isnan(number) else round(float(np.clip(number, -FAR, FAR)), digits)
+def _rounded(numbers: Sequence[float] | Vector, digits: int = MILLIMETRES) -> list[float | None]:
+    """The numbers in the room that the page has for them; None for none."""
+    within = np.clip(numbers, -FAR, FAR).tolist()
+    return [None if math.isnan(x) else round(x, digits) for x in within]

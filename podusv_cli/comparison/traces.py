@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -64,14 +63,16 @@ def thinned(numbers: Vector) -> tuple[Vector, Vector]:
     if len(numbers) <= 2 * PIECES:
         return numbers, np.empty(0)
     edges = np.linspace(0, len(numbers), PIECES + 1).round().astype(int)
-    kept, places = [], []
-    for first, last in pairwise(edges):
-        rows = first + np.flatnonzero(np.isfinite(numbers[first:last]))
-        rows = rows if len(rows) else np.array([first])
-        both = sorted((rows[numbers[rows].argmin()], rows[numbers[rows].argmax()]))
-        kept += both
-        places += [255 * (row - first) // (last - first) for row in both]
-    return numbers[kept], np.array(places)
+    first, sizes = edges[:-1, None], np.diff(edges)[:, None]
+    rows = first + np.arange(sizes.max())  # of every piece, the shorter ones filled up
+    inside = rows < edges[1:, None]
+    pieces = numbers[np.minimum(rows, len(numbers) - 1)]
+    good = inside & np.isfinite(pieces)
+    least = np.where(good, pieces, np.inf).argmin(axis=1)
+    most = np.where(good, pieces, -np.inf).argmax(axis=1)
+    within = np.sort(np.stack((least, most), axis=1), axis=1)
+    within[~good.any(axis=1)] = 0
+    return numbers[(first + within).ravel()], (255 * within // sizes).ravel()
 
 
 def encoded(numbers: Vector, places: Vector) -> dict[str, str]:
