@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -55,6 +56,7 @@ def times(started: datetime, finished: datetime) -> dict[str, Any]:
     }
 
 
+@cache
 def source_tree(package: Path) -> dict[str, Any] | None:
     """Commit of the checkout that `package` is part of, and whether the package differs from it."""
     # A package installed somewhere below an unrelated checkout is not tracked there.
