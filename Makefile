@@ -11,7 +11,7 @@ PYTEST := OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/pytest --numpro
 OURS := podusv podusv_cli tests benchmarks examples docs
 # Every dependency of a run at its lower bound; what tests need beside them, as new as may be.
 OLDEST := .venv-oldest
-LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\(.*\)",/\1==\2/p' pyproject.toml
+LOWEST := sed -n '/^dependencies = \[/,/^\]/s/^ *"\(.*\)>=\([^,"]*\).*/\1==\2/p' pyproject.toml
 NEWEST := .venv-newest
 # $(call SEPARATE,FOLDER,PINS): the tests in an environment of their own, without constraints.
 define SEPARATE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,8 +20,9 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.kernel import LANES, Vector, kernel, shared
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
-from podusv_cli.engine.machine import compile
+from podusv_cli.engine.machine import compile, wide_numba
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
+from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.batch import Batch, simulate_many
 from podusv_cli.engine.running.lanes import why_alone
 from podusv_cli.engine.running.watch import Work
@@ -277,3 +279,21 @@ def test_runs_that_hang_side_by_side_are_made_again_one_by_one(
     alone = simulate_many(loops, grid, side_by_side=False)
     monkeypatch.setattr(Work, "hangs", wide)
     same(simulate_many(loops, grid, side_by_side=True), alone)
+
+
+def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An llvmlite without one of the passes raised AttributeError in the middle of a study."""
+
+    def without_a_pass(*given: Any) -> Any:
+        raise AttributeError("no attribute 'add_always_inliner_pass'")
+
+    monkeypatch.setattr(wide_numba.widening, "widened", without_a_pass)
+    (piece,) = [
+        p for p in lanes._pieces(loop("pid"), Observer()) if p.label.startswith("lanes_law")
+    ]
+    code = wide_numba.object_code(piece.function, piece.prototype)
+    assert code.symbol == ""
+    assert b"cannot be widened: AttributeError: no attribute 'add_always" in code.content
+    assert code.content.endswith(f"llvmlite {version('llvmlite')}".encode())

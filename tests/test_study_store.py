@@ -11,6 +11,7 @@ import pytest
 from small_study import TEXT, made, small, written
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.studies.study import dispatch as marching
 from podusv_cli.studies.study import runs_file, runs_writer
@@ -243,3 +244,19 @@ def test_success_is_evaluated_once_for_each_law(whole, monkeypatch):
     monkeypatch.setattr(runs_file, "succeeded", lambda *given: (times.append(1), real(*given))[1])
     judged(whole.plan, runs)
     assert len(times) == 2
+
+
+def test_a_study_whose_runs_march_one_by_one_says_why(tmp_path, monkeypatch):
+    config, told = written(tmp_path / "small.yaml", ("draws: 40", "draws: 2")), []
+    monkeypatch.setattr(lanes, "WORTH", 0)
+    monkeypatch.setattr(lanes, "marcher", refuse)
+    request = sweep.Request(out=tmp_path / "study", figures=False, warn=told.append)
+    assert sweep.run(config, request, lambda tally: None).results
+    assert [text for text in told if "one by one" in text] == [
+        "pid: runs march one by one: no such pass",
+        "li: runs march one by one: no such pass",
+    ]
+
+
+def refuse(*given):
+    raise TypeError("no such pass")

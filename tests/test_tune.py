@@ -210,7 +210,7 @@ def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
     assert code == 0
     assert err.startswith("runs of the search: 32 (budget 32 for each law, repeats: 1); on draws")
     assert "median(effort_u) on 12 fresh draws:" in out
-    assert re.search(r"^toy +\d -> \d +\d -> \d +1\.6\d+ \[", out, re.MULTILINE)
+    assert re.search(r"^toy +2 -> 2 +0 -> 0 +1\.6\d+, no spread +0\.03\d+,", out, re.MULTILINE)
     told = json.loads((tmp_path / "out" / "tune.json").read_text())
     assert told["gains"] == {"toy": ["gain", "other"], "bare": []}
     assert told["idle"] == {"toy": ["unread"]}

@@ -44,7 +44,7 @@ def tune(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
             assign or (), out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed,
-            trust, say=line.say, begin=silent if quiet or as_json else line.note,
+            trust, say=line.say, warn=line.warn, begin=silent if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:

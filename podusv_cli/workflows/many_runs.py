@@ -105,6 +105,11 @@ def compiling(request: Request, law: str) -> Callable[[float], None]:
     return lambda part: request.say(f"compiling {law}, once for all runs to come: {part:.0%}")
 
 
+def one_by_one(law: str, why: str) -> str:
+    """That the runs of a law march one by one, which takes about five times as long."""
+    return f"{law}: runs march one by one: {why}"
+
+
 def engine_for(
     request: Request, folder: Path, scenario: Scenario, seal: str
 ) -> AbstractContextManager[Engine]:

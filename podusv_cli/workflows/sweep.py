@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -38,6 +39,7 @@ from podusv_cli.workflows.many_runs import (
     folder_of,
     interrupted,
     loaded_for,
+    one_by_one,
     refused,
     scenario_texts,
 )
@@ -131,12 +133,14 @@ def _marched(
         session.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
-def _announce(store: Store, request: Request, missing: Gaps) -> None:
-    """Warn of mixed machines and of invalid draws."""
+def _announce(store: Store, request: Request, missing: Gaps, alone: Mapping[str, str]) -> None:
+    """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one."""
     if missing and (mixed := mixture(store.folder)):
         request.warn(mixed)
     if missing and (invalid := check_draws(store.plan)).count:
         request.warn(invalid.in_words())
+    for law, why in alone.items():
+        request.warn(one_by_one(law, why))
 
 
 def _is_whole(store: Store) -> bool:

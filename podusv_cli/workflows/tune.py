@@ -40,6 +40,7 @@ from podusv_cli.workflows.many_runs import (
     folder_of,
     interrupted,
     loaded_for,
+    one_by_one,
     refused,
     scenario_texts,
 )
@@ -153,7 +154,9 @@ def _prepare(plan: TunePlan, request: Request) -> None:
         options = [{gain.key: word} for gain in gains for word in gain.words]
         for new in options or [{}] if gains else []:
             if with_gains(plan.laws[law], new):
-                prepare(plan.variant({law: (law, new)}, TRAIN, 1), law, 0, runs, told)
+                variant = plan.variant({law: (law, new)}, TRAIN, 1)
+                if why := prepare(variant, law, 0, runs, told):
+                    request.warn(one_by_one(law, why))
 
 
 def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:

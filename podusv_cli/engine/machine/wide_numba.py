@@ -10,7 +10,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import llvmlite.binding as llvm
+import numba
 from llvmlite import ir
 from numba import njit, types
 from numba.core import cgutils, config
@@ -31,7 +33,8 @@ from podusv_cli.engine.machine.wide_masks import LANES_MEMORY, PLAIN_MEMORY
 def object_code(function: Any, prototype: Any) -> Code:
     """Object code of a kernel for lanes and all kernels it calls, or why there is none.
 
-    Raises TypeError where that need not be so the next time.
+    Another version of numba or llvmlite may fail in any way; runs then march one by one. Raises
+    TypeError where that need not be so the next time.
     """
     try:
         module = _module(function, prototype)
@@ -45,6 +48,10 @@ def object_code(function: Any, prototype: Any) -> Code:
         return Code("", f"its machine code cannot be widened: {error}".encode())
     except TypeError as error:  # says what and where
         return Code("", str(error).encode())
+    except Exception as error:
+        versions = f"numba {numba.__version__}, llvmlite {llvmlite.__version__}"
+        reason = f"its machine code cannot be widened: {in_a_line(error)}; {versions}"
+        return Code("", reason.encode())
 
 
 def _module(function: Any, prototype: Any) -> Any:

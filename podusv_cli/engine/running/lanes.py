@@ -229,10 +229,12 @@ class Sorter:
 def prepare(
     loop: ClosedLoop, observer: Observer, instants: int,
     compiling: Callable[[float], None] | None = None,
-) -> None:  # fmt: skip
-    """Compile the march of runs like this loop, if so many instants in all are worth it."""
-    if instants >= WORTH:
-        why_alone(loop, observer, compiling)
+) -> str:  # fmt: skip
+    """Compile the march of runs like this loop, if so many instants in all are worth it.
+
+    Why these runs cannot march side by side; empty where they can, or where it is not worth it.
+    """
+    return why_alone(loop, observer, compiling) if instants >= WORTH else ""
 
 
 def why_alone(

@@ -207,20 +207,20 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 def dispatch(
     store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Shard = (1, 1),
-    begin: Callable[[Gaps], None] = lambda missing: None,
+    begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
 ) -> tuple[Tally, bool]:  # fmt: skip
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
 
-    `begin` is told what is missing before the first run.
+    `begin` is told before the first run what is missing, and which laws march one by one and why.
 
     Every unit is on the disk before the next is handed out. Raises PodusvError where a unit cannot
     be made at all or not be written, KeyboardInterrupt after an interrupt; what is made is kept.
     """
     driver = Driver(store, tell, time.monotonic() + seconds, part)
     missing = driver.missing()
-    for law, cell in missing:
-        prepare(store.plan, law, cell)  # before the fork, so that no process compiles it again
-    begin(missing)
+    # Before the fork, so that no process compiles it again.
+    reasons = {law: prepare(store.plan, law, cell) for law, cell in missing}
+    begin(missing, {law: why for law, why in reasons.items() if why})
     driver.tally.began = time.monotonic()  # compiling and timing are over
     finished = engine(driver, driver.done)
     if driver.failure:

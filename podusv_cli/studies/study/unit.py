@@ -65,8 +65,10 @@ class UnitResult:
 def prepare(
     plan: Plan, law: str, cell: int, runs: int = 0,
     compiling: Callable[[float], None] | None = None,
-) -> None:  # fmt: skip
-    """Check a law, and have its march compiled and loaded. Raises LawError.
+) -> str:  # fmt: skip
+    """Check a law, and have its march compiled and loaded; why its runs march one by one.
+
+    The reason is empty where runs march side by side. Raises LawError.
 
     `runs` is how many runs of it there will be, by default those of the plan. `compiling` is called
     with the fraction that is compiled, if there is anything to compile.
@@ -75,7 +77,7 @@ def prepare(
     loop, seeing = scenario.closed_loop(), watching(scenario)
     ready(loop, scenario.time_grid(), seeing, compiled=True, compiling=compiling)
     runs = runs or plan.sweep.draws * len(plan.cells)
-    lanes.prepare(loop, seeing, runs * scenario.time_grid().steps, compiling)
+    return lanes.prepare(loop, seeing, runs * scenario.time_grid().steps, compiling)
 
 
 def make(
