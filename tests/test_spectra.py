@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import cumulative_trapezoid, quad
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.torsethaugen import peaks, torsethaugen
@@ -99,6 +99,20 @@ def test_factors_of_random_amplitudes_are_exponential_with_mean_one():
     assert drawn.mean() == pytest.approx(1.0, abs=0.01)
     assert drawn.var() == pytest.approx(1.0, abs=0.03)
     assert np.mean(drawn > 2.0) == pytest.approx(math.exp(-2.0), abs=0.004)
+
+
+@pytest.mark.parametrize("count", [1, 7, 100, 5000])
+def test_bins_of_a_sea_share_elevation_velocity_and_acceleration(count):
+    """By an independent integral of S, w^2 S and w^4 S over every bin."""
+    edges = spectra.sea_edges(
+        lambda rate: spectra.jonswap(rate, 2.0, PEAK, 3.3), 0.5 * PEAK, 4.0 * PEAK, count
+    )
+    np.testing.assert_allclose(edges[[0, -1]], [0.5 * PEAK, 4.0 * PEAK], rtol=1e-14)
+    rate = np.linspace(0.5 * PEAK, 4.0 * PEAK, 200_001)
+    density = spectra.jonswap(rate, 2.0, PEAK, 3.3)
+    moments = [cumulative_trapezoid(density * rate**n, rate, initial=0.0) for n in (0, 2, 4)]
+    share = np.interp(edges, rate, sum(moment / moment[-1] for moment in moments) / 3.0)
+    np.testing.assert_allclose(np.diff(share), 1.0 / count, rtol=0.05)
 
 
 def test_bins_that_grow_do_so_by_one_factor():

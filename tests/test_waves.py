@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, Constant, adrift, run
 from scenario_samples import SOUND, told
+from scipy.integrate import cumulative_trapezoid
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import WAVE_MOTION
@@ -118,26 +119,46 @@ def heights(components, amplitudes):
 def test_heights_of_random_amplitudes_scatter_as_those_of_a_gaussian_sea():
     """Of a Gaussian process var(m0)/m0^2 = 2 pi (integral of S^2)/(T m0^2); Hs has half of it.
 
-    With 7 components for every period of the peak 3 % more come out, with 3.5 16 %.
+    With 372 components, twice what `resolving` says, 6 % more come out, with 100 39 %.
     """
     rates = np.linspace(0.5, 4.0, 20_001) * PEAK
     density = spectra.jonswap(rates, 1.0, PEAK, 3.3)
     square, m0 = np.trapezoid(density**2, rates), np.trapezoid(density, rates)
     theory = 0.5 * math.sqrt(TURN * square / (SECONDS * m0**2))
     assert theory == pytest.approx(0.043, abs=2e-4)
-    many = heights(math.ceil(7.0 * SECONDS / 1.5), "random")
-    assert many.std() == pytest.approx(1.03 * theory, rel=0.28)  # three deviations of 60 draws
+    many = heights(372, "random")
+    assert many.std() == pytest.approx(1.06 * theory, rel=0.28)  # three deviations of 60 draws
     assert many.mean() == pytest.approx(1.0, abs=0.02)
-    assert heights(100, "deterministic").std() < 0.5 * theory
-    assert heights(100, "random").std() > 2.0 * theory, "too few components"
+    assert heights(100, "deterministic").std() < 0.75 * theory
+    few = heights(100, "random").std()
+    assert 1.1 * theory < few < 1.75 * theory, "bins of one width give 2.5 times as much"
 
 
-def test_components_that_are_asked_for_are_3_5_for_every_period_of_the_peak():
+def test_components_that_are_asked_for_are_0_9_for_every_period_of_the_peak():
+    """Where the bins, weighted by the square of their energy, are 1/duration wide."""
     sea = Waves(height=1.0, period=1.5)
-    assert sea.resolving(SECONDS) == math.ceil(3.5 * SECONDS / 1.5)
-    assert sea.model_copy(update={"components": 999}).resolving(SECONDS) == 724
+    rate = np.linspace(0.5 * PEAK, 4.0 * PEAK, 200_001)
+    density = spectra.jonswap(rate, 1.0, PEAK, 3.3)
+    energy = np.interp(sea._edges(), rate, cumulative_trapezoid(density, rate, initial=0.0))
+    width = np.sum(np.diff(energy) ** 2) / np.trapezoid(density**2, rate) / TURN
+    assert sea.resolving(SECONDS) == pytest.approx(100 * SECONDS * width, rel=0.01)
+    assert sea.resolving(SECONDS) / (SECONDS / 1.5) == pytest.approx(0.9, abs=0.01)
+    assert sea.model_copy(update={"components": 999}).resolving(SECONDS) == pytest.approx(
+        186, abs=1
+    )
     assert sea.model_copy(update={"amplitudes": "deterministic"}).resolving(SECONDS) == 0
     assert one().resolving(SECONDS) == 0, "a regular wave"
+
+
+@pytest.mark.parametrize("kind", [{}, {"spectrum": "ittc", "period_is": "zero_crossing"}])
+def test_a_regular_wave_has_exactly_the_period_that_is_asked_for(kind):
+    """The rate was drawn between the cut-offs: 2.7 s where 4 s were asked for."""
+    sea = Waves(height=0.5, period=4.0, components=1, amplitudes="deterministic", **kind)
+    rate, _, a = component(sea)
+    assert rate == pytest.approx(sea.peak, rel=1e-15)
+    assert 4.0 * a / math.sqrt(2.0) == pytest.approx(0.5, rel=0.02)
+    if not kind:
+        assert rate == pytest.approx(TURN / 4.0, rel=1e-15)
 
 
 @pytest.mark.parametrize(("psi", "u"), [(0.0, 1.5), (math.pi, 1.5), (math.pi / 3, 2.0)])

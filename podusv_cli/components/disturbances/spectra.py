@@ -27,6 +27,7 @@ FAR = 1000.0  # times a rate is its peak, where there is nothing left of a spect
 # them number by number.
 GROUP = 2 * LANES
 SAMPLES = 16  # of a spectrum in every bin
+FINE = 4096  # steps in which a spectrum is added up
 NORSOK_N = 0.468
 HARRIS_LENGTH = 1800.0  # m
 SHARES = np.linspace(0.0, 1.0, 513)  # of the way from -pi/2 to pi/2
@@ -135,8 +136,8 @@ def resolving(variance: Vector, edges: Vector, duration: float) -> int:
     """How many components leave a Gaussian process's scatter to sums over `duration` [s].
 
     The variance of such a sum scatters by the sum of all v^2, with v of each bin; that of the
-    process by the integral of S^2 over the duration. They are equal where the bins, weighted by
-    S^2, are 1/duration wide. `edges` in Hz.
+    process by the integral of S^2 over the duration, the sum of all v^2 over bin's width and
+    duration. They are equal where the bins, weighted by S^2, are 1/duration wide. `edges` in Hz.
     """
     wide = np.sum(variance**2) / np.sum(variance**2 / np.diff(edges))
     return math.ceil(len(variance) * duration * wide)
@@ -160,6 +161,28 @@ def cosines(variance: Vector, edges: Vector, seed: int, stream: str, amplitudes:
 def even_edges(low: float, high: float, count: int) -> Vector:
     """Edges of `count` bins of one width."""
     return np.linspace(low, high, count + 1)
+
+
+def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
+    """Edges of `count` bins [rad/s] that elevation, velocity and acceleration share evenly.
+
+    Each bin has the same share of S/m0 + rate^2 S/m2 + rate^4 S/m4. By the energy S alone the few
+    bins of the tail would be so wide that velocities, and the drift of hulls that reflect short
+    waves only, scatter twice as much as a sea's.
+    """
+    fine = np.linspace(low, high, FINE + 1)
+    rate = (fine[:-1] + fine[1:]) / 2.0
+    square, found = rate * rate, density(rate)
+    sums = (np.cumsum(part) for part in (found, found * square, found * square * square))
+    shares = np.concatenate([[0.0], sum(each / each[-1] for each in sums) / 3.0])
+    return inverse(shares, fine, np.linspace(0.0, 1.0, count + 1))
+
+
+def inverse(shares: Vector, values: Vector, wanted: Vector) -> Vector:
+    """Where the shares, from 0 to 1, reach the wanted ones, between the values by lines."""
+    i = np.clip(np.searchsorted(shares, wanted, side="right") - 1, 0, len(shares) - 2)
+    part = (wanted - shares[i]) / (shares[i + 1] - shares[i])
+    return np.asarray(values[i] + part * (values[i + 1] - values[i]))
 
 
 def growing_edges(low: float, high: float, count: int) -> Vector:
@@ -190,10 +213,7 @@ def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
         return np.zeros(count)
     angles = math.pi * (SHARES - 0.5)
     shares = _shares(spreading)
-    drawn = uniforms((seed, stream, "direction"), 0, count)
-    i = np.searchsorted(shares, drawn, side="right") - 1
-    part = (drawn - shares[i]) / (shares[i + 1] - shares[i])
-    return np.asarray(angles[i] + part * (angles[i + 1] - angles[i]))
+    return inverse(shares, angles, uniforms((seed, stream, "direction"), 0, count))
 
 
 @cache

@@ -35,7 +35,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -58,6 +57,7 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
 STREAM = "waves"
+BINS = 100  # in which the energy between the cut-offs is added up
 BOTH = 0.95  # of the energy of two peaks that the cut-offs must leave
 LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
 Share = Literal["curve"] | Annotated[float, Field(ge=0, le=1)]
@@ -97,7 +97,9 @@ class Waves(Disturbance):
     spreading: int = value(
         0, "", "n of the directions' density cos^2n; 0: all waves in one direction", ge=0, le=50
     )
-    components: int = value(100, "", "how many cosines", ge=1, le=10_000)
+    components: int = value(
+        100, "", "how many cosines; one is a regular wave of exactly this period", ge=1, le=10_000
+    )
     amplitudes: spectra.Amplitudes = value(
         "random", "", "of the components: drawn, so that the height scatters between seeds as a "
         "sea's does, or those of the spectrum for every seed",
@@ -130,7 +132,7 @@ class Waves(Disturbance):
             )
         if self.spectrum == "torsethaugen":
             self._suits_torsethaugen()
-        kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
+        kept = self._kept()
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
@@ -148,7 +150,7 @@ class Waves(Disturbance):
                 f"the torsethaugen spectrum holds up to {HIGHEST:g} m and below {LONGEST:g} s, "
                 f"found {self.height:g} m and {self.period:g} s"
             )
-        kept = math.fsum(self._variance()) / (self.height / 4.0) ** 2
+        kept = self._kept()
         if kept < BOTH:
             ratio = self.period / peaks(self.height, self.period)[1].period
             bound = f"lowest {0.6 * ratio:.2g}" if ratio < 1.0 else f"highest {3.0 * ratio:.2g}"
@@ -183,32 +185,49 @@ class Waves(Disturbance):
         return self.components
 
     def resolving(self, duration: float) -> int:
-        """3.5 components for every period of the peak, with the default cut-offs."""
+        """0.9 components for every period of the peak, with the default cut-offs."""
         if self.amplitudes == "deterministic" or self.components == 1:
             return 0
         return spectra.resolving(self._variance(), self._edges() / TURN, duration)
 
+    @property
+    def _band(self) -> tuple[float, float]:
+        """The cut-offs [rad/s]."""
+        return self.lowest * self.peak, self.highest * self.peak
+
+    def _density(self, rate: Vector) -> Vector:
+        return DENSITY[self.spectrum](self, rate)
+
+    def _kept(self) -> float:
+        """The share of the spectrum's energy that the cut-offs leave."""
+        edges = spectra.even_edges(*self._band, BINS)
+        return math.fsum(spectra.in_bins(self._density, edges)) / (self.height / 4.0) ** 2
+
     def _edges(self) -> Vector:
-        """Edges of the bins [rad/s]."""
-        low, high = self.lowest * self.peak, self.highest * self.peak
-        return spectra.even_edges(low, high, self.components)
+        """Edges of the components' bins [rad/s]."""
+        return spectra.sea_edges(self._density, *self._band, self.components)
 
     def _variance(self) -> Vector:
         """The variance in each bin [m2]."""
-        return spectra.in_bins(partial(DENSITY[self.spectrum], self), self._edges())
+        return spectra.in_bins(self._density, self._edges())
+
+    def _rates(self, drawn: Vector) -> Vector:
+        """Rates of the components [rad/s]: as drawn; a regular wave has exactly the peak's."""
+        return np.array([self.peak]) if self.components == 1 else drawn
 
     def table_for(self, vessel: Vessel, duration: float) -> Vector:
         """Rows of rates and phases in turns, wave numbers, amplitudes, directions, reflections."""
         count, stream = self.components, (self.seed, STREAM)
         drawn = spectra.cosines(self._variance(), self._edges(), *stream, self.amplitudes)
+        rate = self._rates(drawn.rate)
         away = spectra.directions(self.spreading, count, *stream)
         c, s = np.transpose([cos_sin(self._travel + angle) for angle in away.tolist()])
-        number = drawn.rate * drawn.rate / spectra.GRAVITY
+        number = rate * rate / spectra.GRAVITY
         ends = _shares(self.reflection_u, BOW_AND_STERN, number * vessel.length)
         sides = _shares(self.reflection_v, SIDES, number * vessel.beam)
         rows = np.zeros((8, spectra.whole_groups(count)))
         rows[:, :count] = (
-            drawn.rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s, ends, sides,
+            rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s, ends, sides,
         )  # fmt: skip
         return rows.ravel()
 
