@@ -69,6 +69,8 @@ TABLE: dict[str, list[Row]] = {
     ("while label.casefold() in used:", "while label in used:", "test_names_are_told_apart"),
 ],
 "comparison": [
+    ("cut = [whole, point + power]", "cut = [whole, power + point]",
+     "test_latex_has_symbols_or_words_and_numbers_cut_at_their_point"),
     ("if never or (isinstance(sign, STRICT) and self._close(a, b)):", "if never:",
      "test_what_cannot_be_told_and_why"),
     ("if run.until < window[1] - NEAR if window else run.ending:", "if run.ending:",
@@ -245,6 +247,8 @@ TABLE: dict[str, list[Row]] = {
      "test_trials_read_back_with_infinite_numbers"),
 ],
 "theory": [
+    ("gain_reduction=max((gain for", "gain_reduction=min((gain for",
+     "test_of_several_gains_that_the_loop_needs_the_nearest_to_its_own_is_told"),
     ("0.5 * weight * square for", "weight * square for",
      "test_rate_integrates_to_the_change_of_V_to_fourth_order"),
     ("swing = (alpha_u * sin_e - v * cos_e) * spin", "swing = (alpha_u * sin_e + v * cos_e) * spin",
@@ -262,6 +266,9 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one"),
 ],
 "metrics": [
+    ("        error[2] = wrap(error[2])\n", "", "test_a_heading_is_as_consistent_a_turn_further"),
+    ("t >= FROM - NEAR and t <= TO + NEAR", "t >= FROM and t <= TO",
+     "test_a_window_ends_at_the_instant_that_rounds_beyond_it"),
     ("ABSOLUTE, weight * z_e", "ABSOLUTE, 0.5 * weight * z_e",
      "test_a_run_that_diverges_is_a_run_and_its_warnings_are_there"),
     ("share = 0.5 * weight if opens else weight", "share = weight",
@@ -276,6 +283,9 @@ TABLE: dict[str, list[Row]] = {
      "test_a_run_without_any_instant_has_no_numbers"),
 ],
 "engine": [
+    ("rows = -(-self.reached // self.grid.log_every)", "rows = self.reached // self.grid.log_every",
+     "test_a_place_has_the_last_row_that_was_logged"),
+    ('"relay": [COUNT],', '"relay": [],', "test_runs_of_other_delays_march_beside_their_like"),
     ("shifted(count, memory, 0.5 * h, k2, y)", "shifted(count, memory, 0.5 * h, k1, y)",
      "test_the_memory_takes_a_sample_by_a_method_of_the_fourth_order"),
     (" or (period > 0 and count == 0)", "", "test_a_difference_that_fits_no_step_is_refused"),
@@ -322,6 +332,8 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_a_sampled_law_is_integrated_at_fourth_order_to_another_solution"),
 ],
 "controllers": [
+    ("MOST * k.U and learns * more > 0.0", "MOST * k.U",
+     "test_beyond_its_bound_it_learns_nothing_and_unlearns"),
     ("(k.k_ze * z_e + P - v * sin_e) / cos_e", "(k.k_ze * z_e + P + v * sin_e) / cos_e",
      "test_virtual_controls_are_21_and_30_as_printed_while_nothing_is_folded"),
     ("return -math.pi if psi_e > 0.0 else math.pi", "return math.pi if psi_e > 0.0 else -math.pi",
@@ -387,6 +399,8 @@ TABLE: dict[str, list[Row]] = {
      "test_an_impossible_vessel_is_refused"),
 ],
 "paths": [
+    ("segment(lap + 0.5 * k.fillet, count", "segment(lap + 0.75 * k.fillet, count",
+     "test_each_corner_is_its_own_where_legs_last_hardly_longer_than_the_fillet"),
     ("(3.0 * table[c] * s + 2.0 * table[c + 1]) * s",
      "(2.0 * table[c] * s + 2.0 * table[c + 1]) * s", "test_breaks_are_exactly_the_jumps"),
     ('if self.after == "loop":  # the last leg', "if False:  # the last leg",

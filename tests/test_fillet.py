@@ -79,6 +79,15 @@ def test_the_law_sees_the_mean_of_the_target_over_the_time_of_the_fillet(after: 
         np.testing.assert_allclose(shown(path, t)[:2], mean(path, t), atol=2e-7)
 
 
+def test_each_corner_is_its_own_where_legs_last_hardly_longer_than_the_fillet() -> None:
+    """Between 1 and 1.5 fillets: half a fillet past a corner the next one has not begun."""
+    path = Waypoints(points=CORNERS, speed=0.5, legs="straight", after="stop", fillet=5.8)
+    lasting = np.diff([at.time for at in path.breaks()])
+    assert 5.8 < lasting.min() < 1.5 * 5.8
+    for t in np.linspace(path.fillet, 1.2 * path.breaks()[-1].time, 97):
+        np.testing.assert_allclose(shown(path, t)[:2], mean(path, t), atol=1e-6)
+
+
 def test_velocity_and_acceleration_are_those_of_the_rounded_target() -> None:
     path, h = course("stop"), 1e-5
     for known in path.breaks():

@@ -14,9 +14,14 @@ import pytest
 from plugin_samples import LAW
 
 from benchmarks.variants import variants
+from podusv_cli.components.actuators.command import Command
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
+from podusv_cli.components.disturbances.total import Total
+from podusv_cli.components.disturbances.waves import Waves
+from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.core.kernel import LANES, Vector, kernel, shared
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
@@ -133,6 +138,34 @@ def test_runs_of_another_choice_march_beside_their_like() -> None:
         replace(one, controller=bases[i % 2]) for i, one in enumerate(scattered(loop("pid"), 5))
     ]
     same(*both(loops))
+
+
+# Parts of a loop that runs side by side have to share: a delay, the periods of sensors, which there
+# are, and where the parts of a list of loads begin.
+OTHERS: list[tuple[str, list[Any]]] = [
+    ("actuator", [Saturated(command=Command(delay=d)) for d in (0.03, 0.11, 0.0)]),
+    ("measurement", [
+        Sensors(position=Sensor(period=p, delay=d, noise=0.1), velocity=v)
+        for p, d, v in ((0.07, 0.02, Sensor()), (0.03, 0.0, Sensor()), (0.07, 0.02, None))
+    ]),
+    ("disturbance", [
+        Total(parts=(Waves(height=0.2, period=1.5, components=n), HarmonicDisturbance()))
+        for n in (8, 40)
+    ]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("part", "others"), OTHERS, ids=[part for part, _ in OTHERS])
+def test_runs_of_other_delays_march_beside_their_like(part: str, others: list[Any]) -> None:
+    """And of other periods of sensors, and other tables: whatever lanes share sorts them."""
+    base = replace(loop("pid"), actuator=Saturated(command=Command(delay=0.05)))
+    scattered_loops = scattered(base, 5) + scattered(base, 6)
+    loops = [
+        replace(one, **{part: others[i % len(others)]}) for i, one in enumerate(scattered_loops)
+    ]
+    together, alone = both(loops, replace(GRID, steps=60))
+    assert why_alone(loops[0], Observer()) == ""
+    same(together, alone)
 
 
 @kernel

@@ -41,7 +41,7 @@ from podusv_cli.findings import stability
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.theory.course import course
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
-from podusv_cli.theory.margins import Cut, _roots, delay_margin, margins
+from podusv_cli.theory.margins import Cut, _roots, delay_margin, margins, stable
 
 GRID = TimeGrid(0.01, 3000)
 
@@ -80,6 +80,21 @@ def test_an_unstable_plant_needs_its_gain():
     assert found.delay_margin == pytest.approx(math.pi / 3.0 / math.sqrt(3.0))
     assert found.peak_S == pytest.approx(1.0)
     assert found.peak_T == pytest.approx(2.0, rel=1e-4)  # at 0
+
+
+def test_of_several_gains_that_the_loop_needs_the_nearest_to_its_own_is_told():
+    """4 (s + 1)^6/s^7 crosses the negative real axis twice beyond -1."""
+    numerator, denominator = list(np.poly(-np.ones(6))), [1.0, *[0.0] * 7]
+
+    def loop(gain: float) -> Cut:
+        return fed_back(4.0 * gain, numerator, denominator)
+
+    # arg L = 6 atan(w) - 7 pi/2 is -pi at tan(5 pi/12), and -3 pi at tan(pi/12).
+    crossed = [math.tan(math.pi * n / 12.0) for n in (1.0, 5.0)]
+    gains = [w**7 / (4.0 * (1.0 + w * w) ** 3) for w in crossed]
+    assert gains[0] < gains[1] < 1.0
+    assert margins(loop(1.0)).gain_reduction == pytest.approx(gains[1], rel=1e-9)
+    assert [stable(loop(gains[1] * near).A) for near in (0.999, 1.001)] == [False, True]
 
 
 def test_a_sharp_resonance_is_found_with_its_peak_and_all_crossovers():

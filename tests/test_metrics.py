@@ -24,9 +24,10 @@ from podusv_cli.components.paths.legs import Legs
 from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import ScenarioError
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.metrics import consistency
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.distance import OF_OPTIMUM
 from podusv_cli.metrics.margins import OF_LOOP
@@ -122,6 +123,19 @@ def test_errors_of_the_estimate_follow_their_definitions(compiled):
     assert got["estimate_heading_rms"] == rms("psi")
     assert got["estimate_velocity_rms"] == rms("u", "v")
     assert got["estimate_yaw_rate_rms"] == rms("r")
+
+
+@pytest.mark.parametrize("turns", [-1, 0, 1, 2])
+def test_a_heading_is_as_consistent_a_turn_further(turns):
+    """The filter's heading and the hull's may differ by whole turns, from either side of south."""
+    error, variance = np.array([0.1, -0.2, 0.03, 0.04, -0.05, 0.06]), np.linspace(0.5, 1.0, 6)
+    state = np.array([1.0, 2.0, 3.1, 0.5, 0.1, 0.2])
+    estimate = state + error + 2.0 * math.pi * turns * (np.arange(6) == 2)
+    packed = np.diag(variance)[np.triu_indices(6)]
+    s, seen = np.concatenate([state, estimate, packed, np.zeros(12)]), np.zeros(consistency.SIZE)
+    k = bundle({"estimate": 6.0, "covariance": 6.0, "order": 6.0, "steady_from": 0.0})
+    consistency.watch(1.0, 1.0, s, k, seen)
+    assert seen[consistency.SQUARE] == pytest.approx(np.sum(error**2 / variance), rel=1e-9)
 
 
 @pytest.mark.parametrize("compiled", [True, False])
@@ -361,6 +375,18 @@ def test_a_further_radius_has_the_settling_time_of_that_radius(run):
     t, z_e = log["time"], log["z_e"]
     assert got["settling_time_far"] == pytest.approx(crossing(t, z_e, 9.0), rel=1e-12)
     assert math.isnan(got["settling_time_near"])  # the standoff is larger
+
+
+def test_a_window_ends_at_the_instant_that_rounds_beyond_it():
+    """35 steps of 0.01 s are 0.35000000000000003 s; the last instant belongs to the window."""
+    assert 35 * 0.01 > 0.35
+    windows = (("short", (0.35, 0.57)), ("early", (0.07, 0.35)))
+    log, got = windowed(steps=60, windows=windows)
+    for name, first, last in (("short", 35, 57), ("early", 7, 35)):
+        t, z_e = log["time"][first : last + 1], log["z_e"][first : last + 1]
+        rms = np.sqrt(np.trapezoid(z_e**2, t) / np.ptp(t))
+        assert got[f"error_{name}_rms"] == pytest.approx(rms, rel=1e-12)
+        assert got[f"error_{name}_max"] == z_e.max()
 
 
 def test_windows_are_the_same_in_machine_code_and_in_python():

@@ -11,6 +11,7 @@ from test_pod import pods
 from test_velocity_vector import SAMPLED
 
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers import momentum_adaptation as adaptation
 from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
 from podusv_cli.components.controllers.momentum_vector import MomentumVector, moment_for
 from podusv_cli.components.disturbances.calm import Calm
@@ -148,6 +149,20 @@ def test_a_hull_that_slides_more_than_told_is_learnt_and_comes_to_the_line():
     assert abs(learns["r"][learns["time"] > 250]).max() < 0.005
     assert 0.5 * MORE < learns["dP"][-1] < 1.1 * MORE
     assert last(learns, 50.0).max() < 0.05
+
+
+@pytest.mark.parametrize("more", [0.3, -0.3])
+def test_beyond_its_bound_it_learns_nothing_and_unlearns(more):
+    """By the gradient of the docstring, dP_hat' = -gamma phi e_v/(phi_0^2 + phi^2)."""
+    k = bundle(LAW.constants_with(NONLINEAR))
+    assert abs(more) > adaptation.MOST * k.U
+    memory, rate, x = np.zeros(20), np.zeros(20), np.zeros(6)
+    memory[adaptation.MORE], memory[adaptation.PHI] = more, 0.05
+    for x[4], stays in ((-more, True), (more, False)):  # e_v with either sign
+        gradient = -k.gamma * 0.05 * x[4] / (adaptation.PHI_0**2 + 0.05**2)
+        adaptation.adapt(x, memory, k, rate)
+        assert rate[adaptation.MORE] == (0.0 if stays else pytest.approx(gradient, rel=1e-12))
+        assert stays or gradient * more < 0.0
 
 
 def test_told_exactly_it_learns_nothing_under_constant_loads():

@@ -3,6 +3,9 @@
 import base64
 import json
 import re
+import shutil
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,6 +38,25 @@ def test_a_spike_survives_and_stands_at_its_time():
     time = (at // 2 + places[at] / 256) / traces.PIECES
     assert time == pytest.approx(20_000 / 31_001, abs=2 / 256 / traces.PIECES)
     assert np.isnan(kept).any(), "a gap longer than a piece stays one"
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="runs the page's script with Node.js")
+def test_the_page_puts_a_spike_at_its_time():
+    """By the script's own function, not by a second one in Python."""
+    numbers = np.zeros(31_001)
+    numbers[20_001] = 7.5
+    curve = traces.encoded(*traces.thinned(numbers))
+    template = Path(traces.__file__).parent / "templates" / "curves.js"
+    (function,) = re.findall(r"^  const decoded = .*?^  };$", template.read_text(), re.M | re.S)
+    script = f"""const chosen = {{ selectedIndex: 0 }};
+      {function}
+      const run = {{ start: 100.0, end: 410.0, curves: [{json.dumps(curve)}] }};
+      console.log(curve(run).find((point) => point.y === 7.5).t);"""
+    found = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
+    piece = 310.0 / traces.PIECES
+    assert float(found.stdout) == pytest.approx(
+        100.0 + 310.0 * 20_001 / 31_001, abs=2 / 256 * piece
+    )
 
 
 def test_a_short_signal_is_whole_and_evenly_spaced():

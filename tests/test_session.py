@@ -126,6 +126,21 @@ def test_a_place_keeps_the_log_that_led_to_it():
         opened("podusv:own_vessel.yaml", 2.0).restore(place)
 
 
+@pytest.mark.parametrize("count", [4, 6, 7])
+def test_a_place_has_the_last_row_that_was_logged(count):
+    """One row in three periods, and a place within these three; an earlier place comes between."""
+    session = opened("podusv:own_vessel.yaml", 2.0, **{"log.every": 30, "simulation.step": 0.01})
+    begin = session.state()
+    steered(session, count)
+    place, log = session.state(), session.log
+    session.restore(begin)
+    for _ in range(count):
+        session.step((-50.0, 1.0))
+    session.restore(place)
+    for signal, values in session.log.items():
+        np.testing.assert_array_equal(values, log[signal], signal)
+
+
 def test_the_run_of_a_session_is_as_long_as_the_session():
     """Where the last demand is cut short, and where no instant but the first is logged."""
     session = opened("podusv:own_vessel.yaml", 0.25)

@@ -81,3 +81,9 @@ def standard_normal(u: Vector) -> Vector:
     tail = np.where(r <= 5.0, _ratio(r - 1.6, TAIL), _ratio(r - 5.0, FAR_TAIL))
     z[out] = np.copysign(tail, q[out])
     return z
+
+
+def by_lines(at: Vector, x: Vector, y: Vector) -> Vector:
+    """y at each of `at`, between the points (x, y) and beyond the first and last two by lines."""
+    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+    return np.asarray(y[i] + (at - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.portable import exponential, logarithm
+from podusv_cli.core.portable import by_lines, exponential, logarithm
 
 
 class Curve(NamedTuple):
@@ -43,6 +43,4 @@ def reflected(curve: Curve, size: Vector) -> Vector:
     Between two points a power law; below the first that of the first two; above the last its share.
     """
     x, y = logarithm(np.array(curve.size)), logarithm(np.array(curve.share))
-    at = np.minimum(logarithm(size), x[-1])
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
-    return exponential(y[i] + (at - x[i]) / (x[i + 1] - x[i]) * (y[i + 1] - y[i]))
+    return exponential(by_lines(np.minimum(logarithm(size), x[-1]), x, y))

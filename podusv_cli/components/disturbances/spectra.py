@@ -16,7 +16,7 @@ import numpy as np
 
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import LANES, Vector, kernel
-from podusv_cli.core.portable import exponential, logarithm
+from podusv_cli.core.portable import by_lines, exponential, logarithm
 from podusv_cli.core.random_words import uniforms
 
 GRAVITY = 9.81  # m/s2
@@ -175,14 +175,7 @@ def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
     square, found = rate * rate, density(rate)
     sums = (np.cumsum(part) for part in (found, found * square, found * square * square))
     shares = np.concatenate([[0.0], sum(each / each[-1] for each in sums) / 3.0])
-    return inverse(shares, fine, np.linspace(0.0, 1.0, count + 1))
-
-
-def inverse(shares: Vector, values: Vector, wanted: Vector) -> Vector:
-    """Where the shares, from 0 to 1, reach the wanted ones, between the values by lines."""
-    i = np.clip(np.searchsorted(shares, wanted, side="right") - 1, 0, len(shares) - 2)
-    part = (wanted - shares[i]) / (shares[i + 1] - shares[i])
-    return np.asarray(values[i] + part * (values[i + 1] - values[i]))
+    return by_lines(np.linspace(0.0, 1.0, count + 1), shares, fine)
 
 
 def growing_edges(low: float, high: float, count: int) -> Vector:
@@ -213,7 +206,7 @@ def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
         return np.zeros(count)
     angles = math.pi * (SHARES - 0.5)
     shares = _shares(spreading)
-    return inverse(shares, angles, uniforms((seed, stream, "direction"), 0, count))
+    return by_lines(uniforms((seed, stream, "direction"), 0, count), shares, angles)
 
 
 @cache
