@@ -23,7 +23,7 @@ MISTAKES = {
     "failures(pdi) <= 0.1": "unknown law 'pdi'; did you mean 'pid'?",
     "failures(pid.iae) <= 0.1": "failures takes the name of one law",
     "failures(pid) <= 5": "is a share between 0 and 1, and cannot be compared with 5",
-    "failures(pid) < failures(li)": "compare a statistic with a number",
+    "failures(pid) < median(li.iae)": "two shares with each other: failures(a) < failures(b)",
     "median(pid.iae) < median(li.iae)": "median(a.iae / b.iae)",
     "proposed.iae < pid.iae": "compare a statistic with a number",
     "proposed.iae < 3": "no statistic of all draws; write one of share",

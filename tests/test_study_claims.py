@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from scipy.special import bdtr
+from scipy.stats import binomtest
 from study_samples import Made, claim, judged, study
 
 from podusv_cli.expressions.verdict import as_markdown
@@ -52,6 +53,50 @@ def test_every_statistic_is_what_its_definition_says() -> None:
         (part,) = judged(runs, f"{text} >= 0.5").parts
         assert (part.estimate, part.low, part.high) == pytest.approx(tuple(expected)), text
         assert part.n == 6
+
+
+def test_two_shares_are_compared_by_the_draws_in_which_they_differ() -> None:
+    """McNemar's exact test: of 6 + 21 draws with one failure, 6 are a's; scipy has the p-value."""
+    a, b = np.ones(300), np.ones(300)
+    a[:6], b[6:27] = inf, inf
+    a[27:60] = b[27:60] = inf
+    verdict = judged(study(a=a, b=b), "failures(a) < failures(b)")
+    assert verdict.answer is True
+    (part,) = verdict.parts
+    assert (part.n, part.differ, part.estimate) == (300, 27, pytest.approx(6 / 27))
+    assert "failures(a) alone, not failures(b) = 0.2222 [" in part.in_words()
+    assert "(300 draws, one of both alone in 27)" in part.in_words()
+    p = binomtest(6, 27).pvalue
+    for level in (0.9, 0.95, 0.99, 0.995, 0.999):
+        answer = judged(study(a=a, b=b), "failures(a) < failures(b)", level=level).answer
+        assert answer is (True if p < 1.0 - level else None), level
+    both = judged(study(a=a, b=b), "failures(b) > failures(a)", "failures(a) > failures(b)")
+    assert [one.answer for one in both] == [True, False]
+
+
+def test_independent_intervals_would_not_tell_what_paired_draws_tell() -> None:
+    a, b = np.ones(300), np.ones(300)
+    a[:60] = b[:60] = b[60:72] = inf  # b fails wherever a does, and in 12 draws more
+    runs = study(a=a, b=b)
+    assert judged(runs, "failures(a) < 0.22 and failures(b) > 0.22").answer is None
+    assert judged(runs, "share(not success(a)) < share(not success(b))").answer is True
+
+
+def test_shares_that_never_differ_cannot_be_told_apart() -> None:
+    runs = study(a=[1.0, inf, 2.0], b=[3.0, inf, 4.0])
+    verdict = judged(runs, "failures(a) < failures(b)")
+    assert verdict.answer is None
+    assert verdict.more is None
+
+
+def test_two_shares_are_seldom_told_apart_wrongly() -> None:
+    """Equal shares, failing together or not: in at most 5 % of studies there is an answer."""
+    random, wrong = np.random.default_rng(8), 0
+    for _ in range(STUDIES // 4):
+        hard, own = random.random(80) < 0.2, random.random((2, 80)) < 0.15
+        a, b = (np.where(hard | one, inf, 1.0) for one in own)
+        wrong += judged(study(a=a, b=b), "failures(a) < failures(b)").answer is not None
+    assert wrong / (STUDIES // 4) <= 0.05 + 0.02
 
 
 def test_a_share_shows_draws_without_a_winner() -> None:

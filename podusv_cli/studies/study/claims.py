@@ -4,6 +4,7 @@
     failures(adaptive_neural) <= 0.01 and not failures(pid) <= 0.01
     quantile(adaptive_neural.z_e_steady, 0.99) <= 0.6
     median(adaptive_neural.iae / full_backstepping.iae) <= 1.0
+    failures(adaptive_neural) < failures(pid)
 
 docs/study_claims.md describes the language.
 """
@@ -27,7 +28,7 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.sweep import StudyClaim
 from podusv_cli.studies.study.expressions import OverLaws
 from podusv_cli.studies.study.runs import Mask, StudyRuns
-from podusv_cli.studies.study.samples import FAILURES, SHARE, STATISTICS, Sample
+from podusv_cli.studies.study.samples import ALONE, FAILURES, SAMPLERS, SHARE, STATISTICS, Sample
 from podusv_cli.studies.study.statistics import holm
 from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
 
@@ -36,6 +37,11 @@ EXAMPLE = "share(a.iae < b.iae) >= 0.95"
 MIRRORED: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE,
 }  # fmt: skip
+SHARES = {SHARE, FAILURES}
+COMPARED = (
+    "compare a statistic with a number, or two shares with each other: failures(a) < failures(b); "
+    "for two laws, write share(a.iae < b.iae) or median(a.iae / b.iae) on the left"
+)
 Samples = list[Sample]  # of a statistic, one for each cell
 
 
@@ -168,7 +174,7 @@ class _Evaluation(Logic):
     def _sampled(self, call: ast.Call) -> Samples:
         """The statistic's samples, from the draws that all of its laws have been through."""
         walk = OverLaws(self.metrics, self.tolerance, runs=self.runs)
-        sample = STATISTICS[function(call)](call, walk)
+        sample = SAMPLERS[function(call)](call, walk)
         if not walk.names:
             refuse(call, "names no law; write law.metric, as in a.iae")
         self.laws += walk.names
@@ -194,19 +200,25 @@ def _compared(node: ast.Compare) -> Iterator[Link]:
     sides = [node.left, *node.comparators]
     for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
         calls = [side for side in (left, right) if not _is_number(side)]
-        if len(calls) != 1:
-            refuse(
-                node,
-                "compare a statistic with a number; for two laws, write share(a.iae < b.iae) or "
-                "median(a.iae / b.iae) on the left",
-            )
-        first = calls[0] is left
-        call, bound = _statistic(calls[0]), number(right if first else left)
+        if {_name(side) for side in calls} <= SHARES and len(calls) == 2:
+            text = f"{ast.unparse(left)} alone, not {ast.unparse(right)}"
+            toward, bound, call = sign, 0.5, ast.Call(ast.Name(ALONE), calls, [])
+        elif len(calls) == 1:
+            first = calls[0] is left
+            call, bound = _statistic(calls[0]), number(right if first else left)
+            text = ast.unparse(call)
+            toward = sign if first else MIRRORED.get(type(sign), type(sign))()
+        else:
+            refuse(node, COMPARED)
         if type(sign) not in SIGNS:
             refuse(node, "compare with <, <=, >, >=")
         _checked(call, bound)
-        toward = sign if first else MIRRORED[type(sign)]()
-        yield Link(ast.unparse(call), call, toward, bound)
+        yield Link(text, ast.copy_location(call, node), toward, bound)
+
+
+def _name(node: ast.expr) -> str:
+    """Of a function that is called; "" where none is."""
+    return function(node) if isinstance(node, ast.Call) else ""
 
 
 def _is_number(node: ast.expr) -> bool:
@@ -222,7 +234,7 @@ def _statistic(node: ast.expr) -> ast.Call:
 
 def _checked(call: ast.Call, bound: float) -> None:
     """Refuse a bound that no share can have, or that only a percentage could."""
-    if function(call) in (SHARE, FAILURES) and not 0.0 <= bound <= 1.0:
+    if function(call) in SHARES and not 0.0 <= bound <= 1.0:
         refuse(call, f"is a share between 0 and 1, and cannot be compared with {bound:g}")
 
 

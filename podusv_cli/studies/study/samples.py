@@ -14,6 +14,7 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS
 from podusv_cli.expressions.reading import function, number, refuse
+from podusv_cli.expressions.walk import Condition
 from podusv_cli.studies.study import statistics
 from podusv_cli.studies.study.expressions import OverLaws
 from podusv_cli.studies.study.runs import Mask
@@ -25,7 +26,8 @@ class Sample(ABC):
     """The draws of one cell: how many, and in how many of them a number is unknown.
 
     In a share's comparisons of two laws, `both_failed` and `close` count the draws in which both
-    failed, and those in which they differ by no more than the margin.
+    failed, and those in which they differ by no more than the margin. Of two shares, `differ`
+    counts the draws in which one of both conditions holds alone.
     """
 
     cell: str
@@ -33,6 +35,7 @@ class Sample(ABC):
     unknown: int
     both_failed: int = field(default=0, kw_only=True)
     close: int = field(default=0, kw_only=True)
+    differ: int = field(default=0, kw_only=True)
     has_margin: ClassVar[bool]  # of the bound that the statistic is compared with
 
     @abstractmethod
@@ -69,6 +72,32 @@ class Share(Sample):
 
 
 @dataclass(frozen=True)
+class Alone(Sample):
+    """Two conditions in the same draws: the first alone, of the draws in which one is alone.
+
+    Below one half where the first has the smaller share. Under equal shares the number is
+    binomial, which makes McNemar's test exact (McNemar 1947; Agresti, "Categorical Data
+    Analysis", section 10.1).
+    """
+
+    first: int
+    has_margin = False
+
+    def interval(self, level: float) -> Interval:
+        """Clopper and Pearson's."""
+        if not self.differ + self.unknown:
+            return Interval(math.nan, 0.0, 1.0)
+        return statistics.share(self.first, self.differ + self.unknown, level, self.unknown)
+
+    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+        """As if the shares of draws with one alone stayed as they are."""
+        if not self.differ:
+            return None
+        more = statistics.needed(self.first / self.differ, bound, level)
+        return more and math.ceil(more * self.n / self.differ)
+
+
+@dataclass(frozen=True)
 class Quantile(Sample):
     """A quantile of one value for each draw."""
 
@@ -92,12 +121,20 @@ class Quantile(Sample):
 
 
 SHARE, FAILURES, QUANTILE, MEDIAN = "share", "failures", "quantile", "median"
+ALONE = "alone"  # of two shares; `claims` writes it for a comparison of them
 # Statistics: from the call and a walk over runs to the sample of a cell, among its used draws.
 Sampler = Callable[[str, int, Mask], Sample]
 
 
+def _condition(call: ast.Call, walk: OverLaws) -> Condition:
+    """What a share is of."""
+    if function(call) == FAILURES:
+        return Condition.known(~walk.runs.success(walk.only(call)))
+    return walk.condition(_arguments(call, 1, "one condition, as in share(a.iae < b.iae)")[0])
+
+
 def _share(call: ast.Call, walk: OverLaws) -> Sampler:
-    held = walk.condition(_arguments(call, 1, "one condition, as in share(a.iae < b.iae)")[0])
+    held = _condition(call, walk)
 
     def sample(label: str, cell: int, used: Mask) -> Share:
         def count(where: Mask) -> int:
@@ -111,11 +148,18 @@ def _share(call: ast.Call, walk: OverLaws) -> Sampler:
     return sample
 
 
-def _failures(call: ast.Call, walk: OverLaws) -> Sampler:
-    failed = ~walk.runs.success(walk.only(call))
-    return lambda label, cell, used: Share(
-        label, int(used.sum()), 0, int(np.sum(failed[cell] & used))
-    )
+def _alone(call: ast.Call, walk: OverLaws) -> Sampler:
+    first, second = (_condition(share, walk) for share in call.args if isinstance(share, ast.Call))
+
+    def sample(label: str, cell: int, used: Mask) -> Alone:
+        def count(where: Mask) -> int:
+            return int(np.sum(where[cell] & used))
+
+        told = (first.yes | first.no) & (second.yes | second.no)
+        alone, other = count(first.yes & second.no), count(first.no & second.yes)
+        return Alone(label, int(used.sum()), count(~told), alone, differ=alone + other)
+
+    return sample
 
 
 def _quantile(call: ast.Call, walk: OverLaws) -> Sampler:
@@ -162,5 +206,6 @@ def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
 
 
 STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
-    SHARE: _share, FAILURES: _failures, QUANTILE: _quantile, MEDIAN: _quantile,
+    SHARE: _share, FAILURES: _share, QUANTILE: _quantile, MEDIAN: _quantile,
 }  # fmt: skip
+SAMPLERS = STATISTICS | {ALONE: _alone}

@@ -16,7 +16,8 @@ from podusv_cli.studies.study.statistics import Interval
 class Statistic:
     """A statistic of a claim in one cell, with its interval at this level.
 
-    `unknown` draws lack a number. `both_failed` and `close` are draws without a winner.
+    `unknown` draws lack a number. `both_failed` and `close` are draws without a winner. In `differ`
+    draws one of two conditions holds alone.
     """
 
     statistic: str
@@ -29,6 +30,7 @@ class Statistic:
     unknown: int
     both_failed: int
     close: int
+    differ: int
 
     @classmethod
     def of(cls, statistic: str, sample: Sample, level: float) -> Self:
@@ -36,7 +38,7 @@ class Statistic:
         estimate, low, high = map(float, sample.interval(level))
         return cls(
             statistic, sample.cell, sample.n, estimate, low, high, level,
-            sample.unknown, sample.both_failed, sample.close,
+            sample.unknown, sample.both_failed, sample.close, sample.differ,
         )  # fmt: skip
 
     def in_words(self) -> str:
@@ -45,6 +47,7 @@ class Statistic:
         counts = [f"{self.n} draws" if self.n else "no draw"]
         counts += [f"both failed in {self.both_failed}"] if self.both_failed else []
         counts += [f"{self.close} within the margin"] if self.close else []
+        counts += [f"one of both alone in {self.differ}"] if self.differ else []
         counts += [f"a number is missing in {self.unknown}"] if self.unknown else []
         interval = Interval(self.estimate, self.low, self.high)
         return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
