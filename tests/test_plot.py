@@ -1,7 +1,5 @@
 """`podusv plot`: what it draws, what it refuses, what it says."""
 
-import hashlib
-import json
 import os
 import subprocess
 import sys
@@ -9,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_samples import no_figures_but, recording, scenario, shown
-from PIL import Image
+from drawn_samples import no_figures_but, recording, scenario
 from storage_samples import log as encode
 
 from podusv_cli import __version__
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures import animation, card
+from podusv_cli.figures import animation
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.figures.style import Look, house_style, image
+from podusv_cli.figures.style import Look, house_style
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import run_folder
 from podusv_cli.workflows import plot as plotting
@@ -314,55 +311,3 @@ def test_the_style_of_a_paper_has_serif_type_of_eight_points(one, tmp_path, monk
 def test_a_size_or_style_that_there_is_not_is_refused(size, style, told):
     with pytest.raises(UsageError, match=told):
         plotting.look_of(2, size, style)
-
-
-# --- a card to share
-
-
-def test_a_card_is_one_picture_of_1200_by_630(one, other, tmp_path):
-    drawn = plot(one, other, out=tmp_path, figures=(), carded=True)
-    assert [path.name for path in drawn.files] == ["card.png"]
-    assert Image.open(drawn.files[0]).size == (1200, 630)
-    assert plot(one, other, out=tmp_path, figures=("velocities",), carded=True).files == [
-        tmp_path / "velocities.svg", tmp_path / "card.png",
-    ]  # fmt: skip
-
-
-def test_a_card_says_the_first_claim_that_was_decided_with_seed_and_digest(place, one, tmp_path):
-    plan = scenario("waves").model_copy(update={"description": "In waves."})
-    folder = keep(place / "decided", pid(), plan)
-    claims = [
-        {"says": "A.", "source": "ours", "verdict": "cannot tell", "numbers": {}},
-        {
-            "says": "B.", "source": "ours", "verdict": "reproduced",
-            "numbers": {"pid.iae": 2.0, "pid.delay_margin": None},
-        },
-    ]  # fmt: skip
-    (tmp_path / "claims.json").write_text(json.dumps({"format": 1, "claims": claims}))
-    (member,) = plotting.from_folder(folder)
-    words = plotting._words([tmp_path], [member])
-    assert (words.claim, words.verdict, words.numbers) == ("B.", "holds", "pid.iae = 2")
-    assert words.title == member.scenario.description
-    digest = hashlib.sha256(resolved_yaml(member.scenario).encode()).hexdigest()[:8]
-    assert words.origin.endswith(f"seed none (nothing is random), scenario {digest}")
-    assert not plotting._words([one], [member]).claim
-
-
-def test_long_words_stay_on_the_card(two_shown):
-    words = card.Words("title " * 60, "claim " * 90, "reproduced", "number " * 90, "origin " * 90)
-    with house_style():
-        figure = card.figure(two_shown, words)
-        image(figure, "png")
-        written = [text.get_text().partition(" ")[0] for text in figure.texts]
-        assert written == ["title", "origin", "number", "claim", "reproduced:"]
-        for text in figure.texts:
-            box = text.get_window_extent()
-            assert box.x0 >= 0.0
-            assert box.x1 <= figure.bbox.x1
-            assert box.y1 <= figure.bbox.y1
-            assert not any(box.padded(-1).overlaps(axes.bbox) for axes in figure.axes)
-
-
-@pytest.fixture
-def two_shown():
-    return shown(("a", recording()), ("b", recording(shift=0.7)))

@@ -48,9 +48,6 @@ def plot(
         bool,
         typer.Option("--animate", help="The chase as a film as well: MP4, GIF without ffmpeg."),
     ] = False,
-    card: Annotated[
-        bool, typer.Option("--card", help="A picture of 1200 x 630; figures only with --figure.")
-    ] = False,
     out: Annotated[
         Path, typer.Option(help="Folder for the figures; replaces those of the same name there.")
     ] = Path("figures"),
@@ -72,7 +69,6 @@ def plot(
         label or (),
         workflow.look_of(columns, size, style),
         animate,
-        card,
     )
     drawn = workflow.plot([Path(run) for run in runs], request, choice)
     for path in drawn.files:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import re
@@ -16,29 +15,24 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli import __version__
 from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.recording import Recording
-from podusv_cli.expressions.verdict import ANSWERS, is_published, words
-from podusv_cli.figures import card, panels
+from podusv_cli.figures import panels
 from podusv_cli.figures.animation import animate, file_name
 from podusv_cli.figures.drawing import SCREEN, check_names, draw_in_parallel, figures_of
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown, dressed
 from podusv_cli.figures.style import STYLES, Look
-from podusv_cli.pages.page import flat
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import recorded
-from podusv_cli.storage import files, json_files, manifest
+from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
 from podusv_cli.workflows.run import Request
 
 NARROW = 5.0  # inches; narrower figures have their panels in one column
-CLAIMS = "claims.json"
 LARGEST = 40.0  # inches, of a figure
 STAMP = re.compile(r"\d{8}T\d{6}Z-[0-9a-f]{8}(-\d+)?")  # a run folder that nobody named
 
@@ -67,7 +61,6 @@ class Choice:
     labels: Sequence[str] = ()
     look: Look = SCREEN
     animated: bool = False
-    carded: bool = False
 
 
 def look_of(columns: int, size: str, style: str) -> Look:
@@ -106,50 +99,21 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
         raise UsageError(
             f"no run has two instants from {choice.since:g} to {choice.until:g} s ({ends})"
         )
-    alone = choice.carded and not (request.names or choice.signals)
-    sheets = [] if alone else _chosen(request.names, known, shown, choice.signals)
+    sheets = _chosen(request.names, known, shown, choice.signals)
     planned = [f"{sheet.name}.{form}" for sheet in sheets for form in request.formats]
     film = file_name()
-    planned += [film] * choice.animated + [card.FILE] * choice.carded
+    planned += [film] * choice.animated
     _check_not_finished(out, planned)
     files.check_places(out / name for name in planned)
     extras = Extras()
     drawn = draw_in_parallel(shown, sheets, request.formats, extras, choice.look)
     if choice.animated:
         drawn |= extras.attempt(film, lambda: {film: animate(shown, film)}) or {}
-    if choice.carded:
-        words = _words(runs, members)
-        drawn |= extras.attempt(card.FILE, lambda: {card.FILE: card.card(shown, words)}) or {}
     if extras.interrupted:
         raise KeyboardInterrupt("interrupted; no figure was written")
     replaced = _put(out, drawn)
     differing = differences({m.label: m.scenario.model_dump() for m in members})
     return Drawn([out / n for n in drawn], replaced, empty, extras.missing, differing)
-
-
-def _words(folders: Sequence[Path], members: Sequence[Member]) -> card.Words:
-    """What a card says of these runs: the first claim of their comparison that was decided."""
-    scenario = members[0].scenario
-    text = "".join(resolved_yaml(member.scenario) for member in members)
-    seeds = {
-        f"{value}" for member in members for key, value in flat(member.scenario.model_dump())
-        if key.rpartition(".")[2] == "seed"
-    }  # fmt: skip
-    origin = (
-        f"podusv {__version__}, seed {', '.join(sorted(seeds)) or 'none (nothing is random)'}, "
-        f"scenario {hashlib.sha256(text.encode()).hexdigest()[:8]}"
-    )
-    places = [folder / CLAIMS for folder in folders if (folder / CLAIMS).is_file()]
-    judged = [claim for place in places for claim in json_files.read(place).get("claims", ())]
-    decided = [claim for claim in judged if claim.get("verdict") != ANSWERS[None]]
-    title = scenario.description or scenario.name
-    if not decided:
-        return card.Words(title, origin=origin)
-    claim = decided[0]
-    known = {name: value for name, value in claim["numbers"].items() if value is not None}
-    told = ", ".join(f"{name} = {value:.4g}" for name, value in known.items())
-    answer = words(claim["verdict"] == ANSWERS[True], published=is_published(claim["source"]))
-    return card.Words(title, claim["says"], answer, told, origin)
 
 
 def _named(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
