@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -16,6 +17,7 @@ from law_samples import STEADY
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+import podusv
 from podusv_cli.comparison import table
 from podusv_cli.components.actuators.command import Command
 from podusv_cli.components.actuators.ideal import Ideal
@@ -35,10 +37,11 @@ from podusv_cli.core.component import value
 from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import LOADS, ClosedLoop
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.findings import stability
 from podusv_cli.metrics.margins import OF_LOOP
+from podusv_cli.theory import steady
 from podusv_cli.theory.course import course
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
 from podusv_cli.theory.margins import Cut, _roots, delay_margin, margins, stable
@@ -354,8 +357,32 @@ def test_the_last_straight_line_is_taken_before_any_circle():
 
 def test_a_law_that_does_not_settle_has_no_margins():
     weak = calm(VelocityVector(), actuator=Saturated(surge_limit=0.01, yaw_limit=2.5))
-    with pytest.raises(NotConvergedError, match=r"no steady motion was found .* m from the target"):
+    with pytest.raises(
+        NotConvergedError, match=r"no steady motion was found: .* m from the target"
+    ):
         loop_margins(weak, TimeGrid(0.01, 1000))
+
+
+def test_a_law_that_stays_near_and_never_rests_is_told_with_its_distance(monkeypatch):
+    """The network never rests with the load held; a plain run says how far off it is meanwhile."""
+    monkeypatch.setattr(steady, "MOST_EVALUATIONS", 3000)
+    law = podusv.load("podusv:laws/learned.yaml").singles()["policy"]
+    with pytest.raises(NotConvergedError, match="no steady motion was found") as told:
+        loop_margins(law.closed_loop(), law.time_grid())
+    form = r"is (\S+) m .* t = (\S+) s, and (\S+) m to (\S+) m when it goes on for (\S+) s"
+    there, time, near, far, seconds = map(float, re.search(form, str(told.value)).groups())
+    run = podusv.simulate(law, {"simulation.duration": time}).recording
+    assert there == pytest.approx(run["z_e"][-1], rel=6e-3)  # three digits are told
+    held = {
+        "start": {name: float(run[name][-1]) for name in ("x", "y", "psi", "u", "v", "r")},
+        "path": {"kind": "line", "x": float(run["x_d"][-1])},
+        "disturbance": {"kind": "step", **{b: float(run[b][-1]) for b in LOADS[3:]}},
+        "simulation.duration": math.ceil(seconds),
+    }  # fmt: skip
+    left = podusv.simulate(law, held).recording
+    late = left["z_e"][(left["time"] >= seconds / 2) & (left["time"] <= seconds)]
+    assert (near, far) == (pytest.approx(late.min(), rel=0.02), pytest.approx(late.max(), rel=0.02))
+    assert far < 0.06
 
 
 def test_a_corner_at_the_steady_motion_has_no_derivative():

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -144,6 +145,18 @@ def _inputs(loop: ClosedLoop, states: int) -> Vector:
     return rates
 
 
+class _Left(NamedTuple):
+    """Where the vessel is that was left to settle for some seconds.
+
+    In the later half of them its distance to the target was between `nearest` and `farthest` [m].
+    """
+
+    q: Vector
+    seconds: float
+    nearest: float
+    farthest: float
+
+
 class _Frame:
     """The loop as a target sees it that moves on a course, its load held."""
 
@@ -190,20 +203,24 @@ class _Frame:
             raise ArithmeticError("a rate is not finite")
         return row
 
-    def settled(self, q: Vector) -> Vector:
-        """Where the vessel is once it was left to settle, or as far as it came."""
+    def settled(self, q: Vector) -> _Left:
+        """The vessel once it was left to settle, or as far as it came."""
         from scipy.integrate import BDF  # slow to import
 
         solver = BDF(
             lambda _, q: self.row(q)[: len(q)], 0.0, q, SETTLING, rtol=1e-6, atol=1e-9,
             jac=lambda _, q: self._central(q, STEPS[0])[: len(q)],
         )  # fmt: skip
+        way = [(0.0, math.hypot(*q[:2]))]
         while solver.status == "running" and solver.nfev < MOST_EVALUATIONS:
             solver.step()
-        return np.asarray(solver.y)
+            way.append((solver.t, math.hypot(*solver.y[:2])))
+        late = [distance for t, distance in way if t >= 0.5 * solver.t]
+        return _Left(np.asarray(solver.y), solver.t, min(late), max(late))
 
-    def steady(self, q: Vector) -> Vector:
-        """The q near this one that does not change, by Newton's method."""
+    def steady(self, left: _Left) -> Vector:
+        """The q near that of the settled vessel which does not change, by Newton's method."""
+        q = left.q
         for _ in range(ROUNDS):
             rates, slopes = self.row(q)[: len(q)], self._central(q, STEPS[1])[: len(q)]
             size = _size(q)
@@ -216,14 +233,16 @@ class _Frame:
             still = abs(rates) <= 1e-6 * heights + ROUNDED * most
             if (abs(move) <= SETTLED * size).all() and still.all():
                 return q
-        raise NotConvergedError(self._restless(q))
+        raise NotConvergedError(self._restless(left))
 
-    def _restless(self, q: Vector) -> str:
-        pace = abs(self.row(q)[: len(q)]) / _size(q)
+    def _restless(self, left: _Left) -> str:
+        pace = abs(self.row(left.q)[: len(left.q)]) / _size(left.q)
         return (
-            f"no steady motion was found from t = {self.course.time:g} s on: the vessel is "
-            f"{math.hypot(*q[:2]):.3g} m from the target, and {self.labels[1 + pace.argmax()]} "
-            f"changes most; {WHAT_IT_TAKES}"
+            f"no steady motion was found: the run is {math.hypot(*self.start[:2]):.3g} m from the "
+            f"target at t = {self.course.time:g} s, and {left.nearest:.3g} m to "
+            f"{left.farthest:.3g} m when it goes on for {left.seconds:.3g} s with the load of that "
+            f"time; {self.labels[1 + pace.argmax()]} changes most there, and Newton's method finds "
+            f"no state that stays; {WHAT_IT_TAKES}"
         )
 
     def _central(self, q: Vector, relative: float) -> Vector:
