@@ -20,17 +20,19 @@ from typing import Any
 import cortex_m7
 import numpy as np
 import pytest
-from command_samples import ROOT
+from command_samples import ROOT, one_line
 from conftest import REQUIRED
 
 import podusv
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core import registry
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.export import c, link, objects
+from podusv_cli.export import check as checking
 from podusv_cli.export.check import check
 from podusv_cli.export.fmu import variables
 from podusv_cli.export.law import ExportedLaw
+from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
 SOURCE = "podusv:mu_2017/corrected.yaml"
@@ -173,7 +175,10 @@ def test_the_c_files_have_the_bits_of_the_run_and_tell_where_they_have_not(tmp_p
     cells = first.split(",")
     cells[place] = repr(float(np.nextafter(float(cells[place]), 1e9)))
     samples.write_text("\n".join([names, ",".join(cells), *rest]) + "\n")
-    said = podusv("export", "--check", str(folder))
+    said = podusv("export", "--check", "--trust", str(folder))
+    assert (said.code, "check.csv was altered" in said.err) == (5, True)
+    manifest.write(folder, "finished")
+    said = podusv("export", "--check", "--trust", str(folder))
     assert said.code == 3
     assert re.match(r"library: t = 0 s: tau_u_cmd is .*, and is .* in check\.csv\n", said.out)
 
@@ -415,11 +420,9 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     with pytest.raises(UsageError, match=r"is no exported law: it has no law\.json"):
         check(tmp_path)
     (tmp_path / "law.json").write_text("{}")
-    with pytest.raises(UsageError, match=r"check\.csv is not the table .* law\.json describes"):
+    with pytest.raises(UsageError, match=r"is no exported law: it has no manifest\.json"):
         check(tmp_path)
-    parts = dict.fromkeys(("inputs", "demand", "signals", "memory"), ())
-    (tmp_path / "law.json").write_text(json.dumps(parts))
-    (tmp_path / "check.csv").write_text("time\n0.0\n")
+    described(tmp_path, "0\n")
     with pytest.raises(UsageError, match=r"exported with --no-c, and FMPy.*podusv\[export\]"):
         check(tmp_path)
     monkeypatch.setattr(workflow, "this_machine", lambda: "")
@@ -440,13 +443,87 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     assert said == []  # before anything is computed
 
 
-@pytest.mark.parametrize("table", ["", "time\n", "time\nzero\n", "time\n0\n0,1\n", "time,x\n0,1\n"])
-def test_a_table_that_is_not_the_one_described_gets_a_sentence(tmp_path, table):
-    parts = dict.fromkeys(("inputs", "demand", "signals", "memory"), ())
-    (tmp_path / "law.json").write_text(json.dumps(parts))
-    (tmp_path / "check.csv").write_text(table)
+ABOUT = {
+    "inputs": [{"name": f"i{i}"} for i in range(15)], "demand": [{"name": "u"}, {"name": "r"}],
+    "signals": [], "memory": [], "period": 0.1, "platforms": [], "of_run": True,
+}  # fmt: skip
+HEAD = ",".join(["time", *(one["name"] for one in ABOUT["inputs"] + ABOUT["demand"])])
+
+
+def described(folder: Path, rows: str, **changes: Any) -> None:
+    """An exported law without code: law.json, a table with these rows, and a manifest of both."""
+    (folder / "law.json").write_text(json.dumps({**ABOUT, **changes}))
+    (folder / "check.csv").write_text(f"{HEAD}\n" + rows.replace("0", ",".join("0" * 18)))
+    manifest.write(folder, "finished")
+
+
+@pytest.mark.parametrize("rows", ["", "zero\n", "0\n0,1\n", "0,1\n"])
+def test_a_table_that_is_not_the_one_described_gets_a_sentence(tmp_path, rows):
+    described(tmp_path, rows)
     with pytest.raises(UsageError, match=r"export the law again"):
         check(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"inputs": 3}, {"inputs": ABOUT["inputs"][1:]}, {"demand": None}, {"signals": ["e_ct"]},
+        {"memory": {"a": 1}}, {"period": "0.1"}, {"period": -1.0}, {"platforms": "linux64"},
+        {"of_run": 1},
+    ],
+)  # fmt: skip
+def test_a_law_json_of_other_types_gets_a_sentence(tmp_path, changes):
+    described(tmp_path, "0\n", **changes)
+    (key,) = changes
+    with pytest.raises(StorageError, match=rf"law\.json: damaged, .* \({key}"):
+        check(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    """An exported law; tests copy it."""
+    return exported(tmp_path_factory.mktemp("sound") / "law")
+
+
+DAMAGES = {
+    "removed": lambda path: path.unlink(),
+    "emptied": lambda path: path.write_bytes(b""),
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+    "flipped": lambda path: path.write_bytes(path.read_bytes()[:-9] + b"#" * 9),
+    "a folder": lambda path: (path.unlink(), path.mkdir()),
+}
+FILES = ("law.json", "check.csv", "law.c", "law.h", "{}/law.o", "provenance.json", "manifest.json")
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("file", FILES)
+def test_of_a_damaged_folder_nothing_is_compiled_and_a_sentence_says_why(
+    sound, tmp_path, podusv, monkeypatch, file, damage
+):
+    folder = tmp_path / "law"
+    shutil.copytree(sound, folder)
+    DAMAGES[damage](folder / file.format(link.this_machine()))
+    monkeypatch.setattr(checking, "shared_library", lambda *given: pytest.fail("it was compiled"))
+    said = podusv("export", "--check", "--trust", folder)
+    assert said.code in (2, 5)
+    assert one_line(said.err)
+
+
+def test_code_that_a_folder_brings_along_is_run_with_trust_alone(
+    sound, tmp_path, podusv, monkeypatch
+):
+    monkeypatch.setattr(checking, "shared_library", lambda *given: pytest.fail("it was compiled"))
+    said = podusv("export", "--check", sound)
+    assert (said.code, said.out) == (2, "")
+    assert "this would execute the code in" in said.err
+    assert one_line(said.err).endswith("allow it with --trust")
+    folder = exported(tmp_path / "law", c=False, fmu=True)
+    for name in ("law.c", "law.h", f"{link.this_machine()}/law.o"):  # nobody's manifest has these
+        (folder / name).parent.mkdir(exist_ok=True)
+        shutil.copy(sound / name, folder / name)
+    monkeypatch.setattr(checking, "find_spec", lambda name: None)
+    said = podusv("export", "--check", "--trust", folder)
+    assert (said.code, "exported with --no-c" in said.err) == (2, True)
 
 
 @pytest.mark.slow

@@ -42,6 +42,9 @@ def export(
     check: Annotated[
         bool, typer.Option("--check", help="Step an exported law beside podusv's own run.")
     ] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="With --check: execute the code in the folder.")
+    ] = False,
     force: options.Force = False,
     quiet: options.Quiet = False,
     plugin: options.Plugins = None,
@@ -49,11 +52,11 @@ def export(
     """Write the law of a scenario as C and as an FMU, to be used without podusv.
 
     The scenario has to sample its law (`control.period`). check.csv has every sample of a run; with
-    --check the law is stepped through it, and exit code 3 says that a bit differs. That executes
-    the code in the folder.
+    --check --trust the law is stepped through it, and exit code 3 says that a bit differs. That
+    executes the code in the folder.
     """
     if check:
-        _check(Path(config))
+        _check(Path(config), trusted=trust)
         return
     from podusv_cli.workflows import export as workflow  # heavy imports only when needed
 
@@ -69,13 +72,13 @@ def export(
     done = workflow.export(Path(config), request)
     echo_path(done)
     if not quiet:
-        echo(f"check it: podusv export --check {done}", err=True)
+        echo(f"check it: podusv export --check --trust {done}", err=True)
 
 
-def _check(folder: Path) -> None:
+def _check(folder: Path, *, trusted: bool) -> None:
     from podusv_cli.export.check import check  # heavy imports only when needed
 
-    found = check(folder)
+    found = check(folder, trusted=trusted)
     for one in found:
         echo(f"{one.what}: {one.differs or f'{one.samples} samples with the bits of {one.whose}'}")
     raise typer.Exit(DIFFERS if any(one.differs for one in found) else 0)

@@ -87,7 +87,7 @@ def echo_table(head: list[str], rows: list[list[str]]) -> None:
     head, rows = [*map(visible, head)], [[*map(visible, row)] for row in rows]
     widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
     room = columns() if sys.stdout.isatty() else sys.maxsize
-    if sum(widths[:2]) + max(widths[2:]) + 2 * len(SPACE) > room:
+    if sum(widths[:2]) + max(widths[2:], default=0) + 2 * len(SPACE) > room:
         for row in rows:
             cells = [f"{title} {cell}" for title, cell in zip(head[2:], row[2:], strict=True)]
             echo_entry(row[0], ", ".join(cells), facts=f"[{row[1]}]")

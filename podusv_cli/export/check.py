@@ -5,26 +5,25 @@ from __future__ import annotations
 import csv
 import ctypes
 import struct
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import UsageError, in_a_line
 from podusv_cli.core.kernel import Vector
 from podusv_cli.export.link import shared_library, this_machine
 from podusv_cli.export.objects import PLATFORMS
-from podusv_cli.storage import json_files
+from podusv_cli.storage import json_files, manifest
 
-PARTS = ("inputs", "demand", "signals", "memory")  # of law.json, in the order of the columns
 SAMPLES, ABOUT, FMU = "check.csv", "law.json", "law.fmu"
-STATE, TARGET, LOADS = 6, 6, 3
+STATE, TARGET, LOADS, DEMAND = 6, 6, 3, 2
+INPUTS = STATE + TARGET + LOADS
 Step = Callable[[Vector], Sequence[float]]  # from time and inputs of a sample to what comes out
 
 
@@ -41,25 +40,55 @@ class Checked:
     differs: str = ""
 
 
-def check(folder: Path) -> list[Checked]:
+class Number(BaseModel):
+    """What is read of a number in law.json; there is more."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    name: str
+
+
+class About(BaseModel):
+    """What is read of law.json; there is more."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    inputs: list[Number] = Field(min_length=INPUTS, max_length=INPUTS)
+    demand: list[Number] = Field(min_length=DEMAND, max_length=DEMAND)
+    signals: list[Number]
+    memory: list[Number]
+    period: PositiveFloat
+    platforms: list[str]
+    of_run: bool
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the columns of check.csv."""
+        numbers = (*self.inputs, *self.demand, *self.signals, *self.memory)
+        return ["time", *(one.name for one in numbers)]
+
+
+def check(folder: Path, *, trusted: bool = True) -> list[Checked]:
     """Step the library that the folder's files make, and its FMU where FMPy is installed.
 
-    This executes code of the folder. Raises UsageError where it is no export, and without a
-    compiler for this machine.
+    This executes code of the folder: files that its manifest lists, unchanged. Raises UsageError
+    where the folder is no export, where it is not `trusted`, and without a compiler for this
+    machine; StorageError where a file was altered.
     """
-    if not (folder / ABOUT).is_file():
+    listed = _listed(folder)
+    about = json_files.read_as(folder / ABOUT, About)
+    samples = _samples(folder, about)
+    if not trusted:
         raise UsageError(
-            f"{folder} is no exported law: it has no {ABOUT}; make one with podusv export"
+            f"this would execute the code in {folder}; if you know who made it, allow it with "
+            "--trust"
         )
-    about, names, samples = _read(folder)
     found, unit = [], folder / FMU
     # A library that is loaded cannot be deleted on every machine.
     with TemporaryDirectory(ignore_cleanup_errors=True) as place:
-        if (folder / "law.c").is_file():
-            library = _library(folder, Path(place), about)
-            found.append(_compared("library", samples, names, about, library))
-        if unit.is_file() and find_spec("fmpy"):
-            found.append(_compared(FMU, samples, names, about, _fmu(unit, Path(place), about)))
+        if "law.c" in listed:
+            library = _library(folder, Path(place), about, listed)
+            found.append(_compared("library", samples, about, library))
+        if FMU in listed and find_spec("fmpy"):
+            found.append(_compared(FMU, samples, about, _fmu(unit, Path(place), about)))
     if not found:
         raise UsageError(
             f"{folder} was exported with --no-c, and FMPy, which steps its {FMU}, is not there; "
@@ -68,46 +97,56 @@ def check(folder: Path) -> list[Checked]:
     return found
 
 
-def _read(folder: Path) -> tuple[dict[str, Any], list[str], Vector]:
-    """What law.json says, names of the samples' columns, and the samples."""
-    about = json_files.read(folder / ABOUT)
+def _listed(folder: Path) -> Collection[str]:
+    """The files of an exported law, which are as its manifest has them."""
+    for name in (ABOUT, manifest.NAME):
+        if not (folder / name).is_file():
+            raise UsageError(
+                f"{folder} is no exported law: it has no {name}; make one with podusv export"
+            )
+    files = manifest.check(folder).files
+    if missing := [name for name in (ABOUT, SAMPLES) if name not in files]:
+        raise UsageError(f"{folder} is no exported law: its {manifest.NAME} lists no {missing[0]}")
+    return files
+
+
+def _samples(folder: Path, about: About) -> Vector:
+    """The samples, a row each."""
     try:
         with (folder / SAMPLES).open(newline="") as lines:
             names, *rows = csv.reader(lines)
-        numbers = [one for part in PARTS for one in about[part]]
-        if names != ["time", *(one["name"] for one in numbers)] or not rows:
+        samples = np.array(rows, dtype=float)
+        if names != about.columns or samples.shape != (len(rows), len(names)):
             raise ValueError
-        return about, names, np.array(rows, dtype=float)
-    except (OSError, KeyError, TypeError, ValueError):
+        return samples
+    except (OSError, ValueError, csv.Error):
         raise UsageError(
             f"{folder}: {SAMPLES} is not the table of samples that {ABOUT} describes; export the "
             "law again with podusv export"
         ) from None
 
 
-def _compared(
-    what: str, samples: Vector, names: Sequence[str], about: dict[str, Any], step: Step
-) -> Checked:
-    inputs = 1 + STATE + TARGET + LOADS
-    whose = "the run" if about["of_run"] else "the law by itself in podusv"
+def _compared(what: str, samples: Vector, about: About, step: Step) -> Checked:
+    given, names = 1 + INPUTS, about.columns
+    whose = "the run" if about.of_run else "the law by itself in podusv"
     for row in samples:
-        out = step(row[:inputs])
-        for name, one, other in zip(names[inputs:], out, row[inputs:], strict=True):
+        out = step(row[:given])
+        for name, one, other in zip(names[given:], out, row[given:], strict=True):
             if struct.pack("d", one) != struct.pack("d", other):
                 told = f"t = {row[0]:g} s: {name} is {one!r}, and is {float(other)!r} in {SAMPLES}"
                 return Checked(what, len(samples), whose, told)
     return Checked(what, len(samples), whose)
 
 
-def _library(folder: Path, place: Path, about: dict[str, Any]) -> Step:
+def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -> Step:
     """The library for this machine, made from the folder's files."""
     name = this_machine()
-    code = folder / name / "law.o"
-    if not (name and code.is_file()):
-        made = ", ".join(about["platforms"])
+    code = f"{name}/law.o"
+    if code not in listed:
+        made = ", ".join(about.platforms)
         raise UsageError(f"{folder} has no object code for this machine, only for {made}")
-    files = {file: (folder / file).read_bytes() for file in ("law.h", "law.c")}
-    files["law.o"] = code.read_bytes()
+    files = {file: (folder / file).read_bytes() for file in ("law.h", "law.c") if file in listed}
+    files["law.o"] = (folder / code).read_bytes()
     path = place / f"law{PLATFORMS[name].library}"
     path.write_bytes(shared_library(files, name, PLATFORMS[name]))
     library, numbers = ctypes.CDLL(str(path)), ctypes.POINTER(ctypes.c_double)
@@ -118,10 +157,10 @@ def _library(folder: Path, place: Path, about: dict[str, Any]) -> Step:
 
     def step(row: Vector) -> list[float]:
         state, target, loads = np.split(row[1:], [STATE, STATE + TARGET])
-        demand = (ctypes.c_double * 2)()
+        demand = (ctypes.c_double * DEMAND)()
         library.podusv_law_step(law, *map(_vector, (state, target, loads)), demand)
-        signals = library.podusv_law_signals(law)[: len(about["signals"])]
-        return [*demand, *signals, *library.podusv_law_memory(law)[: len(about["memory"])]]
+        signals = library.podusv_law_signals(law)[: len(about.signals)]
+        return [*demand, *signals, *library.podusv_law_memory(law)[: len(about.memory)]]
 
     return step
 
@@ -130,16 +169,18 @@ def _vector(numbers: Vector) -> Any:
     return (ctypes.c_double * len(numbers))(*numbers.tolist())
 
 
-def _fmu(path: Path, place: Path, about: dict[str, Any]) -> Step:
+def _fmu(path: Path, place: Path, about: About) -> Step:
     """The FMU, unpacked here and stepped by FMPy."""
     import fmpy  # is not installed with podusv
     from fmpy.fmi2 import FMU2Slave
 
-    with suppress(BadZipFile):
+    try:
         fmpy.extract(str(path), str(place))
+        description = fmpy.read_model_description(str(place))
+    except Exception as error:  # whatever FMPy raises of a file that podusv did not write
+        raise UsageError(f"{path} cannot be read by FMPy: {in_a_line(error)}") from error
     if not (place / "binaries" / this_machine()).is_dir():
-        raise UsageError(f"{path} has no library for this machine, or is damaged")
-    description = fmpy.read_model_description(str(place))
+        raise UsageError(f"{path} has no library for this machine")
     slave = FMU2Slave(
         guid=description.guid, unzipDirectory=str(place),
         modelIdentifier=description.coSimulation.modelIdentifier, instanceName="law",
@@ -153,7 +194,7 @@ def _fmu(path: Path, place: Path, about: dict[str, Any]) -> Step:
 
     def step(row: Vector) -> list[float]:
         slave.setReal(given, row[1 : 1 + len(given)].tolist())
-        slave.doStep(float(row[0]), about["period"])
+        slave.doStep(float(row[0]), about.period)
         return [float(number) for number in slave.getReal(said)]
 
     return step

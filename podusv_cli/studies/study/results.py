@@ -72,10 +72,14 @@ class Results:
     def shown(self) -> list[str]:
         """The metrics that the answer is about: those of the claims, and the most common.
 
-        Those that a reader sees first come before the others.
+        Runs without any of the most common, as manoeuvring trials are, have those that a reader
+        sees first in their place; such metrics always come before the others.
         """
         told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
-        shown = [m for m in self.runs.metrics if m in ALWAYS or f".{m}" in told]
+        gathered = self.runs.metrics
+        headlines = [m for m in gathered if self.known[m].headline]
+        usual = [m for m in gathered if m in ALWAYS] or headlines
+        shown = [m for m in gathered if m in usual or f".{m}" in told]
         return sorted(shown, key=lambda name: not self.known[name].headline)
 
     def without_verdicts(self, contradicted: str) -> Results:
