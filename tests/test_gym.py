@@ -293,6 +293,19 @@ def test_a_reward_that_is_not_defined_at_every_instant_is_a_sentence():
             made.step(action)
 
 
+@pytest.mark.parametrize("reward", ["e_steady", "settling_time"])
+def test_such_a_reward_is_refused_before_the_first_episode(reward):
+    for make in (podusv.gym.Env, podusv.gym.VectorEnv):
+        with pytest.raises(UsageError, match=rf"{reward} is not defined at 0\.1 s; a reward needs"):
+            make(SCENARIO, reward=reward)
+
+
+@pytest.mark.parametrize("reward", [None, 3, ["iae"]])
+def test_a_reward_that_is_no_name_is_a_sentence(reward):
+    with pytest.raises(UsageError, match="podusv.gym: unknown reward"):
+        podusv.gym.Env(SCENARIO, reward=reward)
+
+
 def test_an_action_that_is_no_demand_is_a_sentence_and_nothing_is_lost():
     env, many = single(), several(2)
     with pytest.raises(UsageError, match="no episode has begun; call reset first"):

@@ -94,7 +94,7 @@ def test_a_run_repeats_itself_without_the_original(podusv):
     shutil.move("r", "moved")
     shutil.rmtree("laws")
     assert "identical" in podusv("rerun", "moved", "--trust").out
-    assert podusv("run", "moved/resolved.yaml", "--out", "again", *QUIET).code == 0
+    assert podusv("run", "moved/resolved.yaml", "--trust", "--out", "again", *QUIET).code == 0
     assert Path("again/log.h5").read_bytes() == Path("moved/log.h5").read_bytes()
     assert podusv("diff", "moved", "again").code == 0
 
@@ -139,9 +139,43 @@ def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv):
 def test_a_changed_copy_is_not_run_as_if_it_were_the_same(podusv):
     podusv("run", put(), "--out", "r", *QUIET)
     Path("r/plugins/my_law.py").write_text(LAW + "\n")
-    said = podusv("run", "r/resolved.yaml", *QUIET)
+    said = podusv("run", "r/resolved.yaml", "--trust", *QUIET)
     assert said.code == 2
     assert "r/plugins/my_law.py is not the one that was used; without sha256, any is" in said.err
+
+
+LOADING = (
+    "run",
+    "compare",
+    "validate",
+    "verify",
+    "margins",
+    "optimum",
+    "export",
+    "tune",
+    "sweep run",
+)
+
+
+@pytest.mark.parametrize("command", LOADING)
+def test_a_scenario_in_a_folder_of_podusv_runs_no_file_without_trust(podusv, command):
+    """Whether it is named itself or is what another file extends."""
+    trap = f"{LAW}\nfrom pathlib import Path\nPath('ran').write_text('')\n"
+    put(law=trap)
+    for folder, mark in (("r", "manifest.json"), ("s", "study.json"), ("t", "tune.json")):
+        Path(folder).mkdir()
+        shutil.copytree("laws", f"{folder}/laws")
+        Path(folder, mark).write_text("{}")
+        shutil.copy("a.yaml", f"{folder}/tuned.yaml")
+    Path("mine.yaml").write_text("extends: t/tuned.yaml\n")
+    for file in ("r/tuned.yaml", "s/tuned.yaml", "t/tuned.yaml", "mine.yaml"):
+        said = podusv(*command.split(), file)
+        assert (said.code, said.out) == (2, "")
+        assert "laws/my_law.py; read it, then allow it with --trust" in said.err
+    assert not Path("ran").exists()
+    if command == "validate":
+        assert podusv("validate", "mine.yaml", "--trust").code == 0
+        assert Path("ran").exists()
 
 
 def test_scenarios_of_one_process_know_only_their_own_files(tmp_path, monkeypatch):

@@ -210,3 +210,9 @@ def test_a_metric_so_far_is_that_of_the_run_that_is_left_there():
     assert math.isnan(session.metric("settling_time"))
     with pytest.raises(UsageError, match="session: unknown metric 'iea'"):
         session.metric("iea")
+    for wrong in (None, 3, ["iae"]):
+        with pytest.raises(UsageError, match="session: unknown metric"):
+            session.metric(wrong)
+    for wrong in (None, 0, "here"):
+        with pytest.raises(UsageError, match=r"restore goes back to what state\(\) gave, found"):
+            session.restore(wrong)

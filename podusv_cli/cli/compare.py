@@ -58,6 +58,7 @@ def compare(
     allow_large: options.AllowLarge = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
+    trust: options.Trust = False,
     plugin: options.Plugins = None,
 ) -> None:
     """Simulate scenarios, and compare them with finished runs: table, claims, figures, report.
@@ -74,7 +75,7 @@ def compare(
         request = Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), [name.strip() for name in form.split(",")], workers,
-            metrics=metric or (), compiling=compiling(progress),
+            metrics=metric or (), trust=trust, compiling=compiling(progress),
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)

@@ -42,9 +42,7 @@ def export(
     check: Annotated[
         bool, typer.Option("--check", help="Step an exported law beside podusv's own run.")
     ] = False,
-    trust: Annotated[
-        bool, typer.Option("--trust", help="With --check: execute the code in the folder.")
-    ] = False,
+    trust: options.Trust = False,
     force: options.Force = False,
     quiet: options.Quiet = False,
     plugin: options.Plugins = None,
@@ -67,7 +65,7 @@ def export(
     folder = to or Path(f"{Path(config.removeprefix('podusv:')).stem}-law")
     request = workflow.Request(
         folder, assign or (), controller, force, with_c, with_fmu, platform or (), sys.argv,
-        plugin or (), say,
+        plugin or (), trust, say,
     )  # fmt: skip
     done = workflow.export(Path(config), request)
     echo_path(done)

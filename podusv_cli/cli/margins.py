@@ -48,6 +48,7 @@ def margins(
         str, typer.Option("--format", help="Of the figure: png, pdf, svg; several with commas.")
     ] = "png",
     as_json: options.AsJson = False,
+    trust: options.Trust = False,
     plugin: options.Plugins = None,
 ) -> None:  # fmt: skip
     """Tell how much phase, gain and delay the loops of a scenario's laws can take.
@@ -62,7 +63,7 @@ def margins(
     formats = [name.strip() for name in form.split(",")]
     request = Request(
         assign or (), out, force, argv=sys.argv, plugins=plugin or (), formats=formats,
-        controller=controller,
+        controller=controller, trust=trust,
     )  # fmt: skip
     found = workflow.margins(Path(config), request, at)
     if as_json:

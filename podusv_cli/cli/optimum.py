@@ -42,6 +42,7 @@ def optimum(
     as_json: options.AsJson = False,
     allow_large: options.AllowLarge = False,
     quiet: options.Quiet = False,
+    trust: options.Trust = False,
     plugin: options.Plugins = None,
     controller: Annotated[
         str,
@@ -63,7 +64,7 @@ def optimum(
     warned = Warnings(quiet)
     request = Request(
         assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-        controller=controller,
+        controller=controller, trust=trust,
     )  # fmt: skip
     try:
         with progress_bars(wanted=not (quiet or as_json)) as bars:

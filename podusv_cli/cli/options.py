@@ -27,9 +27,7 @@ Plugins = Annotated[
         "--plugin", metavar="FILE", help="A Python file with components of your own; repeatable."
     ),
 ]
-Trust = Annotated[
-    bool, typer.Option("--trust", help="Execute the plug-in files that the folder brings along.")
-]
+Trust = Annotated[bool, typer.Option("--trust", help="Execute code that a folder brings along.")]
 Out = Annotated[
     Path | None,
     typer.Option(help="Folder for the results.", show_default="results/<name>/<time>-<digest>"),

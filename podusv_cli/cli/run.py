@@ -29,6 +29,7 @@ def run(
     allow_large: options.AllowLarge = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
+    trust: options.Trust = False,
     plugin: options.Plugins = None,
     controller: Annotated[
         str, typer.Option(metavar="NAME", help="Which of `controllers` to run.", show_default=False)
@@ -45,7 +46,7 @@ def run(
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         request = workflow.Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            controller=controller, compiling=compiling(bars),
+            controller=controller, trust=trust, compiling=compiling(bars),
         )  # fmt: skip
         done = workflow.run(Path(config), request, partial(bars, str(config)) if bars else None)
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import AllowLarge, Assignments, Config, Plugins
+from podusv_cli.cli.options import AllowLarge, Assignments, Config, Plugins, Trust
 from podusv_cli.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def validate(
         ),
     ] = False,
     allow_large: AllowLarge = False,
+    trust: Trust = False,
     plugin: Plugins = None,
 ) -> None:
     """Check a scenario as a run does before its first step; if all is valid, print findings.
@@ -39,11 +40,12 @@ def validate(
     from podusv_cli.findings.finding import unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
+    from podusv_cli.scenario.plugins import of_files
     from podusv_cli.studies.study.check import sweep_faults
     from podusv_cli.workflows.execute import examined, warm_up
 
     checks = (unknown_codes, limits(allow_large), sweep_faults, _tune_faults)
-    loaded = load(config, assign or (), checks, plugin or ())
+    loaded = load(config, assign or (), checks, plugin or (), of_files(trust))
     parse_claims(loaded)
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from podusv_cli.cli.options import AsJson, Assignments, Config, Plugins
+from podusv_cli.cli.options import AsJson, Assignments, Config, Plugins, Trust
 from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_table
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ def verify(
     quiet: Annotated[
         bool, typer.Option("--quiet", "-q", help="Print nothing; see the exit code.")
     ] = False,
+    trust: Trust = False,
     plugin: Plugins = None,
 ) -> None:
     """Repeat a scenario at half and at a quarter of its step, and by another integrator.
@@ -49,7 +50,7 @@ def verify(
         try:
             done = verifying.verify(
                 Path(config), assign or (), tolerance, out, progress, force=force,
-                plugins=plugin or (),
+                plugins=plugin or (), trust=trust,
             )  # fmt: skip
         except KeyboardInterrupt:
             text = f"{config}: interrupted before all steps were simulated; nothing was written"

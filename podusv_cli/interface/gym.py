@@ -51,7 +51,16 @@ class Task:
         self.sweep = whole.sweep or Sweep(draws=1)
         self._check_sweep()
         self.scenario, self.period = waiting(whole, period)
-        self.reward, self.limits = self._known(reward), self._limits(limits)
+        self.reward, self.limits = self._known(str(reward)), self._limits(limits)
+        self._check_first()
+
+    def _check_first(self) -> None:
+        """Raise UsageError for a reward that the first period does not define."""
+        plain = self.scenario.simulation.model_copy(update={"compiled": False})
+        scenario = self.scenario.model_copy(update={"simulation": plain})
+        session = Session(scenario, self.period, marcher_of(scenario))
+        after = session.step(np.zeros(OUTPUTS))
+        self.check_reward(session.metric(self.reward), after.status != "diverged", after.time)
 
     def _known(self, reward: str) -> str:
         known = gathered_metrics(self.scenario)

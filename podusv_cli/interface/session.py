@@ -131,9 +131,10 @@ class Session:
 
         Raises UsageError for a name that is no metric.
         """
-        if name not in self._metrics.known:
-            raise UsageError(f"session: {unknown(f'metric {name!r}', name, self._metrics.known)}")
-        return float(self._metrics.one(name, self._pieces.vectors.seen[:, np.newaxis])[0])
+        known, word = self._metrics.known, str(name)
+        if word not in known:
+            raise UsageError(f"session: {unknown(f'metric {name!r}', word, known, 'podusv list')}")
+        return float(self._metrics.one(word, self._pieces.vectors.seen[:, np.newaxis])[0])
 
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""
@@ -183,8 +184,10 @@ class Session:
     def restore(self, place: Bookmark) -> Observation:
         """Go on from a place in this run; what came after it is forgotten.
 
-        Raises UsageError for a place in another session.
+        Raises UsageError for a place in another session, and for what is none.
         """
+        if not isinstance(place, Bookmark):
+            raise UsageError(f"session: restore goes back to what state() gave, found {place!r}")
         if place.session is not self:
             raise UsageError(
                 "session: restore goes back to a place in the same session; this place is in "

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path as File
 from typing import Any, Literal
 
@@ -33,6 +33,7 @@ from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
+FINISHED = ("manifest.json", "study.json", "tune.json")  # folders of podusv have one of these
 Parts = Sequence[tuple[str, str, frozenset[str]]]  # section, kind and fields of components
 BASES: dict[str, type[Component]] = {
     "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
@@ -84,28 +85,42 @@ def _listed(own: Node) -> list[tuple[Node, Node]]:
     return [(node, Node({}, node.mark)) for node in several]
 
 
-def loaded(root: Node, faults: list[Fault], *, trusted: bool = True) -> tuple[Node, Plugins]:
+def loaded(
+    root: Node, faults: list[Fault], *, trusted: bool = True, own: bool = False
+) -> tuple[Node, Plugins]:
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
 
     There a file is named as in the run's folder, with its digest, and an installed package stands
     where the scenario uses a component of it. Where a plug-in cannot be loaded, or its components
     are none, there is a fault; so there is for every file that the tree names where it is not
-    `trusted`, as loading a file executes it.
+    `trusted`, as loading a file executes it. With `own`, files that are named outside the folder of
+    a run, study or search need no trust.
     """
-    own = root.mapping.get(KEY) or Node({}, root.mark)
+    given = root.mapping.get(KEY) or Node({}, root.mark)
     entries: dict[str, Node] = {}
     known: dict[str, Plugin] = {}
-    for name, wanted in [] if own.faulty else _listed(own):
-        if plugin := _plugin(name, wanted, faults, trusted):
+    for name, wanted in [] if given.faulty else _listed(given):
+        allowed = trusted or (own and not _in_folder(name.mark.source))
+        if plugin := _plugin(name, wanted, faults, allowed):
             place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
             entries[place] = _required(plugin, name.mark, wanted)
     plugins = tuple(dict.fromkeys((*known.values(), *installed())))
     try:
         scenario_class(plugins)
-        entries = {p.name: _required(p, own.mark) for p in _used(root)} | entries
+        entries = {p.name: _required(p, given.mark) for p in _used(root)} | entries
     except LawError as error:
-        faults.append(Fault(own.mark, KEY, str(error)))
-    return (root.with_entry(KEY, replace(own, content=entries)) if entries else root), plugins
+        faults.append(Fault(given.mark, KEY, str(error)))
+    return (root.with_entry(KEY, replace(given, content=entries)) if entries else root), plugins
+
+
+def of_files(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
+    """What loads plug-ins of scenarios on the command line, some of them `trusted` alone."""
+    return partial(loaded, trusted=trusted, own=True)
+
+
+def _in_folder(source: str) -> bool:
+    """Whether a file is in the folder of a run, study or search, which anybody may have made."""
+    return any((File(source).parent / name).exists() for name in FINISHED)
 
 
 def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:

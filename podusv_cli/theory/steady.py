@@ -220,7 +220,7 @@ class _Frame:
 
     def steady(self, left: _Left) -> Vector:
         """The q near that of the settled vessel which does not change, by Newton's method."""
-        q = left.q
+        q: Vector = left.q
         for _ in range(ROUNDS):
             rates, slopes = self.row(q)[: len(q)], self._central(q, STEPS[1])[: len(q)]
             size = _size(q)

@@ -22,6 +22,7 @@ from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.workflows.execute import Stopwatch, simulated
@@ -43,6 +44,7 @@ class Request:
     platforms: Sequence[str] = ()
     argv: Sequence[str] = ()
     plugins: Sequence[str] = ()
+    trust: bool = False  # whether plug-in files in a folder of podusv may be executed
     say: Callable[[str], None] = lambda text: None  # what is being done
 
 
@@ -51,7 +53,8 @@ def export(config: Path, request: Request) -> Path:
     started = datetime.now(UTC)
     platforms, linked = _platforms(request), _linked(request) if request.fmu else {}
     too_large = limits(allow_large=False)
-    loaded = load(config, request.overrides, (unknown_codes, too_large), request.plugins)
+    checks, plugged = (unknown_codes, too_large), of_files(request.trust)
+    loaded = load(config, request.overrides, checks, request.plugins, plugged)
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
     if too_large(law.scenario):

@@ -12,6 +12,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
 from podusv_cli.workflows.run import Request
@@ -59,7 +60,8 @@ def _opened(path: Path, request: Request, *, alone: bool) -> Item:
     if path.is_dir():
         return from_folder(path, request.plugins)
     fits = limits(request.allow_large, read_back=True)
-    loaded = load(path, request.overrides, (unknown_codes, fits), request.plugins)
+    plugged = of_files(request.trust)
+    loaded = load(path, request.overrides, (unknown_codes, fits), request.plugins, plugged)
     return from_scenario(loaded, alone=alone)
 
 

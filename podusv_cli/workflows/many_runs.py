@@ -73,7 +73,7 @@ def loaded_for(
     elif config.is_dir():
         loaded = kept_scenario(config, *given, partial(plugins.loaded, trusted=request.trust))
     else:
-        loaded = load(config, *given)
+        loaded = load(config, *given, plugins.of_files(request.trust))
     if getattr(loaded.scenario, key) is None:
         named = config if isinstance(config, Path) else loaded.scenario.name
         raise UsageError(f"{named} has no key `{key}`, {advice}")

@@ -22,6 +22,7 @@ from podusv_cli.optimum.problem import Minimised, Motion, Problem, problem
 from podusv_cli.scenario.limits import estimate, limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
 from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
@@ -75,7 +76,7 @@ def optimum(
     """
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
-    loaded = load(config, request.overrides, checks, request.plugins)
+    loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
     return optimum_of(loaded, request, minimised, step, progress)
 
 

@@ -13,6 +13,7 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
 
@@ -48,7 +49,7 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     watch = Stopwatch()
     with watch.part("load"):
         checks = (unknown_codes, limits(request.allow_large))
-        loaded = load(config, request.overrides, checks, request.plugins)
+        loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
     return run_loaded(loaded, request, progress, watch)
 
 

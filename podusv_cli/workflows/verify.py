@@ -10,6 +10,7 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage import files, json_files
 from podusv_cli.verification import verify as verification
 from podusv_cli.verification.verify import Verification
@@ -20,7 +21,7 @@ RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `
 def verify(
     config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
     progress: Callable[[str, float], None] | None = None, *, force: bool = False,
-    plugins: Sequence[str] = (),
+    plugins: Sequence[str] = (), trust: bool = False,
 ) -> Verification:  # fmt: skip
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
@@ -30,7 +31,7 @@ def verify(
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
-    scenario = load(config, overrides, checks, plugins).scenario
+    scenario = load(config, overrides, checks, plugins, of_files(trust)).scenario
     if out:
         files.check_places([out])
         _spare(out, force)
