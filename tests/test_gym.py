@@ -302,7 +302,7 @@ def test_such_a_reward_is_refused_before_the_first_episode(reward):
 
 @pytest.mark.parametrize("reward", [None, 3, ["iae"]])
 def test_a_reward_that_is_no_name_is_a_sentence(reward):
-    with pytest.raises(UsageError, match="podusv.gym: unknown reward"):
+    with pytest.raises(UsageError, match="unknown reward"):
         podusv.gym.Env(SCENARIO, reward=reward)
 
 

@@ -1,12 +1,14 @@
 """One scenario from several sources: `extends` below, `--set` on top."""
 
+import re
 from pathlib import Path
 
 import pytest
 from conftest import kinds
 from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
-from podusv_cli.scenario.load import load, tree_yaml
+import podusv
+from podusv_cli.scenario.load import load, load_text, resolved_yaml, tree_yaml
 from podusv_cli.scenario.sweep import Keep
 
 *OTHERS, LAST = kinds("controllers")
@@ -42,13 +44,114 @@ def test_several_levels_and_lists_are_replaced_whole():
     assert (network.nodes, network.low, network.high) == ((4, 3, 2), (-2, -2, -2), (3, 3, 3))
 
 
-def test_another_kind_replaces_the_section_and_the_same_kind_does_not():
+def test_another_kind_keeps_what_it_takes_and_tells_what_it_does_not():
     write("base.yaml", SOUND.replace("{kind: pid}", "{kind: dsc, k_ze: 0.4, T_u: 0.5}"))
     write("other.yaml", "extends: base.yaml\ncontroller: {kind: pid}\n")
     write("same.yaml", "extends: base.yaml\ncontroller: {kind: dsc, T_r: 0.7}\n")
-    assert load("other.yaml").scenario.controller.k_ze == 0.1
+    other = load("other.yaml")
+    assert other.scenario.controller.k_ze == 0.4
+    assert other.dropped == (
+        "other.yaml:2:20: controller: kind pid in place of dsc, which loses T_u: 0.5",
+    )
     same = load("same.yaml").scenario.controller
     assert (same.k_ze, same.T_u, same.T_r) == (0.4, 0.5, 0.7)
+
+
+STEERED = """
+vessel: {preset: wamv}
+start: {x: -10.0, y: -5.0}
+path: {kind: line, course: 0.3, speed: 1.3}
+disturbance: {kind: none}
+actuator: {kind: saturated, surge_limit: 800.0, yaw_limit: 370.0}
+controller: {kind: velocity_vector, U: 2.5, N_m: 370.0, T_v: 1.7, k_r: 3.0}
+simulation: {duration: 100.0}
+"""
+TO = "controller.kind=momentum_vector"
+
+
+def several_ways(tmp_path):
+    """The same change of the law's kind, by every way there is."""
+    write("boat.yaml", STEERED)
+    write("over.yaml", "extends: boat.yaml\ncontroller: {kind: momentum_vector}\n")
+    write("several.yaml", STEERED + "controllers: {new: {kind: momentum_vector}}\n")
+    first, second = (
+        "controllers: {new: {kind: pid}}\n",
+        "controllers: {new: {kind: momentum_vector}}\n",
+    )
+    write("named.yaml", STEERED + first)
+    write("renamed.yaml", f"extends: named.yaml\n{second}")
+    yield load("boat.yaml", [TO]).scenario.controller
+    yield load("over.yaml").scenario.controller
+    yield load("several.yaml").scenario.controllers["new"]
+    yield load("renamed.yaml").scenario.controllers["new"]
+    yield load_text(tree_yaml(load("boat.yaml", [TO])), "kept.yaml").scenario.controller
+    yield load_text(resolved_yaml(load("boat.yaml").scenario), "all.yaml", [TO]).scenario.controller
+    yield podusv.load("boat.yaml", {"controller.kind": "momentum_vector"}).controller
+    yield podusv.load(
+        podusv.load("boat.yaml"), {"controller": {"kind": "momentum_vector"}}
+    ).controller
+
+
+@pytest.mark.filterwarnings("ignore:.*in place of velocity_vector")
+def test_it_keeps_the_same_whichever_way_the_kind_is_changed(tmp_path):
+    found = [*several_ways(tmp_path)]
+    assert all(law == found[0] for law in found)
+    assert found[0] == type(found[0])(U=2.5, N_m=370.0, T_v=1.7)
+    assert found[0].kind == "momentum_vector"
+
+
+def test_a_boat_whose_law_changes_its_kind_still_comes_to_its_target():
+    """With U and N_m of a model ship it is left behind by a target at 1.3 m/s."""
+    write("boat.yaml", STEERED)
+    with pytest.warns(UserWarning, match=r"which loses k_r: 3.0$"):
+        kept = podusv.simulate("boat.yaml", {"controller.kind": "momentum_vector"})
+    model_ship = {"controller.U": 1.25, "controller.N_m": 2.5}
+    lost = podusv.simulate("boat.yaml", {"controller": {"kind": "momentum_vector"}, **model_ship})
+    assert kept.metrics["z_e_steady"] < 1e-3 < 10.0 < lost.metrics["z_e_steady"]
+
+
+def test_a_path_of_another_kind_keeps_course_and_speed():
+    write("path.yaml", STEERED.replace("kind: line", "kind: sinusoid, amplitude: 4.0"))
+    for changes in (["path.kind=line"], ["path={kind: line}"]):
+        loaded = load("path.yaml", changes)
+        assert (loaded.scenario.path.course, loaded.scenario.path.speed) == (0.3, 1.3)
+        assert (
+            "path: kind line in place of sinusoid, which loses amplitude: 4.0" in loaded.dropped[0]
+        )
+
+
+def test_a_key_of_the_same_name_and_another_unit_or_type_is_another_key():
+    law = "controller: {kind: cascade, k_u: 9.0, k_r: 4.0}"
+    write("unit.yaml", re.sub("controller: .*", law, STEERED))
+    loaded = load("unit.yaml", ["controller.kind=velocity_vector"])  # 1/s, and there kg/s
+    assert (loaded.scenario.controller.k_u, loaded.scenario.controller.k_r) == (
+        type(loaded.scenario.controller)().k_u, type(loaded.scenario.controller)().k_r,
+    )  # fmt: skip
+    assert "which loses k_u: 9.0, k_r: 4.0" in loaded.dropped[0]
+
+
+def test_a_disturbance_keeps_nothing_of_another_kind():
+    """A current flows to its direction, and wind comes from it."""
+    write("sea.yaml", STEERED.replace("kind: none", "kind: current, speed: 0.2, direction: 1.0"))
+    loaded = load("sea.yaml", ["disturbance={kind: wind, speed: 5.0}"])
+    assert loaded.scenario.disturbance.direction == 0.0
+    assert loaded.dropped == ()
+
+
+COMMANDS = ("run", "compare", "validate", "verify", "margins", "export")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_says_what_a_change_of_kind_loses(podusv, command):
+    write("boat.yaml", STEERED.replace("duration: 100.0", "duration: 1.0"))
+    more = {"export": ("--no-fmu",), "run": ("--no-figures",), "compare": ("--no-figures",)}
+    said = podusv(
+        command, "boat.yaml", "--set", TO, *more.get(command, ()), "--set", "control.period=0.1"
+    )
+    assert (
+        f"warning: --set {TO}: controller: kind momentum_vector in place of" in said.out + said.err
+    )
+    assert "velocity_vector, which loses k_r: 3.0" in " ".join((said.out + said.err).split())
 
 
 def test_another_preset_replaces_the_vessel_with_its_changes():

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli import options
-from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_table
+from podusv_cli.cli.terminal import Warnings, echo, echo_entry, echo_json, echo_table
 
 if TYPE_CHECKING:
     from podusv_cli.theory.loop_margins import LoopMargins
@@ -63,7 +63,7 @@ def margins(
     formats = [name.strip() for name in form.split(",")]
     request = Request(
         assign or (), out, force, argv=sys.argv, plugins=plugin or (), formats=formats,
-        controller=controller, trust=trust,
+        controller=controller, trust=trust, warn=Warnings(),
     )  # fmt: skip
     found = workflow.margins(Path(config), request, at)
     if as_json:

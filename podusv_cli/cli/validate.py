@@ -53,6 +53,7 @@ def validate(
     findings = examined(scenario)
     for single in scenario.singles().values():
         warm_up(single)
+    loaded.told(echo)
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}", *study, *findings)
     if verbose:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli.options import AsJson, Assignments, Config, Plugins, Trust
-from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_table
+from podusv_cli.cli.terminal import Warnings, echo, echo_entry, echo_json, echo_table
 
 if TYPE_CHECKING:
     from podusv_cli.verification.ranking import Ranking
@@ -50,7 +50,7 @@ def verify(
         try:
             done = verifying.verify(
                 Path(config), assign or (), tolerance, out, progress, force=force,
-                plugins=plugin or (), trust=trust,
+                plugins=plugin or (), trust=trust, warn=Warnings(quiet),
             )  # fmt: skip
         except KeyboardInterrupt:
             text = f"{config}: interrupted before all steps were simulated; nothing was written"

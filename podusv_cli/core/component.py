@@ -31,8 +31,9 @@ class Component(BaseModel):
     `presets` are what its field `preset` chooses from. `rows_of` has the fields that may name a
     CSV file of pairs, each with the field that takes the file's rows, `texts_of` those that may
     name a file whose text another field takes, `bytes_of` those that may name a file whose bytes
-    another field takes, as base64. `is_recorded` says that this is `Recorded`. `noun`
-    is what messages call it.
+    another field takes, as base64. `is_recorded` says that this is `Recorded`. One that
+    `stands_alone` takes no value of another kind whose place it takes. `noun` is what messages call
+    it.
     """
 
     presets: ClassVar[Presets | None] = None
@@ -40,6 +41,7 @@ class Component(BaseModel):
     texts_of: ClassVar[dict[str, str]] = {}
     bytes_of: ClassVar[dict[str, str]] = {}
     is_recorded: ClassVar[bool] = False
+    stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 

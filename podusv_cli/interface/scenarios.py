@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from pathlib import Path
@@ -76,7 +77,8 @@ def loaded(
     source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS
 ) -> Loaded:
     """A scenario with its text and the origin of each value. Raises ScenarioError."""
-    return _loaded(source, assignments(changes), checks)
+    found = _loaded(source, assignments(changes), checks)
+    return found.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
 
 
 def assignments(changes: Changes | None) -> list[str]:

@@ -14,6 +14,7 @@ from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.keys import keys_of
+from podusv_cli.scenario.kinds import kept
 from podusv_cli.scenario.layers import alone, composed
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
@@ -49,18 +50,27 @@ class Loaded:
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
     paper.yaml" or "default"; `text` is the scenario file as given. `root` is the tree of which the
-    scenario is made, without what is filled in.
+    scenario is made, without what is filled in. `dropped` are sentences about values that were
+    given to a section before it was given another kind, which does not take them.
     """
 
     scenario: Scenario
     origins: Mapping[str, str]
     text: str
     root: Node
+    dropped: tuple[str, ...] = ()
+
+    def told(self, warn: Callable[[str], object]) -> Loaded:
+        """This, after a warning of all that was dropped."""
+        for lost in self.dropped:
+            warn(f"warning: {lost}")
+        return self
 
     def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
         """The scenario of the same tree with another merged over it. Raises ScenarioError."""
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
+        root = kept(root, keys_of(type(self.scenario)), [])
         source = self.root.mark.source
         return _checked(root, self.scenario.plugged, source, faults, checks)[0]
 
@@ -96,9 +106,9 @@ def load_text(
     root = composed(text, source, overrides, faults, placed=placed)
     if root is None:
         raise ScenarioError(_ordered(faults, source))
-    root, known = _plugged(plugged, plugins.with_given(root, files), source, faults)
+    root, known, dropped = _known(root, plugged, files, source, faults)
     scenario, origins = _checked(root, known, source, faults, checks)
-    return Loaded(scenario, origins, text, root)
+    return Loaded(scenario, origins, text, root, dropped)
 
 
 def load_stored(
@@ -116,11 +126,11 @@ def load_stored(
     _undamaged(faults, source)
     if root is None or faults:
         raise ScenarioError(_ordered(faults, source))
-    root, known = _plugged(plugged, plugins.with_given(root, files), source, faults)
+    root, known, dropped = _known(root, plugged, files, source, faults)
     with_contents(root, keys_of(scenario_class(known)), faults, without_files)
     _undamaged(faults, source)
     scenario, origins = _checked(root, known, source, faults, checks)
-    return Loaded(scenario, origins, text, root)
+    return Loaded(scenario, origins, text, root, dropped)
 
 
 def _undamaged(faults: list[Fault], source: str) -> None:
@@ -129,15 +139,18 @@ def _undamaged(faults: list[Fault], source: str) -> None:
         raise StorageError(f"{fault} (the file is damaged, or podusv did not write it)")
 
 
-def _plugged(
-    plugged: Plugged, root: Node, source: str, faults: list[Fault]
-) -> tuple[Node, Plugins]:
-    """The tree with its plug-ins. Without one of them, nothing else can be said of the tree."""
-    before = len(faults)
-    root, known = plugged(root, faults)
+def _known(
+    root: Node, plugged: Plugged, files: Sequence[str | Plugin], source: str, faults: list[Fault]
+) -> tuple[Node, Plugins, tuple[str, ...]]:
+    """The tree with its plug-ins and with what sections keep of other kinds; what is dropped.
+
+    Without one of the plug-ins, nothing else can be said of the tree.
+    """
+    before, dropped = len(faults), list[str]()
+    root, known = plugged(plugins.with_given(root, files), faults)
     if len(faults) > before:
         raise ScenarioError(_ordered(faults, source))
-    return root, known
+    return kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
 
 
 def _checked(

@@ -14,6 +14,7 @@ from podusv_cli.components.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 from podusv_cli.core.component import Component, Presets
 from podusv_cli.core.plugins import ABSENT, Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
+from podusv_cli.scenario.kinds import over
 from podusv_cli.scenario.named_files import with_files
 from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
@@ -271,7 +272,8 @@ def _controllers(root: Node, top: Key) -> Node:
         return root
     if not base:
         return root.with_entry("controller", next(iter(several.mapping.values())))
-    filled = {name: _over_base(base, own, top) for name, own in several.mapping.items()}
+    law = top.keys["controller"]
+    filled = {name: over(base, own, law) for name, own in several.mapping.items()}
     return root.with_entry("controllers", replace(several, content=filled))
 
 
@@ -280,11 +282,3 @@ def stands_in(root: Node) -> bool:
     several = root.mapping.get("controllers")
     laws = several.mapping.values() if several else ()
     return any(law is root.mapping.get("controller") for law in laws)
-
-
-def _over_base(base: Node, own: Node, top: Key) -> Node:
-    law = top.keys["controller"].kinds.get(own.word("kind") or base.word("kind"))
-    if not law or not isinstance(own.content, dict):
-        return own
-    shared = {key: part for key, part in base.mapping.items() if key in law.keys}
-    return merge(replace(base, content=shared), own, by_kind=False)

@@ -54,7 +54,8 @@ class Node:
     """A value: a scalar, a tuple of nodes, or a mapping from key to node.
 
     `key_mark` is the position of its key. `text` is a scalar as written. `faulty` says that a
-    fault was reported here: a scalar or list has no content, a mapping may lack keys.
+    fault was reported here: a scalar or list has no content, a mapping may lack keys. `instead_of`
+    is the section of another kind that it stands in place of; `kinds.kept` says what it keeps.
     """
 
     content: Any
@@ -62,6 +63,7 @@ class Node:
     key_mark: Mark | None = None
     text: str = ""
     faulty: bool = False
+    instead_of: Node | None = None
 
     @property
     def mapping(self) -> dict[str, Node]:
@@ -159,9 +161,9 @@ def plain(node: Node) -> Any:
 def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
     """`top` over `base`: mappings key by key, other values replaced.
 
-    `by_kind`: a section of another kind or preset replaces the base's section; where only the
-    preset differs, the kind is kept. A mapping of positions {"0": ...} over a list changes those
-    items only.
+    `by_kind`: a section of another kind or preset stands in place of the base's section; where only
+    the preset differs, the kind is kept. A mapping of positions {"0": ...} over a list changes
+    those items only.
     """
     if _names_places(base, top):
         items = list(base.content)
@@ -172,12 +174,15 @@ def merge(base: Node, top: Node, *, by_kind: bool = True) -> Node:
         return top
     if by_kind and _another_kind(base, top):
         kind = base.content.get("kind")
-        return top.with_entry("kind", kind) if kind and "kind" not in top.content else top
+        if kind and "kind" not in top.content:
+            return top.with_entry("kind", kind)
+        return replace(top, instead_of=base) if top.word("kind") != base.word("kind") else top
     entries = dict(base.content)
     for key, entry in top.content.items():
         known = key in entries
         entries[key] = merge(entries[key], entry, by_kind=by_kind) if known else entry
-    return replace(top, content=entries, faulty=top.faulty or base.faulty)
+    faulty = top.faulty or base.faulty
+    return replace(top, content=entries, faulty=faulty, instead_of=base.instead_of)
 
 
 def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) -> Node:

@@ -54,7 +54,7 @@ def export(config: Path, request: Request) -> Path:
     platforms, linked = _platforms(request), _linked(request) if request.fmu else {}
     too_large = limits(allow_large=False)
     checks, plugged = (unknown_codes, too_large), of_files(request.trust)
-    loaded = load(config, request.overrides, checks, request.plugins, plugged)
+    loaded = load(config, request.overrides, checks, request.plugins, plugged).told(request.say)
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
     if too_large(law.scenario):

@@ -11,11 +11,10 @@ from podusv_cli.comparison.claims import ParsedClaim, parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load
-from podusv_cli.scenario.plugins import of_files
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.members import Member, comparable, distinct, numbered
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.run import Request, opened
 
 
 @dataclass(frozen=True)
@@ -60,8 +59,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> Item:
     if path.is_dir():
         return from_folder(path, request.plugins)
     fits = limits(request.allow_large, read_back=True)
-    plugged = of_files(request.trust)
-    loaded = load(path, request.overrides, (unknown_codes, fits), request.plugins, plugged)
+    loaded = opened(path, request, (unknown_codes, fits))
     return from_scenario(loaded, alone=alone)
 
 

@@ -74,6 +74,7 @@ def loaded_for(
         loaded = kept_scenario(config, *given, partial(plugins.loaded, trusted=request.trust))
     else:
         loaded = load(config, *given, plugins.of_files(request.trust))
+    loaded.told(lambda lost: request.warn(lost.removeprefix("warning: ")))
     if getattr(loaded.scenario, key) is None:
         named = config if isinstance(config, Path) else loaded.scenario.name
         raise UsageError(f"{named} has no key `{key}`, {advice}")

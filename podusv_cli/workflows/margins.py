@@ -13,13 +13,11 @@ from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
-from podusv_cli.workflows.run import Request, single
+from podusv_cli.workflows.run import Request, opened, single
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
     started = datetime.now(UTC)
     checks = (unknown_codes, limits(insist=""))
-    loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
+    loaded = opened(config, request, checks)
     duration, label = loaded.scenario.simulation.duration, request.controller
     if at is not None and at > duration:
         raise UsageError(f"--at {at:g}: the run ends at {duration:g} s; give an earlier time")

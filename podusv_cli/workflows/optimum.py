@@ -20,13 +20,12 @@ from podusv_cli.optimum.collocation import Stage
 from podusv_cli.optimum.feedback import schedule
 from podusv_cli.optimum.problem import Minimised, Motion, Problem, problem
 from podusv_cli.scenario.limits import estimate, limits
-from podusv_cli.scenario.load import Loaded, load, resolved_yaml
+from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
 from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
-from podusv_cli.workflows.run import DRAWN, RESULTS, Request, single
+from podusv_cli.workflows.run import DRAWN, RESULTS, Request, opened, single
 
 BESIDE = VelocityVector()  # a law from which the search begins, too: it turns the bow into the load
 Progress = Callable[[str, float], None]
@@ -76,7 +75,7 @@ def optimum(
     """
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
-    loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
+    loaded = opened(config, request, checks)
     return optimum_of(loaded, request, minimised, step, progress)
 
 

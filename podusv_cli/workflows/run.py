@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.finding import Finding
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
+from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import of_files
@@ -32,7 +32,7 @@ class Request:
     force: bool = False
     figures: bool = True
     argv: Sequence[str] = ()
-    warn: Callable[[Finding], None] = lambda finding: None  # called before any simulation
+    warn: Callable[[object], None] = lambda finding: None  # called before any simulation
     allow_large: bool = False
     plugins: Sequence[str] = ()  # files beside those that a scenario names
     names: Sequence[str] = ()  # of figures of a comparison; all that fit where empty
@@ -49,8 +49,14 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     watch = Stopwatch()
     with watch.part("load"):
         checks = (unknown_codes, limits(request.allow_large))
-        loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
+        loaded = opened(config, request, checks)
     return run_loaded(loaded, request, progress, watch)
+
+
+def opened(config: Path, request: Request, checks: Sequence[Check]) -> Loaded:
+    """The scenario of a file; warns of values that it loses. Raises ScenarioError."""
+    loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
+    return loaded.told(request.warn)
 
 
 def run_loaded(

@@ -22,6 +22,7 @@ def verify(
     config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
     progress: Callable[[str, float], None] | None = None, *, force: bool = False,
     plugins: Sequence[str] = (), trust: bool = False,
+    warn: Callable[[object], None] = lambda finding: None,
 ) -> Verification:  # fmt: skip
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
@@ -31,7 +32,7 @@ def verify(
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
-    scenario = load(config, overrides, checks, plugins, of_files(trust)).scenario
+    scenario = load(config, overrides, checks, plugins, of_files(trust)).told(warn).scenario
     if out:
         files.check_places([out])
         _spare(out, force)

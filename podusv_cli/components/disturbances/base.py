@@ -49,6 +49,7 @@ class Disturbance(Component):
     """
 
     noun: ClassVar[str] = "disturbance"
+    stands_alone: ClassVar[bool] = True  # a current's speed and direction are not a wind's
 
     of_time: ClassVar[bool] = False
 

@@ -1,0 +1,89 @@
+"""What a section keeps of one of another kind that it stands in place of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from podusv_cli.scenario.keys import Key
+from podusv_cli.scenario.phrases import as_yaml
+from podusv_cli.scenario.yaml_tree import Node, Route, bracketed, dotted, merge, plain
+
+
+def kept(root: Node, top: Key, dropped: list[str]) -> Node:
+    """The tree whose sections have what they keep of those that they stand in place of.
+
+    `top` are the scenario's keys. For each section that keeps not everything, a sentence with the
+    values is appended to `dropped`.
+    """
+    return _kept(root, top, (), dropped)
+
+
+def _kept(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
+    if node.instead_of:
+        base = _kept(node.instead_of, key, at, dropped)
+        dropped += _lost(base, node, key, at)
+        node = over(base, replace(node, instead_of=None), key)
+    item = key.item(0)
+    if isinstance(node.content, tuple):
+        if not item or not item.kinds:
+            return node
+        parts = enumerate(node.content)
+        return replace(node, content=tuple(_kept(one, item, (*at, i), dropped) for i, one in parts))
+    section = key.kinds.get(node.word("kind"), key)
+    for name, entry in node.mapping.items():
+        below = section.keys.get(name) or key.item(name)
+        if below and (entry.mapping or isinstance(entry.content, tuple)):
+            node = node.with_entry(name, _kept(entry, below, (*at, name), dropped))
+    return node
+
+
+def over(base: Node, own: Node, key: Key) -> Node:
+    """A section over those values of another one that its kind takes, too.
+
+    `key` is what the models say of both. A key of the same name that has another type or unit is
+    another one, and the default of one kind is nothing for another: a scenario that is written out
+    has all of them. Disturbances are as a whole what they are, and keep nothing of another kind.
+    """
+    new = key.kinds.get(own.word("kind") or base.word("kind"))
+    if not new or not isinstance(own.content, dict):
+        return own
+    taken = {name: part for name, part in base.mapping.items() if _taken(name, base, new, key)}
+    return merge(replace(base, content=taken), own, by_kind=False)
+
+
+def _taken(name: str, base: Node, new: Key, key: Key) -> bool:
+    """Whether a kind takes a value that was given to a section of maybe another kind."""
+    old = key.kinds.get(base.word("kind"))
+    if name == "kind" or not old or old.kind == new.kind:
+        return name in new.keys
+    if new.model.stands_alone or name not in new.keys or name not in old.keys:
+        return False
+    one, other = old.keys[name], new.keys[name]
+    alike = (one.annotation, one.unit) == (other.annotation, other.unit)
+    return alike and not _usual(base.mapping[name], old, name)
+
+
+def _lost(base: Node, own: Node, key: Key, at: Route) -> list[str]:
+    """What a section does not keep of another one, in a sentence; defaults are not told."""
+    old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
+    if not old or not new or new.model.stands_alone:
+        return []
+    lost = {
+        name: part
+        for name, part in base.mapping.items()
+        if not (_taken(name, base, new, key) or name in own.mapping or _usual(part, old, name))
+    }
+    if not lost:
+        return []
+    told = ", ".join(f"{name}: {as_yaml(plain(part))}" for name, part in lost.items())
+    place = own.mapping["kind"]
+    return [
+        f"{place.mark}: {bracketed(dotted(at))}: kind {new.kind} in place of {old.kind}, which "
+        f"loses {told}"
+    ]
+
+
+def _usual(part: Node, kind: Key, name: str) -> bool:
+    """Whether a value is the default of a kind's key."""
+    default = kind.keys[name].default if name in kind.keys else None
+    return bool(plain(part) == getattr(default, "model_dump", lambda: default)())
