@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from types import MappingProxyType
 
@@ -200,3 +201,25 @@ def test_trials_of_other_gains_than_are_asked_for_are_not_thrown_away(optuna, tm
     with pytest.raises(StorageError, match="batch 0 of toy-0 has other gains than this machine"):
         searched(tmp_path, "tune.repeats=1", "tune.budget=64")
     assert path.read_text() == other
+
+
+TRIAL = Trial(0, 0, {"gain": 2.0}, 4, FINISHED, 0.5, (0.1, float("inf")), float("inf"), 0.25)
+SHAPES = {
+    "gains": (None, 3, "x", [1]), "runs": (None, "4", [], -1, 1.5), "status": ("done", None),
+    "value": ("x", []), "excesses": (None, "ab", {}, [None, "x"]), "first": ({},), "number": (-1,),
+    "failures": (None,), "batch": ("0", True),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "shapes"), SHAPES.items())
+def test_a_trial_of_another_shape_is_a_damaged_file(tmp_path, key, shapes):
+    (tmp_path / trials.FOLDER).mkdir()
+    trials.write(tmp_path, "toy-0", [TRIAL, TRIAL])
+    assert trials.read(tmp_path, "toy-0") == [TRIAL, TRIAL]
+    file = tmp_path / trials.FOLDER / "toy-0.json"
+    sound = json.loads(file.read_text())
+    for shape in shapes:
+        told = {**sound, "trials": [sound["trials"][0], {**sound["trials"][1], key: shape}]}
+        file.write_text(json.dumps(told))
+        with pytest.raises(StorageError, match=rf"toy-0\.json: damaged, .* \(trials\.1\.{key}"):
+            trials.read(tmp_path, "toy-0")

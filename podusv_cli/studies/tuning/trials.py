@@ -6,14 +6,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from podusv_cli.core.errors import StorageError
+from pydantic import BaseModel, ConfigDict, NonNegativeInt
+
 from podusv_cli.storage import files, json_files
 
 FOLDER = "trials"
 FORMAT = 2
-VECTORS = ("excesses",)
 FINISHED, PRUNED, CUT = "finished", "pruned", "cut"
 
 
@@ -48,26 +48,45 @@ def write(folder: Path, name: str, trials: Sequence[Trial]) -> None:
     files.write_bytes(folder / FOLDER / f"{name}.json", json_files.encode(content))
 
 
+class Stored(BaseModel):
+    """A trial as the file has it: null for a number that is not finite."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+    number: NonNegativeInt
+    batch: NonNegativeInt
+    gains: dict[str, Any]
+    runs: NonNegativeInt
+    status: Literal["finished", "pruned", "cut"]
+    value: float | None
+    excesses: list[float | None]
+    first: float | None
+    failures: float
+
+    def trial(self) -> Trial:
+        """The trial itself."""
+        infinite = {"value": _number(self.value), "first": _number(self.first)}
+        excesses = tuple(map(_number, self.excesses))
+        return Trial(**(self.model_dump() | infinite | {"excesses": excesses}))
+
+
+class File(BaseModel):
+    """What is read of a search's file; there is more."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+    trials: list[Stored]
+
+
 def read(folder: Path, name: str) -> list[Trial]:
     """The trials of a search that are there; none where it has not begun. Raises StorageError."""
     path = folder / FOLDER / f"{name}.json"
     if not path.exists():
         return []
-    try:
-        return [_trial(told) for told in json_files.read(path)["trials"]]
-    except (KeyError, TypeError, ValueError) as error:
-        raise StorageError(f"cannot read {path}: damaged, not as podusv wrote it") from error
-
-
-def _trial(told: dict[str, Any]) -> Trial:
-    numbers: dict[str, Any] = {name: tuple(map(_number, told[name])) for name in VECTORS}
-    numbers |= {name: _number(told[name]) for name in ("value", "first")}
-    return Trial(**(told | numbers))
+    return [stored.trial() for stored in json_files.read_as(path, File).trials]
 
 
 def _number(told: float | None) -> float:
     """JSON knows no infinity, the only number of a trial that is not finite."""
-    return math.inf if told is None else float(told)
+    return math.inf if told is None else told
 
 
 def best(trials: Sequence[Trial]) -> Trial:
