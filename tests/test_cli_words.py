@@ -353,6 +353,57 @@ def test_keys_kinds_figures_and_names_are_offered(
     assert set(offered_for(typed, tmp_path, script)) == offered
 
 
+FILE = """
+plugins: [law.py]
+vessel: {preset: paper_nonlinear}
+path: {kind: line}
+disturbance: [{kind: step}, {kind: wind, speed: 3.0}]
+actuator: {kind: ideal}
+controllers: {mine: {kind: pid}, other: {kind: dsc}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("controllers.mine.K_P", {"controllers.mine.K_Pu=", "controllers.mine.K_Pr="}),
+        ("controllers.other.K_P", set()),
+        ("disturbance[0].b_", {f"disturbance[0].b_{axis}=" for axis in "uvr"}),
+        ("path.r", set()),  # a circle has a radius, a line has none
+        ("control.p", {"control.period="}),
+    ],
+)
+def test_keys_of_the_scenario_that_is_named_are_offered_and_nothing_of_it_runs(
+    tmp_path: Path, monkeypatch, typed: str, offered: set[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("law.py").write_text("open('ran', 'w')\n")
+    Path("a.yaml").write_text(FILE)
+    context = typer.Context(typer.core.TyperCommand("run"))
+    for given in ({"config": "a.yaml"}, {"items": ["a.yaml"]}, {}):
+        context.params, context.args = given, [] if given else ["a.yaml"]
+        assert {word for word, _ in completion.keys(context, typed)} == offered
+    assert not Path("ran").exists()
+
+
+def test_a_scenario_that_cannot_be_read_leaves_all_keys(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text("vessel: [")
+    context = typer.Context(typer.core.TyperCommand("run"))
+    context.params = {"config": "a.yaml"}
+    monkeypatch.setattr(completion, "all_keys", lambda context, typed: [(f"all {typed}", "")])
+    assert completion.keys(context, "path.r") == [("all path.r", "")]
+
+
+@pytest.mark.parametrize("word", cli.MEANT)
+def test_a_command_of_another_name_is_pointed_to(podusv, word: str) -> None:
+    said = podusv(word, "a.yaml")
+    assert said.code == 2
+    (named,) = set(re.findall(r"podusv (\w+)", cli.MEANT[word])[:1])
+    assert named in cli.COMMANDS
+    assert f"No such command '{word}': podusv {named} " in " ".join(said.err.split())
+
+
 def test_what_was_completed_is_kept_until_podusv_changes(tmp_path: Path, monkeypatch) -> None:
     typed = "podusv run --set controller.k_z"
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path / "cache"))
@@ -360,7 +411,7 @@ def test_what_was_completed_is_kept_until_podusv_changes(tmp_path: Path, monkeyp
     assert first[:-1] == second[:-1] != []
     assert "podusv_cli.scenario.model" in first[-1]
     assert "podusv_cli.scenario.model" not in second[-1]
-    (kept,) = tmp_path.rglob("completion/keys.json")
+    (kept,) = tmp_path.rglob("completion/all_keys.json")
     stale = {**json.loads(kept.read_text()), "state": "of an older podusv", "known": {}}
     kept.write_text(json.dumps(stale))
     assert offered_for(typed, tmp_path, LOADED)[:-1] == first[:-1]

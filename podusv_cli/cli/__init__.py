@@ -9,7 +9,7 @@ import gc
 import os
 import sys
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -27,6 +27,12 @@ COMMANDS = (
     "explain", "list", "schema", "new", "bench", "tune", "docs", "demo", "runs", "export",
 )  # fmt: skip
 
+# What others call it, and the command that does it.
+MEANT = {
+    "simulate": "podusv run CONFIG simulates a scenario",
+    "replay": "podusv rerun RUN repeats a finished run, and podusv compare RUN plays it on a page",
+    "fit": "podusv tune CONFIG searches gains of laws; no command fits a hull to data",
+}
 FIRST_STEPS = """\
 podusv simulates and compares controllers for pod-propelled surface vessels. First steps:
 
@@ -39,8 +45,21 @@ podusv simulates and compares controllers for pod-propelled surface vessels. Fir
   podusv --help                            all commands"""
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 
+
+
+class Commands(typer.core.TyperGroup):
+    """The commands, and what those of other names are called here."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that the first word names; an error for an unknown one."""
+        if args and args[0] in MEANT:
+            ctx.fail(f"No such command {args[0]!r}: {MEANT[args[0]]}.")
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
     name="podusv",
+    cls=Commands,
     invoke_without_command=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -108,9 +108,34 @@ def parts(incomplete: str) -> Offered:
     return _beginning(incomplete, dict.fromkeys(PARTS, ""))
 
 
+def keys(context: typer.Context, incomplete: str) -> Offered:
+    """`controller.k_ze=` for `--set`; after the equals sign the words that the value may be.
+
+    Where the scenario is named before, keys of the kinds that it has; nothing of it is executed.
+    """
+    from pathlib import Path
+
+    # A word before an option without its value is not yet an argument.
+    named = [context.params.get("config"), *(context.params.get("items") or ()), *context.args]
+    for name in filter(None, named):
+        if name.startswith("podusv:") or Path(name).is_file():
+            with suppress(Exception):  # there is no place for a message
+                return _beginning(incomplete, _keys_in(name, _plugins(context) or ()))
+    return all_keys(context, incomplete)
+
+
+def _keys_in(name: str, plugins: Plugins) -> Mapping[str, str]:
+    """Those of a scenario's file, whose own plug-ins are left out."""
+    from podusv_cli.scenario.explain import assignments_in
+    from podusv_cli.scenario.load import load
+    from podusv_cli.scenario.plugins import without_own
+
+    return assignments_in(load(name, plugged=without_own(plugins)).scenario)
+
+
 @kept
-def keys(plugins: Plugins) -> Mapping[str, str]:
-    """`controller.k_ze=` for `--set`; after the equals sign the words that the value may be."""
+def all_keys(plugins: Plugins) -> Mapping[str, str]:
+    """The same for any scenario."""
     from podusv_cli.scenario.explain import assignments
 
     return assignments(plugins)

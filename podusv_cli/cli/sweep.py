@@ -58,6 +58,9 @@ def run(
     scheduler: options.Scheduler = "",
     allow_mixed: options.AllowMixed = False,
     trust: options.Trust = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Remove the study that is there, and begin anew.")
+    ] = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -75,7 +78,7 @@ def run(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
             changes, out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed, trust,
-            seconds(until), part_of(shard), line.say, line.warn,
+            seconds(until), part_of(shard), force, line.say, line.warn,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)
     for refused in done.refused:

@@ -36,6 +36,18 @@ NO_XARRAY = (
 )
 
 
+class Numbers(pd.Series):
+    """Metrics by name; a KeyError says which there are."""
+
+    def __getitem__(self, name: Any) -> Any:
+        """The metric, or a part of the series."""
+        try:
+            return super().__getitem__(name)
+        except KeyError:
+            told = unknown(f"metric {name!r} of this run", str(name), map(str, self.index))
+            raise KeyError(told) from None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """A run that is over: its log, metrics and figures.
@@ -65,7 +77,8 @@ class Run:
     @property
     def metrics(self) -> pd.Series[float]:
         """Every metric by name; NaN where it is not defined. `podusv explain NAME` has its unit."""
-        return pd.Series(dict(self.numbers), name=self.label, dtype=float).rename_axis("metric")
+        index = pd.Index(self.numbers, name="metric")
+        return Numbers([*self.numbers.values()], index, float, self.label)
 
     @cached_property
     def log(self) -> xarray.Dataset:

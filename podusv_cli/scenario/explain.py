@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -13,11 +13,12 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.keys import NAME, NO_DEFAULT, NUMBER, Key, either, keys_of
-from podusv_cli.scenario.model import scenario_class
+from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route, with_dotted_key
 
+ALONE = ("path", "actuator", "measurement", "estimator")  # sections with kinds that are no list
 BOOLEANS = {"true or false": ("true", "false")}
 # What a file may leave out although the model has no default for it, and where it comes from.
 FILLED_IN = {("name",): "the file's name", ("nominal",): "the vessel"}
@@ -113,14 +114,31 @@ def names(plugins: Plugins = ()) -> list[str]:
 
 def assignments(plugins: Plugins = ()) -> dict[str, str]:
     """What `--set` takes, and the key's meaning: `control.period=`, `path.kind=line`, ..."""
-    top = keys_of(scenario_class(plugins))
-    keys = [key for key in top.all() if key.field and not key.keys]
-    own = [key for key in keys if {NAME, NUMBER}.isdisjoint(key.path)]
-    return {
-        f"{dotted(key.path)}={word}": _meaning(key)
-        for key in own
-        for word in _choices(key) or BOOLEANS.get(key.type_in_words, ("",))
-    }
+    return dict(_assigned("", keys_of(scenario_class(plugins))))
+
+
+def assignments_in(scenario: Scenario) -> dict[str, str]:
+    """The same for this scenario: keys of the kinds that it has, at their places in it."""
+    top = keys_of(type(scenario))
+    parts = {name: getattr(scenario, name) for name in ALONE}
+    parts |= {**scenario.disturbances(), **scenario.laws()}
+    plain = dict(_assigned("", top, of_kinds=False))
+    for place, part in parts.items():
+        kinds = top.follow(route(place))[0].kinds
+        plain |= _assigned(place, kinds[part.kind])
+    return plain
+
+
+def _assigned(place: str, of: Key, *, of_kinds: bool = True) -> Iterator[tuple[str, str]]:
+    """What `--set` takes below a key, at a place of this name where it has one; and the meaning."""
+    for key in of.all():
+        given = key.path[len(of.path) :]
+        if key.keys or not key.field or not {NAME, NUMBER}.isdisjoint(given):
+            continue
+        if of_kinds or not key.kind:
+            name = f"{place}.{dotted(given)}".removeprefix(".")
+            for word in _choices(key) or BOOLEANS.get(key.type_in_words, ("",)):
+                yield f"{name}={word}", _meaning(key)
 
 
 def _with_contents(keys: list[Key]) -> list[Row]:

@@ -171,9 +171,17 @@ def _checked(
 
 
 def _ordered(faults: list[Fault], first: str) -> list[Fault]:
-    """The faults file by file, the file called `first` ahead, in the order of lines."""
+    """The faults file by file, the file called `first` ahead, in the order of lines.
+
+    Those without a line come last: what is missing may be there under a wrong name.
+    """
     sources = list(dict.fromkeys([first, *(fault.mark.source for fault in faults)]))
-    return sorted(faults, key=lambda f: (sources.index(f.mark.source), f.mark.line, f.mark.column))
+
+    def place(fault: Fault) -> tuple[int, bool, int, int]:
+        mark = fault.mark
+        return sources.index(mark.source), not mark.line, mark.line, mark.column
+
+    return sorted(faults, key=place)
 
 
 def values(scenario: Scenario) -> dict[str, Any]:

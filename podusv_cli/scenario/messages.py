@@ -181,6 +181,8 @@ def _hint(node: Node, key: Key) -> str:
         return "; it cannot be left out"
     if type(node.content) in (int, float) and limits(key.field).get("le") == 0:
         return f"; it is negative here, as it is published with the force: {-node.content:g}?"
+    if node.mapping and str in key.types:
+        return "; put text with braces in quotes"
     if not isinstance(node.content, str):
         return hint(node.text, (bool,) if bool in key.types else ())
     if node.content and node.content in key.kinds:

@@ -118,6 +118,13 @@ def of_files(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugins
     return partial(loaded, trusted=trusted, own=True)
 
 
+def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
+    """What takes in none of the plug-ins that a tree names, but these."""
+    return lambda root, faults: (
+        replace(root, content={k: e for k, e in root.mapping.items() if k != KEY}), known
+    )  # fmt: skip
+
+
 def _in_folder(source: str) -> bool:
     """Whether a file is in the folder of a run, study or search, which anybody may have made."""
     return any((File(source).parent / name).exists() for name in FINISHED)

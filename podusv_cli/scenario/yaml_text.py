@@ -22,13 +22,14 @@ from typing import Any
 import yaml
 
 from podusv_cli.core.timed_rows import NUMBER
-from podusv_cli.scenario.phrases import found, quoted
-from podusv_cli.scenario.shipped import file_of
+from podusv_cli.scenario.phrases import did_you_mean, found, quoted
+from podusv_cli.scenario.shipped import PREFIX, file_of, names
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
 MAX_NODES = 20_000
+ENDINGS = (".yaml", ".yml")
 FAST = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # PyYAML can lack libyaml
 READ_ELSE = re.compile("[?!\t\ufeff\x85\u2028\u2029]")  # libyaml takes texts that PyYAML refuses
 
@@ -57,6 +58,11 @@ SYNTAX = {
     "<block end>, but found": "does not line up with the lines above; check the indentation",
     "expected '<document start>'": "text after the end of the document",
 }
+# A value in brackets, after which a line goes on.
+CLOSED = re.compile(r"(^|[:-] )\s*(\{[^}]*\}|\[[^]]*\])\s*$")
+IN_QUOTES = (
+    "text after the closing bracket; put a text that begins with a bracket or a brace in quotes"
+)
 OPENING = ("unexpected end of stream", "but got '<stream end>'")
 
 
@@ -71,14 +77,29 @@ def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | 
     except (OSError, ValueError) as error:
         reason = str((isinstance(error, OSError) and error.strerror) or error)
         reason = reason[:1].lower() + reason[1:]
-        if named and isinstance(error, FileNotFoundError):
-            reason += f"; looked in {os.path.dirname(os.path.abspath(path))}"
+        if isinstance(error, FileNotFoundError):
+            reason += _meant(path)
+            if named:
+                reason += f"; looked in {os.path.dirname(os.path.abspath(path))}"
         faults.append(Fault(mark, key, f"{named}cannot be read: {reason}"))
         return None
     if len(data) > MAX_BYTES:
         faults.append(Fault(mark, key, f"{named}is larger than {MAX_BYTES:,} bytes"))
         return None
     return data
+
+
+def _meant(path: str) -> str:
+    """`; did you mean 'base.yaml'?` for a file that is not there, "" where nothing is like it."""
+    folder, name = os.path.split(path)
+    near: list[str] = []
+    with suppress(OSError):
+        near = [one for one in sorted(os.listdir(folder or ".")) if one.endswith(ENDINGS)]
+    whole = [os.path.join(folder, name + end) for end in ENDINGS if name + end in near]
+    shipped = [one for one in names() if one in (PREFIX + path, f"{PREFIX}{path}.yaml")]
+    if exact := [*whole, *shipped]:
+        return f"; did you mean {quoted(exact[0])}?"
+    return did_you_mean(name, near)
 
 
 def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
@@ -223,6 +244,8 @@ class _Reader:
         opened = any(part in problem for part in OPENING)
         mark = error.context_mark if opened else error.problem_mark
         text = known[0] if known else "not valid YAML: {problem}"
+        if mark and CLOSED.search(self._text.splitlines()[mark.line][: mark.column]):
+            text = IN_QUOTES
         place = self._mark(mark.line, mark.column) if mark else self._last
         return _CannotContinue(place, text.format(problem=problem))
 
@@ -269,7 +292,7 @@ class _Reader:
     def _mapping(self, event: Any, route: Route) -> Node:
         entries: dict[str, Node] = {}
         while not isinstance(head := self._next(), yaml.MappingEndEvent):
-            key = self._key(head, route)
+            key = self._key(head, route, _decimal_comma(head, entries))
             entry = self._node(self._next(), (*route, key or "?"))
             if key in entries:
                 first = entries[key].key_mark
@@ -279,12 +302,22 @@ class _Reader:
                 entries[key] = replace(entry, key_mark=self._start(head))
         return Node(entries, self._start(event))
 
-    def _key(self, event: Any, route: Route) -> str | None:
-        """The key, or None after a fault."""
+    def _key(self, event: Any, route: Route, advice: str) -> str | None:
+        """The key, or None after a fault; with an advice it is none."""
         is_word = isinstance(event, yaml.ScalarEvent)
         node = self._node(event, route if is_word else (*route, "?"))
-        if is_word and isinstance(node.content, str):
+        if is_word and isinstance(node.content, str) and not advice:
             return node.content
         if not node.faulty:
-            self._fault(event, route, f"keys are words, found {found(node.content, node.text)}")
+            what = found(node.content, node.text)
+            self._fault(event, route, f"keys are words, found {what}{advice}")
         return None
+
+
+def _decimal_comma(event: Any, before: dict[str, Node]) -> str:
+    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}`; else ""."""
+    last = next(reversed(before.values()), None)
+    number = last.text if last else ""
+    fraction = isinstance(event, yaml.ScalarEvent) and event.value.isdigit() and not event.style
+    whole = INTEGER.fullmatch(number)
+    return f"; write a decimal point: {number}.{event.value}" if fraction and whole else ""

@@ -51,6 +51,7 @@ class Request:
     trust: bool = False  # whether plug-in files of the folder may be executed
     seconds: float = math.inf  # of computing, after which no unit of a study is begun
     shard: Shard = WHOLE
+    force: bool = False  # whether a study that is there is removed first
     say: Tell = silent  # what is done beside the runs
     warn: Tell = silent  # is told what is odd, and no error
     begin: Tell = silent  # is told of a search before its first run

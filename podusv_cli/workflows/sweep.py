@@ -89,6 +89,8 @@ def run(config: Source, request: Request, tell: Tell) -> Swept:
     for law in store.plan.laws:  # before there is a folder that a mended law would not fit
         store.plan.single(law, 0).ready(compiling(request, law))
     with sole_writer(store.folder):
+        if request.force:
+            store.clear()
         store.open(started.isoformat(timespec="seconds"), texts)
         return _run(store, request, started, tell)
 

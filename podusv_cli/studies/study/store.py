@@ -17,6 +17,7 @@ import hashlib
 import json
 import math
 import os
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple
@@ -29,8 +30,8 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.metrics.table import metrics_with
-from podusv_cli.scenario.plugins import continue_with
-from podusv_cli.storage import files, json_files
+from podusv_cli.scenario.plugins import FOLDER, continue_with
+from podusv_cli.storage import files, json_files, manifest
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record, runs_file, runs_writer
 from podusv_cli.studies.study.plan import Plan, digest, disagreements
@@ -39,6 +40,7 @@ from podusv_cli.studies.study.unit import Unit, UnitResult
 
 UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
+UNFINISHED = (STUDY, SCENARIO, UNITS, RUNS, FOLDER, "provenance.json")  # in any study's folder
 FORMAT = 1
 SEAL = "sha256"
 
@@ -81,7 +83,7 @@ class Store:
             if self.plan.sweep.draws < there.draws:
                 raise UsageError(
                     f"{self.folder} has {there.draws} draws; ask for as many or more, or name "
-                    "another folder with --out"
+                    "another folder with --out, or begin anew with --force"
                 )
         elif not files.is_empty(self.folder):
             raise UsageError(f"{self.folder} is no study and not empty; name another with --out")
@@ -101,6 +103,28 @@ class Store:
         if not known:
             files.write_texts(self.folder, texts)
 
+    def clear(self) -> None:
+        """Remove the study that the folder holds, whichever it is.
+
+        Raises UsageError where the folder has something else, too. study.json goes last, because a
+        folder without it that is not empty is no study.
+        """
+        if not (self.folder / STUDY).exists():
+            return
+        finished = (self.folder / manifest.NAME).exists()
+        listed = manifest.read(self.folder).files if finished else ()
+        own = {name.partition("/")[0] for name in (*listed, *UNFINISHED, manifest.NAME)}
+        there = {path.name for path in self.folder.iterdir()}
+        if foreign := sorted(there - own - set(files.LOCKS)):
+            raise UsageError(
+                f"{self.folder} holds {foreign[0]}, which is not the study's; --force would remove "
+                "it"
+            )
+        with files.storage_errors(f"cannot remove the study in {self.folder}"):
+            for name in sorted(there - set(files.LOCKS), key=lambda name: name == STUDY):
+                path = self.folder / name
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
     def _metrics(self) -> dict[str, Any]:
         """What a reader without the study's plug-ins has to know of its metrics."""
         scenario = self.plan.scenario
@@ -116,7 +140,7 @@ class Store:
 
     def _agree(
         self, folder: Path, identity: Mapping[str, Any],
-        remedy: str = "name another folder with --out",
+        remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:  # fmt: skip
         if found := disagreements(identity, self._identity()):
             raise UsageError(f"{folder} holds another study: {found}; {remedy}")
