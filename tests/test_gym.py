@@ -361,3 +361,45 @@ def test_the_page_runs_from_an_environment_to_a_network_in_a_scenario(tmp_path):
         loaded = podusv.load("podusv:laws/learned.yaml", changes)
         laws = [loaded.controller, *loaded.controllers.values()]
         assert any(law.kind == "policy" and law.content for law in laws)
+
+
+def trapezoid(values: Any, step: float) -> float:
+    return step * float(values.sum() - 0.5 * (values[0] + values[-1]))
+
+
+@pytest.mark.parametrize(
+    ("period", "duration"), [(0.2, 0.6), (0.2, 0.53), (0.07, 0.53), (0.01, 0.05)]
+)
+def test_a_reward_is_what_the_metric_grows_by_in_the_interval_of_its_action(period, duration):
+    """The integral of z_e, and the largest force, over each interval of the log by themselves."""
+    changes = {"control.period": period, "simulation.duration": duration, "log.every": 1}
+    for reward in ("iae", "peak_tau_u"):
+        given: dict[str, Any] = {"reward": reward}
+        env, many = podusv.gym.Env(SCENARIO, changes, **given), podusv.gym.VectorEnv(
+            SCENARIO, changes, **given
+        )  # fmt: skip
+        env.reset(seed=2)
+        many.reset(seed=[2, *range(7)])
+        random, gained, over = np.random.default_rng(1), [], False
+        while not over:
+            action = random.normal(0.0, 1.0, 2)
+            _, reward_now, _, over, _ = env.step(action)
+            _, together, _, cut, _ = many.step(np.tile(action, (8, 1)))
+            assert (together[0], cut[0]) == (reward_now, over)
+            gained.append(reward_now)
+        run = env.session.close(f"{reward}_{period}_{duration}", figures=False)
+        assert -sum(gained) == pytest.approx(run.metrics[reward], rel=1e-12)
+        assert len(gained) == math.ceil(duration / period - 1e-9)
+        if reward == "iae":
+            every = round(period / 0.01)
+            own = [run["z_e"][k : k + every + 1] for k in range(0, round(duration / 0.01), every)]
+            assert gained == pytest.approx([-trapezoid(part, 0.01) for part in own], rel=1e-9)
+
+
+def test_the_first_action_costs():
+    """At a period of one step, too; the force of surge acts from the first instant on."""
+    given: dict[str, Any] = {"reward": "effort_u", "period": 0.01}
+    env = podusv.gym.Env(SCENARIO, **given)
+    env.reset(seed=0)
+    first, second = (env.step((2.0, 0.0))[1] for _ in range(2))
+    assert first == pytest.approx(second) == pytest.approx(-0.01 * 2.0**2)

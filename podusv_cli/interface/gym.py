@@ -151,8 +151,9 @@ class Env(gymnasium.Env[Vector, Vector]):
     An action is a demand (tau_u [N], tau_r [N m]) that holds for `period` [s], by default
     `control.period`; `limits` are its largest numbers, by default the actuator's. An observation
     has eight numbers in the vessel's own frame: the target ahead and to starboard [m], u, v [m/s],
-    r [rad/s], the target's velocity ahead and to starboard [m/s], and the heading error [rad]. The
-    rewards of an episode add up to the metric `reward` of its run, with a minus. An episode is
+    r [rad/s], the target's velocity ahead and to starboard [m/s], and the heading error [rad]. A
+    reward is what the metric `reward` grew by, from the instant of an action to that of the next,
+    with a minus: the rewards of an episode add up to minus the metric of its run. An episode is
     truncated when `simulation.duration` is over, and terminated where a number is not finite.
 
     `reset(seed=i)` begins the run of draw i of the scenario's `sweep.vary`, as `podusv sweep` has

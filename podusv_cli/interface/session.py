@@ -127,14 +127,14 @@ class Session:
         return self._status
 
     def metric(self, name: str) -> float:
-        """A metric of the run so far, up to the last step of the integration; NaN where undefined.
+        """A metric of the run that `close` writes here; NaN where undefined.
 
         Raises UsageError for a name that is no metric.
         """
         known, word = self._metrics.known, str(name)
         if word not in known:
             raise UsageError(f"session: {unknown(f'metric {name!r}', word, known, 'podusv list')}")
-        return float(self._metrics.one(word, self._pieces.vectors.seen[:, np.newaxis])[0])
+        return float(self._metrics.one(word, self._pieces.seen()[:, np.newaxis])[0])
 
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""

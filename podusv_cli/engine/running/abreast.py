@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import LANES, Vector
@@ -13,6 +14,7 @@ from podusv_cli.engine.loop.closed_loop import Observer, entries
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch_threads import BatchRun
 from podusv_cli.engine.running.lanes import MARCHING, Lanes, alike, room
+from podusv_cli.engine.running.pieces import CHANGING, unchanged
 from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.lane_march import REACHED
@@ -64,15 +66,19 @@ class Abreast:
         self._aim = in_lanes("path", path, names, shared, vectors)
         self._look = in_lanes("law", look, (), NOTHING, vectors | {"signals": view})
         self.law_table, self._seen, self._view = map(self._by_run, (c.law_table, c.seen, view))
+        self._changing = [*(getattr(c, name) for name in CHANGING), self._lanes.under_way]
 
     def _by_run(self, vector: Vector) -> Vector:
         return vector.reshape(-1, LANES)[:, : len(self.places)]
 
     def advance(self, count: int) -> None:
-        """March over so many instants, and over the last one with the step before it."""
-        last = self.reached + count
+        """March over so many instants, or to the end; over the last with the step before it."""
+        last = min(self.reached + count, self.grid.steps)
         self.reached = self._march(self.reached, last + (last == self.grid.steps))
-        self.alive = self._lanes.under_way[REACHED : REACHED + len(self.places)] == MARCHING
+        self.alive = self._marching()
+
+    def _marching(self) -> npt.NDArray[np.bool_]:
+        return np.equal(self._lanes.under_way[REACHED : REACHED + len(self.places)], MARCHING)
 
     @property
     def over(self) -> bool:
@@ -91,9 +97,11 @@ class Abreast:
         return self._view
 
     def seen(self) -> Vector:
-        """What observers have gathered up to the next instant, or to a run's end."""
-        if self.alive.all():
-            return self._seen
-        self._lanes.endings(self.reached, self.grid.steps + 1)
-        ended = [run.seen for run in self._lanes.runs]
-        return np.where(self.alive, self._seen, np.array(ended).T)
+        """What observers gather of runs that end at the next instant, or have ended before."""
+        with unchanged(self._changing):
+            if self.reached <= self.grid.steps:
+                self._march(self.reached, self.reached + 1, self.reached)
+            if self._marching().all():
+                return self._seen.copy()
+            self._lanes.endings(self.reached, self.grid.steps + 1)
+            return np.array([run.seen for run in self._lanes.runs]).T

@@ -20,7 +20,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.running.watch import Ending
 from podusv_cli.engine.step.lane_march import REACHED, advance_lanes
-from podusv_cli.engine.step.layout import Layout, Vectors
+from podusv_cli.engine.step.layout import STEPS, Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT
 
 NUMBER = 8  # bytes
@@ -75,12 +75,17 @@ def marcher(
         pointers = (signatures.LANE_VECTOR * len(vectors))(
             *(vector.ctypes.data_as(signatures.LANE_VECTOR) for vector in vectors)
         )
+        sizes = signatures.whole_numbers(lanes.layout)
         given = (
-            pointers, signatures.whole_numbers(lanes.layout),
-            len(vectors[Vectors._fields.index("seen")]) // LANES,
+            pointers, sizes, len(vectors[Vectors._fields.index("seen")]) // LANES,
             signatures.pointer(lanes.under_way), signatures.pointer(lanes.ends),
         )  # fmt: skip
-        return lambda first, last: int(march(*adapters, first, last, h, *given))
+
+        def over(first: int, last: int, steps: int = lanes.layout.steps) -> int:
+            sizes[STEPS] = steps
+            return int(march(*adapters, first, last, h, *given))
+
+        return over
 
     return ready
 

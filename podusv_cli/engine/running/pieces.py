@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,15 @@ class Mark(NamedTuple):
     log: Vector
 
 
+@contextmanager
+def unchanged(vectors: Sequence[Vector]) -> Iterator[None]:
+    """These vectors have the same numbers afterwards."""
+    before = [vector.copy() for vector in vectors]
+    yield
+    for vector, numbers in zip(vectors, before, strict=True):
+        vector[:] = numbers
+
+
 class Pieces:
     """The march of a loop over a grid, some instants at a time."""
 
@@ -49,6 +59,14 @@ class Pieces:
         """March over the instants before this one; whether all their numbers are finite."""
         self.reached = self._advance(self.reached, instant)
         return self.reached == instant
+
+    def seen(self) -> Vector:
+        """What observers gather of the run that ends at the next instant, as it is steered now."""
+        if not 0 < self.reached <= self.grid.steps:
+            return self.vectors.seen.copy()
+        with unchanged([getattr(self.vectors, name) for name in CHANGING]):
+            self._advance(self.reached, self.reached + 1, self.reached)
+            return self.vectors.seen.copy()
 
     @property
     def time(self) -> float:

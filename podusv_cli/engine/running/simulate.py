@@ -24,10 +24,11 @@ from podusv_cli.engine.running.check import asked, check_law
 from podusv_cli.engine.running.watch import Ending, Word, watch
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Layout, Parts, Vectors
+from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
-March = Callable[[int, int], int]  # over instants first .. last - 1, see `rk4.advance`
+# Over instants first .. last - 1, see `rk4.advance`; a third number stands for the grid's steps
+March = Callable[..., int]
 Marcher = Callable[[Vectors, Layout, float], March]  # of vectors, with a step [s]
 # What a log says of a run, by how its march ended.
 RECORDED: dict[Word, Status] = {
@@ -89,7 +90,11 @@ def marcher(
     """
     if not compiled:
         p = Parts(*(signatures.bind(*part) for part in entries(loop, observer)))
-        return lambda c, n, h: lambda first, last: rk4.advance_plainly(p, first, last, h, c, n)
+        return lambda c, n, h: (
+            lambda first, last, steps=None: rk4.advance_plainly(
+                p, first, last, h, c, n if steps is None else n._replace(steps=steps)
+            )
+        )
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
     parts, march = [*entries(loop, observer)], compile.Piece(rk4.advance, signatures.ADVANCE)
@@ -98,7 +103,12 @@ def marcher(
 
     def over(vectors: Vectors, layout: Layout, h: float) -> March:
         pointers, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
-        return lambda first, last: int(watch(*adapters, first, last, h, pointers, sizes))
+
+        def march(first: int, last: int, steps: int = layout.steps) -> int:
+            sizes[STEPS] = steps
+            return int(watch(*adapters, first, last, h, pointers, sizes))
+
+        return march
 
     return over
 

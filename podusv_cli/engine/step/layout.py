@@ -58,6 +58,9 @@ class Layout(NamedTuple):
         return 1 + self.states + self.columns
 
 
+STEPS = Layout._fields.index("steps")
+
+
 class Vectors(NamedTuple):
     """Vectors of a closed loop: constants of every part, then what the march writes to."""
 
