@@ -21,9 +21,11 @@ import cortex_m7
 import numpy as np
 import pytest
 from command_samples import ROOT, one_line
-from conftest import REQUIRED
+from conftest import REQUIRED, example, kinds
+from exported_laws import Unit
 
 import podusv
+from podusv_cli.components.actuators.command import Command, Failure
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.errors import StorageError, UsageError
@@ -32,6 +34,7 @@ from podusv_cli.export import check as checking
 from podusv_cli.export.check import check
 from podusv_cli.export.fmu import variables
 from podusv_cli.export.law import ExportedLaw
+from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
@@ -344,24 +347,72 @@ def test_the_table_of_samples_has_what_the_law_was_given(tmp_path):
     np.testing.assert_array_equal(at["psi"], log["psi"][::10])
     np.testing.assert_array_equal(at["x_d"], log["x_d"][::10])
     np.testing.assert_array_equal(at["tau_u"][1:], log["tau_u"][9::10][: len(rows) - 1])
-    assert law.assumes(rows)
-    assert not ExportedLaw.of(scenario("momentum_vector", **PODS)).assumes(
-        law.samples(podusv.simulate(scenario("momentum_vector", **PODS)).recording)
-    )
 
 
 def test_the_description_of_the_fmu_names_every_variable_once():
-    law = ExportedLaw.of(scenario("momentum_vector"))
+    law = ExportedLaw.of(scenario("momentum_vector", **PODS))
     about = {
         **c.told(law), "guid": "g", "outputs": [13, 14], "stop": "30.0",
-        "variables": variables(law, loads=True), "loads": True,
+        "variables": variables(law, np.arange(15.0)), "loads": True,
     }  # fmt: skip
     tree = ET.fromstring(c.rendered("modelDescription.xml", about))
     found = [one.get("name") for one in tree.iter("ScalarVariable")]
     assert found == law.columns[1:]
     starts = [real.get("start") for real in tree.iter("Real")]
-    assert all(np.isfinite(float(start)) for start in starts[:15] if start)
+    assert starts[:15] == [f"{i}.0" for i in range(15)]
     assert starts[15:] == [None] * (len(found) - 15)
+
+
+AROUND: dict[str, tuple[str, dict[str, Any], bool]] = {
+    "a demand that is cut": (SOURCE, {}, False),
+    "a delay shorter than the period": (SOURCE, {"actuator": {"command": {"delay": 0.1}}}, True),
+    "a failure after the run": (SOURCE, {"actuator": {"failure": {"time": 99.0}}}, True),
+    "an estimate beside the third leg": (
+        "podusv:laws/legs.yaml",
+        {"controllers": None, "path.points": [[0, 0], [6, 0], [6, 6]], "start.x": 5.0,
+         "start.y": 4.0, "measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}}, False,
+    ),
+}  # fmt: skip
+
+
+@needs_cc
+@pytest.mark.parametrize("around", AROUND)
+def test_an_fmu_begins_where_the_run_does_and_asks_for_loads_that_it_cannot_know(tmp_path, around):
+    """As another program reads it: modelDescription.xml, the library, and check.csv."""
+    source, changes, loads = AROUND[around]
+    base = {"control.period": 0.2, "simulation.duration": 3.0, "controller": law("los_pid")}
+    folder = exported_as(tmp_path, podusv.load(source, {**base, **changes}), fmu=True)
+    unit, rows = Unit(folder / "law.fmu", tmp_path / "unit"), table(folder)
+    given = len(unit.inputs)
+    assert given == (15 if loads else 12)
+    assert unit.starts == unit.read()[:given] == rows[0, 1 : 1 + given].tolist()
+    for row in rows:
+        assert unit.step(row[0], row[1 : 1 + given]) == row[16:].tolist()
+
+
+def exported_as(to: Path, scenario: Any, **options: Any) -> Path:
+    """The folder of a scenario's law for this machine."""
+    (to / "scenario.yaml").write_text(resolved_yaml(scenario))
+    options = {"platforms": [link.this_machine()]} | options
+    return workflow.export(to / "scenario.yaml", workflow.Request(to / "law", **options))
+
+
+def table(folder: Path) -> Any:
+    """The samples of an exported law."""
+    return np.loadtxt(folder / "check.csv", delimiter=",", skiprows=1)
+
+
+@pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
+def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
+    actuator, random = example(kind), np.random.default_rng(3)
+    for _ in range(20):
+        demand, limits = random.normal(0.0, 10.0, 2), actuator.limits()
+        cut = np.clip(demand, np.negative(limits), limits)
+        loads = actuator._driven(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
+        assert np.array_equal(loads, [cut[0], 0.0, cut[1]]) == actuator.only_cuts
+    for around in (Command(), Failure(time=1e9)):
+        name = type(around).__name__.lower()
+        assert not actuator.model_copy(update={name: around}).only_cuts
 
 
 def test_every_platform_gets_object_code_and_nothing_of_this_machine():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from podusv_cli.export import c, objects
@@ -32,33 +32,34 @@ class Variable(NamedTuple):
     start: str | None = None
 
 
-def variables(law: ExportedLaw, *, loads: bool) -> list[Variable]:
-    """Inputs, then demand, signals and memory: a variable's place is its reference."""
-    numbers = [*STATE_NUMBERS, *TARGET_NUMBERS, *(LOAD_NUMBERS if loads else ())]
-    starts = [*law.loop.start, *law.loop.first_target(), *([0.0] * 3 if loads else ())]
+def variables(law: ExportedLaw, first: Sequence[float]) -> list[Variable]:
+    """Inputs, then demand, signals and memory: a variable's place is its reference.
+
+    `first` are the inputs of the run's first sample, at which they begin.
+    """
+    numbers = [*STATE_NUMBERS, *TARGET_NUMBERS, *(LOAD_NUMBERS if law.needs_loads else ())]
     given = [
         Variable(*number, "input", repr(float(start)))
-        for number, start in zip(numbers, starts, strict=True)
+        for number, start in zip(numbers, first, strict=False)
     ]
     said = [Variable(*number, "output") for number in (*DEMAND_NUMBERS, *law.signals)]
     return [*given, *said, *(Variable(*number, "local") for number in law.memory)]
 
 
 def fmu(
-    law: ExportedLaw, text: str, platforms: Mapping[str, objects.Platform], *, loads: bool
+    law: ExportedLaw, text: str, platforms: Mapping[str, objects.Platform], first: Sequence[float]
 ) -> bytes:
     """The archive with a library for each platform, of the law's module `text`.
 
-    `loads` says whether those that act are inputs. Raises UsageError where a library cannot be
-    linked.
+    `first` as in `variables`. Raises UsageError where a library cannot be linked.
     """
-    shown = variables(law, loads=loads)
+    shown = variables(law, first)
     starts = [c.literal(float(one.start)) for one in shown if one.start is not None]
     sources = c.sources(law)
     content = "".join([text, *sources.values(), *starts])
     about = {
         **c.told(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
-        "variables": shown, "starts": starts, "loads": loads,
+        "variables": shown, "starts": starts, "loads": law.needs_loads,
         "outputs": [i for i, one in enumerate(shown, 1) if one.causality == "output"],
         "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),
     }  # fmt: skip

@@ -162,13 +162,10 @@ class ExportedLaw:
         said = (*DEMAND_NUMBERS, *self.signals, *self.memory)
         return ["time", *(one.name for one in (*given, *said))]
 
-    def assumes(self, samples: Vector) -> bool:
-        """Whether the law needs no loads: it asks for none, or they are the demand, cut."""
-        if not self.loop.controller.wants_loads():
-            return True
-        loads, demand = (samples[:, self.columns.index(n) :] for n in ("tau_u", "tau_u_cmd"))
-        cut = np.clip(demand[:-1, :2], [-x for x in self.limits], self.limits)
-        return np.array_equal(loads[1:, :3], np.insert(cut, 1, 0.0, axis=1))
+    @property
+    def needs_loads(self) -> bool:
+        """Whether the law asks for loads that it cannot take from its demand."""
+        return self.loop.controller.wants_loads() and not self.loop.actuator.only_cuts
 
     def as_json(self, platforms: Sequence[str], library: Sequence[str]) -> dict[str, Any]:
         """What law.json says; `library` are functions that the law calls of another library."""
@@ -218,10 +215,13 @@ class ExportedLaw:
     def by_itself(self, samples: Vector) -> Vector:
         """These samples with what comes out of the law by itself."""
         own, step = samples.copy(), self.stepper()
-        inputs = 1 + len(STATE) + len(TARGET) + len(LOAD_NUMBERS)
-        for sample, row in enumerate(own):
-            row[inputs:] = step(sample, row[1:inputs])
+        for sample, (row, given) in enumerate(zip(own, self.inputs(samples), strict=True)):
+            row[1 + len(given) :] = step(sample, given)
         return own
+
+    def inputs(self, samples: Vector) -> Vector:
+        """What the law is given in each of these samples."""
+        return samples[:, 1 : 1 + len(STATE) + len(TARGET) + len(LOAD_NUMBERS)]
 
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
         """The target at these rows of a log; on a path that is followed it is beside the vessel."""

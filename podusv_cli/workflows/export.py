@@ -84,7 +84,7 @@ def export(config: Path, request: Request) -> Path:
                 writer.add(f"{name}/law.o", objects.object_file(text, objects.PLATFORMS[name]))
         if request.fmu:
             request.say(f"linking an FMU for {', '.join(linked)}")
-            writer.add(FMU, fmu(law, text, linked, loads=not law.assumes(seen)))
+            writer.add(FMU, fmu(law, text, linked, law.inputs(samples)[0]))
         writer.add(SAMPLES, _table(law, samples).encode())
         about = law.as_json(platforms, objects.library_functions(text))
         writer.add_json(ABOUT, {**about, "of_run": of_run})

@@ -56,6 +56,7 @@ class Actuator(Component):
     noun: ClassVar[str] = "actuator"
 
     feels_motion: ClassVar[bool] = True  # False: `drive` does not look at x, nor in a subclass
+    cuts: ClassVar[bool] = False  # True: loads are the demand cut at `limits()`, in a subclass, too
     command: Command | None = value(
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )
@@ -94,6 +95,11 @@ class Actuator(Component):
     def is_relayed(self) -> bool:
         """Whether it has a command path or a failure."""
         return bool(self.command or self.failure)
+
+    @property
+    def only_cuts(self) -> bool:
+        """Whether the loads are always the demand of the same instant, cut at `limits()`."""
+        return self.cuts and not self.is_relayed
 
     def delay(self) -> float:
         """How long the law's demand takes to the actuator [s]."""

@@ -13,6 +13,7 @@ class Ideal(Actuator):
 
     kind: Literal["ideal"] = "ideal"
     feels_motion: ClassVar[bool] = False
+    cuts: ClassVar[bool] = True
 
     @staticmethod
     @kernel

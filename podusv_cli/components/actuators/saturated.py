@@ -15,6 +15,7 @@ class Saturated(Actuator):
 
     kind: Literal["saturated"] = "saturated"
     feels_motion: ClassVar[bool] = False
+    cuts: ClassVar[bool] = True
     surge_limit: float = value(8.0, "N", "largest surge force, ahead and astern", gt=0)
     yaw_limit: float = value(2.5, "N m", "largest yaw moment, both ways", gt=0)
 
