@@ -9,14 +9,36 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import example, kinds
 from counting import counted
 from scenario_samples import loaded
 from scipy.stats import qmc
 
+import podusv
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.actuators.command import Command
+from podusv_cli.components.estimators.base import Estimator
+from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.measurements.sensors import Sensors
+from podusv_cli.core.component import Component
+from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.random_words import in_unit_interval
+from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.studies.study.draws import DrawError, drawn, draws, seeds, table, uniforms, words
+from podusv_cli.scenario.yaml_tree import route
+from podusv_cli.studies.study.draws import (
+    DrawError,
+    Number,
+    described,
+    drawn,
+    draws,
+    seeds,
+    table,
+    uniforms,
+    with_values,
+    words,
+)
 
 VARY = """
 sweep:
@@ -184,3 +206,65 @@ def test_a_table_of_many_draws_takes_few_calls() -> None:
     _, few = counted(lambda: table(sweep, 0, 10))
     _, many = counted(lambda: table(sweep, 0, 100_000))
     assert many == few  # no Python for each draw
+
+
+AROUND = {"disturbances": "disturbance", "measurements": "measurement", "estimators": "estimator",
+          "actuators": "actuator", "paths": "path", "controllers": "controller"}  # fmt: skip
+FAILED = {"time": 3.0, "pod": 0}
+
+
+def with_kind(folder: str, kind: type[Component]) -> Scenario:
+    """The paper's task with this component, behind whatever it needs and may have."""
+    part = example(kind)
+    if isinstance(part, Actuator):
+        failure = type(part).model_fields["failure"].annotation.__args__[0]
+        own = {k: v for k, v in FAILED.items() if k in failure.model_fields}
+        part = part.model_copy(update={"command": Command(delay=0.1), "failure": failure(**own)})
+    estimates = isinstance(part, Estimator) and not isinstance(part, NoEstimator)
+    seen = {"measurement": Sensors()} if estimates else {}
+    task = podusv.load("podusv:mu_2017/corrected.yaml").alone()
+    return task.model_copy(update={**seen, AROUND[folder]: part})
+
+
+def awkward(own: float) -> list[float]:
+    """Values off the grid of steps, below all ranges, far beyond, and at the end of many."""
+    numbers = [own + 0.0037, 3.0 * own + 0.02, -own - 1.0, own * 1e9, 0.0]
+    return [int(one) for one in numbers] if isinstance(own, int) else numbers
+
+
+def answers(scenario: Scenario, key: str, number: float) -> tuple[str, str]:
+    """What loading a scenario says of a number, and what a study's draw of it does."""
+    said = ["", ""]
+    try:
+        load_text(resolved_yaml(scenario), "x.yaml", [f"{key}={number!r}"])
+    except ScenarioError as error:
+        said[0] = str(error)
+    try:
+        with_values(scenario, {route(key): Number("", number)})
+    except DrawError as error:
+        said[1] = str(error)
+    return said[0], said[1]
+
+
+def asked(scenario: Scenario, section: str, *, times: bool) -> list[tuple[str, float]]:
+    """Every number of a section that can be drawn, or every time, with awkward values."""
+    found = []
+    for key, own in values(scenario).items():
+        steps = route(key)
+        if steps[0] != section or isinstance(own, bool) or not isinstance(own, (int, float)):
+            continue
+        if not times or described(scenario, steps).unit == "s":
+            found += [(key, number) for number in awkward(own)]
+    return found
+
+
+CASES = [(folder, kind) for folder in AROUND for kind in kinds(folder).values()]
+
+
+@pytest.mark.parametrize("times", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("folder", "kind"), CASES, ids=lambda one: getattr(one, "__name__", one))
+def test_a_draw_is_refused_where_loading_the_scenario_with_it_is(folder, kind, times):
+    given = with_kind(folder, kind)
+    for key, number in asked(given, AROUND[folder], times=times):
+        loading, drawing = answers(given, key, number)
+        assert bool(loading) == bool(drawing), (key, number, loading, drawing)

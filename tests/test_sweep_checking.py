@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from command_samples import Command
+from small_study import TEXT
 
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.explain import explain
@@ -297,3 +298,32 @@ def test_what_a_list_of_disturbances_does_not_have_is_told_with_what_it_has(key)
         load_text(text, "a.yaml", checks=[sweep_faults])
     says = "the list has 2 entries, disturbance[0] to disturbance[1] (step, current)"
     assert says in str(error.value)
+
+
+TRIAL = "controllers={pid: null, li: null, turn: {kind: zigzag}}"
+TIMES = {
+    "controller.execute: {uniform: [0.3, 0.5]}": "controller.execute: 0.300174 s is no whole",
+    "controller.execute: {choice: [0.3, 0.35]}": "controller.execute: 0.35 s is no whole number",
+    "actuator.command.delay: {choice: [0.1, 0.13]}": "delay: 0.13 s is no whole number of steps",
+    "measurement.position.period: {choice: [0.1, 0.25]}": "position.period: 0.25 s is no whole",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("drawn", TIMES)
+def test_a_drawn_time_has_to_fit_the_steps_as_a_given_one(drawn):
+    """Where all draws are off the grid of steps, or one of the values to choose from is."""
+    around = ["actuator.command.delay=0.1", "measurement.kind=sensors", "estimator.kind=ekf"]
+    with pytest.raises(ScenarioError) as told:
+        load_text(
+            TEXT,
+            "a.yaml",
+            [TRIAL, "sweep.claims=null", *around, f"sweep.vary={{{drawn}}}"],
+            [sweep_faults],
+        )
+    assert TIMES[drawn] in str(told.value)
+
+
+def test_what_contradicts_itself_without_a_draw_is_said_once():
+    with pytest.raises(ScenarioError) as told:
+        load_text(TEXT, "a.yaml", ["control.period=0.123"], [sweep_faults])
+    assert str(told.value).count("0.123 s is no whole number of steps") == 1

@@ -10,6 +10,7 @@ from small_study import TEXT
 from tune_samples import faults, planned, toy
 
 from podusv_cli.core.component import Component, value
+from podusv_cli.core.errors import ScenarioError
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text, resolved_yaml
 from podusv_cli.scenario.tune import Range
@@ -31,6 +32,20 @@ TUNED = TEXT + "tune: {budget: 200, train: 4, validate: 10, space: {around: 10.0
 
 def plan(*changes: str) -> TunePlan:
     return TunePlan(load_text(TUNED, "a.yaml", changes, [tune_faults]).scenario)
+
+
+def test_a_gain_that_is_a_time_has_to_fit_the_steps():
+    """At the ends of its range, and between them; and nothing is such a gain by itself."""
+    law = "controllers.pid={rate: difference, difference_step: 0.02}"
+    for space, told in (
+        ("uniform: [0.02, 0.05]", "difference_step of pid: 0.03146 s is no whole number of steps"),
+        ("choice: [0.02, 0.035]", "difference_step of pid: 0.035 s is no whole number of steps"),
+    ):
+        with pytest.raises(ScenarioError, match=told):
+            plan(law, f"tune.space.difference_step={{{space}}}")
+    plan(law, "tune.space.difference_step={choice: [0.02, 0.04]}")
+    trial = plan("controllers={turn: {kind: zigzag}}", "sweep.claims=null", "claims=null")
+    assert "execute" not in [gain.key for gain in trial.gains["turn"]]
 
 
 @pytest.mark.parametrize(

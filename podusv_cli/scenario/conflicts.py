@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from podusv_cli.components.estimators.none import NoEstimator
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from podusv_cli.scenario.model import Scenario
 
 Conflicts = Iterator[tuple[str, str]]  # key and message
+NO_ESTIMATOR = NoEstimator()
 MOST_INSTANTS = 2**53  # that are distinct numbers
 
 
@@ -23,10 +24,21 @@ def conflicts(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other."""
     parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
     values = parts or [
-        *_times(scenario), *_samples(scenario), *_names(scenario), *scenario.metrics.conflicts(),
-        *_seeing(scenario),
+        *of_numbers(scenario), *_names(scenario), *scenario.metrics.conflicts(),
     ]  # fmt: skip
     return values or list(_signals(scenario))
+
+
+def of_numbers(scenario: Scenario) -> Conflicts:
+    """Those that other numbers can bring into a scenario that has none, as draws do."""
+    laws = scenario.laws()
+    sampled = {
+        f"{at}.{law.period_key}".rstrip("."): law.sample_period() for at, law in laws.items()
+    }
+    trials = {f"{at}.execute": trial.execute for at, law in laws.items() if (trial := law.trial())}
+    yield from _times(scenario, sampled | trials)
+    yield from _samples(scenario.control.period, sampled)
+    yield from _seeing(scenario)
 
 
 def _defaults(scenario: Scenario) -> Conflicts:
@@ -65,14 +77,14 @@ def _unanswered(scenario: Scenario) -> Conflicts:
             yield key, f"{describe(law)}: asked what it logs, {in_a_line(error)}"
 
 
-def _times(scenario: Scenario) -> Conflicts:
-    step, laws = scenario.simulation.step, scenario.laws().items()
+def _times(scenario: Scenario, of_laws: Mapping[str, float]) -> Conflicts:
+    """Times [s] that are no whole number of steps; those of the laws by their keys."""
+    step = scenario.simulation.step
     times = {
         "simulation.duration": scenario.simulation.duration,
         "control.period": scenario.control.period,
         "actuator.command.delay": scenario.actuator.delay(),
-        **_sampled(scenario),
-        **{f"{key}.execute": trial.execute for key, law in laws if (trial := law.trial())},
+        **of_laws,
     }
     if max(times.values()) / step > MOST_INSTANTS:
         key, time = max(times.items(), key=lambda item: item[1])
@@ -85,17 +97,9 @@ def _times(scenario: Scenario) -> Conflicts:
             yield key, told
 
 
-def _sampled(scenario: Scenario) -> dict[str, float]:
-    """Seconds between two samples of each law, by the key that gives them."""
-    return {
-        f"{key}.{law.period_key}".rstrip("."): law.sample_period()
-        for key, law in scenario.laws().items()
-    }
-
-
-def _samples(scenario: Scenario) -> Conflicts:
-    period = scenario.control.period
-    for key, sample in _sampled(scenario).items():
+def _samples(period: float, sampled: Mapping[str, float]) -> Conflicts:
+    """Laws whose own samples lie between those of the control, `period` [s] apart."""
+    for key, sample in sampled.items():
         if period and sample and not whole_steps(sample, period):
             text = f"{sample:g} s is no whole number of control periods of {period:g} s"
             yield key, text + nearest_hint(sample, period)
@@ -108,7 +112,7 @@ def _seeing(scenario: Scenario) -> Conflicts:
         yield from ((f"{at}.{key}", text) for key, text in part.conflicts(scenario.vessel, step))
     for key, text in scenario.measurement.conflicts(step):
         yield f"measurement.{key}", text
-    if scenario.measurement.is_exact and scenario.estimator != NoEstimator():
+    if scenario.measurement.is_exact and scenario.estimator != NO_ESTIMATOR:
         text = "has nothing to estimate where the law sees the true state"
         yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
     if told := scenario.estimator.lacking(scenario.measurement.measured()):

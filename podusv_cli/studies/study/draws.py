@@ -22,6 +22,7 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.random_words import Words, in_unit_interval
+from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import hint
@@ -123,13 +124,21 @@ def drawn(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) -> Scena
 
 
 def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
-    """The scenario with new values at these places. Raises DrawError for one out of range."""
+    """The scenario with new values at these places.
+
+    Raises DrawError for one that is out of range, or that contradicts another.
+    """
     given: dict[str, dict[Route, Number]] = {}
     for (section, *rest), number in new.items():
         given.setdefault(str(section), {})[tuple(rest)] = number
-    return scenario.model_copy(
+    made = scenario.model_copy(
         update={section: _section(scenario, section, new) for section, new in given.items()}
     )
+    for key, told in of_numbers(made):
+        raise DrawError(
+            f"{new[steps].source if (steps := _steps(key)) in new else ''}{key}: {told}"
+        )
+    return made
 
 
 @lru_cache(maxsize=1024)
@@ -142,8 +151,13 @@ def content(scenario: Scenario, steps: Route) -> Any:
     return reduce(_inside, steps, scenario)
 
 
+@lru_cache
+def _fields(kind: type[Component]) -> frozenset[str]:
+    return frozenset(kind.model_fields)
+
+
 def _inside(whole: Any, step: str | int) -> Any:
-    if isinstance(whole, Component) and step in type(whole).model_fields:
+    if isinstance(whole, Component) and step in _fields(type(whole)):
         return getattr(whole, str(step))
     if isinstance(whole, tuple) and isinstance(step, int):
         return whole[step]

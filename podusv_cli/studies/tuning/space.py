@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import unit_of
 from podusv_cli.engine.loop.closed_loop import Observer, entries
+from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean
@@ -20,7 +21,8 @@ from podusv_cli.studies.study.plan import changed
 
 DIGITS = 4  # of a gain that is tried, so that a scenario shows all of them
 BOUNDARY = 0.02  # of a range: a gain that is nearer to an end is at its bound
-TRIED = 1.01  # a factor, to see whether a number is one that a search may change
+INSIDE = 0.3819660113  # place in a range at which it is tried, beside its ends
+TRIED = 1.0123456789  # a factor, to see whether a number is one that a search may change
 
 
 @dataclass(frozen=True)
@@ -119,14 +121,12 @@ def _is_gain(law: Controller, key: str, scenario: Scenario) -> bool:
     changed = with_gains(law, {key: own * TRIED}) or with_gains(law, {key: own / TRIED})
     if changed is None:
         return False
-    try:
-        return _structure(scenario, changed) == _structure(scenario, law)
-    except ValueError:  # no whole number of steps between samples
-        return False
+    other = scenario.model_copy(update={"controller": changed})
+    return not any(of_numbers(other)) and _structure(other) == _structure(scenario)
 
 
-def _structure(scenario: Scenario, law: Controller) -> tuple[Any, ...]:
-    loop = scenario.model_copy(update={"controller": law}).closed_loop()
+def _structure(scenario: Scenario) -> tuple[Any, ...]:
+    loop = scenario.closed_loop()
     return loop.layout(scenario.time_grid()), list(entries(loop, Observer()))
 
 
@@ -171,14 +171,14 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
         if name == AROUND or not isinstance(content, Range):
             continue
         named = {label: laws[label]} if dot and label in laws else {} if dot else dict(laws)
-        having = {n: one.controller for n, one in named.items() if key in keys(one.controller)}
+        having = {n: one for n, one in named.items() if key in keys(one.controller)}
         if not having:
             yield (
                 name,
                 f"unknown gain{did_you_mean(name, _known(laws))}; write a key of a law, or law.key",
             )
         yield from (
-            (name, text) for n, law in having.items() for text in _refused(n, law, key, content)
+            (name, text) for n, one in having.items() for text in _refused(n, one, key, content)
         )
 
 
@@ -190,14 +190,20 @@ def _known(laws: Mapping[str, Scenario]) -> list[str]:
     ]
 
 
-def _refused(label: str, law: Controller, key: str, content: Range) -> Iterator[str]:
-    """What is wrong with a range for one law: the ends that its field does not take."""
+def _refused(label: str, scenario: Scenario, key: str, content: Range) -> Iterator[str]:
+    """What is wrong with a range for one law: the values that its scenario does not take."""
+    law = scenario.controller
     own = getattr(law, key)
     if content.keep:
         return
     if content.around and (not isinstance(own, float) or own <= 0.0):
         yield f"{key} of {label} is {own!r}; a factor needs a number above 0, so write log: ..."
         return
-    for end in content.choice or content.log or content.uniform or content.integers or ():
-        if with_gains(law, {key: end}) is None:
-            yield f"{label} does not take {key} = {end!r}; see podusv explain controller.{key}"
+    ends = content.choice or content.log or content.uniform or content.integers or ()
+    (gain,) = _of(content, key, own, type(law).model_fields[key])
+    for tried in (*ends, gain.at(INSIDE)):
+        if taken := with_gains(law, {key: tried}):
+            other = scenario.model_copy(update={"controller": taken})
+            yield from (f"{key} of {label}: {text}" for _, text in of_numbers(other))
+        elif tried in ends:
+            yield f"{label} does not take {key} = {tried!r}; see podusv explain controller.{key}"
