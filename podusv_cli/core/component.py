@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args, get_origin
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    NamedTuple,
+    Self,
+    get_args,
+    get_origin,
+)
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic.fields import FieldInfo
 
+from podusv_cli.core.errors import SizingError
 from podusv_cli.core.kernel import Vector
 
 
@@ -25,6 +36,16 @@ class Presets(NamedTuple):
     file: str  # what messages call one
 
 
+DIGITS = 3  # of a number that a rule gives, so that a scenario shows all of them
+
+
+class Rule(NamedTuple):
+    """How a default follows from hull, actuator and loop; see `components.rules`."""
+
+    words: str  # behind "from hull and actuator: "
+    of: Callable[[Any, float], float]  # from `components.facts` and the model ship's number
+
+
 class Component(BaseModel):
     """A part of a scenario. Fields carry unit, range, default and meaning (see `value`).
 
@@ -33,17 +54,54 @@ class Component(BaseModel):
     name a file whose text another field takes, `bytes_of` those that may name a file whose bytes
     another field takes, as base64. `is_recorded` says that this is `Recorded`. One that
     `stands_alone` takes no value of another kind whose place it takes. `noun` is what messages call
-    it.
+    it. `rules` has the fields that may be null, and in a scenario are by default, with the rule
+    that gives the number; the field's own default is the model ship's.
     """
 
     presets: ClassVar[Presets | None] = None
     rows_of: ClassVar[dict[str, str]] = {}
     texts_of: ClassVar[dict[str, str]] = {}
     bytes_of: ClassVar[dict[str, str]] = {}
+    rules: ClassVar[dict[str, Rule]] = {}
     is_recorded: ClassVar[bool] = False
     stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+    @property
+    def by_rule(self) -> tuple[str, ...]:
+        """The fields that have a rule and no number of the scenario's own."""
+        given = self.model_fields_set
+        return tuple(n for n in self.rules if n not in given or getattr(self, n) is None)
+
+    def sized(self, facts: Any) -> Self:
+        """With the numbers of its rules, for these facts; `by_rule` stays as it is.
+
+        Raises SizingError where a rule gives no number above 0.
+        """
+        new = {name: self._ruled(name, facts) for name in self.by_rule}
+        return self._with(new, self.model_fields_set - new.keys()) if new else self
+
+    def _ruled(self, name: str, facts: Any) -> float:
+        try:
+            number = self.rules[name].of(facts, type(self).model_fields[name].default)
+        except ArithmeticError:
+            number = math.nan
+        if not 0.0 < number < math.inf:
+            what = f"{self.noun} {type(self).model_fields['kind'].default}"
+            raise SizingError(
+                f"{name} of {what} does not follow from hull and actuator ({facts.in_words()}); "
+                "give it a number, or check vessel and actuator"
+            )
+        return float(f"{number:.{DIGITS}g}")
+
+    def changed(self, new: Mapping[str, Any]) -> Self:
+        """With other values, checked. Raises ValidationError."""
+        checked = type(self).model_validate(self.model_dump() | dict(new))
+        return checked._with({}, self.model_fields_set | new.keys()) if self.rules else checked
+
+    def _with(self, new: Mapping[str, Any], given: set[str]) -> Self:
+        return type(self).model_construct(given, **(dict(self) | dict(new)))
 
     def constants(self) -> dict[str, float]:
         """The component's numbers by name, as its kernels read them from `k`.
@@ -137,6 +195,10 @@ def unit_of(field: FieldInfo, of_section: str = OF_SECTION) -> str:
 
 
 Positive = Annotated[float, Field(gt=0)]
+if TYPE_CHECKING:
+    Ruled = float  # a number once its component is `sized`
+else:
+    Ruled = float | None  # a number, or null for that of its rule
 
 
 def wrong_default(owner: Component) -> str:

@@ -52,6 +52,12 @@ class NotConvergedError(PodusvError):
     exit_code = 3
 
 
+class SizingError(PodusvError):
+    """Hull and actuator do not give a number for a default that follows from them."""
+
+    exit_code = 2
+
+
 class LawError(PodusvError):
     """A law, or another component, that does not keep to its declaration or fails when asked."""
 

@@ -94,7 +94,7 @@ def _loaded(source: Any, overrides: list[str], checks: Sequence[Check]) -> Loade
 @_loaded.register
 def _(source: model.Scenario, overrides: list[str], checks: Sequence[Check]) -> Loaded:
     derived = {plugins.KEY, *(["controller"] if source.open_choice else [])}
-    sections = {key: part for key, part in source.model_dump().items() if key not in derived}
+    sections = {key: part for key, part in source.as_given().items() if key not in derived}
     files = [plugin for plugin in source.plugged if plugin.text]  # as they were when it was loaded
     text = yaml_text(sections)
     return load_text(text, source.name, overrides, checks, files, placed=False)

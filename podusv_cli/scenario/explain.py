@@ -230,4 +230,7 @@ def _default(key: Key) -> str:
         return FROM_PRESET[str(key.path[0])]
     if key.default is NO_DEFAULT or key.name == "kind":
         return "required"
+    if key.name in key.model.rules and key.field:
+        number, rule = key.field.default, key.model.rules[key.name]
+        return f"null, from hull and actuator: {number:g} {rule.words}"
     return as_yaml(key.default)

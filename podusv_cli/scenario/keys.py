@@ -139,6 +139,8 @@ class Key:
         # A section that is left out is its default, whatever its own class would start with.
         given = isinstance(self.default, model)
         default = getattr(self.default, name) if given else field.default
+        if name in model.rules:
+            default = None
         path, route = (*self.path, name), (*self.route, name)
         unit = unit_of(self.field) if self.field else ""
         return Key(

@@ -35,6 +35,7 @@ from podusv_cli.scenario.yaml_tree import (
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
+BY_RULE = "from hull and actuator"  # the origin of a number in place of null
 STUDIES = ("sweep", "tune")  # sections that only studies have
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
@@ -49,9 +50,10 @@ class Loaded:
     """A scenario and the origins of its values.
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
-    paper.yaml" or "default"; `text` is the scenario file as given. `root` is the tree of which the
-    scenario is made, without what is filled in. `dropped` are sentences about values that were
-    given to a section before it was given another kind, which does not take them.
+    paper.yaml", "from hull and actuator" or "default"; `text` is the scenario file as given. `root`
+    is the tree of which the scenario is made, without what is filled in. `dropped` are sentences
+    about values that were given to a section before it was given another kind, which does not take
+    them.
     """
 
     scenario: Scenario
@@ -164,6 +166,7 @@ def _checked(
         raise ScenarioError(_ordered(faults, source))
     nodes = {route: find(root, route) for route, _ in _leaves(_data(scenario), ())}
     origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
+    origins |= {dotted(steps): BY_RULE for steps in scenario.by_rule()}
     if stands_in(root):  # the very same law says so, see `Scenario.open_choice`
         first = next(iter(scenario.controllers.values()))
         scenario = scenario.model_copy(update={"controller": first})

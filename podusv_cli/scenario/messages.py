@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from podusv_cli.core.errors import SizingError
 from podusv_cli.scenario.keys import NAME, NUMBER, Key, either, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, hint, unknown, without_case
@@ -26,9 +27,14 @@ def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ())
     `top` are the scenario's keys.
     """
     try:
-        scenario = top.scenario.model_validate(with_defaults(top, plain(root)))
+        given = top.scenario.model_validate(with_defaults(top, plain(root)))
     except ValidationError as error:
         faults.extend(dict.fromkeys(_faults(root, top, error)))
+        return None
+    try:
+        scenario = given.sized()
+    except SizingError as error:
+        faults.append(Fault(follow(root, ("actuator",))[-1].mark, "actuator", str(error)))
         return None
     for key, text in chain(scenario.conflicts(), *(look(scenario) for look in more)):
         steps = route(key) if isinstance(key, str) else key

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, reduce
+from operator import getitem
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
 
@@ -16,6 +17,7 @@ from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.disturbances.total import Total
 from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.estimators.none import NoEstimator
+from podusv_cli.components.facts import Facts
 from podusv_cli.components.measurements.base import Measurement
 from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import Path
@@ -125,7 +127,7 @@ class Scenario(Component):
         if not any(plugin.text for plugin in self.plugged):
             return super().__reduce_ex__(protocol)
         files = tuple((plugin.path, plugin.text) for plugin in self.plugged if plugin.text)
-        return _unpickled, (files, self.model_dump(), self.open_choice)
+        return _unpickled, (files, self.as_given(), self.open_choice)
 
     @property
     def open_choice(self) -> bool:
@@ -166,6 +168,46 @@ class Scenario(Component):
             name: part if isinstance(part, tuple) else (part,) for name, part in parts.items()
         }
         return tuple(n for n, each in several.items() if any(one.is_recorded for one in each))
+
+    @property
+    def facts(self) -> Facts:
+        """What null defaults follow from: the nominal vessel, the actuator, the loop's times."""
+        seen = self.measurement
+        return Facts(
+            self.nominal, self.actuator, self.control.period, seen.age(), seen.noise_of_each()
+        )
+
+    def sized(self) -> Scenario:
+        """With a number in place of each null that means "from hull and actuator".
+
+        Made once when a scenario is loaded, and again where a draw changes what the facts are of.
+        """
+        if self.recorded:  # nobody asks such an actuator
+            return self
+        facts = self.facts
+        several = {label: law.sized(facts) for label, law in self.controllers.items()}
+        law = next(iter(several.values())) if self.open_choice else self.controller.sized(facts)
+        return self.model_copy(
+            update={
+                "path": self.path.sized(facts), "estimator": self.estimator.sized(facts),
+                "controller": law, "controllers": several,
+            }
+        )  # fmt: skip
+
+    def by_rule(self) -> list[tuple[str, ...]]:
+        """The steps of every key whose number `sized` gave."""
+        parts: dict[tuple[str, ...], Component] = {
+            ("path",): self.path, ("estimator",): self.estimator, ("controller",): self.controller,
+            **{("controllers", label): law for label, law in self.controllers.items()},
+        }  # fmt: skip
+        return [(*steps, name) for steps, part in parts.items() for name in part.by_rule]
+
+    def as_given(self) -> dict[str, Any]:
+        """As plain data, with null in place of what `sized` gave."""
+        data = self.model_dump()
+        for *sections, name in self.by_rule():
+            reduce(getitem, sections, data)[name] = None
+        return data
 
     def closed_loop(self) -> ClosedLoop:
         """The closed loop of vessel, path, disturbance, actuator, measurement and law."""
@@ -292,7 +334,7 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
 def _unpickled(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
-    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data)
+    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data).sized()
     if open_choice:
         made = made.model_copy(update={"controller": next(iter(made.controllers.values()))})
     return made

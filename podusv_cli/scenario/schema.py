@@ -34,6 +34,9 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
     for model in _filled_from_outside(top):
         for part in definitions[_name(model, definitions)]["properties"].values():
             part.pop("default", None)
+    for key in top.all():
+        if key.field and key.name in key.model.rules:
+            definitions[_name(key.model, definitions)]["properties"][key.name]["default"] = None
     for model, presets in with_presets(top).values():
         properties = definitions[_name(model, definitions)]["properties"]
         properties["preset"]["enum"] = ["", *preset_names(presets, plugins)]

@@ -117,6 +117,11 @@ class Actuator(Component):
         """The smallest time constant of its states [s]; infinite without states."""
         return math.inf
 
+    def lags(self) -> tuple[float, float]:
+        """How late force and moment follow a demand [s]."""
+        lag = self.shortest_lag()
+        return (lag, lag) if math.isfinite(lag) else (0.0, 0.0)
+
     def settled(self, x: Vector, demand: Vector) -> Vector:
         """Loads (tau_u, tau_v, tau_r) once the actuator has followed a constant demand.
 

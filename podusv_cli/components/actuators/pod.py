@@ -43,6 +43,7 @@ SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9
 ROUNDS = 20  # until speeds and angles agree
 STRONGEST = 1e15  # N, N m; beside it a demand of 1 is lost in rounding
+TURNING = 0.25  # of an angle's lag, that a moment is late by
 SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
@@ -200,6 +201,12 @@ class Pods(Actuator):
     def shortest_lag(self) -> float:
         """Of speeds and angles."""
         return min(min(pod.n_lag, pod.angle_lag) for pod in self.pods)
+
+    def lags(self) -> tuple[float, float]:
+        """The propellers' lag; of a moment also a quarter of that of the angles that turn."""
+        turning = [pod.angle_lag for pod in self.pods if pod.angle_limit > 0.0]
+        lag = max(pod.n_lag for pod in self.pods)
+        return lag, lag + TURNING * max(turning, default=0.0)
 
     def settled(self, x: Vector, demand: Vector) -> Vector:
         """Loads where the pods' state is what is commanded; the advance speed hangs on the angle.

@@ -12,12 +12,14 @@ stays. Anti-windup: the observer is told the loads that act. docs/laws.md has th
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.observer import B_R, B_U, B_V, ObservingController, observe
 from podusv_cli.components.controllers.velocity_loop import Axis
+from podusv_cli.core.component import Rule
 from podusv_cli.core.kernel import Vector, kernel
 
 LAGGED = 6  # position in the memory, behind the observer
@@ -27,6 +29,7 @@ class Adrc(HandController, ObservingController):
     """Moves the hand point as a mass that can be pushed anywhere; an observer finds the loads."""
 
     kind: Literal["adrc"] = "adrc"
+    rules: ClassVar[dict[str, Rule]] = HandController.rules | by.OBSERVER
 
     def slots(self) -> Slots:
         """The observer and the lagged heading."""

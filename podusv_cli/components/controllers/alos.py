@@ -28,7 +28,8 @@ from podusv_cli.components.controllers.guidance import (
 from podusv_cli.components.controllers.observer import B_R, B_U, ObservingController, observe
 from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.components.vessels.plant import surge_force, yaw_moment
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
@@ -64,21 +65,25 @@ class Alos(LineOfSight, ObservingController):
 
     kind: Literal["alos"] = "alos"
     signals: ClassVar[tuple[Signal, ...]] = STEERED
-    lookahead: float = value(0.7, "m", "distance ahead on the path that the bow aims at", gt=0)
-    U: float = value(1.1, "m/s", "largest wanted surge velocity", gt=0)
+    rules: ClassVar[dict[str, Rule]] = {
+        **LineOfSight.rules, **by.OBSERVER, "gamma": by.YAW_PER_REACH, "sigma": by.YAW_REACH,
+        "k_u": by.SURGE, "k_psi": by.YAW, "k_r": by.YAW, "N_m": by.MOMENT,
+    }  # fmt: skip
+    lookahead: Ruled = value(0.7, "m", "distance ahead on the path that the bow aims at", gt=0)
+    U: Ruled = value(1.1, "m/s", "largest wanted surge velocity", gt=0)
     learns: Literal["adaptive", "integral", "published"] = value(
         "adaptive", "", "how the crab angle is found: adapted as an angle (after ALOS, Fossen "
         "2023, but slower far from the line), by an integral of the cross-track error (ILOS, "
         "Borhaug et al. 2008), or by ALOS as published, whose lookahead does not grow",
     )  # fmt: skip
-    gamma: float = value(0.2, "rad/(m s)", "gain of the adapted angle", ge=0)
+    gamma: Ruled = value(0.2, "rad/(m s)", "gain of the adapted angle", ge=0)
     crab_m: float = value(0.5, "rad", "largest adapted angle", gt=0)
-    sigma: float = value(0.1, "m/s", "gain of the integral", ge=0)
-    k_u: float = value(1.0, "1/s", "gain of the surge velocity", gt=0)
-    k_psi: float = value(1.2, "1/s", "gain of the heading", gt=0)
-    k_r: float = value(1.3, "1/s", "gain of the yaw rate", gt=0)
+    sigma: Ruled = value(0.1, "m/s", "gain of the integral", ge=0)
+    k_u: Ruled = value(1.0, "1/s", "gain of the surge velocity", gt=0)
+    k_psi: Ruled = value(1.2, "1/s", "gain of the heading", gt=0)
+    k_r: Ruled = value(1.3, "1/s", "gain of the yaw rate", gt=0)
 
-    N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
+    N_m: Ruled = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
     def most(self) -> Most:
         """U and N_m."""

@@ -11,7 +11,8 @@ import math
 from typing import Any, NamedTuple
 
 from podusv_cli.components.controllers.base import Controller, Most
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
@@ -87,14 +88,19 @@ def wanted_speed(x: Vector, at: Frame, k: Any) -> float:
 class LineOfSight(Controller):
     """What laws with line-of-sight guidance have in common."""
 
-    lookahead: float = value(2.0, "m", "distance ahead on the path that the bow aims at", gt=0)
-    k_s: float = value(0.3, "1/s", "gain of the distance along the course", ge=0)
-    U: float = value(0.9, "m/s", "largest wanted surge velocity", gt=0)
-    U_min: float = value(0.1, "m/s", "least wanted surge velocity, for steerage", ge=0)
-    V_m: float = value(
+    rules: ClassVar[dict[str, Rule]] = {
+        "lookahead": by.AHEAD, "k_s": by.SURGE, "U": by.SPEED, "U_min": by.SPEED, "V_m": by.SPEED,
+        "chi_m": by.TURN,
+    }  # fmt: skip
+
+    lookahead: Ruled = value(2.0, "m", "distance ahead on the path that the bow aims at", gt=0)
+    k_s: Ruled = value(0.3, "1/s", "gain of the distance along the course", ge=0)
+    U: Ruled = value(0.9, "m/s", "largest wanted surge velocity", gt=0)
+    U_min: Ruled = value(0.1, "m/s", "least wanted surge velocity, for steerage", ge=0)
+    V_m: Ruled = value(
         0.02, "m/s", "below this speed of the target its course is the line of sight", gt=0
     )
-    chi_m: float = value(0.3, "rad/s", "largest turn of the course used ahead", gt=0)
+    chi_m: Ruled = value(0.3, "rad/s", "largest turn of the course used ahead", gt=0)
 
     def most(self) -> Most:
         """U."""

@@ -14,7 +14,8 @@ from podusv_cli.components.controllers.base import Controller, Most
 from podusv_cli.components.controllers.constant_bearing import NEARS, Moving, approach, turn_rate
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -87,20 +88,24 @@ def push(
 class HandController(Controller):
     """Options of the hand point, the same for every law that steers it."""
 
+    rules: ClassVar[dict[str, Rule]] = {
+        "hand": by.AHEAD, "T_f": by.PACE_TIME, "k_p": by.PACE, "U": by.SPEED, "k_v": by.PACE,
+    }  # fmt: skip
+
     signals: ClassVar[tuple[Signal, ...]] = (
         Signal("s_a", "m/s", "velocity that the hand point lacks along the bow"),
         Signal("s_b", "m/s", "velocity that the hand point lacks across the bow"),
         Signal("z_h", "m", "distance of the hand point to its own target"),
     )
-    hand: float = value(0.3, "m", "how far the hand point is ahead of the origin", gt=0)
+    hand: Ruled = value(0.3, "m", "how far the hand point is ahead of the origin", gt=0)
     reference: Literal["target", "origin"] = value(
         "origin", "", "what comes to the target: the hand point as published (target), or the "
         "origin, with a target for the hand point that lies ahead along the lagged heading",
     )  # fmt: skip
-    T_f: float = value(2.0, "s", "lag of that heading", gt=0)
-    k_p: float = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
-    U: float = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
-    k_v: float = value(1.0, "1/s", "gain of the velocity that the hand point lacks", gt=0)
+    T_f: Ruled = value(2.0, "s", "lag of that heading", gt=0)
+    k_p: Ruled = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
+    U: Ruled = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
+    k_v: Ruled = value(1.0, "1/s", "gain of the velocity that the hand point lacks", gt=0)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The lagged heading, which comes last in the memory, as the heading is."""

@@ -13,14 +13,15 @@ back-calculation. docs/laws.md has the derivation.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -35,7 +36,8 @@ class HandPosition(HandController):
     """Moves the hand point as a mass that can be pushed anywhere; its integral finds the loads."""
 
     kind: Literal["hand_position"] = "hand_position"
-    k_i: float = value(0.25, "1/s2", "gain of the integral of the missing velocity", ge=0)
+    rules: ClassVar[dict[str, Rule]] = HandController.rules | {"k_i": by.PACE_SQUARED}
+    k_i: Ruled = value(0.25, "1/s2", "gain of the integral of the missing velocity", ge=0)
 
     def slots(self) -> Slots:
         """Integrals and the lagged heading."""

@@ -13,7 +13,7 @@ the observer is told the loads that act.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.momentum_adaptation import (
@@ -39,7 +39,8 @@ from podusv_cli.components.controllers.velocity_steering import (
 )
 from podusv_cli.components.vessels.plant import sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -72,18 +73,21 @@ class MomentumVector(VelocitySteering):
     """Turns the velocity vector to the target, with as much of the sway as the loop bears."""
 
     kind: Literal["momentum_vector"] = "momentum_vector"
-    omega_u: float = value(5.0, "rad/s", "bandwidth of the observer in surge", gt=0)
-    omega_v: float = value(3.0, "rad/s", "bandwidth of the observer in sway", gt=0)
-    omega_r: float = value(0.9, "rad/s", "bandwidth of the observer in yaw", gt=0)
-    Q0: float = value(7.5, "1/s2", "gain of the angle", gt=0)
-    S0: float = value(4.4, "1/s", "gain of the yaw rate", gt=0)
-    k_b0: float = value(0.5, "1/s", "largest gain of the distance across the path", gt=0)
-    T_v: float = value(1.8, "s", "time over which the loads' sway is predicted", ge=0)
+    rules: ClassVar[dict[str, Rule]] = VelocitySteering.rules | {
+        "Q0": by.YAW_SQUARED, "S0": by.YAW, "k_b0": by.PACE, "T_v": by.YAW_TIME, "gamma": by.YAW,
+    }  # fmt: skip
+    omega_u: Ruled = value(5.0, "rad/s", "bandwidth of the observer in surge", gt=0)
+    omega_v: Ruled = value(3.0, "rad/s", "bandwidth of the observer in sway", gt=0)
+    omega_r: Ruled = value(0.9, "rad/s", "bandwidth of the observer in yaw", gt=0)
+    Q0: Ruled = value(7.5, "1/s2", "gain of the angle", gt=0)
+    S0: Ruled = value(4.4, "1/s", "gain of the yaw rate", gt=0)
+    k_b0: Ruled = value(0.5, "1/s", "largest gain of the distance across the path", gt=0)
+    T_v: Ruled = value(1.8, "s", "time over which the loads' sway is predicted", ge=0)
     trust: float = value(
         1.25, "", "how many times as much as told sway may answer yaw; more is safer and slower",
         ge=1,
     )  # fmt: skip
-    gamma: float = value(
+    gamma: Ruled = value(
         0.2, "1/s", "how fast it learns by how much more sway answers yaw; 0: never", ge=0
     )
 

@@ -16,7 +16,7 @@ does not wind up while the actuator limits the demand.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,7 +24,8 @@ from podusv_cli.components.controllers.base import Controller, Slots, each
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -67,9 +68,11 @@ def observe(x: Vector, memory: Vector, tau: Vector, k: Any, rate: Vector) -> Non
 class ObservingController(Controller):
     """A law whose memory is the observer."""
 
-    omega_u: float = value(2.5, "rad/s", "bandwidth of the observer in surge", gt=0)
-    omega_v: float = value(2.0, "rad/s", "bandwidth of the observer in sway", gt=0)
-    omega_r: float = value(1.2, "rad/s", "bandwidth of the observer in yaw", gt=0)
+    rules: ClassVar[dict[str, Rule]] = by.OBSERVER
+
+    omega_u: Ruled = value(2.5, "rad/s", "bandwidth of the observer in surge", gt=0)
+    omega_v: Ruled = value(2.0, "rad/s", "bandwidth of the observer in sway", gt=0)
+    omega_r: Ruled = value(1.2, "rad/s", "bandwidth of the observer in yaw", gt=0)
 
     def slots(self) -> Slots:
         """Velocities and loads."""

@@ -16,14 +16,16 @@ has no memory; super-twisting learns the less, the more the actuator falls short
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.core.component import value
+from podusv_cli.components.facts import Facts
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -33,6 +35,24 @@ TWISTED = (
     Signal("twist_b", "m/s2", "what super-twisting has learnt across the bow", "z_b"),
 )
 TWISTING = 1.0
+ETA0, PHI0 = 0.2, 0.02  # of the model ship [m/s2, m/s]
+LATE = 0.35  # of the boundary layer, what eta adds to a velocity within a delay
+AUTHORITY = "min(a_F/a0, (hand/hand0) (w_N/w0)^2)"
+
+
+def authority(facts: Facts) -> float:
+    """Acceleration that the actuator gives the hand point, over that of the model ship."""
+    return min(facts.a_f, by.reach(facts) * facts.w_f * facts.w_f)
+
+
+def layer(facts: Facts) -> float:
+    """Boundary layer [m/s] that a delay does not turn into a relay."""
+    return max(PHI0 * facts.s, ETA0 * authority(facts) * facts.T_r / LATE)
+
+
+def root(facts: Facts) -> float:
+    """eta/phi sqrt(phi), over that of the model ship."""
+    return authority(facts) * math.sqrt(PHI0 / layer(facts))
 
 
 @kernel
@@ -53,14 +73,20 @@ class SlidingMode(HandController):
     """Pushes the hand point to its wanted velocity with all that the loads can be, and more."""
 
     kind: Literal["sliding_mode"] = "sliding_mode"
+    rules: ClassVar[dict[str, Rule]] = HandController.rules | {
+        "eta": by.times(f"A = {AUTHORITY}", authority),
+        "phi": Rule("max(phi0 U/U0, eta T_r/0.35)", lambda facts, phi: layer(facts) * phi / PHI0),
+        "lambda_1": by.times("eta/phi sqrt(phi) over the model ship's", root),
+        "lambda_2": by.times("A g_p, A as of eta", lambda facts: authority(facts) * facts.g_p),
+    }
     reaching: Literal["boundary_layer", "super_twisting"] = value(
         "boundary_layer", "", "how the surface is reached: first order with a boundary layer, or "
         "second order, which learns slow loads",
     )  # fmt: skip
-    eta: float = value(0.2, "m/s2", "bound of the loads, as accelerations of the hand point", gt=0)
-    phi: float = value(0.02, "m/s", "boundary layer: half its width, or the rounding", gt=0)
-    lambda_1: float = value(0.6, "m1/2 s-3/2", "gain of the root (super-twisting)", ge=0)
-    lambda_2: float = value(0.08, "m/s3", "bound of the loads' rate (super-twisting)", ge=0)
+    eta: Ruled = value(0.2, "m/s2", "bound of the loads, as accelerations of the hand point", gt=0)
+    phi: Ruled = value(0.02, "m/s", "boundary layer: half its width, or the rounding", gt=0)
+    lambda_1: Ruled = value(0.6, "m1/2 s-3/2", "gain of the root (super-twisting)", ge=0)
+    lambda_2: Ruled = value(0.08, "m/s3", "bound of the loads' rate (super-twisting)", ge=0)
 
     def slots(self) -> Slots:
         """What super-twisting has learnt, and the lagged heading."""

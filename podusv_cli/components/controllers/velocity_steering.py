@@ -13,7 +13,8 @@ from podusv_cli.components.controllers.base import Most
 from podusv_cli.components.controllers.constant_bearing import NEARS
 from podusv_cli.components.controllers.observer import B_U, ObservingController
 from podusv_cli.components.vessels.plant import surge_force
-from podusv_cli.core.component import Positive, value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Positive, Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
@@ -74,12 +75,16 @@ class VelocitySteering(ObservingController):
         ),
     )
     no_gains: ClassVar[tuple[str, ...]] = ("thrust_lever",)  # where the pods are
-    k_p: float = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
-    U: float = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
-    r_m: float = value(1.4, "rad/s", "yaw rate that a large angle approaches", gt=0)
-    k_u: float = value(0.75, "1/s", "gain of the surge velocity", gt=0)
-    V_m: float = value(0.1, "m/s", "speed below which a direction counts for less", gt=0)
-    a_m: float = value(1.0, "m/s2", "largest wanted acceleration used ahead", gt=0)
+    rules: ClassVar[dict[str, Rule]] = {
+        **by.OBSERVER, "k_p": by.PACE, "U": by.SPEED, "r_m": by.YAW_RATE, "k_u": by.SURGE,
+        "V_m": by.SPEED, "a_m": by.ACCELERATION, "N_m": by.MOMENT,
+    }  # fmt: skip
+    k_p: Ruled = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
+    U: Ruled = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
+    r_m: Ruled = value(1.4, "rad/s", "yaw rate that a large angle approaches", gt=0)
+    k_u: Ruled = value(0.75, "1/s", "gain of the surge velocity", gt=0)
+    V_m: Ruled = value(0.1, "m/s", "speed below which a direction counts for less", gt=0)
+    a_m: Ruled = value(1.0, "m/s2", "largest wanted acceleration used ahead", gt=0)
     astern: Literal["never", "shorter"] = value(
         "shorter", "", "what a vessel ahead of the target does: turns round, and again when it is "
         "there (never), or backs up if its bow points to the target's course (shorter)",
@@ -88,7 +93,7 @@ class VelocitySteering(ObservingController):
         None, "m", "distance behind the origin at which the pods turn, whose sway force makes the "
         "moment; none where the moment comes without a sway force",
     )  # fmt: skip
-    N_m: float = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
+    N_m: Ruled = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
     def most(self) -> Most:
         """U and N_m."""

@@ -11,7 +11,7 @@ has eigenvalues, docs/laws.md the derivation. Anti-windup: the observer is told 
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from podusv_cli.components.controllers.constant_bearing import Moving, approach, turn_rate
 from podusv_cli.components.controllers.observer import B_R, B_V, observe
@@ -23,7 +23,8 @@ from podusv_cli.components.controllers.velocity_steering import (
     surge_demand,
 )
 from podusv_cli.components.vessels.plant import sway_force, yaw_moment
-from podusv_cli.core.component import value
+from podusv_cli.components import rules as by
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
@@ -60,10 +61,13 @@ class VelocityVector(VelocitySteering):
     """Turns the vector of velocity over ground to the target and keeps it there."""
 
     kind: Literal["velocity_vector"] = "velocity_vector"
-    k_psi: float = value(1.3, "1/s", "gain of the angle", gt=0)
-    k_r: float = value(1.3, "1/s", "gain of the yaw rate", gt=0)
-    T_v: float = value(5.0, "s", "time over which the sway velocity is predicted", ge=0)
-    chi_m: float = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
+    rules: ClassVar[dict[str, Rule]] = VelocitySteering.rules | {
+        "k_psi": by.YAW, "k_r": by.YAW, "T_v": by.YAW_TIME, "chi_m": by.TURN,
+    }  # fmt: skip
+    k_psi: Ruled = value(1.3, "1/s", "gain of the angle", gt=0)
+    k_r: Ruled = value(1.3, "1/s", "gain of the yaw rate", gt=0)
+    T_v: Ruled = value(5.0, "s", "time over which the sway velocity is predicted", ge=0)
+    chi_m: Ruled = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """With the parts of A and of the angle's rate that act on the velocities."""

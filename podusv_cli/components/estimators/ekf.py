@@ -24,16 +24,17 @@ its upper triangle by rows.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
 from podusv_cli.components.estimators.slopes import slopes
 from podusv_cli.components.measurements.base import FRESH, VALUE
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import value
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import wrap
@@ -142,24 +143,29 @@ def wanderings(k: Any, q: Vector) -> None:
 class ExtendedKalmanFilter(Estimator):
     """The estimate with the least mean square error, as far as the model is right.
 
-    The standard deviations are by default those of the measurement `sensors`.
+    The standard deviations of measured values are by default those of the sensors themselves.
     """
 
     kind: Literal["ekf"] = "ekf"
+    rules: ClassVar[dict[str, Rule]] = {
+        "q_b": by.FORCE, "q_b_psi": by.MOMENT, "sigma_b": by.FORCE, "sigma_b_psi": by.MOMENT,
+        "sigma_p": by.noise(0), "sigma_psi": by.noise(2), "sigma_u": by.noise(3),
+        "sigma_v": by.noise(4), "sigma_r": by.noise(5),
+    }  # fmt: skip
     bias: bool = value(True, "", "whether it estimates a load, too")
     q_u: float = value(0.02, "m/s2/sqrt(Hz)", "unexplained surge acceleration", ge=0)
     q_v: float = value(0.02, "m/s2/sqrt(Hz)", "unexplained sway acceleration", ge=0)
     q_r: float = value(0.02, "rad/s2/sqrt(Hz)", "unexplained yaw acceleration", ge=0)
-    q_b: float = value(0.1, "N/sqrt(s)", "how fast the load's force wanders", ge=0)
-    q_b_psi: float = value(0.05, "N m/sqrt(s)", "how fast the load's moment wanders", ge=0)
-    sigma_b: float = value(1.0, "N", "standard deviation of the force at the start", ge=0)
-    sigma_b_psi: float = value(0.5, "N m", "standard deviation of the moment at the start", ge=0)
+    q_b: Ruled = value(0.1, "N/sqrt(s)", "how fast the load's force wanders", ge=0)
+    q_b_psi: Ruled = value(0.05, "N m/sqrt(s)", "how fast the load's moment wanders", ge=0)
+    sigma_b: Ruled = value(1.0, "N", "standard deviation of the force at the start", ge=0)
+    sigma_b_psi: Ruled = value(0.5, "N m", "standard deviation of the moment at the start", ge=0)
     delay_p: float = value(0.0, "s", "age of a measured position when it is delivered", ge=0)
-    sigma_p: float = value(0.02, "m", "standard deviation of a measured position, each axis", gt=0)
-    sigma_psi: float = value(0.005, "rad", "standard deviation of a measured heading", gt=0)
-    sigma_u: float = value(0.02, "m/s", "standard deviation of a measured surge velocity", gt=0)
-    sigma_v: float = value(0.02, "m/s", "standard deviation of a measured sway velocity", gt=0)
-    sigma_r: float = value(0.002, "rad/s", "standard deviation of a measured yaw rate", gt=0)
+    sigma_p: Ruled = value(0.02, "m", "standard deviation of a measured position, each axis", gt=0)
+    sigma_psi: Ruled = value(0.005, "rad", "standard deviation of a measured heading", gt=0)
+    sigma_u: Ruled = value(0.02, "m/s", "standard deviation of a measured surge velocity", gt=0)
+    sigma_v: Ruled = value(0.02, "m/s", "standard deviation of a measured sway velocity", gt=0)
+    sigma_r: Ruled = value(0.002, "rad/s", "standard deviation of a measured yaw rate", gt=0)
 
     @property
     def states(self) -> tuple[Signal, ...]:

@@ -52,6 +52,10 @@ class Measurement(Component):
         """Age of a position when it is delivered [s]."""
         return 0.0
 
+    def age(self) -> float:
+        """Mean age of the heading that the law sees [s]."""
+        return 0.0
+
     def constants_with(self, step: float, motion: int) -> dict[str, float]:
         """Its constants `k`, for a run with this step [s].
 

@@ -132,6 +132,10 @@ class Sensors(Measurement):
         """That of the sensor."""
         return self.position.delay
 
+    def age(self) -> float:
+        """The compass's delay and half its period."""
+        return self.heading.delay + 0.5 * self.heading.period
+
     @property
     def signals(self) -> tuple[Signal, ...]:
         """What is measured, as it was delivered last."""

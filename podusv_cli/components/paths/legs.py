@@ -19,9 +19,10 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.paths.base import Path, Point
 from podusv_cli.components.paths.waypoints import Waypoints
-from podusv_cli.core.component import value
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
 
@@ -55,6 +56,7 @@ class Legs(Path):
     kind: Literal["legs"] = "legs"
     follows: ClassVar[bool] = True
     rows_of: ClassVar[dict[str, str]] = {"file": "points"}
+    rules: ClassVar[dict[str, Rule]] = {"acceptance": by.LENGTH}
     places: ClassVar[tuple[Signal, ...]] = PLACES
     file: str | None = value(
         None, "", "CSV file with one `x,y` [m] a line, beside the scenario; read into `points`"
@@ -63,7 +65,7 @@ class Legs(Path):
         (), "m", "list of [x, y], at least two, neighbours apart", strict=False
     )
     speed: float = value(0.5, "m/s", "wanted speed along the legs", gt=0)
-    acceptance: float = value(
+    acceptance: Ruled = value(
         2.0, "m", "distance to a waypoint within which the next leg becomes active", gt=0
     )
     switch: Literal["circle", "passed"] = value(

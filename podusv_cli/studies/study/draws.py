@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from podusv_cli.core import random_words
 from podusv_cli.core.component import Component
-from podusv_cli.core.errors import PodusvError
+from podusv_cli.core.errors import PodusvError, SizingError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.random_words import Words, in_unit_interval
@@ -126,7 +126,8 @@ def drawn(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) -> Scena
 def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
     """The scenario with new values at these places.
 
-    Raises DrawError for one that is out of range, or that contradicts another.
+    Null defaults follow what they are sized by, as they do when a scenario is loaded. Raises
+    DrawError for a value that is out of range, or that contradicts another.
     """
     given: dict[str, dict[Route, Number]] = {}
     for (section, *rest), number in new.items():
@@ -134,6 +135,10 @@ def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
     made = scenario.model_copy(
         update={section: _section(scenario, section, new) for section, new in given.items()}
     )
+    try:
+        made = made if made.facts == scenario.facts else made.sized()
+    except SizingError as error:
+        raise DrawError(str(error)) from error
     for key, told in of_numbers(made):
         raise DrawError(
             f"{new[steps].source if (steps := _steps(key)) in new else ''}{key}: {told}"
@@ -190,7 +195,7 @@ def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Num
     for place, number in new.items():
         data = _with(data, place, number.value)
     try:
-        return type(old).model_validate(data)
+        return old.changed({str(place[0]): data[place[0]] for place in new})
     except ValidationError as error:
         raise DrawError(_sentence(scenario, at, new, error)) from error
 

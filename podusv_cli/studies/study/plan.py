@@ -126,7 +126,7 @@ class Plan:
 
 def changed(law: Controller, new: Mapping[str, Any]) -> Controller:
     """The law with other numbers. Raises ValidationError where it refuses them."""
-    return type(law).model_validate(law.model_dump() | dict(new))
+    return law.changed(new)
 
 
 def plan(loaded: Loaded) -> Plan:

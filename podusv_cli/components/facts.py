@@ -1,0 +1,209 @@
+"""What a hull can do with its actuator in its loop: numbers known before a run.
+
+From the nominal vessel, the actuator without failure, and the times of the loop. Components size
+their defaults with them (`rules`), relative to the model ship for which the defaults were found:
+CyberShip II's hull `paper_nonlinear` with 8 N and 2.5 N m. docs/laws.md has the formulas.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.vessels.plant import surge_force
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.component import describe
+from podusv_cli.core.errors import SizingError, in_a_line
+from podusv_cli.core.kernel import bundle
+
+# The model ship: length [m], speed at full thrust [m/s], acceleration [m/s2], yaw rate at full
+# moment [rad/s], root of moment over inertia [1/s], force [N], moment [N m].
+L0, U0, A0, R0, W0, F0, N0 = 1.255, 1.00409, 8.0 / 25.8, 0.95544, math.sqrt(2.5 / 2.76), 8.0, 2.5
+PACE0 = 1.3  # 1/s, its gains of the yaw loop, which crosses at about twice this
+SURGE0 = 0.75  # 1/s, its gain of the surge velocity
+GRAVITY = 9.81  # m/s2
+ENOUGH = 1e6  # of the model ship's acceleration; whoever gives this has no limit
+DELIVERED = 0.999  # fraction of a demand that counts as all of it
+CRUISE = 0.6  # of the speed at full thrust
+HALVINGS = 60  # of a speed, until it is a float's last digit
+SPINNING = 5.0  # times U/L, the largest yaw rate that is counted on
+ROUNDS = 6  # until thrust and speed agree
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What defaults are sized by.
+
+    `period` is that of the law [s], 0 where it is continuous; `age` the mean age of what the law
+    sees [s]; `noise` that of each measured quantity of the state, 0 where there is none.
+    """
+
+    nominal: Vessel
+    actuator: Actuator
+    period: float = 0.0
+    age: float = 0.0
+    noise: tuple[float, ...] = (0.0,) * 6
+
+    def _given(self, u: float, demand: tuple[float, float]) -> float:
+        """What is given of a demand at the speed u [m/s], on the axis of its largest number."""
+        x, axis = np.array([0.0, 0.0, 0.0, u, 0.0, 0.0]), int(abs(demand[1]) > abs(demand[0]))
+        try:
+            return float(self.actuator.settled(x, np.array(demand))[2 * axis])
+        except Exception as error:  # of a plug-in
+            raise SizingError(f"{describe(self.actuator)}: {in_a_line(error)}") from error
+
+    def _ahead(self, u: float) -> float:
+        """The largest surge force at the speed u [N]; infinite without a limit."""
+        asked = ENOUGH * A0 * self.nominal.m11
+        given = self._given(u, (asked, 0.0))
+        return given if given < DELIVERED * asked else math.inf
+
+    @cached_property
+    def L(self) -> float:
+        """Length [m]."""
+        return self.nominal.length
+
+    @cached_property
+    def F(self) -> float:
+        """Force ahead at rest [N]; without a limit, that of the model ship scaled by Froude."""
+        force = self._ahead(0.0)
+        return force if math.isfinite(force) else A0 * self.nominal.m11
+
+    @cached_property
+    def U(self) -> float:
+        """Speed at full thrust [m/s], at most sqrt(g L); by Froude without a limit of thrust."""
+        if not math.isfinite(self._ahead(0.0)):
+            return U0 * math.sqrt(self.lam)
+        speed = self._speed(self.F)
+        for _ in range(ROUNDS):  # thrust may fall with the speed
+            force = self._ahead(speed)
+            if math.isclose(force, self._drag(speed), rel_tol=1e-6) or force == self.F:
+                break
+            speed = 0.5 * (speed + self._speed(force))
+        return speed
+
+    def _drag(self, u: float) -> float:
+        return -surge_force(u, 0.0, 0.0, self._k)
+
+    @cached_property
+    def _k(self) -> Any:
+        return bundle(self.nominal.constants())
+
+    def _speed(self, force: float) -> float:
+        """Speed at which the surge damping takes this force [m/s]."""
+        return _rises_to(self._drag, force, math.sqrt(GRAVITY * self.L))
+
+    @cached_property
+    def N(self) -> float:
+        """Least moment left at either side while cruising [N m]; by Froude without a limit."""
+        asked = ENOUGH * W0 * W0 * self.nominal.m33 / self.lam
+        u = CRUISE * self.U
+        cruising = self._drag(u)
+        given = [side * self._given(u, (cruising, side * asked)) for side in (1.0, -1.0)]
+        least = min(given)
+        return least if least < DELIVERED * asked else asked / ENOUGH
+
+    @cached_property
+    def r_top(self) -> float:
+        """Yaw rate at which the yaw damping alone takes N [rad/s], at most 5 U/L."""
+        linear, square = -self.nominal.N_r, -self.nominal.N_rr
+        highest = SPINNING * self.U / self.L
+        return _rises_to(lambda r: (linear + square * r) * r, self.N, highest)
+
+    @cached_property
+    def w_N(self) -> float:
+        """sqrt(N/m33) [1/s]: how fast the moment turns the hull."""
+        return math.sqrt(self.N / self.nominal.m33)
+
+    @cached_property
+    def a_F(self) -> float:
+        """F/m11 [m/s2]."""
+        return self.F / self.nominal.m11
+
+    @cached_property
+    def T_u(self) -> float:
+        """Delay of the surge loop [s]: the actuator, half a period, the age of what is seen."""
+        return self.actuator.lags()[0] + self._late
+
+    @cached_property
+    def T_r(self) -> float:
+        """Delay of the yaw loop [s]."""
+        return self.actuator.lags()[1] + self._late
+
+    @property
+    def _late(self) -> float:
+        return self.actuator.delay() + 0.5 * self.period + self.age
+
+    @cached_property
+    def lam(self) -> float:
+        """Length over that of the model ship."""
+        return self.L / L0
+
+    @cached_property
+    def s(self) -> float:
+        """Speed at full thrust over that of the model ship."""
+        return self.U / U0
+
+    @cached_property
+    def r_f(self) -> float:
+        """Yaw rate at full moment over that of the model ship."""
+        return self.r_top / R0
+
+    @cached_property
+    def a_f(self) -> float:
+        """Acceleration over that of the model ship."""
+        return self.a_F / A0
+
+    @cached_property
+    def w_f(self) -> float:
+        """w_N over that of the model ship."""
+        return self.w_N / W0
+
+    @cached_property
+    def c(self) -> float:
+        """Gain times delay; above 0.3 only where the loop would be slower than the hull."""
+        return min(max(0.6 * self.T_r * self.U / self.L, 0.3), 0.6)
+
+    @cached_property
+    def g_r(self) -> float:
+        """Pace of yaw over that of the model ship."""
+        return min(self.w_f, _over(self.c, PACE0 * self.T_r))
+
+    @cached_property
+    def g_u(self) -> float:
+        """Pace of surge over that of the model ship."""
+        return min((self.a_F / self.U) / (A0 / U0), _over(self.c, SURGE0 * self.T_u))
+
+    @cached_property
+    def g_p(self) -> float:
+        """Pace of the position: the slower of both."""
+        return min(self.g_r, self.g_u)
+
+    def in_words(self) -> str:
+        """The facts in a line, with what limits the pace of yaw."""
+        why = "the moment" if self.g_r == self.w_f else "the delay"
+        return (
+            f"F = {self.F:.4g} N, U = {self.U:.4g} m/s, N = {self.N:.4g} N m, r_top = "
+            f"{self.r_top:.3g} rad/s, T_u = {self.T_u:.3g} s, T_r = {self.T_r:.3g} s: yaw at "
+            f"{self.g_r:.3g} times the model ship's pace, which {why} limits, surge at "
+            f"{self.g_u:.3g} times"
+        )
+
+
+def _over(number: float, delay: float) -> float:
+    return number / delay if delay > 0.0 else math.inf
+
+
+def _rises_to(force: Callable[[float], float], wanted: float, highest: float) -> float:
+    """Where a rising force comes to a wanted one, at most `highest`; by bisection."""
+    low, high = 0.0, highest
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if force(middle) < wanted else (low, middle)
+    return 0.5 * (low + high)

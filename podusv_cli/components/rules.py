@@ -1,0 +1,64 @@
+"""The rules by which defaults follow from hull, actuator and loop: words and formulas.
+
+Each gives the model ship's number times what the facts of a hull are over its own, so the model
+ship keeps its numbers. A component names the rule of each of its keys in its `rules`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from podusv_cli.components.facts import F0, N0, Facts
+from podusv_cli.core.component import Rule
+
+OBSERVED = 0.5  # of 1/period, the largest bandwidth of an observer
+
+
+def times(words: str, factor: Callable[[Facts], float]) -> Rule:
+    """The model ship's number times a factor."""
+    return Rule(f"times {words}", lambda facts, default: default * factor(facts))
+
+
+def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
+    def of(facts: Facts, default: float) -> float:
+        most = OBSERVED / facts.period if facts.period else math.inf
+        return min(default * factor(facts), most)
+
+    return Rule(f"times {words}, at most {OBSERVED:g}/period", of)
+
+
+def noise(place: int) -> Rule:
+    """The noise of the sensor of this number of the state."""
+    return Rule(
+        "noise and bias of the sensor itself, for a sensor without any the number for this one",
+        lambda facts, default: facts.noise[place] or default,
+    )
+
+
+def reach(facts: Facts) -> float:
+    """How far ahead a hull has to aim: its length, or what it goes while it turns."""
+    return max(facts.lam, facts.s / facts.g_r)
+
+
+SPEED = times("U/U0", lambda f: f.s)
+ACCELERATION = times("a_F/a0", lambda f: f.a_f)
+MOMENT = times("N/N0", lambda f: f.N / N0)
+FORCE = times("F/F0", lambda f: f.F / F0)
+LENGTH = times("L/L0", lambda f: f.lam)
+YAW = times("g_r", lambda f: f.g_r)
+YAW_SQUARED = times("g_r^2", lambda f: f.g_r * f.g_r)
+YAW_TIME = times("1/g_r", lambda f: 1.0 / f.g_r)
+SURGE = times("g_u", lambda f: f.g_u)
+PACE = times("g_p = min(g_r, g_u)", lambda f: f.g_p)
+PACE_SQUARED = times("g_p^2", lambda f: f.g_p * f.g_p)
+PACE_TIME = times("1/g_p", lambda f: 1.0 / f.g_p)
+YAW_RATE = times("min(r_top/r0, w_N/w0)", lambda f: min(f.r_f, f.w_f))
+TURN = times("r_top/r0", lambda f: f.r_f)
+AHEAD = times("max(L/L0, (U/U0)/g_r)", reach)
+YAW_REACH = times("g_r max(L/L0, (U/U0)/g_r)", lambda f: f.g_r * reach(f))
+YAW_PER_REACH = times("g_r/max(L/L0, (U/U0)/g_r)", lambda f: f.g_r / reach(f))
+OBSERVED_U = _observer("g_u", lambda f: f.g_u)
+OBSERVED_V = _observer("max(g_r, (U/U0)/(L/L0))", lambda f: max(f.g_r, f.s / f.lam))
+OBSERVED_R = _observer("g_r", lambda f: f.g_r)
+OBSERVER = {"omega_u": OBSERVED_U, "omega_v": OBSERVED_V, "omega_r": OBSERVED_R}
