@@ -30,6 +30,7 @@ SURGE0 = 0.75  # 1/s, its gain of the surge velocity
 GRAVITY = 9.81  # m/s2
 ENOUGH = 1e6  # of the model ship's acceleration; whoever gives this has no limit
 DELIVERED = 0.999  # fraction of a demand that counts as all of it
+CALM = 0.25  # gain times delay that a hand point bears without swinging
 CRUISE = 0.6  # of the speed at full thrust
 HALVINGS = 60  # of a speed, until it is a float's last digit
 SPINNING = 5.0  # times U/L, the largest yaw rate that is counted on
@@ -184,6 +185,12 @@ class Facts:
     def g_p(self) -> float:
         """Pace of the position: the slower of both."""
         return min(self.g_r, self.g_u)
+
+    @cached_property
+    def g_h(self) -> float:
+        """Pace of laws that steer a hand point, which bear less delay."""
+        bears = min(_over(CALM, PACE0 * self.T_r), _over(CALM, SURGE0 * self.T_u))
+        return min(self.g_p, bears)
 
     def in_words(self) -> str:
         """The facts in a line, with what limits the pace of yaw."""

@@ -89,7 +89,7 @@ class HandController(Controller):
     """Options of the hand point, the same for every law that steers it."""
 
     rules: ClassVar[dict[str, Rule]] = {
-        "hand": by.AHEAD, "T_f": by.PACE_TIME, "k_p": by.PACE, "U": by.SPEED, "k_v": by.PACE,
+        "hand": by.AHEAD, "T_f": by.HAND_TIME, "k_p": by.HAND, "U": by.SPEED, "k_v": by.HAND,
     }  # fmt: skip
 
     signals: ClassVar[tuple[Signal, ...]] = (

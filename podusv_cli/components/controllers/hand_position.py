@@ -36,7 +36,7 @@ class HandPosition(HandController):
     """Moves the hand point as a mass that can be pushed anywhere; its integral finds the loads."""
 
     kind: Literal["hand_position"] = "hand_position"
-    rules: ClassVar[dict[str, Rule]] = HandController.rules | {"k_i": by.PACE_SQUARED}
+    rules: ClassVar[dict[str, Rule]] = HandController.rules | {"k_i": by.HAND_SQUARED}
     k_i: Ruled = value(0.25, "1/s2", "gain of the integral of the missing velocity", ge=0)
 
     def slots(self) -> Slots:

@@ -77,7 +77,7 @@ class SlidingMode(HandController):
         "eta": by.times(f"A = {AUTHORITY}", authority),
         "phi": Rule("max(phi0 U/U0, eta T_r/0.35)", lambda facts, phi: layer(facts) * phi / PHI0),
         "lambda_1": by.times("eta/phi sqrt(phi) over the model ship's", root),
-        "lambda_2": by.times("A g_p, A as of eta", lambda facts: authority(facts) * facts.g_p),
+        "lambda_2": by.times("A g_h, A as of eta", lambda facts: authority(facts) * facts.g_h),
     }
     reaching: Literal["boundary_layer", "super_twisting"] = value(
         "boundary_layer", "", "how the surface is reached: first order with a boundary layer, or "
