@@ -1,5 +1,6 @@
 """The law momentum_vector: its equations, what it promises, and what it reaches."""
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -184,7 +185,7 @@ def test_it_reaches_its_goals_on_the_paper_s_task():
 @pytest.mark.parametrize(("period", "grows"), [(30, False), (40, True)])
 def test_the_period_that_its_loops_carry_is_the_one_that_the_run_carries(period, grows):
     """0.3 s and 0.4 s: what `sampled-loop` tells before a run, and the run."""
-    text = SAMPLED.format(period=period / 100).replace("velocity_vector", "momentum_vector")
+    text = SAMPLED.format(period=period / 100, law=json.dumps(LAW.model_dump()))
     codes = [finding.code for finding in preflight(load_text(text, "a.yaml").scenario)]
     assert ("sampled-loop" in codes) is grows
     held = rms(task(LAW, hold_every=period), 150)

@@ -105,6 +105,7 @@ def _tell_marches(scenario: Scenario) -> None:
 
 
 def _explain(loaded: Loaded) -> None:
+    from podusv_cli.core.component import BY_RULE
     from podusv_cli.findings.proof import argument, conditions
     from podusv_cli.scenario.load import values
     from podusv_cli.scenario.phrases import as_yaml
@@ -113,6 +114,6 @@ def _explain(loaded: Loaded) -> None:
     for line in conditions(loaded.scenario):
         echo(line)
     if loaded.scenario.by_rule():
-        echo(f"defaults from hull and actuator: {loaded.scenario.facts.in_words()}")
+        echo(f"defaults {BY_RULE}: {loaded.scenario.facts.in_words()}")
     for key, content in values(loaded.scenario).items():
         echo(f"{key}: {as_yaml(content)}  # {loaded.origins[key]}")

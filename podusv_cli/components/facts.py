@@ -34,7 +34,7 @@ CALM = 0.25  # gain times delay that a hand point bears without swinging
 CRUISE = 0.6  # of the speed at full thrust
 HALVINGS = 60  # of a speed, until it is a float's last digit
 SPINNING = 5.0  # times U/L, the largest yaw rate that is counted on
-ROUNDS = 6  # until thrust and speed agree
+ASKED = 20  # halvings of a speed for each of which an actuator is asked, some ms each
 
 
 @dataclass(frozen=True)
@@ -81,13 +81,10 @@ class Facts:
         """Speed at full thrust [m/s], at most sqrt(g L); by Froude without a limit of thrust."""
         if not math.isfinite(self._ahead(0.0)):
             return U0 * math.sqrt(self.lam)
-        speed = self._speed(self.F)
-        for _ in range(ROUNDS):  # thrust may fall with the speed
-            force = self._ahead(speed)
-            if math.isclose(force, self._drag(speed), rel_tol=1e-6) or force == self.F:
-                break
-            speed = 0.5 * (speed + self._speed(force))
-        return speed
+        fastest = self._speed(self.F)
+        if self._ahead(fastest) == self.F:
+            return fastest
+        return _rises_to(lambda u: self._drag(u) - self._ahead(u), 0.0, fastest, ASKED)
 
     def _drag(self, u: float) -> float:
         return -surge_force(u, 0.0, 0.0, self._k)
@@ -120,7 +117,7 @@ class Facts:
     @cached_property
     def w_N(self) -> float:
         """sqrt(N/m33) [1/s]: how fast the moment turns the hull."""
-        return math.sqrt(self.N / self.nominal.m33)
+        return math.sqrt(max(self.N, 0.0) / self.nominal.m33)
 
     @cached_property
     def a_F(self) -> float:
@@ -207,10 +204,12 @@ def _over(number: float, delay: float) -> float:
     return number / delay if delay > 0.0 else math.inf
 
 
-def _rises_to(force: Callable[[float], float], wanted: float, highest: float) -> float:
+def _rises_to(
+    force: Callable[[float], float], wanted: float, highest: float, halvings: int = HALVINGS
+) -> float:
     """Where a rising force comes to a wanted one, at most `highest`; by bisection."""
     low, high = 0.0, highest
-    for _ in range(HALVINGS):
+    for _ in range(halvings):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if force(middle) < wanted else (low, middle)
     return 0.5 * (low + high)

@@ -17,7 +17,7 @@ OBSERVED = 0.5  # of 1/period, the largest bandwidth of an observer
 
 def times(words: str, factor: Callable[[Facts], float]) -> Rule:
     """The model ship's number times a factor."""
-    return Rule(f"times {words}", lambda facts, default: default * factor(facts))
+    return Rule(f"{{:g}} times {words}", lambda facts, default: default * factor(facts))
 
 
 def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
@@ -25,13 +25,13 @@ def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
         most = OBSERVED / facts.period if facts.period else math.inf
         return min(default * factor(facts), most)
 
-    return Rule(f"times {words}, at most {OBSERVED:g}/period", of)
+    return Rule(f"{{:g}} times {words}, at most {OBSERVED:g}/period", of)
 
 
 def noise(place: int) -> Rule:
     """The noise of the sensor of this number of the state."""
     return Rule(
-        "noise and bias of the sensor itself, for a sensor without any the number for this one",
+        "noise and bias of the sensor itself, {:g} where it has none",
         lambda facts, default: facts.noise[place] or default,
     )
 

@@ -36,13 +36,14 @@ class Presets(NamedTuple):
     file: str  # what messages call one
 
 
+BY_RULE = "from hull, actuator and loop"  # the origin of a number in place of null
 DIGITS = 3  # of a number that a rule gives, so that a scenario shows all of them
 
 
 class Rule(NamedTuple):
     """How a default follows from hull, actuator and loop; see `components.rules`."""
 
-    words: str  # behind "from hull and actuator: "
+    words: str  # with {:g} for the model ship's number
     of: Callable[[Any, float], float]  # from `components.facts` and the model ship's number
 
 
@@ -85,7 +86,7 @@ class Component(BaseModel):
     def _ruled(self, name: str, facts: Any) -> float:
         try:
             number = self.rules[name].of(facts, type(self).model_fields[name].default)
-        except ArithmeticError:
+        except (ArithmeticError, ValueError):
             number = math.nan
         if not 0.0 < number < math.inf:
             what = f"{self.noun} {type(self).model_fields['kind'].default}"

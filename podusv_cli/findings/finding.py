@@ -8,6 +8,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
+from podusv_cli.components.facts import Facts
 from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.finding import Finding, FindingKind
@@ -96,6 +97,11 @@ class Case:
     def reference(self) -> Reference:
         """The steady motion that follows the target."""
         return reference(self.scenario)
+
+    @cached_property
+    def facts(self) -> Facts:
+        """What hull and actuator can do."""
+        return self.scenario.facts
 
     @property
     def first_velocity(self) -> Vector:

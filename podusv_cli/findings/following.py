@@ -9,6 +9,8 @@ from podusv_cli.core.finding import Sentences, after, before
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import Case
+from podusv_cli.findings.reference import median, reference
+from podusv_cli.findings.sizing import other_numbers
 from podusv_cli.scenario.model import Scenario
 
 ROOM = 2.0  # acceptance radii; a shorter leg is left before it is followed
@@ -49,10 +51,31 @@ def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
     lengths, leg = _lengths(scenario.path), int(log["leg"][-1])
     if log.status != "finished" or leg >= len(lengths):
         return
-    missed = log["along_leg"][-1] > lengths[leg]
-    why = "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
     beside = f"{abs(log['e_ct'][-1]):.3g} m beside leg {leg}"
     yield (
         f"{leg} of {len(lengths)} legs are done at the end, {beside}; "
-        f"{why if missed else 'simulate longer, or ask for more speed'}"
+        f"{'; '.join(_unable(scenario)) or _late(log['along_leg'][-1] > lengths[leg])}"
     )
+
+
+def _late(missed: bool) -> str:
+    """What a law that is able to arrive lacks."""
+    if missed:
+        return "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
+    return "simulate longer, or ask for more speed"
+
+
+def _unable(scenario: Scenario) -> list[str]:
+    """Speed and moment that keep a law from arriving: its own, or the hull's."""
+    facts, law = scenario.facts, scenario.controller
+    speed = median(reference(scenario).speed)
+    own = [
+        f"{name} = {number:g} where hull and actuator make it {found:.3g}, so {why}: leave it out"
+        for name, (number, found, why) in other_numbers(law, facts).items()
+    ]
+    if facts.U < speed:
+        own.append(
+            f"the hull goes {facts.U:.3g} m/s at full thrust ({facts.F:.3g} N), and the path asks "
+            f"for {speed:.3g} m/s: slow it down"
+        )
+    return own

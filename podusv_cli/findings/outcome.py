@@ -7,6 +7,7 @@ import numpy as np
 from podusv_cli.core.finding import Sentences, after, rows_where, times_of
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
+from podusv_cli.findings.sea import SENSORS
 from podusv_cli.metrics.consistency import mean_square
 from podusv_cli.scenario.model import Scenario
 
@@ -17,10 +18,6 @@ PLACES = {
 }
 LONG = 0.02  # fraction of the run; shorter saturation is no finding
 DOUBTFUL, TIMID, CHANCE = 2.0, 0.1, 1e-3  # NIS, and its probability; podusv's choice
-SENSORS = {
-    "position": slice(0, 2), "heading": slice(2, 3), "velocity": slice(3, 5),
-    "yaw rate": slice(5, 6),
-}  # fmt: skip
 REVERSALS = 3  # of a zig-zag with two overshoots
 
 
@@ -155,7 +152,7 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
             f"the vessel starts {start:.3g} m from the target and is {end:.3g} m away from it at "
             f"the end (mean over the steady window): {scenario.controller.label} does not track; "
             "check signs and units of the law, of what it is told about the vessel, and its own "
-            "limits (defaults of U and N_m are for a model ship), or take larger gains"
+            "limits (U and N_m), or take larger gains"
         )
 
 

@@ -13,6 +13,10 @@ GRAVITY = 9.81
 BREAKS = 1.0 / 7.0  # height over length at which waves break
 MODEL = 2.0  # m; gusts were measured for what is larger
 LONG = 350  # components that a run needs, 100 periods of a peak; shorter seas scatter anyhow
+SENSORS = {  # by name, which numbers of the state each measures
+    "position": slice(0, 2), "heading": slice(2, 3), "velocity": slice(3, 5),
+    "yaw rate": slice(5, 6),
+}  # fmt: skip
 FAR = 2.0  # factor between what an estimator assumes and what a sensor does
 
 
@@ -86,22 +90,25 @@ def dead_zone(case: Case) -> Sentences:
     "estimator-noise", about="estimator",
     meaning="the filter assumes another noise than sensors have",
     condition=f"a sigma differs by more than a factor of {FAR:g} from its sensor's noise",
-    remedy="give the estimator the sensors' noise",
+    remedy="leave the sigma out, or write null: it is then the sensor's own noise",
 )  # fmt: skip
 def estimator_noise(case: Case) -> Sentences:
     """An estimator trusts a sensor too much or too little. Waves are noise to it, too."""
     assumed = case.scenario.estimator.assumed_noise()
     each = case.scenario.measurement.noise_of_each()
     waves = any(part.sea()[0] for part in case.scenario.disturbances().values())
-    told = dict[str, str]()
+    wrong = set[str]()  # sensors; one sentence each
     for (key, sigma), noise, state in zip(assumed, each, STATE, strict=True):
         far = sigma < noise / FAR or (sigma > FAR * noise and not waves)
-        if key and noise > 0.0 and far:
-            told[key] = (
-                f"{sigma:g} {state.unit}, while the sensor's noise is {noise:.3g} {state.unit}"
+        sensor = next(name for name, places in SENSORS.items() if state in STATE[places])
+        if key and noise > 0.0 and far and sensor not in wrong:
+            wrong.add(sensor)
+            yield At(
+                f"estimator.{key}",
+                f"{sigma:g} {state.unit}, while the noise of the {sensor} is {noise:.3g} "
+                f"{state.unit}; leave the sigmas of the {sensor} out, or write null: they are then "
+                "the sensor's own",
             )
-    for key, text in told.items():
-        yield At(f"estimator.{key}", f"{text}; give the estimator the noise that the sensor has")
 
 
 @before(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from podusv_cli.core import registry
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import BY_RULE, Component
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
@@ -232,5 +232,5 @@ def _default(key: Key) -> str:
         return "required"
     if key.name in key.model.rules and key.field:
         number, rule = key.field.default, key.model.rules[key.name]
-        return f"null, from hull and actuator: {number:g} {rule.words}"
+        return f"null, {BY_RULE}: {rule.words.format(number)}"
     return as_yaml(key.default)

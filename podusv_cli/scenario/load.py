@@ -10,6 +10,7 @@ from typing import Any
 
 import yaml
 
+from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.scenario import plugins
@@ -35,7 +36,6 @@ from podusv_cli.scenario.yaml_tree import (
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
-BY_RULE = "from hull and actuator"  # the origin of a number in place of null
 STUDIES = ("sweep", "tune")  # sections that only studies have
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
@@ -50,10 +50,9 @@ class Loaded:
     """A scenario and the origins of its values.
 
     `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
-    paper.yaml", "from hull and actuator" or "default"; `text` is the scenario file as given. `root`
-    is the tree of which the scenario is made, without what is filled in. `dropped` are sentences
-    about values that were given to a section before it was given another kind, which does not take
-    them.
+    paper.yaml", `BY_RULE` or "default"; `text` is the scenario file as given. `root` is the tree of
+    which the scenario is made, without what is filled in. `dropped` are sentences about values that
+    were given to a section before it was given another kind, which does not take them.
     """
 
     scenario: Scenario

@@ -93,6 +93,10 @@ class Alos(LineOfSight, ObservingController):
         """The observer, then crab angle and offset."""
         return (*super().slots(), *each(LEARNT))
 
+    def steering(self) -> tuple[str, float]:
+        """k_psi."""
+        return "k_psi", self.k_psi
+
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """The yaw rate's gain with that of the heading."""
         return ("k_u", self.k_u, self.omega_u), ("k_r", self.k_r + self.k_psi, self.omega_r)

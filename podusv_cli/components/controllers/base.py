@@ -123,6 +123,10 @@ class Controller(Component):
         """The keys U and N_m of laws that have them; without limits for others."""
         return Most()
 
+    def steering(self) -> tuple[str, float]:
+        """Key and gain [1/s] with which it turns the hull; "" where it has no such gain."""
+        return "", math.nan
+
     def optimum_of(self) -> str:
         """The metric that its motion minimises among all motions of the task; empty for laws."""
         return ""

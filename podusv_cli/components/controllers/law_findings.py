@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.components.controllers.network import NODE_DISTANCE, nearest, node_distance
+from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.components.controllers.tracking import TrackingController
 from podusv_cli.core.finding import Sentences, after, before, rows_where, times_of
@@ -21,6 +22,7 @@ KICK = 1.0  # rad/s; beyond what a hull turns at
 NEAR = 0.05  # hull lengths
 CROSSWISE = 0.05  # |cos psi_e|; the virtual surge velocity is magnified twentyfold
 FAR = 2.0  # widths; a node further away answers with less than exp(-2)
+RELAY = 0.5  # gain times delay, from which a loop of one lag swings
 LAST = 0.1  # of the run, over which a bound is watched
 GROWN = 0.01  # by which it may grow there
 
@@ -189,4 +191,33 @@ def crosswise(scenario: Any, log: Recording) -> Sentences:
         yield (
             f"|cos psi_e| falls below {CROSSWISE:g} {times_of(log, across)}; the virtual surge "
             "velocity (21) divides by it"
+        )
+
+
+@before(
+    "relay-gains", about="controller", meaning="PID's gains swing the actuator between its limits",
+    condition=f"(K_P + K_D/T_d)/inertia times the loop's delay and its period exceeds {RELAY:g}",
+    remedy="take smaller gains; PID's defaults are the paper's, for a model ship without delays",
+    law=Pid,
+)  # fmt: skip
+def relay_gains(case: Any) -> Sentences:
+    """PID's defaults do not follow from hull and actuator, unlike those of later laws."""
+    law, hull, facts = case.scenario.controller, case.scenario.nominal, case.facts
+    axes = (
+        ("surge", law.K_Pu, law.K_Du, hull.m11, facts.T_u),
+        ("yaw", law.K_Pr, law.K_Dr, hull.m33, facts.T_r),
+    )
+    swinging = {}
+    for axis, proportional, derivative, inertia, late in axes:
+        gain = (proportional + derivative / law.T_d) / inertia
+        if gain * (late + facts.period) > RELAY:
+            swinging[axis] = gain, late + facts.period
+    if swinging:
+        loops = " and ".join(f"{gain:.3g} 1/s in {axis}" for axis, (gain, _) in swinging.items())
+        worst = max(gain * late for gain, late in swinging.values())
+        late = max(late for _, late in swinging.values())
+        yield (
+            f"K_P and K_D/T_d over the inertia are {loops}, and the loop is late by {late:.2g} s: "
+            f"the demand swings from limit to limit; take about {RELAY / worst:.2g} times these "
+            "gains, or a law whose defaults follow from hull and actuator, as velocity_vector's do"
         )

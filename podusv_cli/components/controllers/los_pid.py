@@ -62,6 +62,10 @@ class LosPid(LineOfSight):
         rate[FORCE] += k.omega_u * (tau[0] - demand[0])
         rate[MOMENT] += k.omega_psi * (tau[2] - demand[1])
 
+    def steering(self) -> tuple[str, float]:
+        """omega_psi."""
+        return "omega_psi", self.omega_psi
+
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Surge with its integral; yaw with heading and integral; integrals per told inertia."""
         surge, yaw = axes

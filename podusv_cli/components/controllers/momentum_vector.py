@@ -108,6 +108,10 @@ class MomentumVector(VelocitySteering):
         own["fastest"] = min(self.r_m, math.sqrt(self.N_m / nominal.m33))
         return super().constants_with(nominal) | own
 
+    def steering(self) -> tuple[str, float]:
+        """Q0 over S0."""
+        return "Q0", self.Q0 / self.S0
+
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """With the part of A that acts on the surge velocity; S is slower where N_m is small."""
         S = self.S0 * pace(axes[1].told, self.N_m, self.Q0)

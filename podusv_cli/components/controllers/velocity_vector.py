@@ -69,6 +69,10 @@ class VelocityVector(VelocitySteering):
     T_v: Ruled = value(5.0, "s", "time over which the sway velocity is predicted", ge=0)
     chi_m: Ruled = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
 
+    def steering(self) -> tuple[str, float]:
+        """k_psi."""
+        return "k_psi", self.k_psi
+
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
         """With the parts of A and of the angle's rate that act on the velocities."""
         surge, yaw = self.k_u + self.k_p, self.k_r + self.k_psi

@@ -1,0 +1,89 @@
+"""Findings about gains of a law that belong to a hull or an actuator of another size."""
+
+from __future__ import annotations
+
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.facts import PACE0, Facts
+from podusv_cli.core.component import Rule, unit_of
+from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.findings.finding import Case
+from podusv_cli.findings.reference import median
+
+# Of the rule's number, what a number of the scenario's own may be at least and at most.
+USUAL = {"U": (0.5, 2.0), "N_m": (0.3, 3.0), "k_psi": (0.2, 100.0)}
+BEARABLE = 2.0  # times c/T_r, the largest k_psi
+AGILE = 0.8  # of the path's speed over the length, the least gain of the heading
+
+
+def other_numbers(law: Controller, facts: Facts) -> dict[str, tuple[float, float, str]]:
+    """U, N_m and k_psi that are far from the rule's: number, the rule's, and why it matters."""
+    rules = {name: law.rules[name] for name in USUAL if name in law.rules}
+    return {
+        name: (getattr(law, name), found, why)
+        for name, rule in rules.items()
+        if name not in law.by_rule
+        for found in (_of(rule, law, name, facts),)
+        if (why := _why(name, getattr(law, name), found, facts))
+    }
+
+
+def _of(rule: Rule, law: Controller, name: str, facts: Facts) -> float:
+    return rule.of(facts, type(law).model_fields[name].default)
+
+
+def _why(name: str, number: float, found: float, facts: Facts) -> str:
+    """What comes of a number that is too small or too large; else empty."""
+    low, high = USUAL[name]
+    if name == "k_psi" and facts.T_r > 0.0:
+        high = BEARABLE * facts.c / facts.T_r / found
+    consequences = {
+        "U": ("the law never asks for the speed that there is", "surge is always limited"),
+        "N_m": (
+            "surge yields to yaw at moments that the hull hardly feels",
+            "surge does not yield to yaw when the moment runs out",
+        ),
+        "k_psi": (
+            "the hull turns as if it were a far larger one",
+            f"the loop is late by {facts.T_r:.2g} s and swings",
+        ),
+    }
+    small, large = consequences[name]
+    return small if number < low * found else large if number > high * found else ""
+
+
+@before(
+    "gains-for-another-hull", about="controller", meaning="a gain belongs to another hull",
+    condition=f"U outside {USUAL['U'][0]:g} to {USUAL['U'][1]:g} times, N_m outside "
+    f"{USUAL['N_m'][0]:g} to {USUAL['N_m'][1]:g} times what follows from hull and actuator, or "
+    f"k_psi below {USUAL['k_psi'][0]:g} times that or above {BEARABLE:g} c/T_r",
+    remedy="leave the key out, or write null: it then follows from hull and actuator",
+)  # fmt: skip
+def gains_for_another_hull(case: Case) -> Sentences:
+    """Speed, moment or pace are not those of this hull with this actuator."""
+    law = case.scenario.controller
+    for name, (number, found, why) in other_numbers(law, case.facts).items():
+        unit = unit_of(type(law).model_fields[name])
+        yield At(
+            f"controller.{name}",
+            f"{number:g} {unit}, while hull and actuator make it {found:.3g} {unit}: {why}; leave "
+            f"{name} out, or write null",
+        )
+
+
+@before(
+    "slow-steering", about="controller", meaning="the hull is faster than the law steers it",
+    condition=f"the gain of the heading times the length, over the path's speed, is below {AGILE}",
+    remedy="slow the target down, shorten the actuator's lag or the period, or take a larger gain",
+)  # fmt: skip
+def slow_steering(case: Case) -> Sentences:
+    """A hull goes more than its length while the law turns it."""
+    key, gain = case.scenario.controller.steering()
+    length, speed = case.scenario.nominal.length, median(case.reference.speed)
+    if key and gain * length < AGILE * speed:
+        yield At(
+            f"controller.{key}",
+            f"the law turns the hull at {gain:.3g} 1/s, and at {speed:.3g} m/s it goes "
+            f"{speed / gain / length:.2g} lengths in that time: corners are cut wide; slow the "
+            f"target down to {gain * length / AGILE:.2g} m/s, or shorten the actuator's lag and "
+            "the period",
+        )

@@ -1,0 +1,160 @@
+"""Findings about values that fit the others in another unit only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.findings.finding import Case
+
+WATER = 1000.0  # kg/m3
+SLENDER = (0.4, 30.0)  # length over beam
+BULK = (5e-4, 1.0)  # mass over that of water of the volume length times beam squared
+GYRATION = (0.05, 1.0)  # radius of gyration over length
+TYPICAL = 0.25  # radius of gyration over length of most hulls
+TURNED = 0.3  # rad and rad/s; a compass and a gyro with such noise show nothing
+ASTRAY = 10.0  # lengths; a position with such noise shows nothing
+CLOSE = 0.5  # lengths, over which a whole way extends
+FAR = 300.0  # lengths between start and target
+NORTH, EAST = 90.0, 180.0  # deg, the largest latitude and longitude
+DEGREE = 111e3  # m, of latitude
+
+
+class Unit(NamedTuple):
+    """A unit that was perhaps meant, and what one of it is in podusv's."""
+
+    name: str
+    factor: float
+
+
+METRES = (Unit("mm", 1e-3), Unit("cm", 1e-2), Unit("ft", 0.3048))
+KILOGRAMS = (Unit("t", 1e3), Unit("g", 1e-3))
+DEGREES = Unit("deg", math.pi / 180.0)
+RANGES = (
+    f"length over beam outside {SLENDER[0]:g} to {SLENDER[1]:g}, m over 1000 kg/m3 length beam^2 "
+    f"outside {BULK[0]:g} to {BULK[1]:g}, sqrt(I_z/m) over length outside {GYRATION[0]:g} to "
+    f"{GYRATION[1]:g}; noise of heading or yaw rate above {TURNED:g}, of the position above "
+    f"{ASTRAY:g} lengths; points that all lie within {CLOSE:g} lengths; a start {FAR:g} lengths away"
+)
+
+
+@before(
+    "other-unit", about="vessel", meaning="a value fits the others in another unit only",
+    condition=RANGES, remedy="give the value in podusv's unit",
+)  # fmt: skip
+def other_unit(case: Case) -> Sentences:
+    """Ratios of values of hull, sensors, path and start that no boat has."""
+    scenario = case.scenario
+    vessels = {"vessel": scenario.vessel, "nominal": scenario.nominal}
+    if scenario.nominal == scenario.vessel:
+        del vessels["nominal"]
+    hulls = [
+        At(f"{section}.{key}", text)
+        for section, vessel in vessels.items()
+        for key, text in _hull(vessel)
+    ]
+    yield from hulls
+    if hulls:  # the length may be wrong, which the others are compared with
+        return
+    yield from _noise(case)
+    yield from _points(case)
+    yield from _start(case)
+
+
+def _within(number: float, limits: tuple[float, float]) -> bool:
+    return limits[0] <= number <= limits[1]
+
+
+def _meant(number: float, units: tuple[Unit, ...], ratio: float, limits: tuple[float, float]) -> str:
+    """`; in mm it is 4 m?`: the first unit in which the ratio, linear in the number, is usual."""
+    fits = [one for one in units if _within(ratio * one.factor, limits)]
+    return f"; was it given in {fits[0].name}? then write {number * fits[0].factor:g}" if fits else ""
+
+
+def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
+    """Key and sentence for the first of the hull's ratios that no hull has."""
+    L, B, m = vessel.length, vessel.beam, vessel.m
+    slender, bulk = L / B, m / (WATER * L * B * B)
+    radius = math.sqrt(vessel.I_z / m)
+    if not _within(slender, SLENDER):
+        meant = _meant(L, METRES, slender, SLENDER)
+        yield "length", f"{L:g} m over a beam of {B:g} m{meant or '; check both, in metres'}"
+    elif not _within(bulk, BULK):
+        both = [one for one in METRES if _within(bulk / one.factor**3, BULK)]
+        scaled = f"; are length and beam in {both[0].name}? write them in metres" if both else ""
+        if meant := _meant(m, KILOGRAMS, bulk, BULK):
+            yield "m", f"{m:g} kg for a hull of {L:g} m by {B:g} m{meant} (kg)"
+        else:
+            yield "length", f"{L:g} m by {B:g} m for a hull of {m:g} kg{scaled or '; check all'}"
+    elif not _within(radius / L, GYRATION):
+        usual = m * (TYPICAL * L) ** 2
+        yield (
+            "I_z",
+            f"{vessel.I_z:g} kg m2 is a radius of gyration of {radius:.3g} m on a hull of {L:g} m "
+            f"and {m:g} kg; a quarter of the length is usual, which is {usual:.3g} kg m2",
+        )
+
+
+def _noise(case: Case) -> Sentences:
+    """Noise of sensors that show nothing but noise."""
+    noise, length = case.scenario.measurement.noise_of_each(), case.scenario.vessel.length
+    for key, place, unit in (("heading", 2, "rad"), ("yaw_rate", 5, "rad/s")):
+        if noise[place] > TURNED:
+            yield At(
+                f"measurement.{key}.noise",
+                f"{noise[place]:g} {unit} of noise, which shows nothing; was it given in "
+                f"{unit.replace('rad', 'deg')}? then write {noise[place] * DEGREES.factor:.3g}",
+            )
+    if noise[0] > ASTRAY * length:
+        yield At(
+            "measurement.position.noise",
+            f"{noise[0]:g} m of noise on a hull of {length:g} m; was it given in mm? then write "
+            f"{noise[0] / 1000.0:g}",
+        )
+
+
+def _points(case: Case) -> Sentences:
+    """Points of a way that lie within the hull: degrees, mostly."""
+    points = np.asarray(case.scenario.path.waypoints(), float).reshape(-1, 2)
+    length = case.scenario.vessel.length
+    if len(points) < 2:
+        return
+    extent, (north, east) = float(np.ptp(points, axis=0).max()), np.abs(points).max(axis=0)
+    if not extent < CLOSE * length:
+        return
+    degrees = north <= NORTH and east <= EAST and extent * DEGREE > length
+    meant = (
+        f"are they latitude and longitude in degrees? {extent:.3g} deg of latitude are "
+        f"{extent * DEGREE:.3g} m: write metres north and east of a point nearby"
+        if degrees
+        else "are they in km? write metres"
+    )
+    yield At(
+        "path.points", f"they all lie within {extent:.3g} m, on a hull of {length:g} m; {meant}"
+    )
+
+
+def _start(case: Case) -> Sentences:
+    """A start that is nowhere near the target."""
+    start, path, length = case.scenario.start, case.scenario.path, case.scenario.vessel.length
+    if case.scenario.controller.trial():
+        return
+    places = path.waypoints() if path.follows else path.targets((0.0,))[:, :2].tolist()
+    north, east = min(
+        ((start.x - x, start.y - y) for x, y in places), key=lambda off: math.hypot(*off)
+    )
+    away = math.hypot(north, east)
+    if away > FAR * length:
+        axis = int(abs(east) > abs(north))
+        number = (start.x, start.y)[axis]
+        near = away / 1000.0 < FAR * length
+        meant = f"was {number:g} given in mm? then write {number / 1000.0:g}" if near else "check it"
+        yield At(
+            f"start.{'xy'[axis]}",
+            f"{away:.3g} m from the target, {away / length:.3g} lengths; {meant}",
+        )

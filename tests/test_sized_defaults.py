@@ -1,0 +1,279 @@
+"""Defaults that follow from hull, actuator and loop, from the facts to commands that need them."""
+
+import math
+import pickle
+
+import numpy as np
+import podusv
+import pytest
+import yaml
+from conftest import NONLINEAR, kinds
+from plugin_samples import LAW as PLUGGED
+from pydantic import ValidationError
+
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
+from podusv_cli.components.facts import Facts
+from podusv_cli.core.component import BY_RULE
+from podusv_cli.core.errors import ScenarioError, SizingError
+from podusv_cli.core.kernel import kernel
+from podusv_cli.engine.running.batch import simulate_many
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.export.law import ExportedLaw
+from podusv_cli.scenario.explain import explain
+from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
+from podusv_cli.studies.study.check import sweep_faults
+from podusv_cli.scenario.yaml_tree import route
+from podusv_cli.studies.study.draws import content, drawn, draws
+from podusv_cli.studies.tuning.space import gains
+
+LAWS = [kind for kind in kinds("controllers").values() if kind.rules]
+THRUSTER = {
+    "x": -2.3, "T_nn": 200.0, "T_nn_astern": 200.0, "n_max": 1.0, "n_max_astern": 0.9,
+    "n_rate": 4.0, "n_lag": 0.3, "angle_limit": 0.0, "angle_rate": 1.0, "angle_lag": 1.0,
+}  # fmt: skip
+CATAMARAN = f"""
+name: catamaran
+vessel: {{preset: wamv}}
+actuator: {{kind: pod, pods: [{THRUSTER | {"y": -1.03}}, {THRUSTER | {"y": 1.03}}]}}
+disturbance: {{kind: none}}
+path: {{kind: legs, speed: 0.8, points: [[0, 0], [60, 0], [60, 60], [0, 60]]}}
+start: {{y: 5.0}}
+controller: {{kind: velocity_vector}}
+control: {{period: 0.1}}
+simulation: {{duration: 300.0, step: 0.02}}
+""".replace("'", "")
+STUDY = """
+sweep:
+  draws: 4
+  vary: {%s}
+  success: finished
+"""
+
+
+def loaded(*overrides: str, text: str = CATAMARAN) -> Loaded:
+    return load_text(text, "boat.yaml", overrides)
+
+
+def law(*overrides: str) -> Controller:
+    return loaded(*overrides).scenario.controller
+
+
+@pytest.mark.parametrize("kind", LAWS, ids=lambda kind: kind.model_fields["kind"].default)
+def test_the_model_ship_keeps_its_numbers(kind):
+    facts, plain = Facts(NONLINEAR, Saturated()), kind()
+    for name, rule in kind.rules.items():
+        own = kind.model_fields[name].default
+        assert rule.of(facts, own) == pytest.approx(own, rel=1e-3), name
+    assert plain.sized(facts) == plain
+    assert plain.sized(Facts(NONLINEAR, Ideal())) == plain, "without limits, as Froude scales it"
+
+
+def test_facts_of_a_catamaran_are_those_of_a_pocket_calculator():
+    facts = loaded().scenario.facts
+    assert facts.F == pytest.approx(400.0, rel=1e-5)
+    assert facts.U == pytest.approx(4.0 / 3.0, rel=1e-5), "100 U + 150 U^2 = 400"
+    assert facts.N == pytest.approx(1.03 * (200.0 + 0.81 * 200.0), rel=1e-3)
+    assert 800.0 * facts.r_top * (1.0 + facts.r_top) == pytest.approx(facts.N)
+    assert facts.T_r == pytest.approx(facts.T_u) == 0.3 + 0.05
+    assert facts.g_r == pytest.approx(0.3 / (1.3 * 0.35)), "the delay limits it"
+    assert law().k_psi == pytest.approx(1.3 * facts.g_r, rel=5e-3)
+
+
+def test_thrust_that_falls_with_the_speed_lowers_the_speed():
+    falling = CATAMARAN.replace("T_nn_astern", "T_nV: 20.0, T_nn_astern")
+    speed = loaded(text=falling).scenario.facts.U
+    assert 2.0 * (200.0 - 20.0 * speed) == pytest.approx(100.0 * speed + 150.0 * speed**2, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("override", "later"),
+    [
+        ("control.period=0.3", 0.1),
+        ("actuator.command={delay: 0.24}", 0.24),
+        ("measurement={kind: sensors, heading: {period: 0.14, delay: 0.3}}", 0.37),
+        ("actuator.pods[0].angle_limit=0.5", 0.25),
+    ],
+)  # fmt: skip
+def test_every_delay_of_the_loop_counts(override, later):
+    if override.startswith("actuator.pods"):
+        turning = CATAMARAN.replace("angle_limit: 0.0", "angle_limit: 0.5")
+        found = loaded(text=turning).scenario
+    else:
+        found = loaded(override).scenario
+    assert found.facts.T_r == pytest.approx(0.35 + later)
+    assert found.controller.k_psi < law().k_psi
+
+
+def test_a_hull_without_a_limit_is_sized_by_froude():
+    twice = NONLINEAR.model_copy(update={"length": 2.0 * NONLINEAR.length})
+    facts = Facts(twice, Ideal())
+    assert math.sqrt(2.0) == pytest.approx(facts.s, rel=1e-3) == pytest.approx(1.0 / facts.g_r)
+
+
+def test_null_is_the_same_as_no_key_and_a_number_stays():
+    assert law("controller.N_m=null") == law()
+    own = law("controller.N_m=7.0")
+    assert (own.N_m, own.U) == (7.0, law().U)
+    assert "N_m" not in own.by_rule and "U" in own.by_rule
+
+
+def test_origin_resolved_file_and_explanation_name_the_rule():
+    given = loaded("controller.U=1.5")
+    assert given.origins["controller.N_m"] == BY_RULE != given.origins["controller.U"]
+    assert given.origins["path.acceptance"] == BY_RULE
+    again = load_text(resolved_yaml(given.scenario), "resolved.yaml")
+    assert again.scenario == given.scenario and not again.scenario.by_rule()
+    assert yaml.safe_load(resolved_yaml(given.scenario))["controller"]["N_m"] == given.scenario.controller.N_m
+    (row,) = [one for one in explain("controller.velocity_vector.N_m") if one.key == "controller.N_m"]
+    assert row.default == f"null, {BY_RULE}: 2.5 times N/N0"
+
+
+def test_a_resolved_scenario_runs_to_the_same_log():
+    given = loaded("simulation.duration=2.0").scenario
+    again = load_text(resolved_yaml(given), "resolved.yaml").scenario
+    first, second = (simulate(one.closed_loop(), one.time_grid()) for one in (given, again))
+    assert all(np.array_equal(first[name], second[name]) for name in ("x", "y", "tau_r"))
+
+
+def test_a_law_of_a_scenario_has_no_key_without_a_number():
+    every = ", ".join(f"{kind.model_fields['kind'].default}: {{kind: {kind.model_fields['kind'].default}}}" for kind in LAWS)
+    for one in loaded(f"controllers={{{every}}}").scenario.singles().values():
+        assert all(getattr(one.controller, name) > 0.0 for name in one.controller.rules)
+
+
+class Nothing(Ideal):
+    """Gives nothing at all."""
+
+    @staticmethod
+    @kernel
+    def drive(tau):
+        tau[0] = tau[1] = tau[2] = 0.0
+
+
+class Broken(Ideal):
+    """Raises."""
+
+    @staticmethod
+    @kernel
+    def drive(tau):
+        tau[0] = 1.0 / 0.0
+
+
+@pytest.mark.parametrize("actuator", [Nothing(), Broken()])
+def test_an_actuator_that_gives_no_number_is_told(actuator):
+    with pytest.raises(SizingError):
+        VelocityVector().sized(Facts(NONLINEAR, actuator))
+
+
+def test_a_hull_that_gives_no_number_is_told_at_its_place():
+    with pytest.raises(ScenarioError, match=r"actuator: .* does not follow from hull and actuator"):
+        loaded("actuator={kind: saturated, surge_limit: 5e-324}")
+
+
+# --- studies
+
+
+def each(vary: str, *overrides: str) -> list:
+    """The scenarios of the draws of a study, and the study's own."""
+    own = loaded(*overrides, text=CATAMARAN + STUDY % vary).scenario
+    assert not sweep_faults(own)
+    return [own, *(drawn(own.alone(), own.sweep.vary, one) for one in draws(own.sweep, 0, 4))]
+
+
+def test_draws_of_the_true_vessel_do_not_reach_the_law():
+    own, *others = each("vessel.m: {uniform: [120.0, 240.0]}")
+    assert len({one.vessel.m for one in others}) == 4
+    assert {one.controller for one in others} == {own.controller}
+
+
+@pytest.mark.parametrize(
+    ("key", "numbers"),
+    [
+        ("nominal.m", [120.0, 200.0, 240.0]), ("nominal.X_uu", [-300.0, -200.0, -80.0]),
+        ("measurement.heading.delay", [0.1, 0.2, 0.3]), ("actuator.command.delay", [0.1, 0.2]),
+    ],
+)  # fmt: skip
+def test_a_draw_of_what_the_law_is_told_is_as_if_it_were_loaded(key, numbers):
+    others = ["measurement={kind: sensors}", "estimator={kind: ekf}", "actuator.command={}"]
+    own, *rest = each(f"{key}: {{choice: {numbers}}}", *others)
+    assert any(one.controller != own.controller for one in rest)
+    for one in rest:
+        again = loaded(*others, f"{key}={content(one, route(key))!r}").scenario
+        assert (one.controller, one.estimator) == (again.controller, again.estimator)
+
+
+def test_numbers_of_the_scenario_stay_where_others_follow_a_draw():
+    _, *others = each("nominal.m: {uniform: [120.0, 240.0]}, controller.U: {uniform: [1.0, 2.0]}", "controller.k_p=0.21")
+    assert len({one.controller.U for one in others}) == 4 == len({one.controller.a_m for one in others})
+    assert {one.controller.k_p for one in others} == {0.21}
+
+
+def test_a_drawn_noise_is_what_the_filter_assumes():
+    seeing = ("measurement={kind: sensors}", "estimator={kind: ekf, sigma_psi: 0.01}")
+    _, *others = each("measurement.position.noise: {choice: [0.05, 0.5]}", *seeing)
+    assert all(one.estimator.sigma_p == one.measurement.position.noise for one in others)
+    assert {one.estimator.sigma_psi for one in others} == {0.01}
+
+
+def test_runs_side_by_side_have_the_bits_that_they_have_alone():
+    _, *others = each("nominal.m: {uniform: [120.0, 240.0]}", "simulation.duration=4.0")
+    grid = others[0].time_grid()
+    done = simulate_many([one.closed_loop() for one in others], grid, observer=others[0].observer(), side_by_side=True)
+    for place, one in enumerate(others):
+        alone = simulate_many([one.closed_loop()], grid, observer=one.observer())
+        assert np.array_equal(done.seen[place], alone.seen[0], equal_nan=True)
+
+
+def test_a_search_goes_around_the_number_of_the_rule():
+    text = CATAMARAN + STUDY % "vessel.m: {uniform: [120.0, 240.0]}" + "tune: {budget: 40, train: 2, validate: 2}\n"
+    scenario = loaded(text=text).scenario
+    found = {gain.key: gain for gain in gains(scenario.controller, "velocity_vector", scenario, scenario.tune)}
+    assert found["N_m"].own == scenario.controller.N_m == pytest.approx(373.0)
+    assert found["N_m"].low < 373.0 < found["N_m"].high
+    other = scenario.controller.changed({"N_m": 200.0})
+    assert "N_m" not in other.by_rule and "k_psi" in other.by_rule
+
+
+def test_a_changed_law_is_checked():
+    with pytest.raises(ValidationError):
+        VelocityVector().changed({"N_m": -1.0})
+
+
+# --- other ways to a scenario
+
+
+def test_python_keeps_following_the_hull():
+    first = podusv.load(podusv.Scenario(yaml.safe_load(CATAMARAN)))
+    slower = podusv.load(first, {"nominal.X_uu": -600.0})
+    assert slower.controller.U < first.controller.U == law().U
+
+
+def test_a_scenario_of_a_plug_in_keeps_following_in_another_process(tmp_path):
+    (tmp_path / "own.py").write_text(PLUGGED, encoding="utf-8")
+    text = f"plugins: {tmp_path}/own.py\n" + CATAMARAN
+    scenario = loaded("controller.U=1.5", text=text).scenario
+    other = pickle.loads(pickle.dumps(scenario))
+    assert other == scenario and other.by_rule() == scenario.by_rule() != []
+
+
+def test_an_exported_law_has_the_numbers():
+    exported = ExportedLaw.of(loaded().scenario)
+    names = tuple(exported.loop.law_constants())
+    assert exported.vectors.law[names.index("N_m")] == law().N_m
+
+
+# --- a newcomer's boat
+
+
+@pytest.mark.parametrize("kind", ["velocity_vector", "momentum_vector", "los_pid"])
+def test_a_boat_with_two_fixed_thrusters_follows_its_legs_in_its_first_run(kind):
+    """180 kg; with the model ship's 2.5 N m and 1.25 m/s most laws did not come to the first leg."""
+    scenario = loaded(f"controller={{kind: {kind}}}").scenario
+    watch = scenario.observer()
+    seen = simulate_many([scenario.closed_loop()], scenario.time_grid(), observer=watch).seen
+    found = watch.summaries(seen)
+    assert found["path_done"][0] == 1.0
+    assert found["e_ct_rms"][0] < scenario.vessel.length / 3.0
