@@ -19,7 +19,7 @@ from podusv_cli.components.measurements.base import FRESH, VALUE, Measurement
 from podusv_cli.components.measurements.sensors import MEASURED
 from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import Rule, Ruled, value
+from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.finding import after, before
 from podusv_cli.core.kernel import Vector, kernel, tail

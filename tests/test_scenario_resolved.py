@@ -10,9 +10,9 @@ from pydantic import ValidationError
 from scenario_samples import SOUND, loaded, write
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.errors import SizingError
 from podusv_cli.scenario.keys import limits, members, sections
 from podusv_cli.scenario.limits import LEAST_COMPRESSED, Size, needed
-from podusv_cli.core.errors import SizingError
 from podusv_cli.scenario.load import HEADING, load, load_stored, load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LABEL
@@ -128,7 +128,7 @@ def possible(data: dict[str, Any]) -> Scenario:
     data.update(measurement={"kind": "exact"}, estimator={"kind": "none"})
     data["actuator"].update(command=None)
     try:
-        made = Scenario.model_validate(data).sized()
+        made = Scenario.model_validate(data).in_numbers()
     except (ValidationError, SizingError):
         return reject()
     seas, step = made.disturbances().values(), made.simulation.step

@@ -252,7 +252,9 @@ def test_the_settled_error_is_within_the_bound_of_the_cascade():
 @pytest.mark.parametrize(("period", "grows"), [(50, False), (80, True)])
 def test_the_period_that_its_loops_carry_is_the_one_that_the_run_carries(period, grows):
     """0.5 s and 0.8 s: what `sampled-loop` tells before a run, and the run."""
-    scenario = load_text(SAMPLED.format(period=period / 100, law=json.dumps(LAW.model_dump())), "a.yaml").scenario
+    scenario = load_text(
+        SAMPLED.format(period=period / 100, law=json.dumps(LAW.model_dump())), "a.yaml"
+    ).scenario
     codes = [finding.code for finding in preflight(scenario)]
     assert ("sampled-loop" in codes) is grows
     worst = float(within(task(LAW, hold_every=period), 150).max())

@@ -113,7 +113,7 @@ def _explain(loaded: Loaded) -> None:
     echo(argument(loaded.scenario))
     for line in conditions(loaded.scenario):
         echo(line)
-    if loaded.scenario.by_rule():
+    if loaded.scenario.keys_by_rule():
         echo(f"defaults {BY_RULE}: {loaded.scenario.facts.in_words()}")
     for key, content in values(loaded.scenario).items():
         echo(f"{key}: {as_yaml(content)}  # {loaded.origins[key]}")

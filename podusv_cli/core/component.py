@@ -16,6 +16,7 @@ from typing import (
     Literal,
     NamedTuple,
     Self,
+    cast,
     get_args,
     get_origin,
 )
@@ -102,7 +103,8 @@ class Component(BaseModel):
         return checked._with({}, self.model_fields_set | new.keys()) if self.rules else checked
 
     def _with(self, new: Mapping[str, Any], given: set[str]) -> Self:
-        return type(self).model_construct(given, **(dict(self) | dict(new)))
+        made: Any = type(self).model_construct(given, **(dict(self) | dict(new)))
+        return cast("Self", made)
 
     def constants(self) -> dict[str, float]:
         """The component's numbers by name, as its kernels read them from `k`.

@@ -61,7 +61,9 @@ def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
 def _late(missed: bool) -> str:
     """What a law that is able to arrive lacks."""
     if missed:
-        return "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
+        return (
+            "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
+        )
     return "simulate longer, or ask for more speed"
 
 
@@ -73,7 +75,7 @@ def _unable(scenario: Scenario) -> list[str]:
         f"{name} = {number:g} where hull and actuator make it {found:.3g}, so {why}: leave it out"
         for name, (number, found, why) in other_numbers(law, facts).items()
     ]
-    if facts.U < speed:
+    if speed > facts.U:
         own.append(
             f"the hull goes {facts.U:.3g} m/s at full thrust ({facts.F:.3g} N), and the path asks "
             f"for {speed:.3g} m/s: slow it down"

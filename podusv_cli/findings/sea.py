@@ -98,9 +98,9 @@ def estimator_noise(case: Case) -> Sentences:
     each = case.scenario.measurement.noise_of_each()
     waves = any(part.sea()[0] for part in case.scenario.disturbances().values())
     wrong = set[str]()  # sensors; one sentence each
-    for (key, sigma), noise, state in zip(assumed, each, STATE, strict=True):
+    of = [name for name, places in SENSORS.items() for _ in range(places.start, places.stop)]
+    for (key, sigma), noise, state, sensor in zip(assumed, each, STATE, of, strict=True):
         far = sigma < noise / FAR or (sigma > FAR * noise and not waves)
-        sensor = next(name for name, places in SENSORS.items() if state in STATE[places])
         if key and noise > 0.0 and far and sensor not in wrong:
             wrong.add(sensor)
             yield At(

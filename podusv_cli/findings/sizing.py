@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from podusv_cli.components.controllers.base import Controller
-from podusv_cli.components.facts import PACE0, Facts
+from podusv_cli.components.facts import Facts
 from podusv_cli.core.component import Rule, unit_of
 from podusv_cli.core.finding import At, Sentences, before
 from podusv_cli.findings.finding import Case

@@ -39,7 +39,7 @@ RANGES = (
     f"length over beam outside {SLENDER[0]:g} to {SLENDER[1]:g}, m over 1000 kg/m3 length beam^2 "
     f"outside {BULK[0]:g} to {BULK[1]:g}, sqrt(I_z/m) over length outside {GYRATION[0]:g} to "
     f"{GYRATION[1]:g}; noise of heading or yaw rate above {TURNED:g}, of the position above "
-    f"{ASTRAY:g} lengths; points that all lie within {CLOSE:g} lengths; a start {FAR:g} lengths away"
+    f"{ASTRAY:g} lengths; all points within {CLOSE:g} lengths; a start {FAR:g} lengths away"
 )
 
 
@@ -70,10 +70,14 @@ def _within(number: float, limits: tuple[float, float]) -> bool:
     return limits[0] <= number <= limits[1]
 
 
-def _meant(number: float, units: tuple[Unit, ...], ratio: float, limits: tuple[float, float]) -> str:
+def _meant(
+    number: float, units: tuple[Unit, ...], ratio: float, limits: tuple[float, float]
+) -> str:
     """`; in mm it is 4 m?`: the first unit in which the ratio, linear in the number, is usual."""
     fits = [one for one in units if _within(ratio * one.factor, limits)]
-    return f"; was it given in {fits[0].name}? then write {number * fits[0].factor:g}" if fits else ""
+    return (
+        f"; was it given in {fits[0].name}? then write {number * fits[0].factor:g}" if fits else ""
+    )
 
 
 def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
@@ -153,7 +157,9 @@ def _start(case: Case) -> Sentences:
         axis = int(abs(east) > abs(north))
         number = (start.x, start.y)[axis]
         near = away / 1000.0 < FAR * length
-        meant = f"was {number:g} given in mm? then write {number / 1000.0:g}" if near else "check it"
+        meant = (
+            f"was {number:g} given in mm? then write {number / 1000.0:g}" if near else "check it"
+        )
         yield At(
             f"start.{'xy'[axis]}",
             f"{away:.3g} m from the target, {away / length:.3g} lengths; {meant}",

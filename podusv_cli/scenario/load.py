@@ -165,7 +165,7 @@ def _checked(
         raise ScenarioError(_ordered(faults, source))
     nodes = {route: find(root, route) for route, _ in _leaves(_data(scenario), ())}
     origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
-    origins |= {dotted(steps): BY_RULE for steps in scenario.by_rule()}
+    origins |= {dotted(steps): BY_RULE for steps in scenario.keys_by_rule()}
     if stands_in(root):  # the very same law says so, see `Scenario.open_choice`
         first = next(iter(scenario.controllers.values()))
         scenario = scenario.model_copy(update={"controller": first})

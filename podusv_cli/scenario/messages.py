@@ -32,7 +32,7 @@ def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ())
         faults.extend(dict.fromkeys(_faults(root, top, error)))
         return None
     try:
-        scenario = given.sized()
+        scenario = given.in_numbers()
     except SizingError as error:
         faults.append(Fault(follow(root, ("actuator",))[-1].mark, "actuator", str(error)))
         return None

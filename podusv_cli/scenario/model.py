@@ -177,7 +177,7 @@ class Scenario(Component):
             self.nominal, self.actuator, self.control.period, seen.age(), seen.noise_of_each()
         )
 
-    def sized(self) -> Scenario:
+    def in_numbers(self) -> Scenario:
         """With a number in place of each null that means "from hull and actuator".
 
         Made once when a scenario is loaded, and again where a draw changes what the facts are of.
@@ -194,8 +194,8 @@ class Scenario(Component):
             }
         )  # fmt: skip
 
-    def by_rule(self) -> list[tuple[str, ...]]:
-        """The steps of every key whose number `sized` gave."""
+    def keys_by_rule(self) -> list[tuple[str, ...]]:
+        """The steps of every key whose number `in_numbers` gave."""
         parts: dict[tuple[str, ...], Component] = {
             ("path",): self.path, ("estimator",): self.estimator, ("controller",): self.controller,
             **{("controllers", label): law for label, law in self.controllers.items()},
@@ -203,9 +203,9 @@ class Scenario(Component):
         return [(*steps, name) for steps, part in parts.items() for name in part.by_rule]
 
     def as_given(self) -> dict[str, Any]:
-        """As plain data, with null in place of what `sized` gave."""
+        """As plain data, with null in place of what `in_numbers` gave."""
         data = self.model_dump()
-        for *sections, name in self.by_rule():
+        for *sections, name in self.keys_by_rule():
             reduce(getitem, sections, data)[name] = None
         return data
 
@@ -334,7 +334,7 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
 def _unpickled(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
-    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data).sized()
+    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data).in_numbers()
     if open_choice:
         made = made.model_copy(update={"controller": next(iter(made.controllers.values()))})
     return made

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Most, Slots, each
 from podusv_cli.components.controllers.guidance import (
     STEERED,
@@ -28,7 +29,6 @@ from podusv_cli.components.controllers.guidance import (
 from podusv_cli.components.controllers.observer import B_R, B_U, ObservingController, observe
 from podusv_cli.components.controllers.velocity_loop import Axis
 from podusv_cli.components.vessels.plant import surge_force, yaw_moment
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel

@@ -8,10 +8,10 @@ speed that follows the target is podusv's. docs/laws.md has the equations.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
-from podusv_cli.components.controllers.base import Controller, Most
 from podusv_cli.components import rules as by
+from podusv_cli.components.controllers.base import Controller, Most
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel

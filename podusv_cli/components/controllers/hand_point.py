@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Controller, Most
 from podusv_cli.components.controllers.constant_bearing import NEARS, Moving, approach, turn_rate
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel

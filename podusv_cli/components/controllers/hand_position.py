@@ -17,10 +17,10 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.hand_point import PSI_F, HandController, hand_errors, push
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal

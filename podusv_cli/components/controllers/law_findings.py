@@ -218,6 +218,6 @@ def relay_gains(case: Any) -> Sentences:
         late = max(late for _, late in swinging.values())
         yield (
             f"K_P and K_D/T_d over the inertia are {loops}, and the loop is late by {late:.2g} s: "
-            f"the demand swings from limit to limit; take about {RELAY / worst:.2g} times these "
+            f"the demand can swing from limit to limit; take about {RELAY / worst:.2g} times these "
             "gains, or a law whose defaults follow from hull and actuator, as velocity_vector's do"
         )

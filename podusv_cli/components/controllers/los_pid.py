@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.guidance import (
     STEERED,
@@ -25,7 +26,6 @@ from podusv_cli.components.controllers.guidance import (
     wanted_speed,
 )
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
@@ -43,7 +43,10 @@ class LosPid(LineOfSight):
 
     kind: Literal["los_pid"] = "los_pid"
     signals: ClassVar[tuple[Signal, ...]] = STEERED
-    rules: ClassVar[dict[str, Rule]] = LineOfSight.rules | {"omega_u": by.SURGE, "omega_psi": by.YAW}
+    rules: ClassVar[dict[str, Rule]] = LineOfSight.rules | {
+        "omega_u": by.SURGE,
+        "omega_psi": by.YAW,
+    }
     omega_u: Ruled = value(1.0, "rad/s", "bandwidth of the speed loop, a double pole", gt=0)
     omega_psi: Ruled = value(1.2, "rad/s", "bandwidth of the heading loop, a triple pole", gt=0)
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.momentum_adaptation import (
     LEARNT,
@@ -39,7 +40,6 @@ from podusv_cli.components.controllers.velocity_steering import (
 )
 from podusv_cli.components.vessels.plant import sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal

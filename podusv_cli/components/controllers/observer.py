@@ -20,11 +20,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Controller, Slots, each
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal

@@ -75,7 +75,9 @@ class SlidingMode(HandController):
     kind: Literal["sliding_mode"] = "sliding_mode"
     rules: ClassVar[dict[str, Rule]] = HandController.rules | {
         "eta": by.times(f"A = {AUTHORITY}", authority),
-        "phi": Rule("the larger of {:g} U/U0 and eta T_r/0.35", lambda facts, phi: layer(facts) * phi / PHI0),
+        "phi": Rule(
+            "the larger of {:g} U/U0 and eta T_r/0.35", lambda facts, phi: layer(facts) * phi / PHI0
+        ),
         "lambda_1": by.times("eta/phi sqrt(phi) over the model ship's", root),
         "lambda_2": by.times("A g_h, A as of eta", lambda facts: authority(facts) * facts.g_h),
     }

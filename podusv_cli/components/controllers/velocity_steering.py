@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Most
 from podusv_cli.components.controllers.constant_bearing import NEARS
 from podusv_cli.components.controllers.observer import B_U, ObservingController
 from podusv_cli.components.vessels.plant import surge_force
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Positive, Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction

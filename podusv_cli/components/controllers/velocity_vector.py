@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.constant_bearing import Moving, approach, turn_rate
 from podusv_cli.components.controllers.observer import B_R, B_V, observe
 from podusv_cli.components.controllers.velocity_loop import Axis
@@ -23,7 +24,6 @@ from podusv_cli.components.controllers.velocity_steering import (
     surge_demand,
 )
 from podusv_cli.components.vessels.plant import sway_force, yaw_moment
-from podusv_cli.components import rules as by
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel

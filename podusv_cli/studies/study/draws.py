@@ -136,7 +136,7 @@ def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
         update={section: _section(scenario, section, new) for section, new in given.items()}
     )
     try:
-        made = made if made.facts == scenario.facts else made.sized()
+        made = made.in_numbers()
     except SizingError as error:
         raise DrawError(str(error)) from error
     for key, told in of_numbers(made):
