@@ -127,9 +127,10 @@ class Session:
         return self._status
 
     def metric(self, name: str) -> float:
-        """A metric of the run that `close` writes here; NaN where undefined.
+        """A metric of the run so far, its last instant included; NaN where undefined.
 
-        Raises UsageError for a name that is no metric.
+        The part that counts as settled is that of the whole duration. Raises UsageError for a name
+        that is no metric.
         """
         known, word = self._metrics.known, str(name)
         if word not in known:

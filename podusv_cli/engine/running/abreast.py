@@ -14,7 +14,7 @@ from podusv_cli.engine.loop.closed_loop import Observer, entries
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch_threads import BatchRun
 from podusv_cli.engine.running.lanes import MARCHING, Lanes, alike, room
-from podusv_cli.engine.running.pieces import CHANGING, unchanged
+from podusv_cli.engine.running.pieces import CHANGING, Unchanged
 from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.lane_march import REACHED
@@ -66,7 +66,8 @@ class Abreast:
         self._aim = in_lanes("path", path, names, shared, vectors)
         self._look = in_lanes("law", look, (), NOTHING, vectors | {"signals": view})
         self.law_table, self._seen, self._view = map(self._by_run, (c.law_table, c.seen, view))
-        self._changing = [*(getattr(c, name) for name in CHANGING), self._lanes.under_way]
+        changing = [getattr(c, name) for name in CHANGING]
+        self._unchanged = Unchanged([*changing, self._lanes.under_way])
 
     def _by_run(self, vector: Vector) -> Vector:
         return vector.reshape(-1, LANES)[:, : len(self.places)]
@@ -98,7 +99,7 @@ class Abreast:
 
     def seen(self) -> Vector:
         """What observers gather of runs that end at the next instant, or have ended before."""
-        with unchanged(self._changing):
+        with self._unchanged:
             if self.reached <= self.grid.steps:
                 self._march(self.reached, self.reached + 1, self.reached)
             if self._marching().all():

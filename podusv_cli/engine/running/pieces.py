@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,13 +28,22 @@ class Mark(NamedTuple):
     log: Vector
 
 
-@contextmanager
-def unchanged(vectors: Sequence[Vector]) -> Iterator[None]:
-    """These vectors have the same numbers afterwards."""
-    before = [vector.copy() for vector in vectors]
-    yield
-    for vector, numbers in zip(vectors, before, strict=True):
-        vector[:] = numbers
+class Unchanged:
+    """A context after which vectors have the numbers that they had before it."""
+
+    def __init__(self, vectors: Sequence[Vector]) -> None:
+        """These vectors, which stay where they are."""
+        self._kept = [(vector, vector.copy()) for vector in vectors]
+
+    def __enter__(self) -> None:
+        """Remember the numbers."""
+        for vector, numbers in self._kept:
+            numbers[:] = vector
+
+    def __exit__(self, *failure: object) -> None:
+        """Put them back."""
+        for vector, numbers in self._kept:
+            vector[:] = numbers
 
 
 class Pieces:
@@ -52,6 +60,7 @@ class Pieces:
         self.vectors = vectors_of(loop, self._layout, observer, grid, grid.rows)
         self._given = self.vectors.s[self._layout.estimate :]
         self._target = np.zeros(len(TARGET))
+        self._unchanged = Unchanged([getattr(self.vectors, name) for name in CHANGING])
         self._advance = march(self.vectors, self._layout, grid.step)
         self._aim = self._path(next(iter(entries(loop, observer))), compiled)
 
@@ -64,7 +73,7 @@ class Pieces:
         """What observers gather of the run that ends at the next instant, as it is steered now."""
         if not 0 < self.reached <= self.grid.steps:
             return self.vectors.seen.copy()
-        with unchanged([getattr(self.vectors, name) for name in CHANGING]):
+        with self._unchanged:
             self._advance(self.reached, self.reached + 1, self.reached)
             return self.vectors.seen.copy()
 
