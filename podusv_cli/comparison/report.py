@@ -81,7 +81,7 @@ def page(story: Story) -> str:
         beside=figures[:BESIDE],
         figures=figures,
         changed=settings.changed(story.scenario),
-        laws=settings.laws(story.controllers),
+        laws=settings.laws(story.controllers, story.scenario),
         parts=parts,
         cited=any(EQUATION.search(said) for _, said, _ in parts),
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],

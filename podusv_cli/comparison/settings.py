@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from podusv_cli.comparison.differences import PROSE
+from podusv_cli.components.facts import Facts
 from podusv_cli.core.component import Component, unit_of
 from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.explain import summary
@@ -31,9 +32,12 @@ class Setting(NamedTuple):
     changed: bool
 
 
-def settings(part: Component) -> list[Setting]:
-    """Every key of a part, compared with its preset where it has one, else with its defaults."""
-    return list(_settings(part, _preset(part)))
+def settings(part: Component, facts: Facts | None = None) -> list[Setting]:
+    """Every key of a part, compared with its preset where it has one, else with its defaults.
+
+    With the facts of hull and actuator also with defaults that follow from these.
+    """
+    return list(_settings(part, _preset(part) or _sized(part, facts)))
 
 
 def changed(scenario: Scenario) -> list[Setting]:
@@ -41,7 +45,7 @@ def changed(scenario: Scenario) -> list[Setting]:
     return [
         setting._replace(key=f"{name}.{setting.key}")
         for name, part in parts(scenario).items()
-        for setting in settings(part)
+        for setting in settings(part, _facts(scenario))
         if setting.changed
     ]
 
@@ -58,9 +62,12 @@ def parts(scenario: Scenario) -> dict[str, Component]:
     return sections
 
 
-def laws(controllers: Mapping[str, Component]) -> list[tuple[Setting, list[Setting | None]]]:
+def laws(
+    controllers: Mapping[str, Component], scenario: Scenario | None = None
+) -> list[tuple[Setting, list[Setting | None]]]:
     """Every key that a law sets otherwise than by default: what it is, and what each law has."""
-    tables = [{one.key: one for one in settings(law)} for law in controllers.values()]
+    facts = _facts(scenario) if scenario else None
+    tables = [{one.key: one for one in settings(law, facts)} for law in controllers.values()]
     about = {key: one for table in reversed(tables) for key, one in table.items()}
     keys = dict.fromkeys(one.key for table in tables for one in table.values() if one.changed)
     ordered = sorted(keys, key=lambda key: key != "kind")
@@ -74,6 +81,20 @@ def _preset(part: Component) -> Component | None:
         return None
     node = preset_file(presets, name, [])
     return type(part)(**{**plain(node), "preset": name}) if node else None
+
+
+def _facts(scenario: Scenario) -> Facts | None:
+    return None if scenario.recorded else scenario.facts
+
+
+def _sized(part: Component, facts: Facts | None) -> Component | None:
+    """The part with every default, those that follow from the facts too; None without rules."""
+    if facts is None or not part.rules:
+        return None
+    own = {name: field for name, field in type(part).model_fields.items() if field.is_required()}
+    needed = {name: getattr(part, name) for name in own}
+    numbers = {name: part.by_default(name, facts) for name in part.rules}
+    return type(part).model_validate(needed | numbers)
 
 
 def _settings(

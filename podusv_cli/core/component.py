@@ -81,10 +81,11 @@ class Component(BaseModel):
 
         Raises SizingError where a rule gives no number above 0.
         """
-        new = {name: self._ruled(name, facts) for name in self.by_rule}
+        new = {name: self.by_default(name, facts) for name in self.by_rule}
         return self._with(new, self.model_fields_set - new.keys()) if new else self
 
-    def _ruled(self, name: str, facts: Any) -> float:
+    def by_default(self, name: str, facts: Any) -> float:
+        """The number of a rule. Raises SizingError where there is none above 0."""
         try:
             number = self.rules[name].of(facts, type(self).model_fields[name].default)
         except (ArithmeticError, ValueError):
