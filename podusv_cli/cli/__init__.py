@@ -46,7 +46,6 @@ podusv simulates and compares controllers for pod-propelled surface vessels. Fir
 OBJECTS_BETWEEN_COLLECTIONS = 100_000
 
 
-
 class Commands(typer.core.TyperGroup):
     """The commands, and what those of other names are called here."""
 
