@@ -17,6 +17,7 @@ from podusv_cli.components.disturbances.wave_kernels import short_crested
 from podusv_cli.components.disturbances.waves import Waves
 from podusv_cli.components.disturbances.wind import Wind
 from podusv_cli.core.kernel import bundle
+from podusv_cli.scenario.load import load_text, resolved_yaml
 
 SHORT = NONLINEAR.model_copy(update={"length": 1e-3, "beam": 1e-3})
 MOTION = tuple(signal.name for signal in WAVE_MOTION)
@@ -148,6 +149,28 @@ def test_components_that_are_asked_for_are_0_9_for_every_period_of_the_peak():
     )
     assert sea.model_copy(update={"amplitudes": "deterministic"}).resolving(SECONDS) == 0
     assert one().resolving(SECONDS) == 0, "a regular wave"
+
+
+def test_the_components_of_a_run_are_by_default_twice_those_that_it_needs_or_more():
+    """100, doubled: 400 for 310 s of 1.5 s, which need 186; a given number stays."""
+    text = (
+        "name: sea\nvessel: {{preset: paper_nonlinear}}\npath: {{kind: line}}\n"
+        "actuator: {{kind: saturated}}\ncontroller: {{kind: pid}}\n"
+        "disturbance: {sea}\nsimulation: {{duration: {duration}}}\n"
+    )
+
+    def counts(sea, duration):
+        loaded = load_text(text.format(sea=sea, duration=duration), "sea.yaml")
+        again = load_text(resolved_yaml(loaded.scenario), "again.yaml").scenario
+        assert again == loaded.scenario
+        return [part.cosines() for part in again.disturbances().values()]
+
+    one = "{kind: waves, height: 0.1, period: 1.5}"
+    assert counts(one, 310.0) == [400]
+    assert counts(one, 10.0) == [100]
+    assert counts(one.replace("1.5", "0.3"), 310.0) == [3200]
+    given = one.replace("1.5}", "1.5, components: 7, seed: 2}")
+    assert counts(f"[{one}, {given}]", 310.0) == [400, 7]
 
 
 @pytest.mark.parametrize("kind", [{}, {"spectrum": "ittc", "period_is": "zero_crossing"}])

@@ -42,7 +42,8 @@ class Facts:
     """What defaults are sized by.
 
     `period` is that of the law [s], 0 where it is continuous; `age` the mean age of what the law
-    sees [s]; `noise` that of each measured quantity of the state, 0 where there is none.
+    sees [s]; `noise` that of each measured quantity of the state, 0 where there is none; `duration`
+    that of the run [s].
     """
 
     nominal: Vessel
@@ -50,6 +51,7 @@ class Facts:
     period: float = 0.0
     age: float = 0.0
     noise: tuple[float, ...] = (0.0,) * 6
+    duration: float = 0.0
 
     def _given(self, u: float, demand: tuple[float, float]) -> float:
         """What is given of a demand at the speed u [m/s], on the axis of its largest number."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache, reduce
-from operator import getitem
+from functools import cache
 from types import GenericAlias
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, SupportsIndex, TypeVar
 
@@ -174,7 +173,12 @@ class Scenario(Component):
         """What null defaults follow from: the nominal vessel, the actuator, the loop's times."""
         seen = self.measurement
         return Facts(
-            self.nominal, self.actuator, self.control.period, seen.age(), seen.noise_of_each()
+            self.nominal,
+            self.actuator,
+            self.control.period,
+            seen.age(),
+            seen.noise_of_each(),
+            self.simulation.duration,
         )
 
     def in_numbers(self) -> Scenario:
@@ -187,26 +191,34 @@ class Scenario(Component):
         facts = self.facts
         several = {label: law.sized(facts) for label, law in self.controllers.items()}
         law = next(iter(several.values())) if self.open_choice else self.controller.sized(facts)
+        seas = tuple(sea.sized(facts) for sea in self.disturbances().values())
         return self.model_copy(
             update={
                 "path": self.path.sized(facts), "estimator": self.estimator.sized(facts),
                 "controller": law, "controllers": several,
+                "disturbance": seas if isinstance(self.disturbance, tuple) else seas[0],
             }
         )  # fmt: skip
 
-    def keys_by_rule(self) -> list[tuple[str, ...]]:
+    def keys_by_rule(self) -> list[tuple[str | int, ...]]:
         """The steps of every key whose number `in_numbers` gave."""
-        parts: dict[tuple[str, ...], Component] = {
+        seas = self.disturbance
+        parts: dict[tuple[str | int, ...], Component] = {
             ("path",): self.path, ("estimator",): self.estimator, ("controller",): self.controller,
+            **({("disturbance", i): sea for i, sea in enumerate(seas)} if isinstance(seas, tuple)
+               else {("disturbance",): seas}),
             **{("controllers", label): law for label, law in self.controllers.items()},
         }  # fmt: skip
         return [(*steps, name) for steps, part in parts.items() for name in part.by_rule]
 
     def as_given(self) -> dict[str, Any]:
         """As plain data, with null in place of what `in_numbers` gave."""
-        data = self.model_dump()
+        data: dict[str, Any] = self.model_dump()
         for *sections, name in self.keys_by_rule():
-            reduce(getitem, sections, data)[name] = None
+            part: Any = data
+            for section in sections:
+                part = part[section]
+            part[name] = None
         return data
 
     def closed_loop(self) -> ClosedLoop:

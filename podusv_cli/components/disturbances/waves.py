@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -51,12 +51,22 @@ from podusv_cli.components.disturbances.torsethaugen import (
 )
 from podusv_cli.components.disturbances.wave_kernels import TURN, long_crested, short_crested
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import value
+from podusv_cli.core.component import Rule, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
 STREAM = "waves"
+FEWEST, MOST, ENOUGH = 100, 10_000, 2.0  # components; times those that `resolving` asks for
+COMPONENTS = Rule(
+    "{:g}, doubled until there are twice as many as let the height of the run scatter between "
+    "seeds as a sea's (docs/sea.md)",
+    lambda facts, default: math.nan,  # `Waves.by_default` knows the spectrum
+)
+if TYPE_CHECKING:
+    Count = int  # once the waves are `sized`
+else:
+    Count = Annotated[int, Field(ge=1, le=MOST)] | None  # null: by the rule
 BINS = 100  # in which the energy between the cut-offs is added up
 BOTH = 0.95  # of the energy of two peaks that the cut-offs must leave
 LEAST = 0.01  # of the spectrum's energy that the cut-offs must leave
@@ -77,6 +87,7 @@ class Waves(Disturbance):
     """
 
     adds_up: ClassVar[bool] = True  # swell and a wind sea
+    rules: ClassVar[dict[str, Rule]] = {"components": COMPONENTS}
     kind: Literal["waves"] = "waves"
     height: float = value(..., "m", "significant wave height Hs", ge=1e-6, le=1e3)
     period: float = value(..., "s", "period of the waves, see `period_is`", ge=1e-3, le=1e4)
@@ -97,8 +108,8 @@ class Waves(Disturbance):
     spreading: int = value(
         0, "", "n of the directions' density cos^2n; 0: all waves in one direction", ge=0, le=50
     )
-    components: int = value(
-        100, "", "how many cosines; one is a regular wave of exactly this period", ge=1, le=10_000
+    components: Count = value(
+        FEWEST, "", "how many cosines; one is a regular wave of exactly this period"
     )
     amplitudes: spectra.Amplitudes = value(
         "random", "", "of the components: drawn, so that the height scatters between seeds as a "
@@ -183,6 +194,16 @@ class Waves(Disturbance):
     def cosines(self) -> int:
         """The components."""
         return self.components
+
+    def by_default(self, name: str, facts: Any) -> int:
+        """Components for the run's duration, by `COMPONENTS`; a power of two times the fewest.
+
+        So studies that draw height or period have few different numbers.
+        """
+        few = self.model_copy(update={name: FEWEST})
+        wanted = ENOUGH * few.resolving(facts.duration)
+        doublings = math.ceil(math.log2(max(wanted, FEWEST) / FEWEST))
+        return min(FEWEST << doublings, MOST)
 
     def resolving(self, duration: float) -> int:
         """0.9 components for every period of the peak, with the default cut-offs."""
