@@ -2,6 +2,9 @@
 
 import math
 import re
+import subprocess
+import sys
+import tomllib
 from types import SimpleNamespace
 from typing import Any
 
@@ -298,6 +301,35 @@ def test_such_a_reward_is_refused_before_the_first_episode(reward):
     for make in (podusv.gym.Env, podusv.gym.VectorEnv):
         with pytest.raises(UsageError, match=rf"{reward} is not defined at 0\.1 s; a reward needs"):
             make(SCENARIO, reward=reward)
+
+
+def test_gymnasium_makes_environments_by_name():
+    """The same as the classes; without an import of podusv, as installed packages are found."""
+    made = gymnasium.make("podusv/Scenario-v0", scenario=SCENARIO, reward="ise")
+    own = podusv.gym.Env(SCENARIO, reward="ise")
+    np.testing.assert_array_equal(made.reset(seed=4)[0], own.reset(seed=4)[0])
+    one, other = made.step(np.array([3.0, 0.5])), own.step((3.0, 0.5))
+    np.testing.assert_array_equal(one[0], other[0])
+    assert one[1:] == other[1:]
+    several = gymnasium.make_vec(
+        "podusv/Scenario-v0", 3, vectorization_mode="vector_entry_point", scenario=SCENARIO
+    )
+    assert isinstance(several.unwrapped, podusv.gym.VectorEnv)
+    assert several.num_envs == 3
+
+
+def test_gymnasium_alone_knows_the_name_and_imports_nothing_of_podusv_for_it():
+    (point,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][
+        "gymnasium.envs"
+    ].items()
+    asked = (
+        "import sys, gymnasium; from gymnasium.envs.registration import namespace\n"
+        f"with namespace({point[0]!r}):\n"
+        f"    from importlib.metadata import EntryPoint as P; P('', {point[1]!r}, '').load()()\n"
+        "print('podusv/Scenario-v0' in gymnasium.registry, 'podusv_cli.interface' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("True False\n", "")
 
 
 @pytest.mark.parametrize("reward", [None, 3, ["iae"]])

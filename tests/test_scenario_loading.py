@@ -1,5 +1,8 @@
 """Files in, scenarios out: origins, laws to compare, claims, further checks, how much work."""
 
+import re
+from pathlib import Path
+
 import pytest
 from conftest import kinds
 from counting import counted
@@ -7,7 +10,7 @@ from scenario_samples import SOUND, loaded, told
 
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.errors import ScenarioError
-from podusv_cli.scenario.load import load_text, values
+from podusv_cli.scenario.load import load, load_text, values
 from podusv_cli.scenario.model import Scenario
 
 *OTHERS, LAST = kinds("controllers")
@@ -81,3 +84,50 @@ def test_further_checks_are_told_at_the_place_of_the_key():
     with pytest.raises(ScenarioError) as raised:
         load_text(SOUND + claims, "a.yaml", checks=[look])
     assert str(raised.value) == "a.yaml:7:36: claims.C1.expect: no such run"
+
+
+MISTAKES = {
+    "path: {kind: line, course: 0,3}\n": "keys are words, found 3; write a decimal point: 0.3",
+    "path: {kind: line, course: 0,05}\n": "keys are words, found '05'; write a decimal point: 0.05",
+    "path: {kind: line, course: -1,5, x: 2}\n": "found 5; write a decimal point: -1.5",
+    "description: {gain} of a law\n": "put a text that begins with a bracket or a brace in quotes",
+    "description: [gain] of a law\n": "put a text that begins with a bracket or a brace in quotes",
+    "description: {gain}\n": "found a mapping of keys; put text with braces in quotes",
+}
+
+
+@pytest.mark.parametrize("line", MISTAKES)
+def test_a_comma_for_a_point_and_braces_without_quotes_are_named(line):
+    faults = told(f"{SOUND}{line}" if "path" not in line else re.sub("path: .*\n", line, SOUND))
+    assert MISTAKES[line] in faults[0]
+
+
+def test_a_key_that_is_a_number_is_no_decimal_comma():
+    fault = told(SOUND + "claims: {a: x, 5: y}\n")[-1]
+    assert fault.endswith("keys are words, found 5")
+
+
+def test_a_misspelled_section_is_told_before_what_it_leaves_missing():
+    first, *rest = told(SOUND.replace("controller:", "contoller:"))
+    assert "contoller: unknown key; did you mean 'controller'?" in first
+    assert any("controller: missing" in one for one in rest)
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("base", "base.yaml"), ("bsae.yaml", "base.yaml"), ("sub/mine", "sub/mine.yml"),
+        ("mu_2017/corrected", "podusv:mu_2017/corrected.yaml"),
+        ("mu_2017/corrected.yaml", "podusv:mu_2017/corrected.yaml"), ("zzz/q", ""),
+    ],
+)  # fmt: skip
+def test_a_file_of_nearly_that_name_is_proposed(tmp_path, monkeypatch, name, meant):
+    monkeypatch.chdir(tmp_path)
+    Path("sub").mkdir()
+    for file in ("base.yaml", "sub/mine.yml"):
+        Path(file).write_text(SOUND)
+    with pytest.raises(ScenarioError) as caught:
+        load(name)
+    (fault,) = caught.value.lines()
+    hint = f"; did you mean '{meant}'?" if meant else ""
+    assert fault == f"{name}: cannot be read: no such file or directory{hint}"
