@@ -74,10 +74,16 @@ CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 
 def loaded(
-    source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS
-) -> Loaded:
-    """A scenario with its text and the origin of each value. Raises ScenarioError."""
+    source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS,
+    *, silent: bool = False,
+) -> Loaded:  # fmt: skip
+    """A scenario with its text and the origin of each value. Raises ScenarioError.
+
+    Unless it is `silent`, a UserWarning names values that a section loses with its kind.
+    """
     found = _loaded(source, assignments(changes), checks)
+    if silent:
+        return found
     return found.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
 
 

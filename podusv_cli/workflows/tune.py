@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.core.errors import UsageError
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.load import Loaded
@@ -78,8 +79,8 @@ def tune(config: Source, request: Request, tell: Tell) -> Tuned:
     """Search gains for every law with equal budgets, and report them on fresh draws.
 
     `config` is a scenario or the folder of a search. Raises ScenarioError, UsageError where the
-    folder holds another search or Optuna is not installed, StorageError, and KeyboardInterrupt;
-    every batch that was finished is kept.
+    folder holds another search, no law has a gain or Optuna is not installed, StorageError, and
+    KeyboardInterrupt; every batch that was finished is kept.
     """
     started = datetime.now(UTC)
     optuna()
@@ -95,6 +96,11 @@ def _tuned(
     plan = TunePlan(loaded.scenario)
     told = place.known(folder, plan)
     plan = replace(plan, idle=told.idle if told else _idle(plan, request))
+    if not any(plan.gains.values()):
+        raise UsageError(
+            f"{plan.scenario.name}: nothing to search: no number of {', '.join(plan.laws)} "
+            "is a gain that changes a run; add a law with gains to `controllers`"
+        )
     stamp = started.isoformat(timespec="seconds")
     place.write(folder, plan, told, stamp, scenario_texts(loaded))
     request.begin(f"{plan.size}; in {folder}")
