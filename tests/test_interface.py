@@ -158,6 +158,14 @@ def kept(tmp_path_factory):
     return podusv.run(SHORT, out=tmp_path_factory.mktemp("kept") / "run", figures=False)
 
 
+def test_an_unknown_metric_of_a_run_is_a_sentence(kept):
+    metrics = kept.metrics
+    with pytest.raises(KeyError, match=r"unknown metric 'ia' of this run; did you mean 'iae'\?"):
+        metrics["ia"]
+    assert metrics["iae"] == metrics.loc["iae"] == kept.numbers["iae"]
+    assert list(metrics[["iae", "ise"]]) == [kept.numbers["iae"], kept.numbers["ise"]]
+
+
 def test_a_run_in_memory_has_the_log_and_metrics_of_the_one_in_a_folder(kept):
     run = podusv.simulate(SHORT)
     assert not list(Path().iterdir())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -142,6 +143,16 @@ def test_a_changed_copy_is_not_run_as_if_it_were_the_same(podusv):
     said = podusv("run", "r/resolved.yaml", "--trust", *QUIET)
     assert said.code == 2
     assert "r/plugins/my_law.py is not the one that was used; without sha256, any is" in said.err
+
+
+def test_a_law_without_constants_says_that_it_has_none(podusv):
+    """It had ", and those of the nominal vessel"."""
+    law = re.sub("    gain: float = .*\n", "", LAW).replace("k.gain", "k.gain_u")
+    said = podusv("run", put(SCENARIO.replace(", gain: 0.5", ""), law), *QUIET)
+    assert said.code == 2
+    assert re.search(
+        r"no attribute 'gain_u'.*; it has (those of the nominal vessel|none)", said.err
+    )
 
 
 LOADING = (

@@ -98,6 +98,36 @@ def test_shards_that_agree_are_joined_with_the_kernels_that_they_have(tmp_path, 
     assert len(warnings) == 1
 
 
+def test_force_begins_a_study_anew_and_spares_what_is_no_study(whole, tmp_path):
+    folder, config = tmp_path / "study", tmp_path / "small.yaml"
+    config.write_text(TEXT)
+    asked = {"out": folder, "workers": 1, "figures": False}
+    other = ("sweep.draws=4", "sweep.seed=8")
+
+    def run(*changes, force=False):
+        request = sweep.Request(changes, force=force, **asked)
+        return sweep.run(config, request, lambda tally: None)
+
+    run("sweep.draws=6")
+    with pytest.raises(UsageError, match=r"holds another study: .*begin anew with --force"):
+        run(*other)
+    (folder / "mine.txt").write_text("")
+    with pytest.raises(UsageError, match=r"holds mine\.txt, which is not the study's"):
+        run(*other, force=True)
+    assert (folder / RUNS).exists()
+    (folder / "mine.txt").unlink()
+    run(*other, force=True)
+    fresh = sweep.Request(other, tmp_path / "fresh", workers=1, figures=False)
+    sweep.run(config, fresh, lambda tally: None)
+    assert (folder / RUNS).read_bytes() == (tmp_path / "fresh" / RUNS).read_bytes()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full/mine.txt").write_text("")
+    asked["out"] = tmp_path / "full"
+    with pytest.raises(UsageError, match="is no study and not empty"):
+        run(*other, force=True)
+    assert (tmp_path / "full/mine.txt").exists()
+
+
 def test_a_scenario_that_is_not_the_one_of_the_runs_is_refused(whole, tmp_path):
     folder = shutil.copytree(whole, tmp_path / "study")
     (folder / stores.SCENARIO).write_text(TEXT.replace("seed: 7", "seed: 8"))
