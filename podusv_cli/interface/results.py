@@ -39,6 +39,11 @@ NO_XARRAY = (
 class Numbers(pd.Series):
     """Metrics by name; a KeyError says which there are."""
 
+    @property
+    def _constructor(self) -> type[Numbers]:
+        """What pandas makes of a part of them."""
+        return Numbers
+
     def __getitem__(self, name: Any) -> Any:
         """The metric, or a part of the series."""
         try:

@@ -16,13 +16,14 @@ import unicodedata
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
+from difflib import get_close_matches
 from itertools import islice
 from typing import Any
 
 import yaml
 
 from podusv_cli.core.timed_rows import NUMBER
-from podusv_cli.scenario.phrases import did_you_mean, found, quoted
+from podusv_cli.scenario.phrases import found, quoted
 from podusv_cli.scenario.shipped import PREFIX, file_of, names
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
 
@@ -99,7 +100,9 @@ def _meant(path: str) -> str:
     shipped = [one for one in names() if one in (PREFIX + path, f"{PREFIX}{path}.yaml")]
     if exact := [*whole, *shipped]:
         return f"; did you mean {quoted(exact[0])}?"
-    return did_you_mean(name, near)
+    stems = {os.path.splitext(one)[0]: one for one in near}
+    close = get_close_matches(os.path.splitext(name)[0], stems, n=1)
+    return f"; did you mean {quoted(os.path.join(folder, stems[close[0]]))}?" if close else ""
 
 
 def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
@@ -244,7 +247,8 @@ class _Reader:
         opened = any(part in problem for part in OPENING)
         mark = error.context_mark if opened else error.problem_mark
         text = known[0] if known else "not valid YAML: {problem}"
-        if mark and CLOSED.search(self._text.splitlines()[mark.line][: mark.column]):
+        line = self._text.splitlines()[mark.line : mark.line + 1] if mark else []
+        if mark and line and CLOSED.search(line[0][: mark.column]):
             text = IN_QUOTES
         place = self._mark(mark.line, mark.column) if mark else self._last
         return _CannotContinue(place, text.format(problem=problem))
