@@ -23,7 +23,7 @@ from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 from podusv_cli.metrics.table import METRICS, observer
-from podusv_cli.scenario.load import values
+from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
 from podusv_cli.studies.study.check import has, structure
@@ -87,7 +87,8 @@ def alone(scenario: Scenario) -> dict[str, float]:
 def test_every_key_that_can_be_drawn_gives_the_metrics_of_the_run_alone(
     section: str, kind: Any
 ) -> None:
-    base = with_part(section, kind)
+    # With every number written out, as they are in the table of the batch.
+    base = load_text(resolved_yaml(with_part(section, kind)), "resolved.yaml").scenario
     numbers = {
         key: old
         for key, old in values(base).items()

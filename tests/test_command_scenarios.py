@@ -1,12 +1,18 @@
 """Command path and failure in scenarios: what is refused, what is told, and the shipped configs."""
 
+import json
+
 import numpy as np
 import pytest
 from conftest import PACKAGE
 from findings_samples import codes, finding, late, log, scene
 from scipy.special import lambertw
 
+from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.momentum_vector import MomentumVector
+from podusv_cli.components.controllers.sliding_mode import SlidingMode
 from podusv_cli.components.controllers.velocity_loop import Loop
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.stability import delay_margin, delayed_growth
@@ -71,14 +77,19 @@ CALM = ("disturbance={kind: none}", "start={x: -0.2, y: 0.1, u: 0.5}", "simulati
 PID = ("controller.kind=pid", "simulation.step=0.001", "simulation.duration=4")
 
 
+def told_gains(law: Controller) -> str:
+    """The law with numbers that do not follow the delay."""
+    return f"controller={json.dumps(law.model_dump())}"
+
+
 @pytest.mark.parametrize(
     ("short", "long", "rest"),
     [
         (0.02, 0.03, PID),
         (0.0015, 0.003, ("simulation.step=0.0005", "simulation.duration=4")),
-        (0.12, 0.2, ("controller.kind=sliding_mode",)),
-        (0.6, 0.9, ("controller.kind=velocity_vector", *CALM)),
-        (0.4, 0.7, ("controller.kind=momentum_vector", "vessel.preset=cybership2", *CALM)),
+        (0.12, 0.2, (told_gains(SlidingMode()),)),
+        (0.6, 0.9, (told_gains(VelocityVector()), *CALM)),
+        (0.4, 0.7, (told_gains(MomentumVector()), "vessel.preset=cybership2", *CALM)),
     ],
 )
 def test_a_loop_that_is_too_fast_for_the_delay_is_told_and_oscillates(short, long, rest):

@@ -151,12 +151,11 @@ def test_the_sea_with_pods_has_the_pods_and_laws_of_one_scenario_and_the_sea_of_
     assert set(pods) == {*kept, "velocity_vector"}
     for law, scenario in pods.items():
         assert scenario.actuator == kept["pid"].actuator
-        assert (
-            scenario.controller
-            == (kept | {"velocity_vector": sea["velocity_vector"]})[law].controller
-        )
+        given, other = scenario.as_given(), sea[law].as_given()
+        laws = kept | {"velocity_vector": sea["velocity_vector"]}
+        assert given["controller"] == laws[law].as_given()["controller"]
         for part in ("vessel", "path", "disturbance", "measurement", "estimator"):
-            assert getattr(scenario, part) == getattr(sea[law], part), part
+            assert given[part] == other[part], part
 
 
 SEEDED = "disturbance[0].seed={0} disturbance[2].seed={0} measurement.seed={0}"
