@@ -10,7 +10,7 @@ from conftest import NONLINEAR, kinds
 from plugin_samples import LAW as PLUGGED
 from pydantic import ValidationError
 
-import podusv
+import podusv as package
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.base import Controller
@@ -22,6 +22,7 @@ from podusv_cli.core.kernel import kernel
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.export.law import ExportedLaw
+from podusv_cli.findings.sizing import other_numbers
 from podusv_cli.scenario.explain import explain
 from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
@@ -174,8 +175,12 @@ class Broken(Ideal):
 
 @pytest.mark.parametrize("actuator", [Nothing(), Broken()])
 def test_an_actuator_that_gives_no_number_is_told(actuator):
+    facts = Facts(NONLINEAR, actuator)
     with pytest.raises(SizingError):
-        VelocityVector().sized(Facts(NONLINEAR, actuator))
+        VelocityVector().sized(facts)
+    given = VelocityVector(**VelocityVector().model_dump())
+    assert given.sized(facts) == given
+    assert "N_m" not in other_numbers(given, facts), "of a moment that there is not"
 
 
 def test_a_hull_that_gives_no_number_is_told_at_its_place():
@@ -275,9 +280,29 @@ def test_a_changed_law_is_checked():
 # --- other ways to a scenario
 
 
+def test_validate_tells_the_facts_and_what_limits_the_pace(podusv, tmp_path):
+    (tmp_path / "boat.yaml").write_text(CATAMARAN, encoding="utf-8")
+    said = podusv("validate", "-v", str(tmp_path / "boat.yaml")).out
+    assert "N = 372.9 N m" in said
+    assert "T_r = 0.35 s: yaw at 0.659 times the model ship's pace, which the delay limits" in said
+    assert f"controller.N_m: 373.0  # {BY_RULE}" in said
+
+
+def test_a_batch_from_python_follows_what_its_runs_are_told():
+    base = loaded("simulation.duration=3.0").scenario
+    table = package.simulate_many(base, {"nominal.X_uu": [-300.0, -80.0]})
+    for row, number in enumerate((-300.0, -80.0)):
+        one = loaded("simulation.duration=3.0", f"nominal.X_uu={number}").scenario
+        watch = one.observer()
+        alone = watch.summaries(
+            simulate_many([one.closed_loop()], one.time_grid(), observer=watch).seen
+        )
+        assert table.loc[row, "energy"] == alone["energy"][0]
+
+
 def test_python_keeps_following_the_hull():
-    first = podusv.load(podusv.Scenario(yaml.safe_load(CATAMARAN)))
-    slower = podusv.load(first, {"nominal.X_uu": -600.0})
+    first = package.load(package.Scenario(yaml.safe_load(CATAMARAN)))
+    slower = package.load(first, {"nominal.X_uu": -600.0})
     assert slower.controller.U < first.controller.U == law().U
 
 

@@ -192,7 +192,13 @@ class Facts:
         return min(self.g_p, bears)
 
     def in_words(self) -> str:
-        """The facts in a line, with what limits the pace of yaw."""
+        """The facts in a line, with what limits the pace of yaw; or why there are none."""
+        try:
+            return self._in_words()
+        except (SizingError, ArithmeticError, ValueError) as error:
+            return f"no facts: {in_a_line(error)}"
+
+    def _in_words(self) -> str:
         why = "the moment" if self.g_r == self.w_f else "the delay"
         return (
             f"F = {self.F:.4g} N, U = {self.U:.4g} m/s, N = {self.N:.4g} N m, r_top = "

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from podusv_cli.components.paths.base import Path
+from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import Sentences, after, before
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
@@ -75,9 +78,10 @@ def _unable(scenario: Scenario) -> list[str]:
         f"{name} = {number:g} where hull and actuator make it {found:.3g}, so {why}: leave it out"
         for name, (number, found, why) in other_numbers(law, facts).items()
     ]
-    if speed > facts.U:
-        own.append(
-            f"the hull goes {facts.U:.3g} m/s at full thrust ({facts.F:.3g} N), and the path asks "
-            f"for {speed:.3g} m/s: slow it down"
-        )
+    with suppress(SizingError):  # an actuator that cannot be asked
+        if speed > facts.U:
+            own.append(
+                f"the hull goes {facts.U:.3g} m/s at full thrust ({facts.F:.3g} N), and the path "
+                f"asks for {speed:.3g} m/s: slow it down"
+            )
     return own

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.facts import Facts
-from podusv_cli.core.component import Rule, unit_of
+from podusv_cli.core.component import unit_of
+from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import At, Sentences, before
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import median
@@ -17,18 +20,14 @@ AGILE = 0.8  # of the path's speed over the length, the least gain of the headin
 
 def other_numbers(law: Controller, facts: Facts) -> dict[str, tuple[float, float, str]]:
     """U, N_m and k_psi that are far from the rule's: number, the rule's, and why it matters."""
-    rules = {name: law.rules[name] for name in USUAL if name in law.rules}
-    return {
-        name: (getattr(law, name), found, why)
-        for name, rule in rules.items()
-        if name not in law.by_rule
-        for found in (_of(rule, law, name, facts),)
-        if (why := _why(name, getattr(law, name), found, facts))
-    }
-
-
-def _of(rule: Rule, law: Controller, name: str, facts: Facts) -> float:
-    return rule.of(facts, type(law).model_fields[name].default)
+    own = [name for name in USUAL if name in law.rules and name not in law.by_rule]
+    far: dict[str, tuple[float, float, str]] = {}
+    with suppress(SizingError):  # where nothing follows, nothing is far from it
+        for name in own:
+            number, found = getattr(law, name), law.by_default(name, facts)
+            if why := _why(name, number, found, facts):
+                far[name] = number, found, why
+    return far
 
 
 def _why(name: str, number: float, found: float, facts: Facts) -> str:
