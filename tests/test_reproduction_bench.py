@@ -70,13 +70,11 @@ def test_ranks_by_vessel_and_condition_are_those_of_the_runs():
     ours = {"momentum_vector", "velocity_vector"}
     for hull in ("cybership2", "paper_nonlinear"):
         assert set(ranks[hull].nsmallest(2).index) == ours
-    assert ranks[["otter", "revolt"]].idxmin().unique().tolist() == ["super_twisting"]
+    assert ranks[["otter", "revolt"]].idxmin().tolist() == ["momentum_vector", "super_twisting"]
     other = RUNS[RUNS.vessel.isin(["otter", "revolt"]) & (RUNS.condition != "pod")]
     means = other.groupby("law")["rank"].mean()
-    least = min(means[law] for law in ours)
-    second = f"{means.super_twisting:.2f}, `sliding_mode` {means.sliding_mode:.2f}"
-    assert f"without pods it has {second}" in WORDS
-    assert f"not below {least:.2f}." in WORDS
+    told = f"{means.super_twisting:.2f}, `momentum_vector` {means.momentum_vector:.2f}"
+    assert f"without pods it has {told}, `sliding_mode` {means.sliding_mode:.2f}." in WORDS
     by = RUNS.pivot_table("rank", "law", "condition")
     assert f"{(by.sea_fixed - by.sea).abs().max():.1f}." in WORDS
 
@@ -84,8 +82,8 @@ def test_ranks_by_vessel_and_condition_are_those_of_the_runs():
 @pytest.mark.parametrize(
     ("law", "condition", "told"),
     [
-        ("hand_position", "calm", "6.0"), ("hand_position", "hull_light", "8.9"),
-        ("sliding_mode", "calm", "3.4"), ("sliding_mode", "hull_light", "6.8"),
+        ("hand_position", "calm", "5.6"), ("hand_position", "hull_light", "8.0"),
+        ("sliding_mode", "calm", "3.9"), ("sliding_mode", "hull_light", "5.2"),
     ],
 )  # fmt: skip
 def test_the_ranks_by_condition_are_those_of_the_runs(law, condition, told):
