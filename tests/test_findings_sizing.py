@@ -13,6 +13,7 @@ from podusv_cli.findings.sizing import gains_for_another_hull
 from podusv_cli.findings.units import other_unit
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.studies.study.plan import plan
 
 SHIPPED = [
     path for path in sorted((PACKAGE.parent / "configs").rglob("*.yaml"))
@@ -181,5 +182,23 @@ def test_no_scenario_that_podusv_brings_along_is_of_another_hull_or_unit(path):
     ]
 
 
-def test_every_delay_is_short_for_the_scenario_that_the_tests_start_from():
+@pytest.mark.parametrize(
+    "path",
+    [one for one in SHIPPED if one.parent.name in ("mu_2017", "fossen_2003", "lefeber_2003")],
+    ids=lambda path: f"{path.parent.name}/{path.stem}",
+)
+def test_scenarios_of_papers_have_the_numbers_with_which_their_results_were_made(path):
+    """Those of the model ship, or numbers of their own, in every cell of their studies."""
+    try:
+        whole = load(path)
+    except ScenarioError:  # a layer for others to extend
+        return
+    grid = plan(whole).cells if whole.scenario.sweep else ()
+    for one in (whole.scenario, *(cell.scenario for cell in grid)):
+        for part in (*one.laws().values(), one.path, one.estimator):
+            usual = {name: type(part).model_fields[name].default for name in part.by_rule}
+            assert {name: getattr(part, name) for name in usual} == usual
+
+
+def test_the_boat_that_these_tests_start_from_has_no_finding():
     assert preflight(load_text(CATAMARAN, "boat.yaml").scenario) == []
