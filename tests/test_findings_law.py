@@ -217,11 +217,11 @@ CASES = [  # code, its key, overrides with it, and without
      [LATE, "estimator={kind: low_pass}"]),
     ("steep-waves", "disturbance[0].height", [WAVES % 0.5], [WAVES % 0.05]),
     ("few-components", "disturbance[0].components",
-     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 690}")],  # 3.5 a period: 700
-     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 710}")]),
+     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 175}")],  # 0.9 a period: 180
+     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 185}")]),
     ("few-components", "disturbance[0].components",
-     [sea("{kind: waves, height: 1e-3, period: 0.19}")],  # 105 periods
-     [sea("{kind: waves, height: 1e-3, period: 0.21}")]),
+     [sea("{kind: waves, height: 1e-3, period: 0.19, components: 50}")],  # 105 periods
+     [sea("{kind: waves, height: 1e-3, period: 0.21, components: 50}")]),
     ("same-waves", "disturbance[1].seed", [sea(*[SWELL % 1] * 2)], [sea(SWELL % 1, SWELL % 2)]),
     ("few-components", "disturbance[0].components",
      [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 560}")],  # 568

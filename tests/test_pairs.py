@@ -109,8 +109,12 @@ def resolved_scenario(drawn: Drawn, place: Path) -> None:
 
 @pair
 def number_of_a_draw(drawn: Drawn, place: Path) -> None:
-    """A number in a scenario's file, and the same in a draw: refused by both, or the same run."""
-    scenario = drawn.scenario()
+    """A number in a scenario's file, and the same in a draw: refused by both, or the same run.
+
+    The file has a number in place of every null, since a null would follow the number.
+    """
+    text = resolved_yaml(drawn.scenario())
+    scenario = load_text(text, "resolved.yaml").scenario
     numbers = {
         key: own
         for key, own in values(scenario).items()
@@ -119,7 +123,6 @@ def number_of_a_draw(drawn: Drawn, place: Path) -> None:
     for key in drawn.random.choice([*numbers], 4):
         own, factor = numbers[key], drawn.random.choice([-1.0, drawn.between(0.3, 3.0)])
         number = type(own)(own * factor or drawn.between(-2.0, 2.0))
-        text = resolved_yaml(scenario)
         try:
             loaded = load_text(text, "resolved.yaml", [f"{key}={number!r}"]).scenario
         except ScenarioError:

@@ -12,7 +12,7 @@ from podusv_cli.findings.finding import Case
 GRAVITY = 9.81
 BREAKS = 1.0 / 7.0  # height over length at which waves break
 MODEL = 2.0  # m; gusts were measured for what is larger
-LONG = 350  # components that a run needs, 100 periods of a peak; shorter seas scatter anyhow
+LONG = 90  # components that a run needs, 100 periods of a peak; shorter seas scatter anyhow
 SENSORS = {  # by name, which numbers of the state each measures
     "position": slice(0, 2), "heading": slice(2, 3), "velocity": slice(3, 5),
     "yaw rate": slice(5, 6),

@@ -186,7 +186,7 @@ class Scenario(Component):
 
         Made once when a scenario is loaded, and again where a draw changes what the facts are of.
         """
-        if self.recorded:  # nobody asks such an actuator
+        if not self.keys_by_rule() or self.recorded:  # nobody asks an actuator that is recorded
             return self
         facts = self.facts
         several = {label: law.sized(facts) for label, law in self.controllers.items()}
@@ -203,13 +203,14 @@ class Scenario(Component):
     def keys_by_rule(self) -> list[tuple[str | int, ...]]:
         """The steps of every key whose number `in_numbers` gave."""
         seas = self.disturbance
-        parts: dict[tuple[str | int, ...], Component] = {
-            ("path",): self.path, ("estimator",): self.estimator, ("controller",): self.controller,
-            **({("disturbance", i): sea for i, sea in enumerate(seas)} if isinstance(seas, tuple)
-               else {("disturbance",): seas}),
-            **{("controllers", label): law for label, law in self.controllers.items()},
-        }  # fmt: skip
-        return [(*steps, name) for steps, part in parts.items() for name in part.by_rule]
+        parts: list[tuple[tuple[str | int, ...], Component]] = [
+            (("path",), self.path), (("estimator",), self.estimator),
+            (("controller",), self.controller),
+            *((("controllers", label), self.controllers[label]) for label in self.controllers),
+            *(((("disturbance", i), sea) for i, sea in enumerate(seas)) if isinstance(seas, tuple)
+              else [(("disturbance",), seas)]),
+        ]  # fmt: skip
+        return [(*at, name) for at, part in parts if part.rules for name in part.by_rule]
 
     def as_given(self) -> dict[str, Any]:
         """As plain data, with null in place of what `in_numbers` gave."""

@@ -60,7 +60,7 @@ STREAM = "waves"
 FEWEST, MOST, ENOUGH = 100, 10_000, 2.0  # components; times those that `resolving` asks for
 COMPONENTS = Rule(
     "{:g}, doubled until there are twice as many as let the height of the run scatter between "
-    "seeds as a sea's (docs/sea.md)",
+    "seeds as a sea's (podusv docs sea)",
     lambda facts, default: math.nan,  # `Waves.by_default` knows the spectrum
 )
 if TYPE_CHECKING:
