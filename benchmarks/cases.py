@@ -11,6 +11,7 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.network import Network
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import Metrics, observer
 from podusv_cli.scenario.load import load
@@ -85,7 +86,7 @@ def metrics_observer(loop: ClosedLoop, over: TimeGrid) -> Metrics:
     """The observer of `podusv run`, which gathers all metrics."""
     settings = _scenario().metrics
     return observer(
-        loop, over,
+        Plan(loop, over),
         steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
     )  # fmt: skip
 

@@ -39,6 +39,7 @@ from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
@@ -170,7 +171,7 @@ def gathered_number(metric: Metric, compiled: bool) -> float:
     loop, grid = loop_with(Pid()), TimeGrid(STEP, STEPS)
     alone = Plugin(metric.name, f"{id(metric)}", offers=(("metrics", metric),))
     seeing = observer(
-        loop, grid, steady_fraction=0.2, settling_radius=1.0, known=metrics_with((alone,))
+        Plan(loop, grid), steady_fraction=0.2, settling_radius=1.0, known=metrics_with((alone,))
     )
     run = simulate(loop, grid, observer=seeing, compiled=compiled)
     assert run.seen is not None

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, vectors_of
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import marcher
 from podusv_cli.engine.step.grid import TimeGrid
 
@@ -30,9 +31,9 @@ def continuous(loop: ClosedLoop, duration: float, *, compiled: bool = True) -> t
     if loop.actuator.delay() > 0:
         raise ValueError("an actuator with a delay has no continuous right-hand side")
     grid = TimeGrid(1.0, 1, log_every=2)
-    layout = loop.layout(grid)
-    vectors = vectors_of(loop, layout, Observer(), TimeGrid(duration, 1))
-    march = marcher(loop, Observer(), compiled)
+    layout = Plan(loop, grid).layout
+    plan = Plan(loop, TimeGrid(duration, 1))
+    vectors, march = plan.vectors(), marcher(plan, compiled)
 
     def slope(t: float, s: Vector) -> Vector:
         # The march over instant 1 of a grid with step t and no step after it: rates, no more.

@@ -25,6 +25,7 @@ from podusv_cli.core.component import value
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch import Batch, Lazily, simulate_many
 from podusv_cli.engine.running.simulate import simulate
@@ -64,11 +65,11 @@ def spread_out(**parts: Any) -> list[ClosedLoop]:
 @pytest.mark.parametrize("law", [AdaptiveNeural(rate="difference"), DynamicSurface()])
 def test_every_run_has_the_bits_and_metrics_of_a_run_alone(law: Any, workers: int) -> None:
     loops = spread_out(controller=law)
-    watching = observer(loops[0], GRID, **SETTINGS)
+    watching = observer(Plan(loops[0], GRID), **SETTINGS)
     batch = simulate_many(loops, GRID, observer=watching, workers=workers)
     metrics = watching.summaries(batch.seen)
     for i, loop in enumerate(loops):
-        alone = simulate(loop, GRID, observer=observer(loop, GRID, **SETTINGS))
+        alone = simulate(loop, GRID, observer=observer(Plan(loop, GRID), **SETTINGS))
         assert (batch.status[i], batch.reached[i]) == (alone.status, GRID.steps + 1)
         np.testing.assert_array_equal(batch.state[i], [alone[name][-1] for name in STATE])
         np.testing.assert_array_equal(batch.seen[i], alone.seen)
@@ -97,7 +98,7 @@ class Lost(Constant):
 
 def test_a_run_that_diverges_stops_no_other() -> None:
     loops = variants(adrift(controller=Lost()), {"controller.until": [30.0, 4.999, 30.0, 2.499]})
-    watching = observer(loops[0], GRID, **SETTINGS)
+    watching = observer(Plan(loops[0], GRID), **SETTINGS)
     batch = simulate_many(loops, GRID, observer=watching)
     assert batch.status.tolist() == ["finished", "diverged", "finished", "diverged"]
     assert batch.reached.tolist() == [2001, 500, 2001, 250]
@@ -120,13 +121,13 @@ def interrupted(loops: list[ClosedLoop], grid: TimeGrid) -> Batch:
         if fraction >= 2 / len(loops):
             raise KeyboardInterrupt
 
-    watching = observer(loops[0], grid, **SETTINGS)
+    watching = observer(Plan(loops[0], grid), **SETTINGS)
     return simulate_many(loops, grid, observer=watching, workers=1, progress=press)
 
 
 def test_an_interrupt_keeps_the_runs_that_are_done() -> None:
     loops, others = [corrected()] * 40, set(threading.enumerate())
-    watching = observer(loops[0], TimeGrid(0.01, 100_000), **SETTINGS)
+    watching = observer(Plan(loops[0], TimeGrid(0.01, 100_000)), **SETTINGS)
     batch = interrupted(loops, TimeGrid(0.01, 100_000))
     done = batch.status == "finished"
     assert 2 <= done.sum() < 40
@@ -164,7 +165,7 @@ def test_a_loop_of_another_structure_is_invalid(other: ClosedLoop) -> None:
 def test_no_runs_are_an_empty_batch() -> None:
     batch = simulate_many([], GRID)
     assert (len(batch.status), batch.seen.shape) == (0, (0, 1))
-    assert observer(corrected(), GRID, **SETTINGS).summaries(batch.seen)["iae"].shape == (0,)
+    assert observer(Plan(corrected(), GRID), **SETTINGS).summaries(batch.seen)["iae"].shape == (0,)
 
 
 class Faulty(Lost):
@@ -194,7 +195,7 @@ def test_no_run_that_fails_changes_a_bit_of_the_others() -> None:
         return one
 
     grid, fractions = TimeGrid(0.01, 20), list[float]()
-    watching = observer(sound[0], grid, **SETTINGS)
+    watching = observer(Plan(sound[0], grid), **SETTINGS)
     whole = simulate_many(sound, grid, observer=watching, workers=1)
     mixed = simulate_many(
         Lazily(100, make), grid, observer=watching, workers=3, progress=fractions.append

@@ -19,6 +19,7 @@ from podusv_cli.components.controllers.network import Network
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
@@ -26,7 +27,7 @@ from podusv_cli.metrics.table import METRICS, observer
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.check import has, structure
+from podusv_cli.studies.study.check import has
 from podusv_cli.studies.study.draws import DrawError, Number, with_values
 
 SECTIONS = {"paths": "path", "disturbances": "disturbance", "actuators": "actuator"}
@@ -65,9 +66,7 @@ def changed(scenario: Scenario, key: str, old: float) -> Scenario | None:
     try:
         found = with_values(scenario, {route(key): Number("", new)})
         found.closed_loop().check_fit(found.simulation.step)
-        same = structure(found.closed_loop(), found.time_grid()) == structure(
-            scenario.closed_loop(), scenario.time_grid()
-        )
+        same = found.plan().structure == scenario.plan().structure
     except (DrawError, LawError, ValueError):
         return None
     return found if same else None
@@ -155,7 +154,7 @@ def test_a_metric_of_a_plugin_has_the_constants_of_each_run() -> None:
     loops, grid = two_speeds(), TASK.time_grid()
     known = speed_excess(lambda layout: 1)
     settings = {"steady_fraction": 0.2, "settling_radius": 1.0, "known": known}
-    watching = observer(loops[0], grid, **settings)
+    watching = observer(Plan(loops[0], grid), **settings)
     batch = simulate_many(loops, grid, observer=watching)
     u = batch.state[:, 3]
     np.testing.assert_array_equal(watching.summaries(batch.seen)["excess"], u - [0.5, 0.75])
@@ -165,7 +164,7 @@ def test_a_metric_whose_size_depends_on_a_drawn_number_refuses_the_run() -> None
     loops, grid = two_speeds(), TASK.time_grid()
     known = speed_excess(lambda layout: 1 if layout.loop.path.speed < 0.6 else 2)
     settings = {"steady_fraction": 0.2, "settling_radius": 1.0, "known": known}
-    batch = simulate_many(loops, grid, observer=observer(loops[0], grid, **settings))
+    batch = simulate_many(loops, grid, observer=observer(Plan(loops[0], grid), **settings))
     assert batch.status.tolist() == ["finished", "invalid"]
     expected = "metric excess: its accumulator gathers 2 numbers in this run and 1 in others"
     assert batch.cause[1].startswith(expected)

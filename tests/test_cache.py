@@ -23,8 +23,10 @@ from numba import njit
 
 from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.engine.loop.closed_loop import Observer, entries
+from podusv_cli.engine.loop.closed_loop import nothing
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import code_folder, compile, object_cache
+from podusv_cli.engine.step.grid import TimeGrid
 
 FORCE = 0.0
 
@@ -55,7 +57,7 @@ def test_kernels_of_the_same_name_are_not_taken_for_each_other():
 def test_what_does_nothing_has_the_same_code_for_every_law():
     """Laws without samples, and that do not hear of limits, whose constants differ."""
     laws = (example(kind) for kind in kinds("controllers").values())
-    parts = [list(entries(adrift(controller=law), Observer())) for law in laws]
+    parts = [Plan(adrift(controller=law), TimeGrid(0.01, 1)).functions for law in laws]
     for part in ("sample", "after_saturation"):
         idle = {(k, names) for one in parts for p, k, names in one if p == part and is_idle(k)}
         assert len(idle) == 1
@@ -63,7 +65,7 @@ def test_what_does_nothing_has_the_same_code_for_every_law():
 
 def is_idle(function: Any) -> bool:
     """Whether a kernel is the loop's own, which stands where a law has none."""
-    return bool(function.__module__ == entries.__module__)
+    return bool(function.__module__ == nothing.__module__)
 
 
 def test_kernels_that_read_different_constants_are_not_taken_for_each_other():

@@ -21,6 +21,7 @@ from podusv_cli.components.paths.line import Line
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
 
 START = (0.0, 0.0, 0.0, 0.4, 0.0, 0.0)
@@ -266,4 +267,4 @@ def test_a_delay_has_no_ordinary_differential_equation():
 
 def test_runs_that_differ_in_their_delays_have_one_structure():
     grid = TimeGrid(0.01, 100)
-    assert braked(0.0).layout(grid) == braked(0.2).layout(grid)
+    assert Plan(braked(0.0), grid).structure == Plan(braked(0.2), grid).structure

@@ -14,6 +14,7 @@ from podusv_cli.components.controllers.sliding_mode import SlidingMode
 from podusv_cli.components.controllers.velocity_loop import Loop
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.findings.stability import delay_margin, delayed_growth
 from podusv_cli.optimum.problem import problem
@@ -132,7 +133,7 @@ def monitored(*overrides: str) -> monitor.Window:
     """The monitor's window over the whole of a short run."""
     scenario = scene("simulation.duration=2", *overrides)
     loop, grid = scenario.closed_loop(), scenario.time_grid()
-    found = monitor.monitored(loop, grid, simulate(loop, grid))
+    found = monitor.monitored(Plan(loop, grid), simulate(loop, grid))
     assert found is not None
     assert ("V_dot" in found.recording.signals) == (not overrides)
     return found.windows["whole"]

@@ -19,7 +19,8 @@ from podusv_cli.components.paths.base import TARGET
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, Vessel
 from podusv_cli.core import registry
 from podusv_cli.core.kernel import is_kernel
-from podusv_cli.engine.loop.columns import names
+from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.explain import signals
 from podusv_cli.testing import is_finite, keeps_its_declaration, remembers_nothing
 
@@ -155,7 +156,7 @@ def test_every_logged_column_has_one_meaning(room, kind):
     own = Counter([*loop.actuator.states, *loop.actuator.signals])
     wide = {part.name: size for part, size in (dict(loop.controller.slots()) | own).items()}
     about = loop.about()
-    for name, count in Counter(names(loop)).items():
+    for name, count in Counter(Plan(loop, TimeGrid(0.01, 1)).names).items():
         assert count == wide.get(name, 1), f"{name} is logged twice"
         if name not in TARGET[2:] and (loop.has_target or name != "z_e"):
             vector = name.startswith("W_hat") or name in POD_VECTORS

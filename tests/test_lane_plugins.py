@@ -15,7 +15,7 @@ from test_lanes import same
 
 from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES
-from podusv_cli.engine.loop.closed_loop import Observer
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine.kernel_source import OtherSource, source
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.lanes import why_alone
@@ -65,7 +65,7 @@ def test_a_plug_in_whose_file_is_gone_marches_side_by_side(tmp_path: Path) -> No
     written = load(config).scenario.singles()["cross_track"]
     law.unlink()
     linecache.checkcache()
-    assert why_alone(written.closed_loop(), Observer()) == ""
+    assert why_alone(Plan(written.closed_loop(), TimeGrid(0.01, 1))) == ""
 
 
 def test_a_run_that_has_diverged_holds_up_no_loop_of_the_others(tmp_path: Path) -> None:

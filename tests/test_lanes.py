@@ -25,6 +25,7 @@ from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.core.kernel import LANES, Vector, kernel, shared
 from podusv_cli.core.registry import kinds
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import compile, wide_numba
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
 from podusv_cli.engine.running import lanes
@@ -78,7 +79,7 @@ def scattered(base: ClosedLoop, seed: int) -> list[ClosedLoop]:
 
 def both(loops: list[ClosedLoop], grid: TimeGrid = GRID) -> tuple[Batch, Batch]:
     """The batch side by side and run by run."""
-    watching = observer(loops[0], grid, steady_fraction=0.2, settling_radius=1.0)
+    watching = observer(Plan(loops[0], grid), steady_fraction=0.2, settling_radius=1.0)
     alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
     return simulate_many(loops, grid, observer=watching, side_by_side=True), alone
 
@@ -104,8 +105,8 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone(
 ) -> None:
     """Also those that diverge, at different instants."""
     base = replace(loop(law), actuator=actuator)
-    watching = observer(base, GRID, steady_fraction=0.2, settling_radius=1.0)
-    assert why_alone(base, watching) == ""
+    watching = observer(Plan(base, GRID), steady_fraction=0.2, settling_radius=1.0)
+    assert why_alone(Plan.watched(base, GRID, watching)) == ""
     together, alone = both(scattered(base, 7))
     same(together, alone)
     assert {"finished", "diverged"} <= set(alone.status)
@@ -164,7 +165,7 @@ def test_runs_of_other_delays_march_beside_their_like(part: str, others: list[An
         replace(one, **{part: others[i % len(others)]}) for i, one in enumerate(scattered_loops)
     ]
     together, alone = both(loops, replace(GRID, steps=60))
-    assert why_alone(loops[0], Observer()) == ""
+    assert why_alone(Plan.watched(loops[0], GRID, Observer())) == ""
     same(together, alone)
 
 
@@ -177,8 +178,8 @@ def of_the_first(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
 def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
     """What is shared is known of podusv's own kernels only."""
     base, watching = loop("pid"), Observer(of_the_first)
-    assert "test_lanes.py, line" in why_alone(base, watching)
-    assert "shared is for podusv's own kernels" in why_alone(base, watching)
+    assert "test_lanes.py, line" in why_alone(Plan.watched(base, GRID, watching))
+    assert "shared is for podusv's own kernels" in why_alone(Plan.watched(base, GRID, watching))
     loops, grid = scattered(base, 1), TimeGrid(0.01, 20)
     alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
     same(simulate_many(loops, grid, observer=watching, side_by_side=True), alone)
@@ -250,7 +251,7 @@ def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> Non
     """An author begins with a law that does."""
     assert podusv("new", "law", "our_own").code == 0
     written = load(Path("our_own.yaml")).scenario.singles()["our_own"]
-    assert why_alone(written.closed_loop(), Observer()) == ""
+    assert why_alone(Plan.watched(written.closed_loop(), GRID, Observer())) == ""
 
 
 WHILE = """        rest = signals[0]
@@ -281,7 +282,7 @@ def test_a_law_with_a_while_marches_side_by_side(podusv: Any) -> None:
     loops = variants(base, {"start.y": np.linspace(-30.0, 50.0, COUNT)})
     together, alone = both(loops, TimeGrid(0.01, 50))
     same(together, alone)
-    assert why_alone(base, Observer()) == ""
+    assert why_alone(Plan.watched(base, GRID, Observer())) == ""
 
 
 def test_an_interrupt_keeps_all_runs_that_marched_side_by_side() -> None:
@@ -324,7 +325,7 @@ def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(
 
     monkeypatch.setattr(wide_numba.widening, "widened", without_a_pass)
     (piece,) = [
-        p for p in lanes._pieces(loop("pid"), Observer()) if p.label.startswith("lanes_law")
+        p for p in lanes._pieces(Plan(loop("pid"), GRID)) if p.label.startswith("lanes_law")
     ]
     code = wide_numba.object_code(piece.function, piece.prototype)
     assert code.symbol == ""

@@ -25,6 +25,7 @@ from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import Vector, bundle, kernel
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics import consistency
@@ -43,7 +44,7 @@ def gathered(
     loop, *, steps=4000, log_every=1, radius=2.0, steady_fraction=0.25, compiled=True, **options
 ):
     grid = TimeGrid(0.01, steps, log_every)
-    seeing = observer(loop, grid, steady_fraction=steady_fraction, settling_radius=radius)
+    seeing = observer(Plan(loop, grid), steady_fraction=steady_fraction, settling_radius=radius)
     recording = simulate(loop, grid, observer=seeing, compiled=compiled, **options)
     return recording, seeing.summary(recording.seen)
 
@@ -344,7 +345,7 @@ def windowed(*, compiled=True, steps=4000, windows=WINDOWS, until=math.inf):
     """Log and metrics of a run of 40 s that is told of these windows."""
     loop, grid = corrected(actuator=Saturated()), TimeGrid(0.01, steps)
     known = metrics_with((), (windows, RADII))
-    seeing = observer(loop, grid, steady_fraction=0.2, settling_radius=1.0, known=known)
+    seeing = observer(Plan(loop, grid), steady_fraction=0.2, settling_radius=1.0, known=known)
 
     def progress(done):
         if done >= until:

@@ -15,6 +15,7 @@ import pytest
 
 from podusv_cli.comparison.claims import judge, parse_claims
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import observer
@@ -84,7 +85,7 @@ def rerun(scenario):
     """A run without a folder, as a comparison sees it; nothing is timed."""
     loop, grid, settings = scenario.closed_loop(), scenario.time_grid(), scenario.metrics
     seeing = observer(
-        loop, grid, steady_fraction=settings.steady_fraction,
+        Plan(loop, grid), steady_fraction=settings.steady_fraction,
         settling_radius=settings.settling_radius,
     )  # fmt: skip
     recording = simulate(loop, grid, observer=seeing)

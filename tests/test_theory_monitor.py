@@ -32,10 +32,10 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
-from podusv_cli.engine.loop.columns import by_name, names
+from podusv_cli.engine.loop.columns import by_name
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import rates_replay
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Layout
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import Monitored, monitored
@@ -49,7 +49,7 @@ every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
 def watched(loop: ClosedLoop, duration: float, step: float = 0.01, **options: Any) -> Monitored:
     """A run with its monitor."""
     grid = TimeGrid(step, round(duration / step))
-    found = monitored(loop, grid, run(loop, duration, step, **options))
+    found = monitored(Plan(loop, grid), run(loop, duration, step, **options))
     assert found
     return found
 
@@ -97,7 +97,7 @@ def test_unloaded_accelerations_are_those_of_the_hull_left_alone(name):
     sea = HarmonicDisturbance(scale=3.0)
     loop = smooth(GENTLE, vessel=hull, actuator=actuator, disturbance=sea)
     log = run(loop, 3.0)
-    now = rates_replay(loop, TimeGrid(0.01, 300))(log)
+    now = rates_replay(Plan(loop, TimeGrid(0.01, 300)))(log)
     f_u, f_r = unloaded_accelerations(loop, now)
     assert np.median(np.abs(now.signals["tau_v"] + now.signals["b_v"])) > 0.3
     rate, nothing, k = np.zeros(6), np.zeros(3), bundle(hull.constants())
@@ -119,7 +119,7 @@ def test_rates_of_errors_are_derivatives_along_the_flow(law, options):
     loop = corrected(controller=law, path=Circle(), vessel=VESSELS["cybership2"])
     for at in situations(law, 12):
         rows = moving(loop, law, at.x, at.memory)
-        now = rates_replay(loop, TimeGrid(0.01, 1), compiled=False)(rows)
+        now = rates_replay(Plan(loop, TimeGrid(0.01, 1)), compiled=False)(rows)
         e = error_rates(rows, now, law)
         pairs = {"z_e": e.z_e, "psi_e": e.psi_e, "u_e": e.u_e, "r_e": e.r_e, "y_u": e.y_u,
                  "y_r": e.y_r, "alpha_u": now.signals["alpha_u"],
@@ -137,15 +137,15 @@ TINY = 1e-5  # s
 
 def moving(loop: ClosedLoop, law: PolarBackstepping, x: Vector, memory: Vector) -> Recording:
     """Three rows: a state, and where the flow comes from and goes to in a tiny time."""
-    plan: Layout = loop.layout(TimeGrid(0.01, 1))
-    labels = names(loop)[: 1 + plan.states]
+    plan = Plan(loop, TimeGrid(0.01, 1))
+    labels = plan.names[: 1 + plan.layout.states]
     t, s = 20.0, np.concatenate([target_at(loop.path, 20.0)[:2] + x[:2] * 0.5, x[2:], memory])
 
     def recorded(rows: Vector) -> Recording:
         return Recording("finished", law.label, by_name(labels, np.atleast_2d(rows), loop.about()))
 
     here = recorded(np.concatenate([[t], s]))
-    rates = rates_replay(loop, TimeGrid(0.01, 1), compiled=False)(here).rates
+    rates = rates_replay(plan, compiled=False)(here).rates
     ds = np.concatenate([[1.0], *(np.ravel(rates[name]) for name in dict.fromkeys(labels[1:]))])
     row = np.concatenate([[t], s])
     return recorded(np.stack([row - TINY * ds, row, row + TINY * ds]))
@@ -209,7 +209,7 @@ def test_a_wrong_sign_planted_in_the_law_is_caught(sign):
 
     loop = smooth(Wrong(**GENTLE.model_dump()))
     recording = run(loop, 1.0, 0.02, compiled=False)
-    found = monitored(loop, TimeGrid(0.02, 50), recording, compiled=False)
+    found = monitored(Plan(loop, TimeGrid(0.02, 50)), recording, compiled=False)
     assert found
     assert mismatch(loop, found) > 1e-5
     honest = replace(loop, controller=GENTLE)
@@ -261,7 +261,7 @@ def test_sway_stays_below_its_bound():
 
 def test_sampled_control_has_V_but_no_rate():
     loop, grid = smooth(GENTLE), TimeGrid(0.01, 100, hold_every=10)
-    found = monitored(loop, grid, run(loop, 1.0, hold_every=10))
+    found = monitored(Plan(loop, grid), run(loop, 1.0, hold_every=10))
     assert found
     assert "V" in found.recording
     assert "V_dot" not in found.recording
@@ -277,7 +277,7 @@ def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
     loop = corrected(controller=law, vessel=PAPER)
     recording = run(loop, 5.0)
     assert recording.status == "diverged"
-    found = monitored(loop, TimeGrid(0.01, 500), recording)
+    found = monitored(Plan(loop, TimeGrid(0.01, 500)), recording)
     assert found
     assert len(found.recording["V"]) == len(recording["time"])
     assert np.isfinite(found.recording["W_star_u"]).all()
@@ -286,7 +286,7 @@ def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
 def test_plain_and_compiled_monitor_agree():
     loop, grid = smooth(GENTLE), TimeGrid(0.05, 20)
     recording = run(loop, 1.0, 0.05)
-    one, other = (monitored(loop, grid, recording, compiled=c) for c in (True, False))
+    one, other = (monitored(Plan(loop, grid), recording, compiled=c) for c in (True, False))
     assert one
     assert other
     for name in ("V", "V_dot", *(term.name for term in TERMS)):

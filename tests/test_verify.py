@@ -79,8 +79,8 @@ def test_times_in_seconds_stay_when_the_step_is_halved():
     grid = refined(scenario, 2)
     assert (grid.step, grid.steps, grid.hold_every) == (0.0025, 480, 16)
     assert grid.rows == 2
-    sampled = scene(*DIFFERENCE).closed_loop()
-    assert sampled.layout(refined(scene(*DIFFERENCE), 2)).sample_every == 4
+    sampled = scene(*DIFFERENCE)
+    assert sampled.plan(refined(sampled, 2)).layout.sample_every == 4
 
 
 def test_the_first_level_is_the_run_itself():

@@ -211,7 +211,7 @@ def learnt() -> pd.DataFrame:
         one = laws(config)["adaptive_neural"]
         _, log = made(one)
         loop = one.closed_loop()
-        unloaded = unloaded_accelerations(loop, rates_replay(loop, one.time_grid())(log))
+        unloaded = unloaded_accelerations(loop, rates_replay(one.plan())(log))
         for axis, f, m in zip("ur", unloaded, (loop.vessel.m11, loop.vessel.m33), strict=True):
             f_hat, lump = log[f"f_hat_{axis}"], f + log[f"b_{axis}"] / m
             found = {

@@ -97,10 +97,9 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
 def _tell_marches(scenario: Scenario) -> None:
     """Which laws' runs march side by side, and why the others do not."""
     from podusv_cli.engine.running.lanes import why_alone
-    from podusv_cli.studies.study.plan import watching
 
     for law, single in scenario.singles().items():
-        why = why_alone(single.closed_loop(), watching(single))
+        why = why_alone(single.plan())
         echo(f"{law}: runs march {f'one by one: {why}' if why else 'side by side'}")
 
 

@@ -18,7 +18,8 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE, Signal
-from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop, entries
+from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.compile import Piece, adapter, routine
 from podusv_cli.engine.step import law_alone
@@ -92,7 +93,7 @@ class ExportedLaw:
         loop, grid = scenario.closed_loop(), scenario.time_grid()
         if not grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
-        law, whole = loop.controller, loop.layout(grid)
+        law, whole = loop.controller, Plan(loop, grid).layout
         memory, signals = whole.states - whole.memory, len(law.signals)
         first = len(TARGET) + 1
         layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
@@ -124,7 +125,7 @@ class ExportedLaw:
         return {**found, STEP: Piece(law_alone.demand, PROTOTYPE)}
 
     def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-        yield from (e for e in entries(self.loop, self.scenario.observer()) if e[0] != "path")
+        yield from (e for e in self.scenario.plan().functions if e.part != "path")
         yield "path", law_alone.target_is_there, ()
 
     @property

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from podusv_cli.components.controllers.policy import INPUTS, OUTPUTS, observed
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.abreast import Abreast
 from podusv_cli.engine.running.batch_threads import Common
 from podusv_cli.engine.running.lanes import Sorter, why_alone
@@ -251,16 +252,16 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self.single_observation_space = task.observation_space()
         self.action_space = batch_space(self.single_action_space, count)
         self.observation_space = batch_space(self.single_observation_space, count)
-        loop, observer = task.scenario.closed_loop(), task.scenario.observer()
-        if why := why_alone(loop, observer):
+        self._metrics, grid = task.scenario.observer(), task.scenario.time_grid()
+        grid = replace(grid, log_every=grid.steps + 1)
+        plan = Plan.watched(task.scenario.closed_loop(), grid, self._metrics)
+        if why := why_alone(plan):
             raise UsageError(
                 f"podusv.gym: these runs cannot march side by side ({why}); take Gymnasium's "
                 "SyncVectorEnv of podusv.gym.Env"
             )
-        self._metrics, grid = observer, task.scenario.time_grid()
-        self._common = Common(loop, replace(grid, log_every=grid.steps + 1), observer)
-        self._sorter = Sorter(observer, 0, True)
-        self._sorter.choose(loop)
+        self._common, self._sorter = Common(plan), Sorter(0, True)
+        self._sorter.choose(plan)
         self._marches: list[Abreast] = []
         self._views = np.zeros((INPUTS, count))
         self._times, self._gathered = np.zeros((2, count))
@@ -310,13 +311,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         assert advance is not None
         for place, seed in zip(places, seeds, strict=True):
             loop = self._task.drawn(seed, self.np_random).closed_loop()
-            self._common.check(loop)
-            run = self._common.run(place, loop)
+            run = self._common.run(place, self._common.planned(loop))
             groups.append(self._sorter.sorted(run.vectors, run))
         groups += self._sorter.rest()
         self._gathered[places] = 0.0
-        layout, grid = self._common.structure[0], self._common.grid
-        return [Abreast(g, advance, layout, grid, observed, INPUTS) for g in groups if g]
+        return [Abreast(self._common.plan, g, advance, observed, INPUTS) for g in groups if g]
 
     def _observed(self) -> tuple[Vector, Info]:
         """What all see, where a run is terminated what it saw last; the time of every run [s]."""

@@ -9,13 +9,14 @@ import numpy as np
 
 from podusv_cli.core.component import Component
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.interface.border import ParameterError
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import as_yaml, unknown
 from podusv_cli.scenario.yaml_tree import Route, bracketed, route
-from podusv_cli.studies.study.check import DRAWN, has, is_whole, no_entry, structure
+from podusv_cli.studies.study.check import DRAWN, has, is_whole, no_entry
 from podusv_cli.studies.study.draws import DrawError, Number, content, described, with_values
 
 Columns = dict[str, list[Any]]  # by key, with one value a run
@@ -90,7 +91,7 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
     first_rows = {combination: row for row, combination in reversed(rows)}
     for own, row in first_rows.items():
         check_law(loops[row])
-        alike = (structure(loops[at], scenario.time_grid()) for at in (row, 0))
+        alike = (Plan(loops[at], scenario.time_grid()).structure for at in (row, 0))
         if next(alike) != next(alike):
             raise ParameterError(
                 f"row {row}: {_told(words, own)} changes how the loop is put together, and row 0 "

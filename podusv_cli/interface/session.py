@@ -12,6 +12,7 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.pieces import Mark, Pieces
 from podusv_cli.engine.running.simulate import Marcher, marcher
 from podusv_cli.interface.border import explained
@@ -76,8 +77,7 @@ def open_session(
 
 def marcher_of(scenario: Scenario) -> Marcher:
     """What makes the march of a scenario, and of others that differ in numbers."""
-    compiled = scenario.simulation.compiled
-    return marcher(scenario.closed_loop(), scenario.observer(), compiled)
+    return marcher(scenario.plan(), scenario.simulation.compiled)
 
 
 def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
@@ -114,11 +114,9 @@ class Session:
                 f"than {MOST:,} demands of {period:g} s; ask for at most {longest:g} s, or for a "
                 "longer period"
             )
-        self._metrics = scenario.observer()
-        self._pieces = Pieces(
-            scenario.closed_loop(), grid, self._metrics, march,
-            compiled=scenario.simulation.compiled,
-        )  # fmt: skip
+        self._metrics = scenario.observer(grid)
+        plan = Plan.watched(scenario.closed_loop(), grid, self._metrics)
+        self._pieces = Pieces(plan, march, compiled=scenario.simulation.compiled)
         self._demand = self._pieces.vectors.law_table[DEMAND]
 
     @property

@@ -14,7 +14,7 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, kernel, specialise, tail, taking
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
-from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, close_integrals
 from podusv_cli.metrics.windows import NONE, Radii, Windows, named
 
@@ -151,7 +151,7 @@ class Metrics(Observer):
 
 
 def observer(
-    loop: ClosedLoop, grid: TimeGrid, *, steady_fraction: float, settling_radius: float,
+    plan: Plan, *, steady_fraction: float, settling_radius: float,
     known: Mapping[str, Metric] = METRICS,
 ) -> Metrics:  # fmt: skip
     """The observer of those of the known metrics that this loop has.
@@ -159,15 +159,16 @@ def observer(
     It serves all loops of the same structure: each has constants of its own. Raises LawError for a
     metric whose accumulator does not answer.
     """
-    layout = Measured(loop, loop.layout(grid), grid.last_part(steady_fraction), settling_radius)
+    since = plan.grid.last_part(steady_fraction)
+    layout = Measured(plan.loop, plan.layout, since, settling_radius)
     sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
     found = Metrics(
         _watch(parts), sum(size for _, size in parts), differing,
-        parts=parts, step=grid.step, known=known, layout=layout,
+        parts=parts, step=plan.grid.step, known=known, layout=layout,
     )  # fmt: skip
-    found.constants_for(loop)
+    found.constants_for(plan.loop)
     return found
 
 

@@ -8,7 +8,6 @@ from itertools import islice
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
-from podusv_cli.engine.loop.columns import names
 from podusv_cli.scenario.conflicts import Conflicts
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
@@ -73,9 +72,10 @@ class Size:
 def estimate(scenario: Scenario) -> Size:
     """The size of the run with `controller`, counted without allocating its arrays."""
     grid, law = scenario.time_grid(), scenario.controller
-    loop = scenario.closed_loop()
+    plan = scenario.plan(grid)
+    loop = plan.loop
     monitored = len(monitor.signals(loop, sampled=scenario.sampled)) if scenario.log.monitor else 0
-    columns = len(names(loop)) - len(TARGET[2:]) + monitored
+    columns = len(plan.names) - len(TARGET[2:]) + monitored
     content = grid.rows * columns * NUMBER
     cosines = sum(part.cosines() for part in scenario.disturbances().values())
     step = STEP + MEMORY * sum(size for _, size in law.slots()) + COSINE * cosines

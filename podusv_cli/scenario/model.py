@@ -27,6 +27,7 @@ from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
@@ -242,13 +243,20 @@ class Scenario(Component):
         held, first = whole_steps(self.control.period, step) or 0, self.control.update == "before"
         return TimeGrid(step, steps, every, held, first)
 
-    def observer(self, grid: TimeGrid | None = None) -> Metrics:
-        """What gathers the numbers of all metrics, over another grid than the run's where given."""
+    def plan(self, grid: TimeGrid | None = None) -> Plan:
+        """The loop on its grid, or another one, with the observer of all metrics."""
+        return Plan(self.closed_loop(), grid or self.time_grid(), self.metrics_of)
+
+    def metrics_of(self, plan: Plan) -> Metrics:
+        """What gathers the numbers of all metrics in such a run."""
         return observer(
-            self.closed_loop(), grid or self.time_grid(), known=self.known_metrics(),
-            steady_fraction=self.metrics.steady_fraction,
+            plan, known=self.known_metrics(), steady_fraction=self.metrics.steady_fraction,
             settling_radius=self.metrics.settling_radius,
         )  # fmt: skip
+
+    def observer(self, grid: TimeGrid | None = None) -> Metrics:
+        """What gathers the numbers of all metrics, over another grid than the run's where given."""
+        return self.metrics_of(Plan(self.closed_loop(), grid or self.time_grid()))
 
     def ready(self, compiling: Callable[[float], None] | None = None) -> None:
         """Make every check of a run before its first step, and have its march compiled and loaded.
@@ -260,8 +268,7 @@ class Scenario(Component):
             ready,  # who reads scenarios simulates nothing
         )
 
-        compiled = self.simulation.compiled
-        ready(self.closed_loop(), self.time_grid(), self.observer(), compiled, compiling)
+        ready(self.plan(), self.simulation.compiled, compiling)
 
     def known_metrics(self) -> dict[str, Metric]:
         """All metrics by name, with those of plug-ins, and of windows and radii named here."""

@@ -14,8 +14,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, blocks, largest
 from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import Replayed, rates_replay
-from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory import bounds, ideal_weights
 from podusv_cli.theory.lyapunov import TERMS, V_DOT, V, lyapunov, norms, remainders
 from podusv_cli.theory.rates import error_rates
@@ -100,14 +100,14 @@ def about(loop: ClosedLoop, *, sampled: bool) -> dict[str, Signal]:
     )
 
 
-def prepare(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> None:
+def prepare(plan: Plan, compiled: bool) -> None:
     """Compile and load the code that the monitor needs."""
-    if loop.lyapunov() is not None:
-        rates_replay(loop, grid, compiled=compiled)
+    if plan.loop.lyapunov() is not None:
+        rates_replay(plan, compiled=compiled)
 
 
 def monitored(
-    loop: ClosedLoop, grid: TimeGrid, recording: Recording,
+    plan: Plan, recording: Recording,
     *, steady_fraction: float = 0.2, compiled: bool = True, allocate: Allocate = np.empty,
 ) -> Monitored | None:  # fmt: skip
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
@@ -116,12 +116,13 @@ def monitored(
     sampled control, sensors or a delay there is no V' and no bound of V: old measurements act.
     `allocate` makes the arrays for the added signals.
     """
+    loop, grid = plan.loop, plan.grid
     law, count = loop.lyapunov(), len(recording["time"])
     if law is None or not count:
         return None
     sampled = grid.hold_every > 0 or not loop.at_once
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
-        replayed = rates_replay(loop, grid, compiled=compiled)
+        replayed = rates_replay(plan, compiled=compiled)
         chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))
         ideal = ideal_weights.fitted(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)

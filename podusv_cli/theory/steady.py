@@ -11,6 +11,7 @@ Everything is numerical and from the engine's own right-hand side, so any law wi
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -21,10 +22,11 @@ from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.errors import NotConvergedError
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import DEMAND, LOADS, ClosedLoop
-from podusv_cli.engine.loop.columns import names
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import rates_at
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import run
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory.course import Course
 
@@ -94,8 +96,8 @@ def linearised(loop: ClosedLoop, along: Course, step: float, *, compiled: bool =
     side has no derivative there.
     """
     loop = idealised(loop)
-    grid = TimeGrid(step, max(round(along.time / step), 1))
-    frame = _Frame(loop, grid, along, _arrived(loop, grid, compiled), compiled)
+    plan = Plan(loop, TimeGrid(step, max(round(along.time / step), 1)))
+    frame = _Frame(plan, along, _arrived(plan, compiled), compiled)
     try:
         with np.errstate(all="ignore"):
             return _about(loop, frame, frame.steady(frame.settled(frame.start)))
@@ -124,14 +126,14 @@ def _about(loop: ClosedLoop, frame: _Frame, q: Vector) -> Linear:
     )
 
 
-def _arrived(loop: ClosedLoop, grid: TimeGrid, compiled: bool) -> Vector:
+def _arrived(plan: Plan, compiled: bool) -> Vector:
     """The loop's state at the end of a run. Raises NotConvergedError where it diverges."""
-    log = simulate(loop, replace(grid, log_every=grid.steps), compiled=compiled)
+    log = run(replace(plan, grid=replace(plan.grid, log_every=plan.grid.steps)), compiled=compiled)
     if log.status == "interrupted":
         raise KeyboardInterrupt
     if log.status != "finished":
         raise NotConvergedError(f"there is no steady motion: the run {log.message}")
-    state = dict.fromkeys(names(loop)[1 : 1 + loop.layout(grid).states])
+    state = dict.fromkeys(plan.names[1 : 1 + plan.layout.states])
     return np.asarray(np.column_stack([log[name] for name in state])[-1])
 
 
@@ -160,26 +162,24 @@ class _Left(NamedTuple):
 class _Frame:
     """The loop as a target sees it that moves on a course, its load held."""
 
-    def __init__(
-        self, loop: ClosedLoop, grid: TimeGrid, along: Course, s: Vector, compiled: bool
-    ) -> None:
-        self.labels = names(loop)
+    def __init__(self, plan: Plan, along: Course, s: Vector, compiled: bool) -> None:
+        self.labels = plan.names
         self.course = along
         column = {name: i - 1 for i, name in enumerate(self.labels)}
         self.loads = [column[name] for name in LOADS[3:]]
         self._demands = [column[name] for name in DEMAND]
         self._seen = [*range(len(s)), column["tau_u"], column["tau_r"], *self._demands]
-        self._rates = rates_at(loop, grid, compiled=compiled)
+        self._rates = rates_at(plan, compiled=compiled)
         self._origin = np.zeros(len(s))
         self._origin[:2] = along.position
         self.start = s - self._origin
         self._drift = np.zeros(len(s))
         self._drift[:2] = along.velocity
-        self._turn_angles(loop)
+        self._turn_angles(plan.about)
 
-    def _turn_angles(self, loop: ClosedLoop) -> None:
+    def _turn_angles(self, about: Mapping[str, Signal]) -> None:
         """Let angles turn with the course: the heading, and those like it in the law's memory."""
-        about, turn, count = loop.about(), self.course.turn, len(self.start)
+        turn, count = self.course.turn, len(self.start)
         if turn:
             pace = self.row(self.start)[:count] / turn
             angles = [about[name].unit == "rad" for name in self.labels[1 : 1 + count]]

@@ -18,8 +18,9 @@ from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import ready, run
 from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
@@ -187,16 +188,18 @@ def unwritten(outcomes: Iterable[Outcome]) -> str:
     return next(iter(causes), "")
 
 
-def warm_up(scenario: Scenario, compiling: Progress | None = None) -> None:
+def warm_up(
+    scenario: Scenario, compiling: Progress | None = None, plan: Plan | None = None
+) -> None:
     """Make every check of a run before its first step, and have all its code compiled and loaded.
 
     `compiling` is called with the fraction that is compiled, if there is anything to compile.
     Raises LawError.
     """
-    scenario.ready(compiling)
+    plan = plan or scenario.plan()
+    ready(plan, scenario.simulation.compiled, compiling)
     if scenario.log.monitor:
-        loop, grid = scenario.closed_loop(), scenario.time_grid()
-        monitor.prepare(loop, grid, scenario.simulation.compiled)
+        monitor.prepare(plan, scenario.simulation.compiled)
 
 
 def examined(scenario: Scenario) -> list[Finding]:
@@ -215,14 +218,11 @@ def simulated(
     allocate: Allocate = np.empty, compiling: Progress | None = None,
 ) -> Recording:  # fmt: skip
     """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
-    loop, grid, seeing = scenario.closed_loop(), scenario.time_grid(), scenario.observer()
-    compiled = scenario.simulation.compiled
+    plan, compiled = scenario.plan(), scenario.simulation.compiled
     with watch.part("compile"), interrupts_enabled():
-        warm_up(scenario, compiling)
+        warm_up(scenario, compiling, plan)
     with watch.part("engine"):
-        return simulate(
-            loop, grid, observer=seeing, compiled=compiled, progress=progress, allocate=allocate
-        )
+        return run(plan, compiled=compiled, progress=progress, allocate=allocate)
 
 
 def check_figures(scenario: Scenario) -> None:
@@ -258,13 +258,15 @@ def monitored(
     scenario: Scenario, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
-    loop, grid = scenario.closed_loop(), scenario.time_grid()
+    plan = scenario.plan()
     found = scenario.log.monitor and monitor.monitored(
-        loop, grid, recording,
+        plan, recording,
         steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
         allocate=allocate,
     )  # fmt: skip
-    return (found.recording, theory_report(loop, grid, found)) if found else (recording, {})
+    if not found:
+        return recording, {}
+    return found.recording, theory_report(plan.loop, plan.grid, found)
 
 
 def _logged(

@@ -22,6 +22,7 @@ from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import observer
@@ -89,7 +90,7 @@ def repeatable(folder: Path) -> dict[str, Any]:
 def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
     """The loop's recording from machine code and from plain Python."""
     grid = TimeGrid(0.002, 150, hold_every=hold_every)
-    seeing = observer(loop, grid, steady_fraction=0.25, settling_radius=2.0)
+    seeing = observer(Plan(loop, grid), steady_fraction=0.25, settling_radius=2.0)
     one, other = (simulate(loop, grid, observer=seeing, compiled=c) for c in (True, False))
     return one, other
 

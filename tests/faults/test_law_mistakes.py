@@ -18,9 +18,11 @@ from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.registry import kinds
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import marcher
+from podusv_cli.engine.step.grid import TimeGrid
 
 
 def logged(name: str, *axes: str, fixed: bool = False) -> Signal:
@@ -134,7 +136,7 @@ DECLARED: dict[type[Controller], str] = {
 def begun(loop: ClosedLoop) -> None:
     """All that is done before a run."""
     check_law(loop)
-    marcher(loop, Observer(), compiled=True)
+    marcher(Plan(loop, TimeGrid(0.01, 1)), compiled=True)
 
 
 def refused(law: type[Controller]) -> str:

@@ -79,7 +79,7 @@ def verdict(text: str) -> str:
         loaded = load_text(text, "odd.yaml", (), checks)
         parse_claims(loaded)
         for one in loaded.scenario.singles().values():
-            ready(one.closed_loop(), one.time_grid(), one.observer(), compiled=False)
+            ready(one.plan(), compiled=False)
         preflight(loaded.scenario)
         if loaded.scenario.sweep:
             plan(loaded)

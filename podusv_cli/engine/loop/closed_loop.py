@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.controllers.base import Controller
-from podusv_cli.components.disturbances.base import FLOW, WAVE_MOTION, Disturbance
+from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.base import KNOWN, OWN, Measurement
@@ -23,14 +23,8 @@ from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.kernel import call as call_kernel
-from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import LOOP, Signal
-from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.recent import Recall, call
-from podusv_cli.engine.loop.rounded import law_of_rounded, sample_of_rounded
-from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
-from podusv_cli.engine.step.relay import relay
 
 STATE = tuple(state.name for state in signal.STATE)
 DEMAND = ("tau_u_cmd", "tau_r_cmd")
@@ -198,141 +192,3 @@ class ClosedLoop:
             (partial(describe, self.estimator), self.estimated()),
         )
         return signal.by_name((loop, path, (partial(describe, law), law.declared()), own, *others))
-
-    def layout(self, grid: TimeGrid) -> Layout:
-        """Sizes and offsets of the loop on this grid."""
-        law, actuator = self.controller, self.actuator
-        estimate = len(STATE) + len(actuator.states)
-        place = estimate + len(self.estimated())
-        memory, load = place + len(self.path.places), 3 + len(self.disturbance.signals)
-        sizes = [
-            len(TARGET) + 1, len(law.signals), len(DEMAND), 3, load, len(actuator.signals_with),
-            len(self.measurement.signals),
-        ]  # fmt: skip
-        signals, demand, tau, b, flags, sensed, columns = np.cumsum(sizes).tolist()
-        return Layout(
-            states=memory + sum(size for _, size in law.slots()),
-            estimate=estimate if self.measured else 0, place=place, memory=memory,
-            signals=signals, demand=demand, tau=tau, b=b,
-            flow=_flow(self.disturbance, b) if actuator.feels_motion else 0,
-            flags=flags, sensed=sensed, columns=columns,
-            steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
-            sample_every=_sample_steps(law, grid),
-            measured=int(self.measured), update_first=int(grid.update_first),
-            follows=int(self.path.follows),
-            load_of_time=int(self.disturbance.of_time), wants_loads=int(law.wants_loads()),
-            relayed=int(actuator.is_relayed),
-        )  # fmt: skip
-
-
-def _sample_steps(law: Controller, grid: TimeGrid) -> int:
-    period = law.sample_period()
-    if law.takes_samples() and not period:
-        return grid.hold_every or 1
-    count = whole_steps(period, grid.step)
-    if count is None or (period > 0 and count == 0):
-        raise ValueError(
-            f"the law samples every {period:g} s, no whole number of steps of {grid.step:g} s"
-        )
-    if grid.hold_every and count % grid.hold_every:
-        held = grid.hold_every * grid.step
-        raise ValueError(
-            f"the law samples every {period:g} s, no whole number of the {held:g} s for which "
-            "its measurement is held"
-        )
-    return count
-
-
-def entries(
-    loop: ClosedLoop, observer: Observer, recall: Recall = call
-) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-    """Name, kernel and constants' names of every part, in the order the loop takes them."""
-    law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-    constants = tuple(loop.law_constants(recall))
-    rounded = recall(path.fillet_for_law) is not None
-    steer = law_of_rounded(law.law) if rounded else law.law
-    take = sample_of_rounded(law.sample) if rounded and law.takes_samples() else law.sample
-    # What does nothing reads no constants: its machine code is the same for every law.
-    sample = (take, constants) if law.takes_samples() else (nothing, ())
-    told = law.wants_loads()
-    after_saturation = (law.after_saturation, constants) if told else (nothing, ())
-    yield "path", path.evaluate, tuple(loop.path_constants(recall))
-    locate = (path.locate, tuple(loop.path_constants(recall))) if path.follows else (nothing, ())
-    yield "locate", *locate
-    loads = tuple(recall(disturbance.constants_with, loop.vessel))
-    yield "disturbance", disturbance.kernel_with(loop.vessel), loads
-    yield "law", steer, constants
-    yield "sample", *sample
-    yield "actuator", actuator.drive_with(), tuple(recall(actuator.constants))
-    yield "after_saturation", *after_saturation
-    yield from _seeing(loop, recall)
-    yield "observer", observer.watch, tuple(recall(observer.constants_for, loop))
-
-
-def _seeing(loop: ClosedLoop, recall: Recall) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-    """What `entries` has of measurement and estimator."""
-    measurement, estimator = loop.measurement, loop.estimator
-    sense = measurement.sense if loop.measured else nothing
-    correct = estimator.correct if loop.measured else nothing
-    follow = estimator.follow if loop.measured else nothing
-    yield "measurement", sense, tuple(recall(measurement.constants_with, 1.0, 0))
-    constants = tuple(recall(estimator.constants_with, loop.nominal))
-    yield "correct", correct, constants
-    yield "follow", follow, constants
-
-
-@np.errstate(all="ignore")
-def vectors_of(
-    loop: ClosedLoop, layout: Layout, observer: Observer, grid: TimeGrid, rows: int = 1,
-    allocate: Allocate = np.empty, recall: Recall = call,
-) -> Vectors:  # fmt: skip
-    """The loop's vectors, ready for the march to begin, with room for this many logged rows.
-
-    Numbers beyond all limits are for the run to tell.
-    """
-
-    def numbers(constants: Callable[..., dict[str, float]], *given: Any) -> Vector:
-        return np.array(list(recall(constants, *given).values()) or [0.0])
-
-    law, path, disturbance, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-    measurement, estimator = loop.measurement, loop.estimator
-    start, estimate = np.array(loop.start), np.zeros(0)
-    if loop.measured:
-        estimate = estimator.start(start, loop.nominal)
-    duration, motion = grid.steps * grid.step, _wave_motion(disturbance)
-    return Vectors(
-        path=np.array(list(loop.path_constants(recall).values()) or [0.0]),
-        path_table=recall(path.table),
-        disturbance=numbers(disturbance.constants_with, loop.vessel),
-        disturbance_table=recall(disturbance.table_for, loop.vessel, duration),
-        law=np.array(list(loop.law_constants(recall).values()) or [0.0]),
-        law_table=loop.law_table(recall),
-        actuator=numbers(actuator.constants), actuator_table=recall(actuator.table),
-        measurement=numbers(measurement.constants_with, grid.step, motion),
-        measurement_table=recall(measurement.table_for, grid.step, grid.steps),
-        estimator=numbers(estimator.constants_with, loop.nominal),
-        estimator_table=recall(estimator.table),
-        vessel=numbers(loop.vessel.constants),
-        observer=numbers(observer.constants_for, loop),
-        s=np.concatenate(
-            [start, recall(actuator.rest), estimate, np.zeros(len(path.places)),
-             loop.first_memory(recall)]
-        ),
-        row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
-        sensed=measurement.first(start, grid.step),
-        relay=relay(actuator.delay(), grid), held=np.zeros(HELD_SIGNALS + len(law.signals)),
-        work=np.zeros(law.workspace()), seen=np.zeros(observer.size), under_way=np.zeros(2),
-        log=allocate(rows * layout.width),
-    )  # fmt: skip
-
-
-def _flow(disturbance: Disturbance, b: int) -> int:
-    """Where the row has the current, with the load at `b`; 0 where the water is at rest."""
-    signals = disturbance.signals
-    return b + 3 + signals.index(FLOW[0]) if FLOW[0] in signals else 0
-
-
-def _wave_motion(disturbance: Disturbance) -> int:
-    """Where a disturbance writes the motion in waves that sensors see; 0 where it has none."""
-    signals = disturbance.signals
-    return 3 + signals.index(WAVE_MOTION[0]) if WAVE_MOTION[0] in signals else 0

@@ -10,15 +10,14 @@ import numpy.typing as npt
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import LANES, Vector
-from podusv_cli.engine.loop.closed_loop import Observer, entries
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch_threads import BatchRun
 from podusv_cli.engine.running.lanes import MARCHING, Lanes, alike, room
 from podusv_cli.engine.running.pieces import CHANGING, Unchanged
 from podusv_cli.engine.running.simulate import March
-from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.lane_march import REACHED
-from podusv_cli.engine.step.layout import Layout, Vectors
+from podusv_cli.engine.step.layout import Vectors
 
 NOTHING: frozenset[str] = frozenset()
 
@@ -48,10 +47,11 @@ class Abreast:
     """
 
     def __init__(
-        self, runs: Sequence[BatchRun], advance: Callable[[Lanes, float], March], layout: Layout,
-        grid: TimeGrid, look: Any, size: int,
+        self, plan: Plan, runs: Sequence[BatchRun], advance: Callable[[Lanes, float], March],
+        look: Any, size: int,
     ) -> None:  # fmt: skip
-        """Nothing is marched yet."""
+        """Nothing is marched yet; the plan is that of runs like these."""
+        layout, grid = plan.layout, plan.grid
         self.places = [run.position for run in runs]
         self.grid, self.reached, self.alive = grid, 0, np.ones(len(runs), bool)
         self._lanes = Lanes.of([run.vectors for run in runs], layout)
@@ -59,8 +59,8 @@ class Abreast:
         c, target = Vectors(*self._lanes.vectors), room(len(TARGET) * LANES)
         view = room(size * LANES)
         given = c.s[layout.estimate * LANES :]
-        _, path, names = next(iter(entries(runs[0].loop, Observer())))
-        shared = alike(runs[0].loop, Observer())["path"]
+        _, path, names = plan.functions[0]
+        shared = alike(plan)["path"]
         vectors = {"x": given, "place": c.s[layout.place * LANES :], "k": c.path,
                    "table": c.path_table, "target": target}  # fmt: skip
         self._aim = in_lanes("path", path, names, shared, vectors)

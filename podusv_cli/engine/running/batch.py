@@ -19,6 +19,7 @@ from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.batch_threads import BatchRun, Common, Group
 from podusv_cli.engine.running.lanes import FEWEST, Sorter
 from podusv_cli.engine.running.simulate import why
@@ -78,13 +79,13 @@ class Batch:
     state: Vector  # (N, 6), the vessel's state where the march ended
     seen: Vector  # (N, observer.size)
 
-    def note(self, run: BatchRun, ending: Ending, grid: TimeGrid) -> None:
+    def note(self, run: BatchRun, ending: Ending) -> None:
         """Enter how a run ended."""
         i, vectors = run.position, run.vectors
         self.reached[i], self.status[i] = ending.reached, ending.status
         self.state[i], self.seen[i] = vectors.s[: len(STATE)], vectors.seen
         if ending.status not in ("finished", "interrupted"):
-            self.cause[i] = why(ending, run.loop, grid, vectors)
+            self.cause[i] = why(run.plan, vectors, ending)
 
     def refuse(self, position: int, status: str, cause: str) -> None:
         """Enter that a run cannot begin."""
@@ -115,7 +116,8 @@ def simulate_many(
     grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
     batch = _blank(len(loops), observer)
     with interrupts_deferred():
-        runs = _Runs(loops, grid, batch, observer, like, progress, side_by_side)
+        plan = Plan.watched(like, grid, observer) if like else None
+        runs = _Runs(loops, grid, batch, observer, plan, progress, side_by_side)
         runs.march(workers or available_workers())
     return batch
 
@@ -129,12 +131,12 @@ class _Runs:
 
     def __init__(
         self, loops: Loops, grid: TimeGrid, batch: Batch, observer: Observer,
-        like: ClosedLoop | None, progress: Callable[[float], None] | None, lanes: bool | None,
+        like: Plan | None, progress: Callable[[float], None] | None, lanes: bool | None,
     ) -> None:  # fmt: skip
         self._loops, self._grid, self._batch, self._observer = loops, grid, batch, observer
-        self._common = Common(like, grid, observer) if like else None
+        self._common = Common(like) if like else None
         self._progress = progress or (lambda fraction: None)
-        self._lanes = Sorter(observer, len(loops) * (grid.steps + 1), lanes)
+        self._lanes = Sorter(len(loops) * (grid.steps + 1), lanes)
         self._ready: list[Group] = []
         self._busy: list[Group] = []
         self._over, self._settled = 0, False
@@ -185,32 +187,32 @@ class _Runs:
         """The run, or None and an entry of why there is none."""
         if self._settled:
             return self._contained(position, partial(self._run, position))
-        loop = self._contained(position, partial(self._checked, position))
-        if loop is None:
+        plan = self._contained(position, partial(self._checked, position))
+        if plan is None:
             return None
-        self._settle(loop)
-        return self._contained(position, partial(self._run, position, loop))
+        self._settle(plan)
+        return self._contained(position, partial(self._run, position, plan))
 
-    def _settle(self, loop: ClosedLoop) -> None:
-        """Have the march compiled, by the first loop."""
-        common = self._common = self._common or Common(loop, self._grid, self._observer)
-        self._lanes.choose(loop)
+    def _settle(self, plan: Plan) -> None:
+        """Have the march compiled, by the first plan."""
+        common = self._common = self._common or Common(plan)
+        self._lanes.choose(plan)
         if not self._lanes.advance:
             common.advance  # noqa: B018  a kernel that cannot be compiled ends the batch
         self._settled = True
 
-    def _run(self, position: int, loop: ClosedLoop | None = None) -> BatchRun:
+    def _run(self, position: int, plan: Plan | None = None) -> BatchRun:
         assert self._common is not None
-        return self._common.run(position, loop or self._checked(position))
+        return self._common.run(position, plan or self._checked(position))
 
-    def _checked(self, position: int) -> ClosedLoop:
-        """The loop of a run."""
+    def _checked(self, position: int) -> Plan:
+        """The plan of a run."""
         try:
             loop = self._loops[position]
-            (self._common or Common(loop, self._grid, self._observer)).check(loop)
+            own = Common(Plan.watched(loop, self._grid, self._observer))
+            return (self._common or own).planned(loop)
         except (PodusvError, ValueError) as error:
             raise InvalidLoop(str(error)) from error
-        return loop
 
     def _contained(self, position: int, make: Callable[[], T]) -> T | None:
         """What is made for a run; an exception is that run's and no other's."""
@@ -238,11 +240,11 @@ class _Runs:
         if thread.work.result is None and len(thread.runs) > 1:
             thread.work.stop()
             assert self._common is not None
-            again = [self._common.run(run.position, run.loop) for run in thread.runs]
+            again = [self._common.run(run.position, run.plan) for run in thread.runs]
             self._ready += map(self._common.alone, again)
             return
         for run, ending in zip(thread.runs, thread.endings(False), strict=True):
-            self._batch.note(run, ending, self._grid)
+            self._batch.note(run, ending)
         for _ in thread.runs:
             self._count()
 
@@ -258,7 +260,7 @@ class _Runs:
             if thread in stopped:
                 thread.work.stopped()
             for run, ending in zip(thread.runs, thread.endings(thread in stopped), strict=True):
-                self._batch.note(run, ending, self._grid)
+                self._batch.note(run, ending)
 
 
 def _blank(count: int, observer: Observer) -> Batch:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
 from podusv_cli.core.kernel import LANES, whole_lanes
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries, vectors_of
+from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.running.lanes import Lanes
 from podusv_cli.engine.running.simulate import March, marcher
 from podusv_cli.engine.running.watch import Bell, Ending, Work
-from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import Layout, Vectors
+from podusv_cli.engine.step.layout import Vectors
 
 NUMBER = 8  # bytes; LANES numbers are a cache line
 
@@ -26,7 +25,7 @@ class BatchRun:
     """One run of a batch, ready to start."""
 
     position: int
-    loop: ClosedLoop
+    plan: Plan
     vectors: Vectors
 
 
@@ -44,47 +43,42 @@ class Group:
 
 @dataclass(frozen=True)
 class Common:
-    """What the runs of a batch share: the structure of one of their loops, and its march."""
+    """What the runs of a batch share: the plan of one of them, and its march."""
 
-    like: ClosedLoop
-    grid: TimeGrid
-    observer: Observer
+    plan: Plan
     bell: Bell = field(default_factory=Bell)
     recall: Recent = field(default_factory=Recent)
 
     @cached_property
-    def structure(self) -> tuple[Layout, list[Any]]:
-        """The layout, and the kernels with the names of their constants."""
-        return self._structure_of(self.like)
-
-    def _structure_of(self, loop: ClosedLoop) -> tuple[Layout, list[Any]]:
-        return loop.layout(self.grid), list(entries(loop, self.observer, self.recall))
-
-    @cached_property
     def advance(self) -> Callable[..., March]:
         """What makes the compiled march of a run."""
-        return marcher(self.like, self.observer, True)
+        return marcher(self.plan, True)
 
-    def check(self, loop: ClosedLoop) -> None:
-        """Raise ValueError for a loop of another structure, LawError for parts that do not fit."""
-        loop.check_fit(self.grid.step)
-        found, wanted = self._structure_of(loop), self.structure
-        if found != wanted:
+    def planned(self, loop: ClosedLoop) -> Plan:
+        """The plan of a run.
+
+        Raises ValueError for a loop of another structure, LawError for parts that do not fit.
+        """
+        wanted = self.plan
+        loop.check_fit(wanted.grid.step)
+        found = replace(wanted, loop=loop, probe=lambda plan: wanted.observer, recall=self.recall)
+        if found.structure != wanted.structure:
             raise ValueError(
-                f"it has another structure than the batch: {_kinds(loop)} with {found[0]}, not "
-                f"{_kinds(self.like)} with {wanted[0]}; runs of one batch differ in numbers only"
+                f"it has another structure than the batch: {_kinds(loop)} with {found.layout}, "
+                f"not {_kinds(wanted.loop)} with {wanted.layout}; runs of one batch differ in "
+                "numbers only"
             )
+        return found
 
-    def run(self, position: int, loop: ClosedLoop) -> BatchRun:
+    def run(self, position: int, plan: Plan) -> BatchRun:
         """A run that is ready to start."""
-        layout = self.structure[0]
-        vectors = vectors_of(loop, layout, self.observer, self.grid, recall=self.recall)
-        return BatchRun(position, loop, _apart(vectors))
+        return BatchRun(position, plan, _apart(plan.vectors()))
 
     def alone(self, run: BatchRun) -> Group:
         """The thread of one run."""
-        layout, last = self.structure[0], self.grid.steps + 1
-        function = partial(self.advance(run.vectors, layout, self.grid.step), 0, last)
+        grid, layout = self.plan.grid, self.plan.layout
+        last = grid.steps + 1
+        function = partial(self.advance(run.vectors, layout, grid.step), 0, last)
         work = Work(function, run.vectors.under_way, self.bell)
 
         def endings(stopped: bool) -> list[Ending]:
@@ -96,9 +90,9 @@ class Common:
 
     def together(self, runs: list[BatchRun], advance: Callable[[Lanes, float], March]) -> Group:
         """The thread of runs side by side."""
-        last = self.grid.steps + 1
-        lanes = Lanes.of([run.vectors for run in runs], self.structure[0])
-        march = partial(advance(lanes, self.grid.step), 0, last)
+        last = self.plan.grid.steps + 1
+        lanes = Lanes.of([run.vectors for run in runs], self.plan.layout)
+        march = partial(advance(lanes, self.plan.grid.step), 0, last)
         work = Work(march, lanes.under_way, self.bell)
         return Group(runs, work, lambda stopped: lanes.endings(work.reached, last))
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from podusv_cli.components.measurements.base import KNOWN, OWN
 from podusv_cli.core.kernel import LANES, Vector, whole_numbers
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.running.watch import Ending
@@ -29,9 +29,10 @@ WORTH = 20_000_000  # instants of a batch, from which on compiling takes less th
 MARCHING = -1.0  # stands for the instants that a lane has reached
 
 
-def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
+def alike(plan: Plan) -> dict[str, frozenset[str]]:
     """By part the constants that all lanes have to share: choices, sizes and positions."""
-    law, names = loop.controller, {part: names for part, _, names in entries(loop, observer)}
+    loop, observer, law = plan.loop, plan.observer, plan.loop.controller
+    names = {part: names for part, _, names in plan.functions}
     chosen = {
         "path": loop.path.choices(), "locate": loop.path.choices(),
         "disturbance": loop.disturbance.choices(), "actuator": loop.actuator.choices(),
@@ -41,7 +42,7 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
         "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
         "follow": loop.estimator.choices(),
     }  # fmt: skip
-    whole = {part: whole_numbers(inner) for part, inner, _ in entries(loop, observer)}
+    whole = {part: whole_numbers(inner) for part, inner, _ in plan.functions}
     whole["disturbance"] = frozenset(
         loop.disturbance.constant_of(i, name)
         for i, part in enumerate(loop.disturbance.each())
@@ -57,7 +58,7 @@ def alike(loop: ClosedLoop, observer: Observer) -> dict[str, frozenset[str]]:
 
 
 def marcher(
-    loop: ClosedLoop, observer: Observer, compiling: Callable[[float], None] | None = None
+    plan: Plan, compiling: Callable[[float], None] | None = None
 ) -> Callable[[Lanes, float], March]:
     """What makes the compiled march of runs like this loop, side by side, with a step [s].
 
@@ -66,7 +67,7 @@ def marcher(
     """
     from podusv_cli.engine.machine import compile  # only what marches side by side needs it
 
-    pieces = _pieces(loop, observer)
+    pieces = _pieces(plan)
     compile.prepare(pieces, compiling)
     *adapters, march = map(compile.routine, pieces)
 
@@ -90,27 +91,27 @@ def marcher(
     return ready
 
 
-def is_compiled(loop: ClosedLoop, observer: Observer) -> bool:
+def is_compiled(plan: Plan) -> bool:
     """Whether the march of runs like this loop is on the disk, or in memory."""
     from podusv_cli.engine.machine import object_cache
 
-    return all(object_cache.is_kept(piece.name) for piece in _pieces(loop, observer))
+    return all(object_cache.is_kept(piece.name) for piece in _pieces(plan))
 
 
-def _pieces(loop: ClosedLoop, observer: Observer) -> list[Any]:
+def _pieces(plan: Plan) -> list[Any]:
     """What is compiled for lanes: the parts, with what is alike in them, and the march."""
     from podusv_cli.engine.machine import compile
 
-    shared = alike(loop, observer)
-    parts = [compile.lane_adapter(*part, shared[part[0]]) for part in entries(loop, observer)]
+    shared = alike(plan)
+    parts = [compile.lane_adapter(*part, shared[part.part]) for part in plan.functions]
     march = compile.Piece(advance_lanes, signatures.ADVANCE_LANES, compiler=compile.LANES_BY)
     return [*parts, march]
 
 
-def places(loop: ClosedLoop, observer: Observer) -> list[tuple[int, list[int]]]:
+def places(plan: Plan) -> list[tuple[int, list[int]]]:
     """Where the numbers that are alike lie: positions of vectors in `Vectors`, and in these."""
-    shared = alike(loop, observer)
-    names = {part: names for part, _, names in entries(loop, observer)}
+    loop, shared = plan.loop, alike(plan)
+    names = {part: names for part, _, names in plan.functions}
     names["estimator"], shared["estimator"] = names["correct"], shared["correct"]
     found = {
         part: [i for i, n in enumerate(names[part]) if n in shared[part]]
@@ -191,25 +192,25 @@ class Lanes:
 class Sorter:
     """Sorts the runs of a batch by what they have to have in common to march side by side."""
 
-    def __init__(self, observer: Observer, instants: int, wanted: bool | None) -> None:
+    def __init__(self, instants: int, wanted: bool | None) -> None:
         """`instants` are those of all runs; `wanted` says whether to march side by side at all."""
         self.advance: Callable[[Lanes, float], March] | None = None
-        self._observer, self._instants, self._wanted = observer, instants, wanted
+        self._instants, self._wanted = instants, wanted
         self._places: list[tuple[int, list[int]]] = []
         self._waiting: dict[tuple[float, ...], list[Any]] = {}
         self._chosen = False
 
-    def choose(self, loop: ClosedLoop) -> None:
-        """Decide, by the first loop, whether runs march side by side."""
+    def choose(self, plan: Plan) -> None:
+        """Decide, by the first plan, whether runs march side by side."""
         if not self._chosen:
             self._chosen = True
             with suppress(TypeError):  # `why_alone` tells why
-                if self._wanted or (self._wanted is None and self._is_worth(loop)):
-                    self._places = places(loop, self._observer)
-                    self.advance = marcher(loop, self._observer)
+                if self._wanted or (self._wanted is None and self._is_worth(plan)):
+                    self._places = places(plan)
+                    self.advance = marcher(plan)
 
-    def _is_worth(self, loop: ClosedLoop) -> bool:
-        return self._instants >= WORTH or is_compiled(loop, self._observer)
+    def _is_worth(self, plan: Plan) -> bool:
+        return self._instants >= WORTH or is_compiled(plan)
 
     def sorted(self, vectors: Vectors, run: Any) -> list[Any]:
         """The runs to start now that this one is ready."""
@@ -231,24 +232,19 @@ class Sorter:
         return ready
 
 
-def prepare(
-    loop: ClosedLoop, observer: Observer, instants: int,
-    compiling: Callable[[float], None] | None = None,
-) -> str:  # fmt: skip
+def prepare(plan: Plan, instants: int, compiling: Callable[[float], None] | None = None) -> str:
     """Compile the march of runs like this loop, if so many instants in all are worth it.
 
     Why these runs cannot march side by side; empty where they can, or where it is not worth it.
     """
-    return why_alone(loop, observer, compiling) if instants >= WORTH else ""
+    return why_alone(plan, compiling) if instants >= WORTH else ""
 
 
-def why_alone(
-    loop: ClosedLoop, observer: Observer, compiling: Callable[[float], None] | None = None
-) -> str:
+def why_alone(plan: Plan, compiling: Callable[[float], None] | None = None) -> str:
     """Why runs like this loop cannot march side by side; empty where they can."""
     try:
-        places(loop, observer)
-        marcher(loop, observer, compiling)
+        places(plan)
+        marcher(plan, compiling)
     except TypeError as error:
         return str(error)
     return ""

@@ -10,11 +10,11 @@ import numpy as np
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, vectors_of
+from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.simulate import Marcher, recorded
 from podusv_cli.engine.running.watch import Ending
-from podusv_cli.engine.step.grid import TimeGrid
 
 # The vectors that a march writes to, beside the log.
 CHANGING = ("s", "row", "stages", "sensed", "relay", "held", "work", "seen", "under_way")
@@ -47,22 +47,19 @@ class Unchanged:
 
 
 class Pieces:
-    """The march of a loop over a grid, some instants at a time."""
+    """The march of a plan, some instants at a time."""
 
-    def __init__(
-        self, loop: ClosedLoop, grid: TimeGrid, observer: Observer, march: Marcher, *,
-        compiled: bool = True,
-    ) -> None:  # fmt: skip
+    def __init__(self, plan: Plan, march: Marcher, *, compiled: bool = True) -> None:
         """Nothing is marched yet; `march` is that of a loop like this. Raises as `simulate`."""
-        loop.check_fit(grid.step)
-        self.loop, self.grid, self.reached = loop, grid, 0
-        self._layout = loop.layout(grid)
-        self.vectors = vectors_of(loop, self._layout, observer, grid, grid.rows)
+        plan.loop.check_fit(plan.grid.step)
+        self.plan, self.grid, self.reached = plan, plan.grid, 0
+        self._layout = plan.layout
+        self.vectors = plan.vectors(self.grid.rows)
         self._given = self.vectors.s[self._layout.estimate :]
         self._target = np.zeros(len(TARGET))
         self._unchanged = Unchanged([getattr(self.vectors, name) for name in CHANGING])
-        self._advance = march(self.vectors, self._layout, grid.step)
-        self._aim = self._path(next(iter(entries(loop, observer))), compiled)
+        self._advance = march(self.vectors, self._layout, self.grid.step)
+        self._aim = self._path(plan.functions[0], compiled)
 
     def to(self, instant: int) -> bool:
         """March over the instants before this one; whether all their numbers are finite."""
@@ -124,4 +121,4 @@ class Pieces:
         """What is logged so far, as of a run that was stopped here."""
         whole = self.reached > self.grid.steps
         ending = Ending(self.reached, "finished" if whole else "interrupted")
-        return recorded(self.loop, self.grid, self.vectors, self._layout, ending)
+        return recorded(self.plan, self.vectors, ending)

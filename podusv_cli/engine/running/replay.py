@@ -10,11 +10,11 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer, entries, vectors_of
-from podusv_cli.engine.loop.columns import by_name, names
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.columns import by_name
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.step import rk4
-from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT, DEMANDS
 
@@ -70,41 +70,38 @@ class Replayed:
     signals: dict[str, Vector]
 
 
-def rates_at(loop: ClosedLoop, grid: TimeGrid, *, compiled: bool = True) -> Callable[..., Vector]:
+def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     """A function from rows of (t, s) to rows of the rates of s there, then the loop's row.
 
-    The columns are those of `columns.names`. Control is taken as continuous, also where the run's
+    The columns are `plan.names` but the time. Control is taken as continuous, also where the run's
     was sampled, and as without delay. The rates of an estimator are left out: they depend on
     measurements, which the loop's state does not hold. As second argument the function takes rows
     of (tau_u [N], tau_r [N m]) that reach the actuator in place of the law's demands.
     """
-    layout = loop.layout(grid)._replace(hold_every=0, measured=0)
-    vectors = vectors_of(loop, layout, Observer(), grid)
+    layout, vectors = plan.layout._replace(hold_every=0, measured=0), plan.vectors()
     vectors.relay[COUNT] = 0.0
-    run = _rates_runner(loop, compiled)
+    run = _rates_runner(plan, compiled)
 
     def at(rows: Vector, given: Vector | None = None) -> Vector:
-        out, there, plan = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
+        out, there, sizes = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
         if given is not None:  # as if they had been on their way to the actuator
             relay = np.concatenate([np.zeros(DEMANDS), given.ravel()])
             relay[COUNT] = len(rows)
-            there, plan = vectors._replace(relay=relay), layout._replace(relayed=1)
-        run(len(rows), rows.ravel(), out.reshape(-1), there, plan)
+            there, sizes = vectors._replace(relay=relay), layout._replace(relayed=1)
+        run(len(rows), rows.ravel(), out.reshape(-1), there, sizes)
         return out
 
     return at
 
 
-def rates_replay(
-    loop: ClosedLoop, grid: TimeGrid, *, compiled: bool = True
-) -> Callable[[Recording], Replayed]:
+def rates_replay(plan: Plan, *, compiled: bool = True) -> Callable[[Recording], Replayed]:
     """A function that gives the loop's right-hand side at every row of a recording of it.
 
     As `rates_at` has it.
     """
-    labels, split, about = names(loop), 1 + loop.layout(grid).states, loop.about()
+    labels, split, about = plan.names, 1 + plan.layout.states, plan.about
     state = list(dict.fromkeys(labels[:split]))
-    rates = rates_at(loop, grid, compiled=compiled)
+    rates = rates_at(plan, compiled=compiled)
 
     def replayed(recording: Recording) -> Replayed:
         out = rates(np.column_stack([recording[name] for name in state]))
@@ -116,15 +113,14 @@ def rates_replay(
     return replayed
 
 
-def _rates_runner(loop: ClosedLoop, compiled: bool) -> Callable[..., None]:
+def _rates_runner(plan: Plan, compiled: bool) -> Callable[..., None]:
     """`rk4.rates_along` of this loop less its functions."""
-    parts = list(entries(loop, Observer()))
     if not compiled:
-        adapters = [signatures.bind(*part) for part in parts]
-        return lambda *rest: rk4.rates_along(*adapters, *rest)
+        bound = [signatures.bind(*part) for part in plan.functions]
+        return lambda *rest: rk4.rates_along(*bound, *rest)
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    adapters = [compile.entry(*part) for part in parts]
+    adapters = [compile.entry(*part) for part in plan.functions]
     run = compile.routine(compile.Piece(rk4.rates_along, signatures.RATES_ALONG))
 
     def compiled_run(

@@ -10,15 +10,9 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.loop.closed_loop import (
-    DEMAND,
-    STATE,
-    ClosedLoop,
-    Observer,
-    entries,
-    vectors_of,
-)
-from podusv_cli.engine.loop.columns import by_name, names
+from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Observer
+from podusv_cli.engine.loop.columns import by_name
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import asked, check_law
 from podusv_cli.engine.running.watch import Ending, Word, watch
@@ -46,50 +40,54 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     allocate: Allocate = np.empty,
 ) -> Recording:
-    """Integrate the closed loop over the grid.
+    """Plan the closed loop and integrate it over the grid; see `run`."""
+    plan = Plan.watched(loop, grid, observer or Observer())
+    return run(plan, compiled=compiled, progress=progress, allocate=allocate)
+
+
+def run(
+    plan: Plan, *, compiled: bool = True, progress: Callable[[float], None] | None = None,
+    allocate: Allocate = np.empty,
+) -> Recording:  # fmt: skip
+    """Integrate a loop over its grid.
 
     `progress` is called with the fraction done, about 20 times a second. An interrupt ends the
     march and keeps what was logged. `compiled=False` runs the same kernels as plain Python.
     `allocate` gives the room for the logged rows; the recording's signals are views of it.
     """
-    observer, about = observer or Observer(), loop.about()
-    loop.check_fit(grid.step)
-    layout = loop.layout(grid)
-    vectors, last = vectors_of(loop, layout, observer, grid, grid.rows, allocate), layout.steps + 1
-    advance = partial(marcher(loop, observer, compiled)(vectors, layout, grid.step), 0, last)
+    about, grid, layout = plan.about, plan.grid, plan.layout
+    plan.loop.check_fit(grid.step)
+    vectors, last = plan.vectors(grid.rows, allocate), layout.steps + 1
+    advance = partial(marcher(plan, compiled)(vectors, layout, grid.step), 0, last)
     with np.errstate(all="ignore"), interrupts_deferred():
         ending = watch(
             advance, last, vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
-        return replace(recorded(loop, grid, vectors, layout, ending), about=about)
+        return replace(recorded(plan, vectors, ending), about=about)
 
 
-def ready(
-    loop: ClosedLoop, grid: TimeGrid, observer: Observer, compiled: bool,
-    compiling: Callable[[float], None] | None = None,
-) -> None:  # fmt: skip
+def ready(plan: Plan, compiled: bool, compiling: Callable[[float], None] | None = None) -> None:
     """Make every check of a run before its first step, and have its march compiled and loaded.
 
     `compiling` is called with the fraction that is compiled, if there is anything to compile.
     Raises LawError.
     """
-    check_law(loop)
-    loop.check_fit(grid.step)
-    asked(lambda: "the closed loop", partial(vectors_of, loop, loop.layout(grid), observer, grid))
-    marcher(loop, observer, compiled, compiling)
+    check_law(plan.loop)
+    plan.loop.check_fit(plan.grid.step)
+    asked(lambda: "the closed loop", plan.vectors)
+    marcher(plan, compiled, compiling)
 
 
 def marcher(
-    loop: ClosedLoop, observer: Observer, compiled: bool,
-    compiling: Callable[[float], None] | None = None,
-) -> Marcher:  # fmt: skip
-    """What makes the march of loops like this one over such vectors, with a step [s].
+    plan: Plan, compiled: bool, compiling: Callable[[float], None] | None = None
+) -> Marcher:
+    """What makes the march of loops like the plan's over such vectors, with a step [s].
 
     It is compiled if need be. The vectors have to outlive the march.
     """
     if not compiled:
-        p = Parts(*(signatures.bind(*part) for part in entries(loop, observer)))
+        p = Parts(*(signatures.bind(*part) for part in plan.functions))
         return lambda c, n, h: (
             lambda first, last, steps=None: rk4.advance_plainly(
                 p, first, last, h, c, n if steps is None else n._replace(steps=steps)
@@ -97,9 +95,9 @@ def marcher(
         )
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    parts, march = [*entries(loop, observer)], compile.Piece(rk4.advance, signatures.ADVANCE)
-    compile.prepare([*(compile.adapter(*part) for part in parts), march], compiling)
-    adapters, watch = [compile.entry(*part) for part in parts], compile.routine(march)
+    march = compile.Piece(rk4.advance, signatures.ADVANCE)
+    compile.prepare([*(compile.adapter(*part) for part in plan.functions), march], compiling)
+    adapters, watch = [compile.entry(*part) for part in plan.functions], compile.routine(march)
 
     def over(vectors: Vectors, layout: Layout, h: float) -> March:
         pointers, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
@@ -113,32 +111,26 @@ def marcher(
     return over
 
 
-def _logged(loop: ClosedLoop, table: Vector) -> dict[str, Vector]:
-    """The signals of a recording in a table of logged rows."""
-    about = loop.about()
-    named = by_name(names(loop), table, about)
-    return {name: column for name, column in named.items() if name in about}
-
-
-def recorded(
-    loop: ClosedLoop, grid: TimeGrid, vectors: Vectors, layout: Layout, ending: Ending
-) -> Recording:
+def recorded(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
     """The recording of a march that ended so, its signals views of the log."""
+    layout, law = plan.layout, plan.loop.controller
     rows = -(-ending.reached // layout.log_every)
-    signals = _logged(loop, vectors.log.reshape(-1, layout.width)[:rows])
+    table = vectors.log.reshape(-1, layout.width)[:rows]
+    named = by_name(plan.names, table, plan.about)
+    signals = {name: column for name, column in named.items() if name in plan.about}
     status, message = RECORDED[ending.status], ""
     if status == "interrupted":
-        message = f"interrupted after t = {max(ending.reached - 1, 0) * grid.step:.6g} s"
+        message = f"interrupted after t = {max(ending.reached - 1, 0) * plan.grid.step:.6g} s"
     if status == "diverged":
-        message = f"diverged {why(ending, loop, grid, vectors)}; {_last_words(signals)}"
-    fixed = {part.name: array for part, array in loop.controller.fixed_signals().items()}
-    return Recording(status, loop.controller.label, signals, fixed, vectors.seen.copy(), message)
+        message = f"diverged {why(plan, vectors, ending)}; {_last_words(signals)}"
+    fixed = {part.name: array for part, array in law.fixed_signals().items()}
+    return Recording(status, law.label, signals, fixed, vectors.seen.copy(), message)
 
 
-def why(ending: Ending, loop: ClosedLoop, grid: TimeGrid, vectors: Vectors) -> str:
+def why(plan: Plan, vectors: Vectors, ending: Ending) -> str:
     """When and why a march that nobody interrupted did not reach its last instant."""
-    at = ending.reached * grid.step
-    return f"at t = {at:.6g} s: {ending.cause or _culprit(vectors, names(loop), at)}"
+    at = ending.reached * plan.grid.step
+    return f"at t = {at:.6g} s: {ending.cause or _culprit(vectors, plan.names, at)}"
 
 
 def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:

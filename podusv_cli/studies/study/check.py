@@ -11,8 +11,7 @@ import numpy as np
 from podusv_cli.core.component import Component
 from podusv_cli.core.plugins import ABSENT
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer, entries
-from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.keys import Key
@@ -223,19 +222,8 @@ def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> s
 
 def _rebuilt(one: Scenario, other: Scenario) -> bool:
     """Whether two runs differ in more than numbers."""
-    return structure(*_looped(one)) != structure(*_looped(other))
-
-
-def _looped(scenario: Scenario) -> tuple[ClosedLoop, TimeGrid]:
-    return scenario.closed_loop(), scenario.time_grid()
-
-
-def structure(loop: ClosedLoop, grid: TimeGrid) -> tuple[Any, ...]:
-    """What runs of one batch have to have in common: places in vectors, kernels, their constants.
-
-    Raises ValueError where there is no whole number of steps between samples.
-    """
-    return loop.layout(grid), list(entries(loop, Observer()))
+    first, second = (Plan(s.closed_loop(), s.time_grid()).structure for s in (one, other))
+    return first != second
 
 
 def _twice(sweep: Sweep) -> Faults:

@@ -13,7 +13,6 @@ import numpy as np
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.errors import UsageError
-from podusv_cli.engine.loop.closed_loop import entries
 from podusv_cli.engine.machine.object_cache import ingredients
 from podusv_cli.engine.step import rk4 as closed_loop
 from podusv_cli.metrics.table import Metrics
@@ -136,7 +135,7 @@ def plan(loaded: Loaded) -> Plan:
 
 def kernels(scenario: Scenario) -> str:
     """A digest of the source of all kernels of a law's loop, the same on every processor."""
-    parts = [kernel for _, kernel, _ in entries(scenario.closed_loop(), watching(scenario))]
+    parts = [kernel for _, kernel, _ in scenario.plan().functions]
     found = hashlib.sha256()
     for kernel in (closed_loop.advance, *parts):
         for text in ingredients(kernel, {}):

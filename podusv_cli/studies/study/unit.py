@@ -74,10 +74,10 @@ def prepare(
     with the fraction that is compiled, if there is anything to compile.
     """
     scenario = plan.single(law, cell)
-    loop, seeing = scenario.closed_loop(), watching(scenario)
-    ready(loop, scenario.time_grid(), seeing, compiled=True, compiling=compiling)
+    planned = scenario.plan()
+    ready(planned, compiled=True, compiling=compiling)
     runs = runs or plan.sweep.draws * len(plan.cells)
-    return lanes.prepare(loop, seeing, runs * scenario.time_grid().steps, compiling)
+    return lanes.prepare(planned, runs * planned.grid.steps, compiling)
 
 
 def make(

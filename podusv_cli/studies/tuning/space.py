@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import unit_of
-from podusv_cli.engine.loop.closed_loop import Observer, entries
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
@@ -122,12 +122,8 @@ def _is_gain(law: Controller, key: str, scenario: Scenario) -> bool:
     if changed is None:
         return False
     other = scenario.model_copy(update={"controller": changed})
-    return not any(of_numbers(other)) and _structure(other) == _structure(scenario)
-
-
-def _structure(scenario: Scenario) -> tuple[Any, ...]:
-    loop = scenario.closed_loop()
-    return loop.layout(scenario.time_grid()), list(entries(loop, Observer()))
+    first, second = (Plan(s.closed_loop(), s.time_grid()).structure for s in (scenario, other))
+    return not any(of_numbers(other)) and first == second
 
 
 def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
