@@ -23,6 +23,7 @@ import pytest
 from command_samples import ROOT, one_line
 from conftest import REQUIRED, example, kinds
 from exported_laws import Unit
+from fmpy.validation import validate_fmu
 
 import podusv
 from podusv_cli.components.actuators.command import Command, Failure
@@ -577,13 +578,13 @@ def test_code_that_a_folder_brings_along_is_run_with_trust_alone(
     assert (said.code, "exported with --no-c" in said.err) == (2, True)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", LAWS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(law, marks=() if law == "alos" else pytest.mark.slow) for law in LAWS]
+)
 def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
-    validation = pytest.importorskip("fmpy.validation")
     request = workflow.Request(tmp_path / "law", task(kind), platforms=[link.this_machine()])
     folder = workflow.export(Path(SOURCE), request)
-    assert validation.validate_fmu(str(folder / "law.fmu")) == []
+    assert validate_fmu(str(folder / "law.fmu")) == []
     found = check(folder)
     assert [one.what for one in found] == ["library", "law.fmu"]
     assert all(one.samples == 3001 and not one.differs for one in found)
