@@ -26,7 +26,8 @@ FAR = 1000.0  # times a rate is its peak, where there is nothing left of a spect
 # Components in one round of a loop, two registers full: the compiler writes out a loop over one of
 # them number by number.
 GROUP = 2 * LANES
-SAMPLES = 16  # of a spectrum in every bin
+SAMPLES = 16  # of a spectrum in every bin, at least
+ALL_SAMPLES = 800  # in all bins, at least: few are wide, and a peak is narrow
 FINE = 4096  # steps in which a spectrum is added up
 NORSOK_N = 0.468
 HARRIS_LENGTH = 1800.0  # m
@@ -109,8 +110,9 @@ def harris(frequency: Vector, speed: float, drag: float) -> Vector:
 def in_bins(density: Density, edges: Vector) -> Vector:
     """The variance in each bin between neighbouring edges."""
     width = np.diff(edges)
-    samples = (density(edges[:-1] + (i + 0.5) / SAMPLES * width) for i in range(SAMPLES))
-    return np.asarray(sum(samples) * width / SAMPLES)
+    count = max(SAMPLES, math.ceil(ALL_SAMPLES / len(width)))
+    samples = (density(edges[:-1] + (i + 0.5) / count * width) for i in range(count))
+    return np.asarray(sum(samples) * width / count)
 
 
 def as_given(count: int, seed: int, stream: str) -> Vector:
