@@ -8,6 +8,7 @@ from drawn_samples import recording, shown
 from html_tree import tree
 
 from podusv_cli.comparison import chase, report, settings, table
+from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.finding import Finding
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import Picture
@@ -225,6 +226,24 @@ def test_what_a_scenario_sets_is_held_against_preset_and_default(override, told)
     )
     assert other - plain == told
     assert not plain - other
+
+
+def test_legs_are_held_against_the_acceptance_that_follows_from_the_hull():
+    """Legs have no points by default, so there are none that could be checked."""
+    legs = "path={kind: legs, points: [[0, 0], [9, 0]]}"
+    plain, other = (
+        {(one.key, one.value, one.default) for one in settings.changed(some)}
+        for some in (scenario(legs), scenario(legs, "path.acceptance=3"))
+    )
+    assert other - plain == {("path.acceptance", "3", "2")}
+
+
+def test_numbers_are_shown_where_none_follows_from_the_hull():
+    """Nothing follows where the yaw moment is too small to turn the hull."""
+    law = VelocityVector(**dict.fromkeys(VelocityVector.rules, 1.0))
+    some = scenario("actuator.yaw_limit=5e-324").model_copy(update={"controller": law})
+    rows = {about.key: row[0].value for about, row in settings.laws({"a": law}, some)}
+    assert rows["N_m"] == "1"
 
 
 def test_a_law_is_held_against_its_defaults_and_the_other_laws():

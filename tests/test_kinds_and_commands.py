@@ -144,4 +144,5 @@ def test_every_kind_goes_through_every_command(cell, recwarn, kind, command):
     else:
         assert (said.code, bool(said.out)) == (0, True), said.err
     assert "Traceback" not in said.err
+    assert not [*Path().rglob("missing.json")], "parts that could not be made: page, tables"
     assert not recwarn.list

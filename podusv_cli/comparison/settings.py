@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from podusv_cli.comparison.differences import PROSE
 from podusv_cli.components.facts import Facts
 from podusv_cli.core.component import Component, unit_of
+from podusv_cli.core.errors import SizingError
 from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.explain import summary
 from podusv_cli.scenario.model import Scenario
@@ -88,13 +90,17 @@ def _facts(scenario: Scenario) -> Facts | None:
 
 
 def _sized(part: Component, facts: Facts | None) -> Component | None:
-    """The part with every default, those that follow from the facts too; None without rules."""
+    """The part with every default, those that follow from the facts too; None without any.
+
+    It is read only, and not checked: legs have no points by default.
+    """
     if facts is None or not part.rules:
         return None
     own = {name: field for name, field in type(part).model_fields.items() if field.is_required()}
-    needed = {name: getattr(part, name) for name in own}
-    numbers = {name: part.by_default(name, facts) for name in part.rules}
-    return type(part).model_validate(needed | numbers)
+    values = {name: getattr(part, name) for name in own}
+    with suppress(SizingError):  # the scenario has numbers where nothing follows
+        values |= {name: part.by_default(name, facts) for name in part.rules}
+    return type(part).model_construct(**values)
 
 
 def _settings(
