@@ -87,6 +87,7 @@ def test_shares_that_never_differ_cannot_be_told_apart() -> None:
     verdict = judged(runs, "failures(a) < failures(b)")
     assert verdict.answer is None
     assert verdict.more is None
+    assert "in no draw does one of both conditions hold alone" in verdict.evidence()
 
 
 def test_two_shares_are_seldom_told_apart_wrongly() -> None:

@@ -121,6 +121,8 @@ class StudyVerdict(Verdict):
             return "no run has a number that the claim is about"
         if any(part.unknown for part in self.parts):
             return "missing numbers leave the answer open"
+        if any(math.isnan(part.estimate) for part in self.parts):
+            return "in no draw does one of both conditions hold alone, so the shares do not differ"
         if self.more is None:
             return (
                 "the shares found are just those asked for, so it cannot be said how many draws "
