@@ -16,7 +16,7 @@ from test_metrics import gathered
 
 from podusv_cli.components.actuators import allocation_qp
 from podusv_cli.components.actuators.allocation import allocate
-from podusv_cli.components.actuators.pod import Pod, Pods
+from podusv_cli.components.actuators.pod import Pod, Pods, follow
 from podusv_cli.components.actuators.propeller import inflow, speed_for, thrust
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.paths.line import Line
@@ -235,6 +235,27 @@ def test_energy_and_travel_are_those_of_the_log():
 def test_pods_that_cannot_be_are_refused(several, words):
     with pytest.raises(ValidationError, match=words):
         Pods(pods=tuple({**POD, **own} for own in several))
+
+
+def test_fixed_propellers_need_no_numbers_of_an_angle_and_move_as_with_any():
+    pair = [{"x": -2.0, "y": side, "angle_limit": 0.0} for side in (-0.9, 1.1)]
+    without = {"angle_rate": None, "angle_lag": None}
+    full, bare = pods(*pair), pods(*({**own, **without} for own in pair))
+    assert bare.lags() == full.lags() == (0.2, 0.2)
+    slow = pods(*({**own, "angle_lag": 0.01} for own in pair))
+    assert bare.shortest_lag() == slow.shortest_lag() == 0.2  # nothing turns
+    state, command = np.array([3.0, -5.0, 0.0, 0.0]), np.array([20.0, 9.0, 0.0, 0.0])
+    rates = np.empty((2, 4))
+    for rate, one in zip(rates, (bare, full), strict=True):
+        follow(state, command, bundle(one.constants()), one.table(), rate)
+    assert np.array_equal(rates[0], rates[1])
+    assert rates[0, :2] == pytest.approx([60.0, 60.0])  # the limit of 17/0.2 and 14/0.2 1/s2
+
+
+@pytest.mark.parametrize("name", ["angle_rate", "angle_lag"])
+def test_a_pod_that_turns_needs_the_numbers_of_its_angle(name):
+    with pytest.raises(ValidationError, match=f"{name}.*angle_limit: 0"):
+        pods({name: None})
 
 
 @pytest.mark.parametrize("demand", [(math.nan, 1.0), (5.0, 1.0)])

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Self
+
+from pydantic import model_validator
 
 from podusv_cli.components.actuators.command import Failure
 from podusv_cli.core.component import Component, value
@@ -31,19 +34,40 @@ class Pod(Component):
         math.radians(35.0), "rad", "largest angle, both ways; 0 for a fixed propeller",
         ge=0, le=0.5 * math.pi,
     )  # fmt: skip
-    angle_rate: float = value(..., "rad/s", "fastest change of the angle", gt=0)
-    angle_lag: float = value(..., "s", "time constant of the angle", gt=0)
+    angle_rate: float | None = value(
+        None, "rad/s", "fastest change of the angle; needed unless the propeller is fixed", gt=0
+    )
+    angle_lag: float | None = value(
+        None, "s", "time constant of the angle; needed unless the propeller is fixed", gt=0
+    )
     power_nnn: float | None = value(
         None, "W s3", "power over |n|^3; without it neither power nor energy is logged", ge=0
     )
 
+    @model_validator(mode="after")
+    def _turning(self) -> Self:
+        missing = [name for name in ("angle_rate", "angle_lag") if getattr(self, name) is None]
+        if missing and self.angle_limit > 0.0:
+            raise ValueError(
+                f"turns by up to {self.angle_limit:.3g} rad and has no {' and no '.join(missing)}; "
+                "give it, or angle_limit: 0 for a fixed propeller"
+            )
+        return self
+
+    def lags(self) -> tuple[float, float]:
+        """Time constants of the speed and of the angle [s]; that of an angle that is fixed is 0."""
+        return self.n_lag, self.angle_lag or 0.0 if self.angle_limit > 0.0 else 0.0
+
     def numbers(self) -> list[float]:
-        """The pod's row in the actuator's table, see `propeller`."""
+        """The pod's row in the actuator's table, see `propeller`.
+
+        A fixed angle never moves, so any rate and lag above 0 do for it.
+        """
         astern = self.T_nV if self.T_nV_astern is None else self.T_nV_astern
         return [
             self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, astern, self.n_max,
-            self.n_max_astern, self.angle_limit, self.n_rate, self.angle_rate, self.n_lag,
-            self.angle_lag, self.power_nnn or 0.0,
+            self.n_max_astern, self.angle_limit, self.n_rate,
+            self.angle_rate or 1.0, self.n_lag, self.angle_lag or 1.0, self.power_nnn or 0.0,
         ]  # fmt: skip
 
 

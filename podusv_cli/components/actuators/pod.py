@@ -199,14 +199,13 @@ class Pods(Actuator):
         return np.array([number for pod in self.pods for number in pod.numbers()])
 
     def shortest_lag(self) -> float:
-        """Of speeds and angles."""
-        return min(min(pod.n_lag, pod.angle_lag) for pod in self.pods)
+        """Of speeds, and of angles that turn."""
+        return min(lag for pod in self.pods for lag in pod.lags() if lag > 0.0)
 
     def lags(self) -> tuple[float, float]:
         """The propellers' lag; of a moment also a quarter of that of the angles that turn."""
-        turning = [pod.angle_lag for pod in self.pods if pod.angle_limit > 0.0]
-        lag = max(pod.n_lag for pod in self.pods)
-        return lag, lag + TURNING * max(turning, default=0.0)
+        lag, turning = (max(lags) for lags in zip(*(pod.lags() for pod in self.pods), strict=True))
+        return lag, lag + TURNING * turning
 
     def settled(self, x: Vector, demand: Vector) -> Vector:
         """Loads where the pods' state is what is commanded; the advance speed hangs on the angle.

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Controller
-from podusv_cli.core.component import value
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -46,7 +47,8 @@ def begun(t: float, k: Any) -> bool:
 class Manoeuvre(Controller):
     """Straight ahead until `execute`, then another way; the path and its target are left aside."""
 
-    thrust: float = value(2.0, "N", "thrust of the approach", gt=0)
+    rules: ClassVar[dict[str, Rule]] = {"thrust": by.FORCE}
+    thrust: Ruled = value(2.0, "N", "thrust of the approach", gt=0)
     execute: float = value(
         60.0, "s", "time at which the trial begins, a whole number of steps; steady speed by then",
         ge=0,
@@ -61,4 +63,5 @@ class Steering(Manoeuvre):
     """The thrust of the approach, steered; positive angles steer to starboard."""
 
     signals: ClassVar[tuple[Signal, ...]] = (STEERING,)
-    lever: float = value(0.5, "m", "distance of the thrust behind the body origin", gt=0)
+    rules: ClassVar[dict[str, Rule]] = Manoeuvre.rules | {"lever": by.LENGTH}
+    lever: Ruled = value(0.5, "m", "distance of the thrust behind the body origin", gt=0)

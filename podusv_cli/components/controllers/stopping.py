@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
+from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, Trial, each
 from podusv_cli.components.controllers.manoeuvre import Manoeuvre, begun
-from podusv_cli.core.component import value
+from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
 
@@ -17,7 +18,8 @@ class Stopping(Manoeuvre):
     """Full astern from `execute` on (IMO MSC.137(76)); no thrust once the surge speed is zero."""
 
     kind: Literal["stopping"] = "stopping"
-    astern: float = value(2.0, "N", "thrust astern, a positive number", gt=0)
+    rules: ClassVar[dict[str, Rule]] = Manoeuvre.rules | {"astern": by.FORCE}
+    astern: Ruled = value(2.0, "N", "thrust astern, a positive number", gt=0)
 
     def slots(self) -> Slots:
         """The stage of the trial."""
