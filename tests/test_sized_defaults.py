@@ -339,8 +339,9 @@ def test_a_trial_of_the_boat_comes_to_its_end_without_a_number():
     """With the model ship's 2 N the boat did not turn by 10 deg in ten minutes."""
     trial = ("controller={kind: zigzag}", "path={kind: line}", "start.y=0")
     scenario = loaded(*trial).scenario
-    assert scenario.controller.thrust == pytest.approx(2.0 * 2.0 * 200.0 / 8.0, rel=5e-3)
-    assert scenario.controller.lever == pytest.approx(0.5 * scenario.vessel.length / 1.255, rel=5e-3)
+    own, length = scenario.controller, scenario.vessel.length
+    assert own.thrust == pytest.approx(2.0 * 2.0 * 200.0 / 8.0, rel=5e-3)
+    assert own.lever == pytest.approx(0.5 * length / 1.255, rel=5e-3)
     watch = scenario.observer()
     seen = simulate_many([scenario.closed_loop()], scenario.time_grid(), observer=watch).seen
     assert np.isfinite(watch.summaries(seen)["overshoot_2"][0])

@@ -100,7 +100,7 @@ def _sized(part: Component, facts: Facts | None) -> Component | None:
     values = {name: getattr(part, name) for name in own}
     with suppress(SizingError):  # the scenario has numbers where nothing follows
         values |= {name: part.by_default(name, facts) for name in part.rules}
-    return type(part).model_construct(**values)
+    return type(part).model_construct(None, **values)
 
 
 def _settings(

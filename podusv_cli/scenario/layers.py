@@ -168,6 +168,10 @@ def _override_tree(override: str, faults: list[Fault]) -> Node:
     elif len(keys) > MAX_DEPTH:
         faults.append(Fault(mark, "", f"nested deeper than {MAX_DEPTH} levels"))
         keys = []
+    elif text.lstrip().startswith(FLOW[:2]) and text.count("{") > text.count("}"):
+        faults.append(
+            Fault(mark, "", "a brace is never closed; in a shell, put the whole value in quotes")
+        )
     elif text.lstrip().startswith(FLOW):
         node = read(text, mark.source, faults, placed=False)
     else:
