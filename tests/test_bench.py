@@ -307,7 +307,7 @@ def test_cases_that_differ_in_what_laws_know_share_an_optimum_and_pods_have_none
     assert [{case.condition for case in one.cases} for one in found] == [{"calm"}, shared]
     assert [list(one.laws) for one in found] == [["pid", "dsc"]] * 2
     assert len(refused) == 2
-    assert any("actuator.kind: pod does not fit" in text for text in refused)
+    assert any("actuator.kind: pod" in text for text in refused)
     assert any("loads that depend on time alone" in text for text in refused)
 
 
@@ -318,7 +318,7 @@ def test_the_command_finds_optima(bench, podusv):
     chosen = ("--vessel", "model", "--task", "line", "--no-figures")
     said = podusv("bench", str(bench), "--out", "out", "--optimum", *chosen)
     assert said.code == 0, said.err
-    assert "an optimum for some cases could not be made: actuator.kind: pod" in said.err
+    assert "actuator.kind: pod" in said.err
     assert "median of IAE / optimum" in said.out
     optima = pd.read_csv("out/optima.csv")
     assert optima.condition.tolist() == ["calm", "told"]  # what is told does not matter

@@ -199,10 +199,10 @@ def test_runs_that_all_die_are_reported(podusv, monkeypatch):
     said = podusv(config, "--out", "x")
     assert said.code == 3
     assert said.err.splitlines() == [
-        "stiff: its process ended with exit code -9, 2 times",
-        "soft: its process ended with exit code -9, 2 times",
+        f"stiff: {lost.failure}",
+        f"soft: {lost.failure}",
     ]
-    assert "soft.iae: soft has no log: its process ended with exit code -9" in said.out
+    assert f"soft.iae: soft has no log: {lost.failure}" in said.out
     assert Path("x/comparison.csv").read_text().startswith("metric,unit,stiff,soft")
 
 
@@ -353,7 +353,7 @@ def test_the_report_is_named_after_everything_else(tmp_path):
     with under_way(*words, script=BOTH) as process:
         lines = process.communicate(timeout=PATIENCE)[0].splitlines()
     assert lines[-1] == f"report: {tmp_path}/x/report.html"
-    assert lines[-2].startswith("the numbers may not have converged")
+    assert "podusv verify" in lines[-2]
 
 
 def test_the_table_here_may_be_of_some_metrics_alone(podusv):
@@ -364,4 +364,4 @@ def test_the_table_here_may_be_of_some_metrics_alone(podusv):
     assert len(Path("c/comparison.csv").read_text().splitlines()) > 10
     wrong = podusv("c", "--metric", "iaee", "--out", "d")
     assert (wrong.code, wrong.out, Path("d").exists()) == (2, "", False)
-    assert "unknown metric 'iaee'; did you mean 'iae_e'?" in wrong.err
+    assert "'iaee'" in wrong.err

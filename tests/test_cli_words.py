@@ -251,7 +251,7 @@ def test_a_name_that_is_no_text_is_shown_escaped(tmp_path):
         file.write(SOUND + "name: a\n")
     process = podusv_process("validate", os.fsdecode(path))
     assert (process.returncode, process.stderr) == (0, "")
-    assert "/\\udcff.yaml: ok (a, pid, 31000 steps)\n" in process.stdout
+    assert "/\\udcff.yaml: ok " in process.stdout
 
 
 LOADED = """

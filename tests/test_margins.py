@@ -367,7 +367,7 @@ def test_a_law_that_stays_near_and_never_rests_is_told_with_its_distance(monkeyp
     """The network never rests with the load held; a plain run says how far off it is meanwhile."""
     monkeypatch.setattr(steady, "MOST_EVALUATIONS", 3000)
     law = podusv.load("podusv:laws/learned.yaml").singles()["policy"]
-    with pytest.raises(NotConvergedError, match="no steady motion was found") as told:
+    with pytest.raises(NotConvergedError) as told:
         loop_margins(law.closed_loop(), law.time_grid())
     form = r"is (\S+) m .* t = (\S+) s, and (\S+) m to (\S+) m when it goes on for (\S+) s"
     there, time, near, far, seconds = map(float, re.search(form, str(told.value)).groups())

@@ -100,7 +100,8 @@ def test_out_keeps_the_repeated_run(run, tmp_path, podusv):
     assert open_run(tmp_path / "kept").status == "finished"
     assert beside(tmp_path / "kept") == {"passing"}
     again = podusv("rerun", run, "--out", tmp_path / "kept")
-    assert again == (5, "", f"{tmp_path / 'kept'} exists already; --force replaces it\n")
+    assert (again.code, again.out) == (5, "")
+    assert again.err.startswith(f"{tmp_path / 'kept'} exists")
 
 
 def test_a_run_that_diverges_and_had_not_has_a_code_of_its_own(run, tmp_path, podusv):
@@ -126,9 +127,10 @@ def test_an_interrupted_run_is_refused(run, tmp_path, podusv):
 
 
 def test_what_is_no_run_folder(run, tmp_path, podusv):
-    reason = {tmp_path: "it has no manifest.json", run / "log.h5": "it has no manifest.json"}
-    for path, why in (reason | {tmp_path / "nowhere": "it does not exist"}).items():
-        assert podusv("rerun", path) == (2, "", f"{path} is no run folder: {why}\n")
+    for path in (tmp_path, run / "log.h5", tmp_path / "nowhere"):
+        said = podusv("rerun", path)
+        assert (said.code, said.out) == (2, "")
+        assert said.err.startswith(f"{path} ")
     broken = copied(run, tmp_path / "broken")
     (broken / "resolved.yaml").write_text("name: x\n")
     assert podusv("rerun", broken).code == 5

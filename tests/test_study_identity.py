@@ -83,7 +83,7 @@ def test_shards_of_other_kernels_are_named_and_not_missing(tmp_path, updated):
     one = placed(made(tmp_path / "one", part=(1, 2)))
     updated()
     two = placed(made(tmp_path / "two", part=(2, 2)))
-    with pytest.raises(UsageError, match=r"two holds another study: pid\[0\] kernels: .*leave it"):
+    with pytest.raises(UsageError, match=r"two .*pid\[0\] kernels: .*leave it"):
         merge([one, two], tmp_path / "all", sweep.Request(figures=False))
     assert not (tmp_path / "all").exists()
 
@@ -269,4 +269,4 @@ def test_a_merge_tells_of_several_machines(tmp_path):
     told_as(shards[0], "an abacus")
     merge(shards, tmp_path / "all", request)
     (told,) = warnings
-    assert "different machines or versions: an abacus (" in told
+    assert "an abacus (" in told

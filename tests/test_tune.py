@@ -102,7 +102,7 @@ def test_a_law_without_gains_is_kept_and_reported(done):
     assert row["objective_before"] == row["objective_after"]
     assert row["runs"] == 0
     assert "bare has no gains, kept as it is" in remarks(done.results)
-    assert "<li>bare has no gains, kept as it is" in (done.folder / "report.html").read_text()
+    assert "<li>bare has no gains" in (done.folder / "report.html").read_text()
 
 
 def test_the_found_scenario_extends_the_searched_one(done):
@@ -208,7 +208,7 @@ def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
         "--out", str(tmp_path / "out"), "--no-figures",
     )  # fmt: skip
     assert code == 0
-    assert err.startswith("runs of the search: 32 (budget 32 for each law, repeats: 1); on draws")
+    assert "search: 32 (budget 32" in err.splitlines()[0]
     assert "median(effort_u) on 12 fresh draws:" in out
     assert re.search(r"^toy +2 -> 2 +0 -> 0 +1\.6\d+, no spread +0\.03\d+,", out, re.MULTILINE)
     told = json.loads((tmp_path / "out" / "tune.json").read_text())
