@@ -84,6 +84,10 @@ def test_what_is_to_be_kept_is_as_in_the_studies():
     assert {off(at, law) for at in sound for law in LAWS[:4]} == {0}
     lost = [off(PLACES[-1], law) for law in LAWS[:4]]
     assert f"in {min(lost)} to {max(lost)} of 100 draws of state 6 at 0.5 Hz" in WORDS
+    assert f"{lost[0]} with `velocity_vector`, {lost[1]} with `adaptive_neural`" in WORDS
+    further, nearer = (number_of(PLACES[3], law, "error_after_rms") for law in LAWS[1::-1])
+    assert further > nearer
+    assert "it is further from the target" in WORDS
     theirs, ours = (1000 * number_of(PLACES[3], law, "e_after_max") for law in LAWS[1::-1])
     assert f"({theirs:.0f} against {ours:.0f} mm in state 6 at 10 Hz)" in WORDS
     turned = [number_of(PLACES[3], law, "tv_tau_u") for law in LAWS[1::-1]]
@@ -183,6 +187,8 @@ def test_what_is_said_of_pods_is_as_in_the_tables():
         assert first == f"{1000 * number('pods', law, 'e_after_max'):.0f}"
     lost = [int(cell) / 1000 for law in LAWS[1:4] for cell in runs[law]]
     assert f"are {min(lost):.1f} to {max(lost):.1f} m beyond their standoff at worst" in WORDS
+    most = max(int(cell) for cell in runs["velocity_vector"]) / 1000
+    assert f"`velocity_vector` stays within {most:.2f} m of the target" in WORDS
     share = 100 * number("pods", "velocity_vector", "at_angle_limit")
     assert f"at their angle limit for {share:.0f} % of the time" in WORDS
 
