@@ -54,7 +54,7 @@ ITSELF = [(*words, "--out", "place") for words in (RUN, COMPARE, *RERUNS, ("plot
 def podusv(beside_old_results, monkeypatch):
     write("long.yaml", MINUTES)
     Path().chmod(0o755)
-    monkeypatch.setattr(execute, "simulate", begun)
+    monkeypatch.setattr(execute, "run", begun)
     monkeypatch.setattr(compare, "run_all", begun)  # whose processes rerun uses, too
     monkeypatch.setattr(compare, "warm_up", begun)
     monkeypatch.setattr(drawing, "draw_in_parallel", begun)

@@ -73,7 +73,7 @@ def told(old, *given, progress=None, **more):
         if progress:
             progress(fraction)
     return old(*given, progress=tell, **more)
-patch(execute, "simulate", told)
+patch(execute, "run", told)
 """
 
 
@@ -152,7 +152,7 @@ def test_a_lost_terminal_ends_a_comparison_and_keeps_it():
 @pytest.mark.slow
 @pytest.mark.parametrize(("ignored", "code"), [(False, 129), (True, 0)])
 def test_a_hangup_ends_it_but_not_under_nohup(ignored, code):
-    patches = 'patch(execute, "simulate", lambda old, *given, **more: old(*given, **more))'
+    patches = 'patch(execute, "run", lambda old, *given, **more: old(*given, **more))'
     if ignored:
         patches = f"import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); {patches}"
     config = write("a.yaml", LONG.replace("1e5", "1e3") if ignored else LONG)
@@ -279,7 +279,7 @@ def soon(number: signal.Signals, work: Callable[..., object]) -> Callable[..., o
 
 @pytest.mark.parametrize(("number", "code"), [*SIGNALS, (signal.SIGHUP, 129)])
 def test_an_interrupted_run_is_kept(podusv, number, code, monkeypatch):
-    monkeypatch.setattr(execute, "simulate", soon(number, execute.simulate))
+    monkeypatch.setattr(execute, "run", soon(number, execute.run))
     said = podusv("run", write("long.yaml", LONG), "--out", "x")
     assert said.code == code
     assert said.err.startswith("long.yaml: interrupted after t = ")
@@ -290,7 +290,7 @@ def test_an_interrupted_run_is_kept(podusv, number, code, monkeypatch):
 def test_an_interrupted_run_takes_no_finished_ones_place(podusv, monkeypatch):
     assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
     old = files(Path("x"))
-    monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
+    monkeypatch.setattr(execute, "run", soon(signal.SIGINT, execute.run))
     said = podusv("run", write("long.yaml", LONG), "--out", "x", "--force")
     assert (said.code, said.out) == (130, "pid interrupted: x-2\n")
     assert files(Path("x")) == old
@@ -301,7 +301,7 @@ def test_a_fault_after_an_interrupt_is_told(podusv, monkeypatch):
     def faulty(*args: object) -> None:
         raise TypeError("no such thing")
 
-    monkeypatch.setattr(execute, "simulate", soon(signal.SIGINT, execute.simulate))
+    monkeypatch.setattr(execute, "run", soon(signal.SIGINT, execute.run))
     monkeypatch.setattr(execute, "_write", faulty)
     said = podusv("run", write("long.yaml", LONG), "--out", "x")
     assert said == (130, "", "podusv: interrupted, and then TypeError: no such thing\n")
@@ -339,14 +339,14 @@ def test_an_interrupted_verification_says_that_nothing_was_written(podusv, monke
 
 
 def test_run_and_rerun_tell_an_interruption_in_the_same_words(podusv, monkeypatch):
-    simulate = execute.simulate
+    simulate = execute.run
 
     def interrupted(*args: object, **options: object) -> object:
         os.kill(os.getpid(), signal.SIGINT)
         return simulate(*args, **options)
 
     assert podusv("run", write("short.yaml", BASE), "--out", "x", "--no-figures").code == 0
-    monkeypatch.setattr(execute, "simulate", interrupted)
+    monkeypatch.setattr(execute, "run", interrupted)
     run = podusv("run", "short.yaml", "--out", "y", "--no-figures")
     rerun = podusv("rerun", "x")
     assert (run.code, rerun.code) == (130, 130)
