@@ -171,6 +171,21 @@ def test_findings_tell_of_a_leg_too_short_and_of_legs_that_are_left() -> None:
     assert "path.switch: passed" in told
 
 
+def test_a_trial_leaves_the_legs_aside_and_no_finding_asks_for_them() -> None:
+    warnings = run("zigzag", **{"simulation.duration": 2.0}).warnings
+    assert any("trial-unfinished" in one for one in warnings)
+    assert not any("never-arrives" in one for one in warnings)
+
+
+def test_a_number_that_a_run_has_not_is_never_or_a_dash(podusv: Any, tmp_path: Any) -> None:
+    short = ("simulation.duration=1", "actuator={kind: pod, preset: otter}")
+    sets = [word for one in short for word in ("--set", one)]
+    said = podusv("run", "podusv:laws/legs.yaml", "--no-figures", "--out", tmp_path / "r", *sets)
+    shown = {line.split()[-1]: line.split()[-2] for line in said.out.splitlines()}
+    assert shown["path_time"] == "never"
+    assert shown["energy_pod"] == "-"  # the Otter's power is not known
+
+
 @pytest.mark.parametrize("command", ["optimum", "margins"])
 def test_what_needs_a_target_with_a_timetable_says_so(
     command: str, podusv: Any, tmp_path: Any

@@ -85,7 +85,7 @@ def _report(done: Optimum) -> None:
     from podusv_cli.optimum.collocation import TOLERANCE
 
     name = done.minimised
-    _, unit = done.run.rows[name]
+    _, unit, _ = done.run.rows[name]
     rows = [
         [s.start, f"{s.step:.4g} s", f"{s.integral:.7g}", str(s.iterations), f"{s.seconds:.1f} s"]
         for s in done.stages

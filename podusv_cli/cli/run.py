@@ -64,10 +64,11 @@ def run(
 
 def _report(done: Finished, verbose: bool) -> None:
     rows = {name: row for name, row in done.rows.items() if name in done.metrics}
-    for name, (words, unit) in rows.items() if done.status == "finished" else ():
+    for name, (words, unit, undefined) in rows.items() if done.status == "finished" else ():
         number = done.metrics[name]
-        never = name.startswith("settling_time") and math.isnan(number)
-        shown = f"{'never':>12}" if never else f"{number:>12.6g} {unit if unit != '1' else ''}"
+        shown = f"{number:>12.6g} {unit if unit != '1' else ''}"
+        if math.isnan(number):
+            shown = f"{undefined:>12}"
         echo(f"{words:<46} {shown:<20}  {name}")
     if verbose:
         for name, seconds in done.timing.items():

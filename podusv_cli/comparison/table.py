@@ -121,7 +121,7 @@ def rows(frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names =
         best = math.nan if name in unranked else min(ranked, default=math.nan)
         first, metric = numbers[0], known[name]
         texts = [
-            "never" if metric.happens and finished[i] and math.isnan(number) else
+            metric.undefined if metric.happens and finished[i] and math.isnan(number) else
             "no limit" if metric.margin and math.isinf(number) else
             _cell(number, first, math.nan if out[i] else best, i)
             for i, number in enumerate(numbers)

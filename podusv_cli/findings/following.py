@@ -50,9 +50,9 @@ def short_leg(case: Case) -> Sentences:
     needs=("leg", "e_ct", "along_leg"),
 )  # fmt: skip
 def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
-    """The run ends on its way, or round a waypoint that it missed."""
+    """The run ends on its way, or round a waypoint that it missed. Trials follow no path."""
     lengths, leg = _lengths(scenario.path), int(log["leg"][-1])
-    if log.status != "finished" or leg >= len(lengths):
+    if log.status != "finished" or leg >= len(lengths) or scenario.controller.trial():
         return
     beside = f"{abs(log['e_ct'][-1]):.3g} m beside leg {leg}"
     yield (

@@ -130,6 +130,11 @@ class Metric:
         return self.words or self.meaning
 
     @property
+    def undefined(self) -> str:
+        """What a table has for a run that finished without the number."""
+        return "never" if self.happens else "-"
+
+    @property
     def infinite(self) -> str:
         """What it means that a number of many runs is infinite."""
         return "never" if self.happens else "failed"

@@ -98,8 +98,8 @@ class Finished:
     others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
     warnings: tuple[Finding, ...] = ()
     missing: tuple[Failure, ...] = ()
-    # words and unit of all metrics, those first that a reader sees first
-    rows: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    # words, unit and what stands where there is none, of all metrics; a reader sees the first first
+    rows: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -171,7 +171,10 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(),
         warnings=warnings, missing=tuple(extras.missing),
-        rows={m.name: (m.row, m.unit) for m in headlines_first(task.scenario.known_metrics())},
+        rows={
+            m.name: (m.row, m.unit, m.undefined)
+            for m in headlines_first(task.scenario.known_metrics())
+        },
     )  # fmt: skip
 
 
