@@ -4,7 +4,6 @@ import math
 import re
 import subprocess
 import sys
-import tomllib
 from types import SimpleNamespace
 from typing import Any
 
@@ -304,7 +303,7 @@ def test_such_a_reward_is_refused_before_the_first_episode(reward):
 
 
 def test_gymnasium_makes_environments_by_name():
-    """The same as the classes; without an import of podusv, as installed packages are found."""
+    """The same as the classes."""
     made = gymnasium.make("podusv/Scenario-v0", scenario=SCENARIO, reward="ise")
     own = podusv.gym.Env(SCENARIO, reward="ise")
     np.testing.assert_array_equal(made.reset(seed=4)[0], own.reset(seed=4)[0])
@@ -318,18 +317,15 @@ def test_gymnasium_makes_environments_by_name():
     assert several.num_envs == 3
 
 
-def test_gymnasium_alone_knows_the_name_and_imports_nothing_of_podusv_for_it():
-    (point,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][
-        "gymnasium.envs"
-    ].items()
+def test_gymnasium_alone_finds_the_environment_by_module_and_name():
+    """In a process that has imported nothing of podusv."""
     asked = (
-        "import sys, gymnasium; from gymnasium.envs.registration import namespace\n"
-        f"with namespace({point[0]!r}):\n"
-        f"    from importlib.metadata import EntryPoint as P; P('', {point[1]!r}, '').load()()\n"
-        "print('podusv/Scenario-v0' in gymnasium.registry, 'podusv_cli.interface' in sys.modules)"
+        "import gymnasium\n"
+        f"made = gymnasium.make('podusv.gym:podusv/Scenario-v0', scenario={SCENARIO!r})\n"
+        "print(type(made.unwrapped).__name__)"
     )
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ("True False\n", "")
+    assert done.stdout == "Env\n"
 
 
 @pytest.mark.parametrize("reward", [None, 3, ["iae"]])
