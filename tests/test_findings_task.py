@@ -319,7 +319,7 @@ def test_a_hull_with_damping_of_the_wrong_sign_has_to_be_held_back():
 
 def test_added_mass_of_the_wrong_sign_makes_the_hull_lighter():
     """From rest, under a constant thrust: less mass, more acceleration."""
-    thrust = (*STILL, "controller={kind: turning_circle}")
+    thrust = (*STILL, "controller={kind: turning_circle, thrust: 2.0}")
     wrong, right = (*thrust, "vessel.X_udot=12.0"), (*thrust, "vessel.X_udot=-12.0")
     told = finding("added-mass-sign", *wrong)
     assert told.where == "vessel.X_udot"
