@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import kinds
+from conftest import REQUIRED, kinds
 from scenario_samples import loaded
 from storage_samples import ENVIRONMENT, PYTHON, TEXTS, files, log, recording
 
@@ -19,7 +19,10 @@ from podusv_cli.storage import log as log_file
 from podusv_cli.storage.files import disk_array
 from podusv_cli.workflows.execute import HELD, Task, execute
 
-GIVEN = {"schedule": ', rows: "0, 1, 0\\n200, 2, 0.5\\n"', "zigzag": ", check_every: 0.05"}
+GIVEN = {
+    "schedule": ', rows: "0, 1, 0\\n200, 2, 0.5\\n"', "zigzag": ", check_every: 0.05",
+    "policy": f", content: {REQUIRED['policy']['content']}",
+}  # fmt: skip
 LAWS = {f"{kind} {period}": (kind, period) for kind in kinds("controllers") for period in (0, 0.05)}
 SCENARIO = """
 vessel: {{preset: paper_nonlinear}}

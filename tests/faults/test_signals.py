@@ -95,10 +95,10 @@ def ended(process: object, number: signal.Signals, times: int = 1) -> tuple[int,
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("module", "number", "code"),
-    [("typer", *SIGNALS[1]), ("h5py", *SIGNALS[0]), ("pandas", *SIGNALS[1])],
+    [("typer", *SIGNALS[1]), ("h5py", *SIGNALS[0]), ("yaml", *SIGNALS[1])],
 )
 def test_while_importing(folder, module, number, code):
-    """typer before there is a command, h5py by each worker, pandas by the command."""
+    """typer before there is a command, h5py by each worker, yaml by the command."""
     says = {
         "typer": "", "h5py": "interrupted before any run finished; nothing was written\n",
     }.get(module, "interrupted\n")  # fmt: skip
