@@ -30,7 +30,7 @@ COMMANDS = (
 # What others call it, and the command that does it.
 MEANT = {
     "simulate": "podusv run CONFIG simulates a scenario",
-    "help": "podusv docs shows the pages, and podusv --help all commands",
+    "help": "podusv docs [PAGE] shows the pages, and podusv --help all commands",
     "replay": "podusv rerun RUN repeats a finished run, and podusv compare RUN plays it on a page",
     "fit": "podusv tune CONFIG searches gains of laws; no command fits a hull to data",
 }
