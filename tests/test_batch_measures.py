@@ -24,11 +24,10 @@ from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 from podusv_cli.metrics.table import METRICS, observer
+from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.check import has
-from podusv_cli.studies.study.draws import DrawError, Number, with_values
 
 SECTIONS = {"paths": "path", "disturbances": "disturbance", "actuators": "actuator"}
 SECTIONS |= {room: room.removesuffix("s") for room in ("measurements", "estimators", "controllers")}
@@ -67,7 +66,7 @@ def changed(scenario: Scenario, key: str, old: float) -> Scenario | None:
         found = with_values(scenario, {route(key): Number("", new)})
         found.closed_loop().check_fit(found.simulation.step)
         same = found.plan().structure == scenario.plan().structure
-    except (DrawError, LawError, ValueError):
+    except (ValueRefused, LawError, ValueError):
         return None
     return found if same else None
 

@@ -20,8 +20,8 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.address import PER_RUN
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.study.check import DRAWN
 
 PAGES = [
     path.relative_to(ROOT).as_posix()
@@ -277,4 +277,4 @@ def test_every_section_that_can_be_drawn_in_is_named() -> None:
     (sentence,) = re.findall(
         r"The sections (.*) can be drawn in", (ROOT / "docs" / "studies.md").read_text()
     )
-    assert re.findall(r"`(\w+)`", sentence) == list(DRAWN)
+    assert re.findall(r"`(\w+)`", sentence) == list(PER_RUN)

@@ -26,11 +26,11 @@ from podusv_cli.export import link
 from podusv_cli.export.check import check
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.interface.results import Run
+from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.check import gathered_metrics, has
-from podusv_cli.studies.study.draws import DrawError, Number, with_values
+from podusv_cli.studies.study.check import gathered_metrics
 from podusv_cli.workflows import export as exporting
 from podusv_cli.workflows import rerun as repeating
 from podusv_cli.workflows import studies
@@ -126,7 +126,7 @@ def number_of_a_draw(drawn: Drawn, place: Path) -> None:
         try:
             loaded = load_text(text, "resolved.yaml", [f"{key}={number!r}"]).scenario
         except ScenarioError:
-            with pytest.raises(DrawError):
+            with pytest.raises(ValueRefused):
                 with_values(scenario, {route(key): Number("", number)})
         else:
             changed = with_values(scenario, {route(key): Number("", number)})

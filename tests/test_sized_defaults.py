@@ -23,11 +23,12 @@ from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.findings.sizing import other_numbers
+from podusv_cli.scenario.address import content
 from podusv_cli.scenario.explain import explain
 from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
 from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.draws import content, drawn, draws
+from podusv_cli.studies.study.draws import drawn, draws
 from podusv_cli.studies.tuning.space import gains
 
 LAWS = [kind for kind in kinds("controllers").values() if kind.rules]

@@ -23,22 +23,12 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.random_words import in_unit_interval
+from podusv_cli.scenario.address import Number, ValueRefused, described, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.draws import (
-    DrawError,
-    Number,
-    described,
-    drawn,
-    draws,
-    seeds,
-    table,
-    uniforms,
-    with_values,
-    words,
-)
+from podusv_cli.studies.study.draws import drawn, draws, seeds, table, uniforms, words
 
 VARY = """
 sweep:
@@ -188,7 +178,7 @@ def test_the_nominal_vessel_is_a_key_like_others() -> None:
     ],
 )
 def test_a_draw_out_of_range_names_quantity_value_key_and_range(draw: Any, words: str) -> None:
-    with pytest.raises(DrawError) as told:
+    with pytest.raises(ValueRefused) as told:
         drawn(scenario(), swept().vary, draw)
     assert words in str(told.value)
 
@@ -241,7 +231,7 @@ def answers(scenario: Scenario, key: str, number: float) -> tuple[str, str]:
         said[0] = str(error)
     try:
         with_values(scenario, {route(key): Number("", number)})
-    except DrawError as error:
+    except ValueRefused as error:
         said[1] = str(error)
     return said[0], said[1]
 

@@ -11,13 +11,14 @@ from command_samples import Command
 from small_study import TEXT
 
 from podusv_cli.core.errors import ScenarioError
+from podusv_cli.scenario.address import ValueRefused
 from podusv_cli.scenario.explain import explain
 from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
 from podusv_cli.studies.study.cells import MOST, cells
 from podusv_cli.studies.study.check import singles, sweep_faults
-from podusv_cli.studies.study.draws import DrawError, drawn, draws
+from podusv_cli.studies.study.draws import drawn, draws
 from podusv_cli.studies.study.invalid import invalid_draws
 
 ROOT = Path(__file__).parents[1]
@@ -227,7 +228,7 @@ def test_all_draws_that_a_run_could_not_take_are_counted(text: str) -> None:
         for one in laws:
             try:
                 drawn(one, sweep.vary, draw)
-            except DrawError as error:
+            except ValueRefused as error:
                 reasons.setdefault(i, str(error))
     found = invalid_draws(laws, sweep, sweep.draws)
     assert found.count == len(reasons)

@@ -12,12 +12,21 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.interface.border import ParameterError
+from podusv_cli.scenario.address import (
+    PER_RUN,
+    Number,
+    ValueRefused,
+    content,
+    described,
+    has,
+    is_whole,
+    no_entry,
+    with_values,
+)
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import as_yaml, unknown
 from podusv_cli.scenario.yaml_tree import Route, bracketed, route
-from podusv_cli.studies.study.check import DRAWN, has, is_whole, no_entry
-from podusv_cli.studies.study.draws import DrawError, Number, content, described, with_values
 
 Columns = dict[str, list[Any]]  # by key, with one value a run
 
@@ -55,7 +64,7 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
         }
         try:
             made.append(with_values(scenario, numbers))
-        except DrawError as error:
+        except ValueRefused as error:
             raise ParameterError(f"row {row}: {error}") from error
     return made
 
@@ -65,10 +74,10 @@ def _steps(scenario: Scenario, name: str) -> Route:
     key = bracketed(name)
     steps = route(key)
     section = str(steps[0]) if steps else ""
-    if section not in DRAWN and section in Scenario.model_fields:
+    if section not in PER_RUN and section in Scenario.model_fields:
         raise ParameterError(
             f"{name}: {section} is the same in all runs of a batch (allowed: keys of "
-            f"{', '.join(DRAWN)}); to change it: podusv.load(source, {{{name!r}: ...}})"
+            f"{', '.join(PER_RUN)}); to change it: podusv.load(source, {{{name!r}: ...}})"
         )
     if not steps or not has(scenario, key):
         known = [one for one in values(scenario) if has(scenario, one)]

@@ -14,23 +14,26 @@ from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.scenario.keys import Key
+from podusv_cli.scenario.address import (
+    PER_RUN,
+    ValueRefused,
+    content,
+    described,
+    has,
+    is_whole,
+    no_entry,
+)
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
+from podusv_cli.scenario.yaml_tree import Route, route
 from podusv_cli.studies.study.claims import parse
-from podusv_cli.studies.study.draws import DrawError, content, described, drawn
+from podusv_cli.studies.study.draws import drawn
 from podusv_cli.studies.study.expressions import parse_success
 from podusv_cli.studies.study.runs import AXES, ENDING, OWN
 
-# The sections that may differ between the runs of a cell.
-DRAWN = (
-    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
-    "controller",
-)  # fmt: skip
 # Shares at which a distribution is tried; its ends and its middle may be rounder than its draws.
 TRIED = np.array([0.000871, 0.381966, 0.998713])
 REAL = ("uniform", "normal", "lognormal", "triangular", "angle")  # draw other than whole numbers
@@ -113,7 +116,7 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     """What is wrong with a key that a quantity changes; `laws` are the scenarios by law."""
     steps = route(key)
     section = str(steps[0]) if steps else ""
-    if section not in DRAWN and section in Scenario.model_fields:
+    if section not in PER_RUN and section in Scenario.model_fields:
         yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
         return
     lacking = [label for label, one in laws.items() if not has(one, key)]
@@ -130,32 +133,10 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
         yield from (t for one in laws.values() for t in _type(key, quantity, one))
 
 
-def has(scenario: Scenario, key: str) -> bool:
-    """Whether the scenario has this key, in a section that may differ between runs."""
-    steps = route(key)
-    try:
-        content(scenario, steps)
-    except LookupError:
-        return False
-    return bool(steps) and dotted(steps) == key and steps[0] in DRAWN
-
-
-def no_entry(scenario: Scenario, steps: Route) -> str:
-    """What a list on the way has, where the step behind it is none of its places; else empty."""
-    for end in range(1, len(steps)):
-        if not has(scenario, dotted(steps[:end])):
-            return ""
-        whole, step = content(scenario, steps[:end]), steps[end]
-        if isinstance(whole, tuple) and not (isinstance(step, int) and step < len(whole)):
-            kinds = [getattr(part, "kind", None) for part in whole]
-            return entries_of(dotted(steps[:end]), kinds)
-    return ""
-
-
 def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
     """All keys of numbers that a draw can change, but for those in lists."""
     found = [item for one in laws.values() for item in values(one).items()]
-    return [key for key, own in found if route(key)[0] in DRAWN and _is_number(own)]
+    return [key for key, own in found if route(key)[0] in PER_RUN and _is_number(own)]
 
 
 def _is_number(own: Any) -> bool:
@@ -181,11 +162,6 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     elif not words:
         what = "a section" if isinstance(own, Component) else found(own, str(own or "null"))
         yield f"{key} is no number but {what}"
-
-
-def is_whole(key: Key) -> bool:
-    """Whether the value is a whole number, and no other."""
-    return int in key.types and float not in key.types
 
 
 def _real(quantity: Quantity) -> str:
@@ -215,7 +191,7 @@ def _tried(name: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Itera
 def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> str:
     try:
         drawn(scenario, {name: quantity}, {name: value})
-    except DrawError as error:
+    except ValueRefused as error:
         return str(error)
     return ""
 

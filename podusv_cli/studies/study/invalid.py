@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from podusv_cli.scenario.address import ValueRefused
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.study.check import singles
-from podusv_cli.studies.study.draws import DrawError, drawn, draws
+from podusv_cli.studies.study.draws import drawn, draws
 from podusv_cli.studies.study.plan import Plan
 
 MOST_TRIED = 2000  # scenarios with a draw in them, about a second
@@ -45,7 +46,7 @@ def invalid_draws(scenarios: Sequence[Scenario], sweep: Sweep, count: int) -> In
         for one in scenarios:
             try:
                 drawn(one, sweep.vary, draw)
-            except DrawError as error:
+            except ValueRefused as error:
                 reasons.setdefault(number, str(error))
     first = min(reasons, default=0)
     return Invalid(len(reasons), first, reasons.get(first, ""), checked, sweep.draws)

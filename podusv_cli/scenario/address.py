@@ -1,0 +1,176 @@
+"""The value at a key of a scenario: what it is, what the models say of it, and another one there.
+
+A key is written as in YAML with dots, `disturbance[1].seed`; `yaml_tree.route` gives its steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache, reduce
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.errors import PodusvError, SizingError
+from podusv_cli.core.escaping import visible
+from podusv_cli.scenario.conflicts import of_numbers
+from podusv_cli.scenario.keys import Key, keys_of
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.phrases import hint
+from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
+
+# The sections in which runs of one compiled loop may differ.
+PER_RUN = (
+    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
+    "controller",
+)  # fmt: skip
+
+
+class Number(NamedTuple):
+    """What a key becomes, and what a message about it starts with: who says so, if anybody."""
+
+    source: str
+    value: Any
+
+    def __str__(self) -> str:
+        """The value, on one line."""
+        return f"{self.value:.6g}" if isinstance(self.value, float) else visible(self.value)
+
+
+class ValueRefused(PodusvError):
+    """A value that the scenario cannot take."""
+
+    exit_code = 2
+
+
+@lru_cache(maxsize=1024)
+def steps_at(key: str) -> Route:
+    """`route`, remembered, as every draw asks for the same keys."""
+    return route(key)
+
+
+def content(scenario: Scenario, steps: Route) -> Any:
+    """What a scenario has at a key. Raises LookupError where it has no such key."""
+    return reduce(_inside, steps, scenario)
+
+
+@lru_cache
+def _fields(kind: type[Component]) -> frozenset[str]:
+    return frozenset(kind.model_fields)
+
+
+def _inside(whole: Any, step: str | int) -> Any:
+    if isinstance(whole, Component) and step in _fields(type(whole)):
+        return getattr(whole, str(step))
+    if isinstance(whole, tuple) and isinstance(step, int):
+        return whole[step]
+    raise LookupError(step)
+
+
+def described(scenario: Scenario, steps: Route) -> Key:
+    """What the models say of a key that the scenario has."""
+    way: list[str | int] = []
+    for end, step in enumerate(steps, 1):
+        kind = getattr(content(scenario, steps[:end]), "kind", None)
+        way += [step, kind] if kind else [step]
+    return keys_of(type(scenario)).follow(tuple(way))[0]
+
+
+def has(scenario: Scenario, key: str) -> bool:
+    """Whether the scenario has this key, in a section that may differ between runs."""
+    steps = route(key)
+    try:
+        content(scenario, steps)
+    except LookupError:
+        return False
+    return bool(steps) and dotted(steps) == key and steps[0] in PER_RUN
+
+
+def no_entry(scenario: Scenario, steps: Route) -> str:
+    """What a list on the way has, where the step behind it is none of its places; else empty."""
+    for end in range(1, len(steps)):
+        if not has(scenario, dotted(steps[:end])):
+            return ""
+        whole, step = content(scenario, steps[:end]), steps[end]
+        if isinstance(whole, tuple) and not (isinstance(step, int) and step < len(whole)):
+            kinds = [getattr(part, "kind", None) for part in whole]
+            return entries_of(dotted(steps[:end]), kinds)
+    return ""
+
+
+def is_whole(key: Key) -> bool:
+    """Whether the value is a whole number, and no other."""
+    return int in key.types and float not in key.types
+
+
+def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
+    """The scenario with new values at these places.
+
+    Null defaults follow what they are sized by, as they do when a scenario is loaded. Raises
+    ValueRefused for a value that is out of range, or that contradicts another.
+    """
+    given: dict[str, dict[Route, Number]] = {}
+    for (section, *rest), number in new.items():
+        given.setdefault(str(section), {})[tuple(rest)] = number
+    made = scenario.model_copy(
+        update={section: _section(scenario, section, new) for section, new in given.items()}
+    )
+    try:
+        made = made.in_numbers()
+    except SizingError as error:
+        raise ValueRefused(str(error)) from error
+    for key, told in of_numbers(made):
+        raise ValueRefused(
+            f"{new[steps].source if (steps := steps_at(key)) in new else ''}{key}: {told}"
+        )
+    return made
+
+
+def _section(scenario: Scenario, section: str, new: Mapping[Route, Number]) -> Any:
+    """A section with new values at these places, checked by its own model."""
+    old = getattr(scenario, section)
+    if not isinstance(old, tuple):
+        return _part(scenario, (section,), old, new)
+    each = [{steps[1:]: n for steps, n in new.items() if steps[0] == i} for i in range(len(old))]
+    return tuple(
+        _part(scenario, (section, i), part, own) if own else part
+        for i, (part, own) in enumerate(zip(old, each, strict=True))
+    )
+
+
+def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Number]) -> Component:
+    data: Any = old.model_dump()
+    for place, number in new.items():
+        data = _with(data, place, number.value)
+    try:
+        return old.changed({str(place[0]): data[place[0]] for place in new})
+    except ValidationError as error:
+        raise ValueRefused(_sentence(scenario, at, new, error)) from error
+
+
+def _with(whole: Any, steps: Route, new: Any) -> Any:
+    """Plain data with another value at a place."""
+    if not steps:
+        return new
+    step, *rest = steps
+    inner = _with(whole[step], tuple(rest), new)
+    if isinstance(step, int):
+        return (*whole[:step], inner, *whole[step + 1 :])
+    return {**whole, step: inner}
+
+
+def _sentence(
+    scenario: Scenario, at: Route, new: Mapping[Route, Number], error: ValidationError
+) -> str:
+    """The first complaint, as a sentence with source, key, value and range."""
+    complaint = error.errors(include_url=False)[0]
+    place = next((steps for steps in new if complaint["loc"][: len(steps)] == steps), None)
+    if place is None:
+        reason = complaint.get("ctx", {}).get("error", complaint["msg"])
+        numbers = ", ".join(f"{dotted((*at, *s))} = {x}" for s, x in new.items())
+        return f"{dotted(at)}: {reason}, with {numbers}"
+    key = described(scenario, (*at, *place))
+    number = new[place]
+    advice = hint(number.value, key.types) if isinstance(number.value, str) else ""
+    return f"{number.source}{dotted(key.path)} = {number}; must be {key.wanted}{advice}"
