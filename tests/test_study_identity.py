@@ -160,7 +160,7 @@ def test_a_study_that_was_killed_while_its_draws_were_raised_goes_on(tmp_path, m
     assert done.tally.wanted == done.results.wanted == 2 * asked
 
 
-def test_invalid_draws_are_told_before_the_first_run(tmp_path):
+def test_invalid_runs_are_told_before_the_first_run(tmp_path):
     config = written(
         tmp_path / "small.yaml", ("uniform: [0.7, 1.3]", "normal: {mean: 1, sigma: 0.7}")
     )
@@ -172,10 +172,10 @@ def test_invalid_draws_are_told_before_the_first_run(tmp_path):
     request = sweep.Request(("sweep.draws=12",), units.parent, figures=False, warn=warn)
     done = sweep.run(config, request, lambda tally: None)
     runs = studies.stored(done.folder).runs()
-    count = int(runs.broken("pid").sum())
-    assert 0 < count < 12
+    count = sum(int(runs.broken(law).sum()) for law in ("pid", "li"))
+    assert 0 < count < 24
     ((text, there),) = told
-    assert text.startswith(f"invalid draws: {count} of 12 (")
+    assert text.startswith(f"invalid runs: {count} of 24 tried (")
     assert "; draw " in text
     assert there == 0
 

@@ -19,7 +19,7 @@ from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.study.cells import cells
 from podusv_cli.studies.study.check import singles, sweep_faults
-from podusv_cli.studies.study.invalid import invalid_draws
+from podusv_cli.studies.study.invalid import invalid_runs
 
 CONFIGS = ROOT / "configs"
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss
@@ -93,7 +93,7 @@ def verdict(path: Path) -> str:
         made = [cell.scenario for cell in cells(loaded, sweep_faults)]
         if sweep := loaded.scenario.sweep:
             runs = [one for scenario in made for one in singles(scenario).values()]
-            invalid_draws(runs, sweep, min(sweep.draws, 20))
+            invalid_runs(runs, sweep, 20 * len(runs))
     except ScenarioError as error:
         return str(error)
     return "ok"
