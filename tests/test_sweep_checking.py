@@ -58,6 +58,11 @@ IN_VARY = [
         "hull: @{times: {uniform: [1, 2]}}",
         "'hull'; a quantity with a name of your own needs `keys`",
     ),
+    (
+        "actuator.command.delay: @{angle: all}",
+        "write this section first, as in actuator.command: {",
+    ),
+    ("actuator.command.wait: @{angle: all}", "unknown key 'actuator.command.wait'"),
     ("vessel: @{angle: all}", "vessel is no number but a section"),
     ("path.points: @{angle: all}", "unknown key 'path.points'"),
     ("vessel.source: @{choice: [me]}", "vessel.source is no number but \"The paper's"),

@@ -28,7 +28,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.phrases import did_you_mean, found, unknown
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.scenario.yaml_tree import Route, route
+from podusv_cli.scenario.yaml_tree import Route, dotted, route
 from podusv_cli.studies.study.claims import parse
 from podusv_cli.studies.study.draws import drawn
 from podusv_cli.studies.study.expressions import parse_success
@@ -122,7 +122,8 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     lacking = [label for label, one in laws.items() if not has(one, key)]
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
-        beyond = next(filter(None, (no_entry(one, steps) for one in laws.values())), "")
+        whys = (why(one, steps) for one in laws.values() for why in (no_entry, no_section))
+        beyond = next(filter(None, whys), "")
         free = "" if quantity.keys or len(steps) > 1 else FREE_NAME
         yield beyond or f"unknown key {key!r}{near or free}"
     elif lacking:
@@ -131,6 +132,22 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
         yield f"{who}; name the laws that have it, {having}, in sweep.laws"
     else:
         yield from (t for one in laws.values() for t in _type(key, quantity, one))
+
+
+def no_section(scenario: Scenario, steps: Route) -> str:
+    """Which section on the way is null, where it could have the key; else empty."""
+    for end in range(1, len(steps)):
+        at, inner = dotted(steps[:end]), dotted(steps[end:])
+        if not has(scenario, at):
+            return ""
+        if content(scenario, steps[:end]) is None and described(scenario, steps[:end]).follow(
+            steps[end:]
+        ):
+            return (
+                f"{at} is null, and a draw changes what is there; write this section first, as in "
+                f"{at}: {{{inner}: ...}}"
+            )
+    return ""
 
 
 def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
