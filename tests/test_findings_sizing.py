@@ -76,6 +76,16 @@ def test_a_number_far_from_the_rule_s_is_told_and_a_near_one_is_not(far, near):
     assert not told("gains-for-another-hull", boat(f"controller.{near}"))
 
 
+def test_a_small_U_is_told_only_where_the_path_asks_for_more():
+    """Of 1.66 m/s that hull and actuator make, 0.5 m/s are enough for a path of 0.3 m/s."""
+    slow = "path.speed=0.3"
+    assert not told("gains-for-another-hull", boat("controller.U=0.5", slow))
+    assert told("gains-for-another-hull", boat("controller.U=0.4", slow))
+    assert told("gains-for-another-hull", boat("controller.U=3.5", slow))
+    reached = [run(boat(*own, slow))["leg"][-1] for own in ((), ("controller.U=0.5",))]
+    assert reached[0] == reached[1] > 0
+
+
 def test_a_hull_that_outruns_its_steering_cuts_its_corners():
     slow, fast = "path.speed=0.3", "path.speed=1.2"
     lazy = "controller.k_psi=0.18"
@@ -120,6 +130,8 @@ def test_sigmas_are_those_of_the_sensors():
     noise = "measurement={kind: sensors, position: {noise: 0.3, bias: 0.4}, yaw_rate: null}"
     found = boat(noise, "estimator={kind: ekf, sigma_psi: 0.04}").estimator
     assert (found.sigma_p, found.sigma_psi, found.sigma_u) == (0.5, 0.04, 0.02)
+    given = boat("measurement={kind: sensors, heading: {noise: 0.0123456}}", "estimator.kind=ekf")
+    assert given.estimator.sigma_psi == 0.0123456, "a sensor's own number is not rounded"
 
 
 # --- units

@@ -33,6 +33,7 @@ def noise(place: int) -> Rule:
     return Rule(
         "noise and bias of the sensor itself, {:g} where it has none",
         lambda facts, default: facts.noise[place] or default,
+        exact=True,
     )
 
 

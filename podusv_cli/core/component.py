@@ -46,6 +46,7 @@ class Rule(NamedTuple):
 
     words: str  # with {:g} for the model ship's number
     of: Callable[[Any, float], float]  # from `components.facts` and the model ship's number
+    exact: bool = False  # another key's number, not rounded to DIGITS
 
 
 class Component(BaseModel):
@@ -86,8 +87,9 @@ class Component(BaseModel):
 
     def by_default(self, name: str, facts: Any) -> float:
         """The number of a rule. Raises SizingError where there is none above 0."""
+        rule = self.rules[name]
         try:
-            number = self.rules[name].of(facts, type(self).model_fields[name].default)
+            number = rule.of(facts, type(self).model_fields[name].default)
         except (ArithmeticError, ValueError):
             number = math.nan
         if not 0.0 < number < math.inf:
@@ -96,7 +98,7 @@ class Component(BaseModel):
                 f"{name} of {what} does not follow from hull and actuator ({facts.in_words()}); "
                 "give it a number, or check vessel and actuator"
             )
-        return float(f"{number:.{DIGITS}g}")
+        return number if rule.exact else float(f"{number:.{DIGITS}g}")
 
     def changed(self, new: Mapping[str, Any]) -> Self:
         """With other values, checked. Raises ValidationError."""

@@ -14,6 +14,7 @@ from podusv_cli.findings.reference import median
 
 # Of the rule's number, what a number of the scenario's own may be at least and at most.
 USUAL = {"U": (0.5, 2.0), "N_m": (0.3, 3.0), "k_psi": (0.2, 100.0)}
+AMPLE = 1.5  # of the path's speed, a U that catches up with it
 BEARABLE = 2.0  # times c/T_r, the largest k_psi
 AGILE = 0.8  # of the path's speed over the length, the least gain of the heading
 
@@ -52,15 +53,18 @@ def _why(name: str, number: float, found: float, facts: Facts) -> str:
 
 @before(
     "gains-for-another-hull", about="controller", meaning="a gain belongs to another hull",
-    condition=f"U outside {USUAL['U'][0]:g} to {USUAL['U'][1]:g} times, N_m outside "
-    f"{USUAL['N_m'][0]:g} to {USUAL['N_m'][1]:g} times what follows from hull and actuator, or "
-    f"k_psi below {USUAL['k_psi'][0]:g} times that or above {BEARABLE:g} c/T_r",
+    condition=f"U outside {USUAL['U'][0]:g} to {USUAL['U'][1]:g} times (a small one only below "
+    f"{AMPLE:g} times the path's speed), N_m outside {USUAL['N_m'][0]:g} to {USUAL['N_m'][1]:g} "
+    f"times what follows from hull and actuator, or k_psi below {USUAL['k_psi'][0]:g} times that "
+    f"or above {BEARABLE:g} c/T_r",
     remedy="leave the key out, or write null: it then follows from hull and actuator",
 )  # fmt: skip
 def gains_for_another_hull(case: Case) -> Sentences:
     """Speed, moment or pace are not those of this hull with this actuator."""
-    law = case.scenario.controller
+    law, asked = case.scenario.controller, float(case.reference.speed.max())
     for name, (number, found, why) in other_numbers(law, case.facts).items():
+        if name == "U" and AMPLE * asked <= number < found:
+            continue
         unit = unit_of(type(law).model_fields[name])
         yield At(
             f"controller.{name}",
