@@ -172,9 +172,12 @@ def test_findings_tell_of_a_leg_too_short_and_of_legs_that_are_left() -> None:
 
 
 def test_a_trial_leaves_the_legs_aside_and_no_finding_asks_for_them() -> None:
-    warnings = run("zigzag", **{"simulation.duration": 2.0}).warnings
-    assert any("trial-unfinished" in one for one in warnings)
-    assert not any("never-arrives" in one for one in warnings)
+    trial = run("zigzag", **{"simulation.duration": 2.0})
+    assert any("trial-unfinished" in one for one in trial.warnings)
+    assert not any("never-arrives" in one for one in trial.warnings)
+    of_legs = {"e_ct_integral", "e_ct_rms", "e_ct_max", "e_ct_steady", "path_time", "path_done"}
+    assert not of_legs & set(trial.metrics.index)
+    assert of_legs <= set(run("los_pid", **{"simulation.duration": 2.0}).metrics.index)
 
 
 def test_a_number_that_a_run_has_not_is_never_or_a_dash(podusv: Any, tmp_path: Any) -> None:

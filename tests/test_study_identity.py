@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from textwrap import dedent
 
 import h5py
 import pytest
@@ -178,6 +179,32 @@ def test_invalid_runs_are_told_before_the_first_run(tmp_path):
     assert text.startswith(f"invalid runs: {count} of 24 tried (")
     assert "; draw " in text
     assert there == 0
+
+
+def test_laws_of_a_study_may_have_different_metrics(tmp_path):
+    """Two trials and a law; a log is kept of each, and compared with the table."""
+    text = """
+    vessel: {preset: otter}
+    actuator: {kind: pod, preset: otter}
+    path: {kind: legs, points: [[0, 0], [60, 0], [60, 60]]}
+    disturbance: {kind: none}
+    controllers:
+      zigzag: {kind: zigzag, execute: 0.5}
+      circle: {kind: turning_circle, execute: 0.5}
+      los: {kind: los_pid}
+    simulation: {duration: 60.0, step: 0.05}
+    sweep: {draws: 3, keep: {draws: [0]}, vary: {vessel.m: {times: {uniform: [0.9, 1.1]}}}}
+    """
+    (tmp_path / "a.yaml").write_text(dedent(text))
+    request = sweep.Request(out=tmp_path / "out", workers=1, figures=False)
+    done = sweep.run(tmp_path / "a.yaml", request, lambda tally: None)
+    rows = done.results.summary.set_index(["law", "metric"]).index
+    of_law = {law: {metric for one, metric in rows if one == law} for law in done.results.runs.laws}
+    assert [law for law in of_law if "e_ct_rms" in of_law[law]] == ["los"]
+    assert [law for law in of_law if "overshoot_1" in of_law[law]] == ["zigzag"]
+    assert [law for law in of_law if "advance" in of_law[law]] == ["circle"]
+    assert not done.missing
+    assert not done.results.contradicted
 
 
 def placed_in(path, dataset):

@@ -41,9 +41,13 @@ def _rms(seen: Vector, step: float) -> float:
     return math.sqrt(seen[SQUARE] / seen[TIME]) if seen[TIME] else math.nan
 
 
-OF = Accumulator(
-    watch, lambda layout: SIZE if layout.loop.path.places == PLACES else 0, _constants, INTEGRALS
-)
+def _size(layout: Measured) -> int:
+    """A manoeuvring trial leaves the path aside."""
+    follows = layout.loop.path.places == PLACES and layout.loop.controller.trial() is None
+    return SIZE if follows else 0
+
+
+OF = Accumulator(watch, _size, _constants, INTEGRALS)
 e_ct_integral = Metric(
     "e_ct_integral",
     "m s",

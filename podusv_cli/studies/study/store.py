@@ -20,7 +20,7 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
@@ -183,12 +183,14 @@ class Store:
         """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
         there = (result for earlier in self._earlier() for result in earlier.results())
         for result in chain(there, filter(None, (read(path, self.seal) for path in paths))):
-            if set(result.metrics) != set(self.plan.metrics):
+            if not set(result.metrics) <= set(self.plan.metrics):
                 raise StorageError(
                     f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the "
                     "runs; restore the file"
                 )
-            yield result
+            undefined = np.full(result.unit.count, np.nan)  # of laws that do not have a metric
+            metrics = {name: result.metrics.get(name, undefined) for name in self.plan.metrics}
+            yield replace(result, metrics=metrics)
 
     def runs(self) -> runs_file.Table:
         """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
