@@ -7,7 +7,7 @@ import os
 from types import MappingProxyType
 
 import pytest
-from tune_samples import contents, planned, searched, tuned
+from tune_samples import contents, planned, searched, toy, tuned
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.studies.study.store import RUNS, UNITS, Store
@@ -82,6 +82,28 @@ def test_a_folder_without_its_scenario_says_how_to_go_on(tmp_path, monkeypatch):
     (tmp_path / "out" / place.SCENARIO).unlink(missing_ok=True)
     with pytest.raises(UsageError, match="podusv tune CONFIG --out"):
         place.check(tmp_path / "out")
+
+
+def test_force_begins_a_search_anew_and_spares_what_is_no_search(tmp_path, optuna):
+    def run(train, *, force):
+        changes = ("tune.budget=32", "tune.repeats=1", f"tune.train={train}")
+        request = workflow.Request(changes, tmp_path / "out", 1, figures=False, force=force)
+        return workflow.tune(toy(tmp_path), request, lambda tally, text: None)
+
+    run(4, force=False)
+    with pytest.raises(UsageError, match="begin anew with --force"):
+        run(2, force=False)
+    (tmp_path / "out/mine.txt").write_text("")
+    with pytest.raises(UsageError, match=r"mine\.txt"):
+        run(2, force=True)
+    assert (tmp_path / "out" / place.TUNED).exists()
+    (tmp_path / "out/mine.txt").unlink()
+    anew = contents(run(2, force=True).folder)
+    again = workflow.Request(workers=1, figures=False, trust=True, force=True)
+    workflow.tune(tmp_path / "out", again, lambda tally, text: None)
+    assert anew == contents(tmp_path / "out")
+    (tmp_path / "out").rename(tmp_path / "before")
+    assert anew == contents(run(2, force=False).folder)
 
 
 def validation(folder, gain):

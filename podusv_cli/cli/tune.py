@@ -27,6 +27,9 @@ def tune(
     scheduler: options.Scheduler = "",
     allow_mixed: options.AllowMixed = False,
     trust: options.Trust = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Remove the search that is there, and begin anew.")
+    ] = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -44,7 +47,8 @@ def tune(
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
             assign or (), out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed,
-            trust, say=line.say, warn=line.warn, begin=silent if quiet or as_json else line.note,
+            trust, say=line.say, warn=line.warn, force=force,
+            begin=silent if quiet or as_json else line.note,
         )  # fmt: skip
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections.abc import Collection
 from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -99,6 +101,28 @@ def check(folder: Path) -> Manifest:
 def foreign(folder: Path, manifest: Manifest) -> list[str]:
     """Files in `folder` that the manifest does not list, sorted."""
     return sorted(set(atomic.names_inside(folder)) - set(manifest.files) - {NAME})
+
+
+def remove(folder: Path, what: str, proof: str, unfinished: Collection[str]) -> None:
+    """Remove what a folder holds, if it has the file `proof`, which says that it is a `what`.
+
+    `unfinished` are the other names in a folder that has no manifest yet. Raises UsageError where
+    there is something else, too. `proof` goes last, because without it a folder that is not empty
+    is somebody else's.
+    """
+    if not (folder / proof).exists():
+        return
+    listed = read(folder).files if (folder / NAME).exists() else ()
+    own = {name.partition("/")[0] for name in (*listed, *unfinished, proof, NAME)}
+    there = {path.name for path in folder.iterdir()} - set(atomic.LOCKS)
+    if others := sorted(there - own):
+        raise UsageError(
+            f"{folder} holds {others[0]}, which is not the {what}'s; --force would remove it"
+        )
+    with atomic.storage_errors(f"cannot remove the {what} in {folder}"):
+        for name in sorted(there, key=lambda name: name == proof):
+            path = folder / name
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def _entry(path: Path) -> FileEntry:

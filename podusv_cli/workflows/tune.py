@@ -92,9 +92,9 @@ def tune(config: Source, request: Request, tell: Tell) -> Tuned:
 def _tuned(
     loaded: Loaded, folder: Path, request: Request, started: datetime, tell: Tell
 ) -> Tuned:  # fmt: skip
-    """Search what is not there yet in a folder that no other process writes into."""
-    plan = TunePlan(loaded.scenario)
-    told = place.known(folder, plan)
+    """Search what is not there yet, or all anew; no other process writes into the folder."""
+    plan, texts = TunePlan(loaded.scenario), scenario_texts(loaded)
+    told = None if request.force else place.known(folder, plan)
     plan = replace(plan, idle=told.idle if told else _idle(plan, request))
     if not any(plan.gains.values()):
         raise UsageError(
@@ -102,7 +102,9 @@ def _tuned(
             "is a gain that changes a run; add a law with gains to `controllers`"
         )
     stamp = started.isoformat(timespec="seconds")
-    place.write(folder, plan, told, stamp, scenario_texts(loaded))
+    if request.force:  # by now, nothing that is asked for is wrong
+        place.clear(folder)
+    place.write(folder, plan, told, stamp, texts)
     request.begin(f"{plan.size}; in {folder}")
     with engine_for(request, folder, plan.scenario, digest(plan.base.identity)) as engine:
         results = _simulated(plan, folder, request, started, engine, tell)

@@ -17,7 +17,6 @@ import hashlib
 import json
 import math
 import os
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import astuple, replace
@@ -40,7 +39,7 @@ from podusv_cli.studies.study.unit import Unit, UnitResult
 
 UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
-UNFINISHED = (STUDY, SCENARIO, UNITS, RUNS, FOLDER, "provenance.json")  # in any study's folder
+UNFINISHED = (SCENARIO, UNITS, RUNS, FOLDER, "provenance.json")  # in any study's folder
 FORMAT = 1
 SEAL = "sha256"
 
@@ -106,24 +105,9 @@ class Store:
     def clear(self) -> None:
         """Remove the study that the folder holds, whichever it is.
 
-        Raises UsageError where the folder has something else, too. study.json goes last, because a
-        folder without it that is not empty is no study.
+        Raises UsageError where the folder has something else, too.
         """
-        if not (self.folder / STUDY).exists():
-            return
-        finished = (self.folder / manifest.NAME).exists()
-        listed = manifest.read(self.folder).files if finished else ()
-        own = {name.partition("/")[0] for name in (*listed, *UNFINISHED, manifest.NAME)}
-        there = {path.name for path in self.folder.iterdir()}
-        if foreign := sorted(there - own - set(files.LOCKS)):
-            raise UsageError(
-                f"{self.folder} holds {foreign[0]}, which is not the study's; --force would remove "
-                "it"
-            )
-        with files.storage_errors(f"cannot remove the study in {self.folder}"):
-            for name in sorted(there - set(files.LOCKS), key=lambda name: name == STUDY):
-                path = self.folder / name
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        manifest.remove(self.folder, "study", STUDY, UNFINISHED)
 
     def _metrics(self) -> dict[str, Any]:
         """What a reader without the study's plug-ins has to know of its metrics."""

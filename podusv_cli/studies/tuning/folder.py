@@ -10,16 +10,18 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveInt
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.load import yaml_text
+from podusv_cli.scenario.plugins import FOLDER
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.scenario.tune import Tune
-from podusv_cli.storage import files, json_files
+from podusv_cli.storage import files, json_files, manifest
 from podusv_cli.studies.study.plan import disagreements
 from podusv_cli.studies.study.store import SCENARIO
-from podusv_cli.studies.tuning import sampler, trials
+from podusv_cli.studies.tuning import sampler, trials, validation
 from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.results import Results
 
 TUNE, TUNED = "tune.json", "tuned.yaml"
+UNFINISHED = (SCENARIO, TUNED, trials.FOLDER, validation.FOLDER, FOLDER, "provenance.json")
 FORMAT = 3
 
 
@@ -65,10 +67,16 @@ def known(folder: Path, plan: TunePlan) -> Record | None:
     told = json_files.read_as(folder / TUNE, Record)
     if different := disagreements(told.identity, _identity(plan)):
         raise UsageError(
-            f"{folder} holds another search: {different}; name another folder with --out"
+            f"{folder} holds another search: {different}; name another folder with --out, or begin "
+            "anew with --force"
         )
     _as_much(folder, _asked(told), plan.tune)
     return told
+
+
+def clear(folder: Path) -> None:
+    """Remove the search that is there. Raises UsageError where there is something else, too."""
+    manifest.remove(folder, "search", TUNE, UNFINISHED)
 
 
 def _asked(told: Record | None) -> list[dict[str, Any]]:
@@ -119,8 +127,8 @@ def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> 
         there = max((one[key] for one in history), default=0)
         if getattr(tune, key) < there:
             raise UsageError(
-                f"{folder} has {key}: {there} ({unit}); ask for as many or more, or name another "
-                "folder with --out"
+                f"{folder} has {key}: {there} ({unit}); ask for as many or more, name another "
+                "folder with --out, or begin anew with --force"
             )
 
 
