@@ -15,8 +15,9 @@ from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.network import Network
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import replayer
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import run, simulate
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
@@ -146,7 +147,9 @@ def law_costs(rounds: int = 15) -> dict[str, dict[str, list[float]]]:
     The ratio is to adaptive_neural with 27 nodes, round by round.
     """
     replays = {
-        name: replayer(loop, simulate(loop, grid(log_every=10))) for name, loop in rivals().items()
+        name: replayer(plan, run(plan))
+        for name, loop in rivals().items()
+        for plan in [Plan(loop, grid(log_every=10))]
     }
     times = in_turns(replays, rounds)
     return {

@@ -14,6 +14,8 @@ import numpy.typing as npt
 
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.engine.step.grid import TimeGrid
 
 Array = npt.NDArray[np.float64]
 
@@ -95,7 +97,7 @@ class Loop:
         self.parts: Any = loop
         self.ship, self.law = Ship(loop.vessel), Law(loop.controller, loop.nominal)
         held = 2  # numbers of podusv's memory that this law does not have
-        self.start = np.concatenate([loop.start, loop.first_memory()[held:]])
+        self.start = np.concatenate([loop.start, Plan(loop, TimeGrid(1.0, 1)).first_memory[held:]])
 
     def target(self, t: float) -> Array:
         """Position and velocity on the straight part of the path."""

@@ -115,7 +115,7 @@ def component_kind(component: Component) -> str:
 
 def keeps_its_declaration(component: Component) -> None:
     """Signals, memory and constants are as declared, every output is written."""
-    check_law(loop_with(component))
+    check_law(Plan(loop_with(component), TimeGrid(STEP, STEPS)))
 
 
 def is_finite(component: Component) -> None:

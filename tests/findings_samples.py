@@ -8,7 +8,7 @@ from conftest import PACKAGE
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import preflight
+from podusv_cli.findings.finding import Case, preflight
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -41,9 +41,9 @@ def finding(code: str, *overrides: str) -> Finding:
 @lru_cache(maxsize=3)  # a recording takes up to 40 MB, which every process started after it copies
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
-    scenario = scene(*overrides).alone()
-    recording = execute.simulated(scenario, execute.Stopwatch())
-    return recording, execute.summary(scenario, recording, Extras())
+    case = Case(scene(*overrides).alone())
+    recording = execute.simulated(case, execute.Stopwatch())
+    return recording, execute.summary(case, recording, Extras())
 
 
 def log(*overrides: str) -> Recording:

@@ -14,6 +14,8 @@ from podusv_cli.components.paths.circle import Circle
 from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.engine.step.grid import TimeGrid
 
 # A trial takes samples, so it is no differential equation; a schedule does not look at the target.
 CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).takes_samples()}
@@ -106,7 +108,7 @@ def right_hand_side(t: float, s: Vector) -> Vector:
 
 def test_the_corrected_run_agrees_with_dop853_on_equations_written_out_anew():
     loop = corrected()
-    first = np.concatenate([loop.start, loop.first_memory()[2:]])
+    first = np.concatenate([loop.start, Plan(loop, TimeGrid(0.01, 1)).first_memory[2:]])
     other = solve_ivp(
         right_hand_side, (0, 10), first, method="DOP853", rtol=1e-12, atol=1e-12,
         t_eval=np.arange(11.0),

@@ -10,7 +10,9 @@ from podusv_cli.components.controllers.base import Slots
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
+from podusv_cli.engine.step.grid import TimeGrid
 
 E_CT = Signal("e_ct", "m", "cross-track error")
 MODES = Signal("modes", "m", "amplitudes of the modes", axes=("mode",))
@@ -53,7 +55,7 @@ def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use
 @pytest.mark.parametrize("compiled", [True, False])
 def test_a_law_without_psi_e_runs_and_its_recording_says_what_it_logged(compiled):
     loop = corrected(controller=CrossTrack())
-    check_law(loop)
+    check_law(Plan(loop, TimeGrid(0.01, 1)))
     out = run(loop, 0.3, compiled=compiled)
     assert "psi_e" not in out
     assert out.about["e_ct"] is E_CT

@@ -34,6 +34,7 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
 
@@ -276,10 +277,10 @@ def test_no_steps_is_the_start_alone():
 
 def test_a_run_leaves_its_loop_as_it_was():
     loop = corrected()
-    before = loop.first_memory()
+    before = Plan(loop, TimeGrid(0.01, 1)).first_memory
     run(loop, 1.0)
     assert isinstance(loop, ClosedLoop)
-    np.testing.assert_array_equal(loop.first_memory(), before)
+    np.testing.assert_array_equal(Plan(loop, TimeGrid(0.01, 1)).first_memory, before)
 
 
 def test_an_interrupt_after_the_last_step_does_not_cut_a_run_short():

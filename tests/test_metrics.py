@@ -294,7 +294,8 @@ def test_settling_is_read_between_the_instants():
 
 def test_every_metric_is_computed_and_documented(limited):
     log, got = limited
-    (cost,) = law_costs([(corrected(), log)])
+    plan = Plan(corrected(), TimeGrid(0.01, 1))
+    (cost,) = law_costs([(plan, log)])
     _, of_pods = gathered(corrected(actuator=example(Pods)), steps=10)
     trials = [corrected(controller=kind()) for kind in (TurningCircle, Zigzag, Stopping)]
     of_trials = {name for trial in trials for name in gathered(trial, steps=10)[1]}
@@ -304,10 +305,7 @@ def test_every_metric_is_computed_and_documented(limited):
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in OF_OPTIMUM.values()} | set(OF_LOOP)  # there only
     simulated = (
-        set(got | cost | operations(corrected(), log) | of_pods)
-        | of_estimates
-        | of_trials
-        | of_path
+        set(got | cost | operations(plan, log) | of_pods) | of_estimates | of_trials | of_path
     )
     assert always == simulated | compared
     assert set(of_pods) > set(got)
@@ -318,7 +316,9 @@ def test_every_metric_is_computed_and_documented(limited):
 def test_full_derivatives_cost_more_than_pid():
     """A replay that timed nothing would not tell the cheapest law from the dearest."""
     dear, cheap = corrected(controller=FullBackstepping()), corrected(controller=Pid())
-    costs = law_costs([(loop, gathered(loop, steps=500)[0]) for loop in (dear, cheap)])
+    costs = law_costs(
+        [(Plan(loop, TimeGrid(0.01, 1)), gathered(loop, steps=500)[0]) for loop in (dear, cheap)]
+    )
     assert costs[0]["law_ns"] > 1.3 * costs[1]["law_ns"] > 0
 
 

@@ -14,7 +14,7 @@ from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import kernel, scratch
 from podusv_cli.core.kinematics import direction
 from podusv_cli.engine.loop.recent import Recent
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import run
 from podusv_cli.metrics.operations import Tally, operations
 from podusv_cli.scenario.load import load
 
@@ -59,9 +59,8 @@ def counts(*keys):
     scenario = load(CONFIGS / "mu_2017/corrected_compare.yaml", ["simulation.duration=1", *keys])
     found = {}
     for name, one in scenario.scenario.singles().items():
-        loop = one.closed_loop()
-        recording = simulate(loop, one.time_grid())
-        found[name] = operations(loop, recording)["law_operations"]
+        plan = one.plan()
+        found[name] = operations(plan, run(plan))["law_operations"]
     return found
 
 

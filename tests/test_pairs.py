@@ -25,6 +25,7 @@ from podusv_cli.core.kernel import LANES
 from podusv_cli.export import link
 from podusv_cli.export.check import check
 from podusv_cli.export.law import ExportedLaw
+from podusv_cli.findings.finding import Case
 from podusv_cli.interface.results import Run
 from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
@@ -77,7 +78,7 @@ def signals(run: Run) -> Mapping[str, Any]:
 
 def marched(scenario: Scenario) -> Mapping[str, Any]:
     """What a run logs, without what is made of its log."""
-    return simulated(scenario, Stopwatch()).signals
+    return simulated(Case(scenario), Stopwatch()).signals
 
 
 @pair

@@ -15,10 +15,8 @@ import pytest
 
 from podusv_cli.comparison.claims import judge, parse_claims
 from podusv_cli.comparison.entries import Entry
-from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running import simulate as simulation
 from podusv_cli.metrics.operations import operations
-from podusv_cli.metrics.table import observer
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
 
@@ -83,13 +81,9 @@ def committed(letter):
 
 def rerun(scenario):
     """A run without a folder, as a comparison sees it; nothing is timed."""
-    loop, grid, settings = scenario.closed_loop(), scenario.time_grid(), scenario.metrics
-    seeing = observer(
-        Plan(loop, grid), steady_fraction=settings.steady_fraction,
-        settling_radius=settings.settling_radius,
-    )  # fmt: skip
-    recording = simulate(loop, grid, observer=seeing)
-    numbers = seeing.summary(recording.seen) | operations(loop, recording)
+    plan = scenario.plan()
+    recording = simulation.run(plan)
+    numbers = plan.observer.summary(recording.seen) | operations(plan, recording)
     run = SimpleNamespace(recording=recording, metrics=numbers)
     return Entry("", run, scenario)
 

@@ -318,7 +318,7 @@ def test_a_scenario_of_a_plug_in_keeps_following_in_another_process(tmp_path):
 
 def test_an_exported_law_has_the_numbers():
     exported = ExportedLaw.of(loaded().scenario)
-    names = tuple(exported.loop.law_constants())
+    names = tuple(exported.plan.law_constants)
     assert exported.vectors.law[names.index("N_m")] == law().N_m
 
 

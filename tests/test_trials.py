@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
+from podusv_cli.findings.finding import Case
 from podusv_cli.findings.outcome import trial_unfinished
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load_text
@@ -34,8 +35,9 @@ def done(name, *sets, hull=MODEL):
     """Scenario, recording and metrics of a shipped trial."""
     text = f"extends: podusv:trials/{name}.yaml\nname: trial\n{hull}"
     scenario = load_text(text, "trial.yaml", sets).scenario.alone()
-    recording = simulated(scenario, Stopwatch())
-    return scenario, recording, summary(scenario, recording, Extras())
+    case = Case(scenario)
+    recording = simulated(case, Stopwatch())
+    return scenario, recording, summary(case, recording, Extras())
 
 
 def slope(scenario, angle):

@@ -22,6 +22,7 @@ from podusv_cli.components.controllers.network import activation
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import rates_replay
+from podusv_cli.findings import finding
 from podusv_cli.findings.stability import loops, sampled_growth
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load
@@ -71,10 +72,11 @@ def laws(config: str, *overrides: str) -> dict[str, Scenario]:
 
 def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     """Metrics and log of a run."""
-    recording = simulated(scenario, Stopwatch())
+    case = finding.Case(scenario)
+    recording = simulated(case, Stopwatch())
     seen = recording.seen
     assert seen is not None  # it was observed
-    return scenario.observer().summary(seen), recording
+    return case.plan.observer.summary(seen), recording
 
 
 def errors(scenario: Scenario) -> dict[str, float]:

@@ -37,7 +37,7 @@ def validate(
     fits neither on the disk nor into memory.
     """
     from podusv_cli.comparison.claims import parse_claims
-    from podusv_cli.findings.finding import unknown_codes
+    from podusv_cli.findings.finding import Case, merged, unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
     from podusv_cli.scenario.plugins import of_files
@@ -50,9 +50,10 @@ def validate(
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
-    findings = examined(scenario)
-    for single in scenario.singles().values():
-        warm_up(single)
+    cases = {label: Case(single) for label, single in scenario.singles().items()}
+    findings = merged({label: examined(case) for label, case in cases.items()})
+    for case in cases.values():
+        warm_up(case)
     loaded.told(echo)
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
     echo(f"a run takes {largest(scenario)}", *study, *findings)

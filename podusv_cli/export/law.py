@@ -24,7 +24,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.compile import Piece, adapter, routine
 from podusv_cli.engine.step import law_alone
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
+from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.scenario.model import Scenario
 
 # What a part of the loop is called in the object file
@@ -80,8 +80,7 @@ class ExportedLaw:
     """
 
     scenario: Scenario
-    loop: ClosedLoop
-    grid: TimeGrid
+    plan: Plan
     layout: Layout
     vectors: Vectors
 
@@ -90,11 +89,11 @@ class ExportedLaw:
         """The law of a scenario with one. Raises UsageError where it takes no samples."""
         every = scenario.log.model_copy(update={"every": 1})
         scenario = scenario.model_copy(update={"log": every})
-        loop, grid = scenario.closed_loop(), scenario.time_grid()
-        if not grid.hold_every:
+        plan = scenario.plan()
+        if not plan.grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
-        law, whole = loop.controller, Plan(loop, grid).layout
-        memory, signals = whole.states - whole.memory, len(law.signals)
+        whole, signals = plan.layout, len(plan.loop.controller.signals)
+        memory = whole.states - whole.memory
         first = len(TARGET) + 1
         layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
             states=len(STATE) + memory, memory=len(STATE), place=len(STATE) + memory,
@@ -103,14 +102,21 @@ class ExportedLaw:
             sample_every=whole.sample_every, update_first=whole.update_first,
             wants_loads=whole.wants_loads,
         )  # fmt: skip
-        vectors = Vectors(**{name: np.zeros(1) for name in Vectors._fields})._replace(
-            law=np.array(list(loop.law_constants().values()) or [0.0]),
-            law_table=loop.law_table(),
-            s=np.concatenate([np.zeros(len(STATE)), loop.first_memory()]),
+        vectors = plan.vectors()._replace(
+            s=np.concatenate([np.zeros(len(STATE)), plan.first_memory]),
             row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
-            held=np.zeros(HELD_SIGNALS + signals), work=np.zeros(law.workspace()),
         )  # fmt: skip
-        return cls(scenario, loop, grid, layout, vectors)
+        return cls(scenario, plan, layout, vectors)
+
+    @property
+    def loop(self) -> ClosedLoop:
+        """The parts of the scenario's run."""
+        return self.plan.loop
+
+    @property
+    def grid(self) -> TimeGrid:
+        """The instants of the scenario's run."""
+        return self.plan.grid
 
     @property
     def period(self) -> float:
@@ -125,7 +131,7 @@ class ExportedLaw:
         return {**found, STEP: Piece(law_alone.demand, PROTOTYPE)}
 
     def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-        yield from (e for e in self.scenario.plan().functions if e.part != "path")
+        yield from (e for e in self.plan.functions if e.part != "path")
         yield "path", law_alone.target_is_there, ()
 
     @property
@@ -227,7 +233,7 @@ class ExportedLaw:
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
         """The target at these rows of a log; on a path that is followed it is beside the vessel."""
         path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
-        k, table = bundle(self.loop.path_constants()), path.table()
+        k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
             x = np.array([log[one.name][row] for one in self._given])
             place = np.array([log[one.name][row] for one in path.places])

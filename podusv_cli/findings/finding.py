@@ -15,6 +15,7 @@ from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.scenario.model import Scenario
@@ -58,9 +59,7 @@ def preflight(scenario: Scenario) -> list[Finding]:
 
     With `controllers` these are the findings for each law, merged.
     """
-    if scenario.controllers:
-        return merged({name: preflight(one) for name, one in scenario.singles().items()})
-    return _findings("before", scenario, Case(scenario))
+    return merged({name: Case(one).findings() for name, one in scenario.singles().items()})
 
 
 def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
@@ -89,9 +88,18 @@ def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Case:
-    """A scenario with one law, and what several findings need of it, computed once."""
+    """A scenario with one law, its plan, and what several findings need of it, computed once."""
 
     scenario: Scenario
+
+    def findings(self) -> list[Finding]:
+        """The findings about it before it runs, but those that it silences."""
+        return _findings("before", self.scenario, self)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """The run's loop on its grid, with the observer of all metrics."""
+        return self.scenario.plan()
 
     @cached_property
     def reference(self) -> Reference:
@@ -112,10 +120,10 @@ class Case:
     @cached_property
     def first_signals(self) -> dict[str, float]:
         """The law's signals at t = 0; NaN where undefined, as on top of the target."""
-        loop = self.scenario.closed_loop()
+        law = self.scenario.controller
         try:
-            _, _, signals = evaluated(loop, 0.0)
+            _, _, signals = evaluated(self.plan, 0.0)
         except Exception:  # `check_law` reports a faulty law before the run
-            signals = np.full(len(loop.controller.signals), np.nan)
-        names = (part.name for part in loop.controller.signals)
+            signals = np.full(len(law.signals), np.nan)
+        names = (part.name for part in law.signals)
         return dict(zip(names, signals.tolist(), strict=True))

@@ -21,7 +21,6 @@ from podusv_cli.findings.stability import (
     rk4_growth,
     sampled_growth,
 )
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.loop_margins import loop_margins
 
 UNSTABLE = 1.0 + 1e-6
@@ -35,7 +34,7 @@ LOOPS: dict[Cause, tuple[str, str, str]] = {
 
 def _too_fast(case: Case, cause: Cause) -> Sentences:
     """RK4 is unstable at this step because of a velocity loop with this cause."""
-    grid = case.scenario.time_grid()
+    grid = case.plan.grid
     reported: set[str] = set()
     for nu in () if grid.hold_every else (case.first_velocity, case.reference.working):
         for loop in loops(case.scenario, nu, cause):
@@ -60,7 +59,7 @@ def _largest_step(loop: Loop) -> float:
 
 def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
     """A velocity loop with this cause is unstable when the law is evaluated once per period."""
-    grid, period = case.scenario.time_grid(), case.scenario.control.period
+    grid, period = case.plan.grid, case.scenario.control.period
     if not grid.hold_every:
         return
     nu = case.reference.working
@@ -94,12 +93,11 @@ stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
 sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
 
 
-def _margin(scenario: Scenario) -> float:
+def _margin(case: Case) -> float:
     """The delay [s] that the loop bears; NaN where it has no steady motion, or is unstable."""
     try:
-        found = loop_margins(
-            scenario.closed_loop(), scenario.time_grid(), compiled=scenario.simulation.compiled
-        )
+        compiled = case.scenario.simulation.compiled
+        found = loop_margins(case.plan.loop, case.plan.grid, compiled=compiled)
     except (LawError, NotConvergedError):
         return math.nan
     return found.delay_margin
@@ -117,7 +115,7 @@ def delayed_loop(case: Case) -> Sentences:
     Where the path has no steady motion, the velocity loops alone are looked at.
     """
     delay = case.scenario.actuator.delay()
-    whole = _margin(case.scenario) if delay else math.nan
+    whole = _margin(case) if delay else math.nan
     if delay > whole:
         yield (
             f"on the steady part of the path the loop grows with a delay of {delay:g} s; take a "

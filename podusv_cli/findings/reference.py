@@ -91,7 +91,7 @@ def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
 
 def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Vector:
     """The disturbance on a hull at the target's position and velocity."""
-    sea, vessel = scenario.closed_loop().disturbance, scenario.vessel
+    sea, vessel = scenario.sea, scenario.vessel
     course = np.arctan2(target[:, 3] + 0.0, target[:, 2] + 0.0)  # -0.0 is no half turn
     speed = np.hypot(target[:, 2], target[:, 3])
     states = np.column_stack([target[:, :2], course, speed, 0.0 * speed, turn])

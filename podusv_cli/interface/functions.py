@@ -16,7 +16,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
-from podusv_cli.findings.finding import postflight, preflight
+from podusv_cli.findings.finding import Case, postflight
 from podusv_cli.interface.border import ParameterError
 from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
@@ -49,14 +49,13 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     >>> float(run.metrics["iae"].round()), run["z_e"].shape
     (71.0, (3001,))
     """
-    scenario = _single(loaded(source, changes))
-    recording = simulated(scenario, Stopwatch())
-    whole, _ = monitored(scenario, recording)
-    found = [*preflight(scenario), *postflight(scenario, whole)]
-    extras = Extras()
-    numbers = summary(scenario, recording, extras)
+    case, extras = Case(_single(loaded(source, changes))), Extras()
+    recording = simulated(case, Stopwatch())
+    whole, _ = monitored(case, recording)
+    found = [*case.findings(), *postflight(case.scenario, whole)]
+    numbers = summary(case, recording, extras)
     warned = tuple(map(str, (*found, *extras.missing)))
-    return Run(whole.controller, scenario, whole, numbers, warned)
+    return Run(whole.controller, case.scenario, whole, numbers, warned)
 
 
 def run(
@@ -175,12 +174,12 @@ def simulate_many(
     scenario, given = _single(loaded(source)), columns(parameters)
     if workers < 0:
         raise ParameterError(f"workers = {workers}: must be 0 (one a core) or more")
-    loop, watching = scenario.closed_loop(), scenario.observer()
+    plan, watching = scenario.plan(), scenario.observer()
     loops = [one.closed_loop() for one in scenarios(scenario, given)]
-    check_law(loop)
+    check_law(plan)
     check_words(scenario, loops, given)
     done = batch.simulate_many(
-        loops, scenario.time_grid(), observer=watching, workers=workers, side_by_side=side_by_side
+        loops, plan.grid, observer=watching, workers=workers, side_by_side=side_by_side
     )
     ends = {"status": done.status, "cause": done.cause}
     return pd.DataFrame({**given, **ends, **watching.summaries(done.seen)})

@@ -98,10 +98,12 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
     words = {key: column for key, column in given.items() if any(map(_is_word, column))}
     rows = list(enumerate(zip(*words.values(), strict=True)))
     first_rows = {combination: row for row, combination in reversed(rows)}
+    grid = scenario.time_grid()
+    first = Plan(loops[0], grid)
     for own, row in first_rows.items():
-        check_law(loops[row])
-        alike = (Plan(loops[at], scenario.time_grid()).structure for at in (row, 0))
-        if next(alike) != next(alike):
+        plan = Plan(loops[row], grid)
+        check_law(plan)
+        if plan.structure != first.structure:
             raise ParameterError(
                 f"row {row}: {_told(words, own)} changes how the loop is put together, and row 0 "
                 f"has {_told(words, rows[0][1])}; make a batch for each"

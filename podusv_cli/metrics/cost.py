@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import replayer
 from podusv_cli.metrics.metric import Metric
 
@@ -34,12 +34,12 @@ high = Metric(
 QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # positions in the sorted times
 
 
-def law_costs(runs: Sequence[tuple[ClosedLoop, Recording]]) -> list[dict[str, float]]:
+def law_costs(runs: Sequence[tuple[Plan, Recording]]) -> list[dict[str, float]]:
     """Median time of one evaluation of each law [ns], and its quartiles, over repeated replays.
 
     The laws are timed in turn, so that changes of the machine's speed affect all alike.
     """
-    replays = [replayer(loop, recording) for loop, recording in runs]
+    replays = [replayer(plan, recording) for plan, recording in runs]
     times = np.array([[replay() for replay in replays] for _ in range(REPLAYS)])
     quartiles = np.sort(times, axis=0)[QUARTILES]  # np.percentile would import numpy.ma
     return [

@@ -15,7 +15,8 @@ from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
 from podusv_cli.core.kernel import bundle, call, scratch, transplanted
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import logged_rows
 from podusv_cli.metrics.metric import Metric
 
@@ -114,14 +115,14 @@ setattr(Counted, "__array_ufunc__", _of_numpy)  # noqa: B010 - as the others
 
 
 @np.errstate(all="ignore")
-def operations(loop: ClosedLoop, recording: Recording) -> dict[str, float]:
+def operations(plan: Plan, recording: Recording) -> dict[str, float]:
     """The metric of this run's law, by its name."""
-    law, tally = loop.controller, Tally()
-    rows = logged_rows(loop, recording, 3)
+    law, tally = plan.loop.controller, Tally()
+    rows = logged_rows(plan, recording, 3)
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
-    constants = law.constants_with(loop.nominal)
+    constants = plan.law_constants
     vectors = {
-        "x": state, "memory": memory, "target": target, "table": law.table(), "tau": np.zeros(2),
+        "x": state, "memory": memory, "target": target, "table": plan.law_table, "tau": np.zeros(2),
         "rate": np.zeros(len(memory)), "signals": np.zeros(len(law.signals)),
         "work": np.zeros(law.workspace()),
     }  # fmt: skip

@@ -8,6 +8,7 @@ from itertools import islice
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.conflicts import Conflicts
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
@@ -69,16 +70,18 @@ class Size:
         return f"about {time_in_words(self.seconds)}, {memory} of memory and {disk} of disk"
 
 
-def estimate(scenario: Scenario) -> Size:
-    """The size of the run with `controller`, counted without allocating its arrays."""
-    grid, law = scenario.time_grid(), scenario.controller
-    plan = scenario.plan(grid)
-    loop = plan.loop
-    monitored = len(monitor.signals(loop, sampled=scenario.sampled)) if scenario.log.monitor else 0
+def estimate(scenario: Scenario, plan: Plan | None = None) -> Size:
+    """The size of the run with `controller`, counted without allocating its arrays.
+
+    `plan` is that of the run where there is one already.
+    """
+    plan = plan or scenario.plan()
+    grid = plan.grid
+    monitored = len(monitor.signals(plan)) if scenario.log.monitor else 0
     columns = len(plan.names) - len(TARGET[2:]) + monitored
     content = grid.rows * columns * NUMBER
     cosines = sum(part.cosines() for part in scenario.disturbances().values())
-    step = STEP + MEMORY * sum(size for _, size in law.slots()) + COSINE * cosines
+    step = STEP + MEMORY * len(plan.states["law"]) + COSINE * cosines
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
     unlogged = len(TARGET[2:]) + (len(monitor.UNLOGGED) if monitored else 0)

@@ -225,14 +225,19 @@ class Scenario(Component):
 
     def closed_loop(self) -> ClosedLoop:
         """The closed loop of vessel, path, disturbance, actuator, measurement and law."""
-        start, sea = self.start, self.disturbance
+        start = self.start
         return ClosedLoop(
-            vessel=self.vessel, nominal=self.nominal, path=self.path,
-            disturbance=Total(parts=sea) if isinstance(sea, tuple) else sea,
+            vessel=self.vessel, nominal=self.nominal, path=self.path, disturbance=self.sea,
             actuator=self.actuator, controller=self.controller,
             measurement=self.measurement, estimator=self.estimator,
             start=(start.x, start.y, start.psi, start.u, start.v, start.r),
         )  # fmt: skip
+
+    @property
+    def sea(self) -> Disturbance:
+        """The disturbance as one, also where it is a list."""
+        parts = self.disturbance
+        return Total(parts=parts) if isinstance(parts, tuple) else parts
 
     def time_grid(self) -> TimeGrid:
         """The instants of the run; call `conflicts` first."""
@@ -310,13 +315,8 @@ class Scenario(Component):
 
     def about(self) -> dict[str, Signal]:
         """Every signal of the run's log by name. Raises LawError where two have one name."""
-        loop = self.closed_loop()
-        return monitor.about(loop, sampled=self.sampled) if self.log.monitor else loop.about()
-
-    @property
-    def sampled(self) -> bool:
-        """Whether old measurements act: with sampled control, with sensors and with a delay."""
-        return self.control.period > 0 or not self.closed_loop().at_once
+        plan = self.plan()
+        return monitor.about(plan) if self.log.monitor else plan.about
 
 
 def scenario_class(plugins: Plugins) -> type[Scenario]:

@@ -82,21 +82,21 @@ class Monitored:
     traces: Traces
 
 
-def signals(loop: ClosedLoop, *, sampled: bool) -> tuple[Signal, ...]:
+def signals(plan: Plan) -> tuple[Signal, ...]:
     """The signals that the monitor adds over time; none for a law without V."""
-    law = loop.lyapunov()
+    law = plan.loop.lyapunov()
     if law is None:
         return ()
-    rate = () if sampled else (V_DOT,)
+    rate = () if plan.sampled else (V_DOT,)
     return (V, *rate, *TERMS, *(ERRORS if law.filtered() else ()), *NETWORKS)
 
 
-def about(loop: ClosedLoop, *, sampled: bool) -> dict[str, Signal]:
-    """All signals of the log, the monitor's included. Raises LawError as `loop.about`."""
-    added = signals(loop, sampled=sampled)
+def about(plan: Plan) -> dict[str, Signal]:
+    """All signals of the log, the monitor's included. Raises LawError as `plan.about`."""
+    added = signals(plan)
     added += FIXED if added else ()
     return by_name(
-        ((lambda: "the loop", loop.about().values()), (lambda: "the stability monitor", added))
+        ((lambda: "the loop", plan.about.values()), (lambda: "the stability monitor", added))
     )
 
 
@@ -120,7 +120,6 @@ def monitored(
     law, count = loop.lyapunov(), len(recording["time"])
     if law is None or not count:
         return None
-    sampled = grid.hold_every > 0 or not loop.at_once
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(plan, compiled=compiled)
         chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))
@@ -133,15 +132,15 @@ def monitored(
                 if name not in traces:
                     traces[name] = allocate(count)
                 traces[name][rows] = part
-        observed = _Observer(loop, law, recording, traces, ideal, b, not sampled)
+        observed = _Observer(loop, law, recording, traces, ideal, b, not plan.sampled)
         starts = (0.0, grid.last_part(steady_fraction))
         windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
-    logged = [signal.name for signal in signals(loop, sampled=sampled)]
+    logged = [signal.name for signal in signals(plan)]
     extended = replace(
         recording,
         signals={**recording.signals, **{name: traces[name] for name in logged}},
         fixed={**recording.fixed, **_fixed(windows, ideal)},
-        about=about(loop, sampled=sampled),
+        about=about(plan),
     )
     return Monitored(extended, windows, traces)
 

@@ -20,7 +20,7 @@ from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.finding import merged
+from podusv_cli.findings.finding import Case, merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Failure
@@ -172,7 +172,7 @@ def make_runs(
     wanted = [member for member in members if member.run is None]
     with interrupts_enabled():
         for member in wanted:
-            warm_up(member.scenario, request.compiling)
+            warm_up(Case(member.scenario), request.compiling)
     tasks = [
         Task(
             member.scenario, member.text, folder / member.label,
@@ -243,7 +243,7 @@ def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
         if e.scenario.simulation.compiled and len(e.recording["time"])
         and not e.scenario.recorded
     ]  # fmt: skip
-    loops = [(entry.scenario.closed_loop(), entry.recording) for entry in timed]
+    loops = [(entry.scenario.plan(), entry.recording) for entry in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
     return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]

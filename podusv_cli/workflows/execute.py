@@ -18,10 +18,9 @@ from podusv_cli import __version__
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import ready, run
-from podusv_cli.findings.finding import postflight, preflight
+from podusv_cli.findings.finding import Case, postflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import headlines_first
@@ -116,15 +115,19 @@ class Finished:
 
 
 def execute(
-    task: Task, progress: Progress | None = None, watch: Stopwatch | None = None
-) -> Finished:
+    task: Task, progress: Progress | None = None, watch: Stopwatch | None = None,
+    case: Case | None = None,
+) -> Finished:  # fmt: skip
     """Simulate, measure, write, draw; `target` is there only when all of it is.
+
+    `case` is the task's scenario with its plan, where it was looked at before.
 
     A run that diverges or is interrupted is written like any other; its status tells. An interrupt
     after the simulation costs the figures or the law's cost, nothing else; what fails after it is
     left out, and missing.json says why. Raises StorageError.
     """
-    started, watch, size = datetime.now(UTC), watch or Stopwatch(), estimate(task.scenario)
+    started, watch, case = datetime.now(UTC), watch or Stopwatch(), case or Case(task.scenario)
+    size = estimate(case.scenario, case.plan)
     with (
         interrupts_deferred(),
         folder.RunWriter(
@@ -133,18 +136,16 @@ def execute(
     ):
         long = size.content > task.held and not task.scenario.log.compress
         allocate = partial(files.disk_array, writer.folder) if long else np.empty
-        recording = simulated(task.scenario, watch, progress, allocate, task.compiling)
+        recording = simulated(case, watch, progress, allocate, task.compiling)
         extras = Extras(recording.status == "interrupted")
         with watch.part("metrics"):
-            gather = partial(summary, task.scenario, recording, extras)
+            gather = partial(summary, case, recording, extras)
             metrics = extras.made("the metrics", gather) or {}
-            metrics |= (
-                extras.attempt("the law's cost", lambda: _cost(task.scenario, recording)) or {}
-            )
+            metrics |= extras.attempt("the law's cost", lambda: _cost(case, recording)) or {}
         with watch.part("theory"):
             whole, theory = extras.made(
                 "theory.json with the stability monitor's signals",
-                lambda: monitored(task.scenario, recording, allocate),
+                lambda: monitored(case, recording, allocate),
             ) or (recording, {})
         with watch.part("write"):
             whole = _logged(writer, task.scenario, whole, again=long)
@@ -191,41 +192,38 @@ def unwritten(outcomes: Iterable[Outcome]) -> str:
     return next(iter(causes), "")
 
 
-def warm_up(
-    scenario: Scenario, compiling: Progress | None = None, plan: Plan | None = None
-) -> None:
+def warm_up(case: Case, compiling: Progress | None = None) -> None:
     """Make every check of a run before its first step, and have all its code compiled and loaded.
 
     `compiling` is called with the fraction that is compiled, if there is anything to compile.
     Raises LawError.
     """
-    plan = plan or scenario.plan()
-    ready(plan, scenario.simulation.compiled, compiling)
-    if scenario.log.monitor:
-        monitor.prepare(plan, scenario.simulation.compiled)
+    compiled = case.scenario.simulation.compiled
+    ready(case.plan, compiled, compiling)
+    if case.scenario.log.monitor:
+        monitor.prepare(case.plan, compiled)
 
 
-def examined(scenario: Scenario) -> list[Finding]:
-    """The findings about a scenario whose figures, laws and paths were asked before.
+def examined(case: Case) -> list[Finding]:
+    """The findings about a scenario whose figures, law and path are asked before.
 
     Raises LawError.
     """
-    check_figures(scenario)
-    for single in scenario.singles().values():
-        check_law(single.closed_loop())
-    return preflight(scenario)
+    check_figures(case.scenario)
+    check_law(case.plan)
+    return case.findings()
 
 
 def simulated(
-    scenario: Scenario, watch: Stopwatch, progress: Progress | None = None,
+    case: Case, watch: Stopwatch, progress: Progress | None = None,
     allocate: Allocate = np.empty, compiling: Progress | None = None,
 ) -> Recording:  # fmt: skip
     """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
-    plan, compiled = scenario.plan(), scenario.simulation.compiled
     with watch.part("compile"), interrupts_enabled():
-        warm_up(scenario, compiling, plan)
+        warm_up(case, compiling)
+    compiled = case.scenario.simulation.compiled
     with watch.part("engine"):
-        return run(plan, compiled=compiled, progress=progress, allocate=allocate)
+        return run(case.plan, compiled=compiled, progress=progress, allocate=allocate)
 
 
 def check_figures(scenario: Scenario) -> None:
@@ -236,11 +234,11 @@ def check_figures(scenario: Scenario) -> None:
         figures_with(scenario.plugged)
 
 
-def summary(scenario: Scenario, recording: Recording, extras: Extras) -> dict[str, float]:
+def summary(case: Case, recording: Recording, extras: Extras) -> dict[str, float]:
     """The metrics of a run that was observed; those that raise are missing among the extras."""
     seen = recording.seen
-    numbers = scenario.observer().summary(seen, extras.note) if seen is not None else {}
-    for name, metric in scenario.known_metrics().items():
+    numbers = case.plan.observer.summary(seen, extras.note) if seen is not None else {}
+    for name, metric in case.scenario.known_metrics().items():
         if metric.of_log and len(recording["time"]):
             try:
                 numbers[name] = float(metric.of_log(recording))
@@ -249,19 +247,18 @@ def summary(scenario: Scenario, recording: Recording, extras: Extras) -> dict[st
     return numbers
 
 
-def _cost(scenario: Scenario, recording: Recording) -> dict[str, float]:
+def _cost(case: Case, recording: Recording) -> dict[str, float]:
     if not len(recording["time"]):
         return {}
-    loop = scenario.closed_loop()
-    timed = law_costs([(loop, recording)])[0] if scenario.simulation.compiled else {}
-    return timed | operations(loop, recording)
+    timed = law_costs([(case.plan, recording)])[0] if case.scenario.simulation.compiled else {}
+    return timed | operations(case.plan, recording)
 
 
 def monitored(
-    scenario: Scenario, recording: Recording, allocate: Allocate = np.empty
+    case: Case, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
-    plan = scenario.plan()
+    plan, scenario = case.plan, case.scenario
     found = scenario.log.monitor and monitor.monitored(
         plan, recording,
         steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,

@@ -18,7 +18,7 @@ from podusv_cli.export.check import ABOUT, FMU, SAMPLES
 from podusv_cli.export.fmu import fmu
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.export.link import linker, this_machine
-from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.phrases import unknown
@@ -67,7 +67,7 @@ def export(config: Path, request: Request) -> Path:
         if names := ", ".join(others(loaded, request.controller)):
             request.say(f"exporting `controller`; --controller chooses among {names}")
         request.say("simulating the run that the law is checked against")
-        run = simulated(law.scenario, Stopwatch())
+        run = simulated(Case(law.scenario), Stopwatch())
         if run.status == "interrupted":
             raise KeyboardInterrupt
         seen = law.samples(run)

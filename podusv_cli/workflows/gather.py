@@ -9,7 +9,7 @@ from pathlib import Path
 
 from podusv_cli.comparison.claims import ParsedClaim, parse_claims
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.workflows.execute import examined
@@ -74,7 +74,7 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
-        Member(label, single, loaded.text, noticed=examined(single))
+        Member(label, single, loaded.text, noticed=examined(Case(single)))
         for label, single in zip(labels, singles.values(), strict=True)
     ]
     return Item(scenario.name, members, list(singles), parse_claims(loaded))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
@@ -51,7 +52,7 @@ def keep(
     tasks = [_task(folder, results.plan, one, argv, figures=figures) for one in missing]
     with interrupts_enabled():
         for law, cell in dict.fromkeys((one.law, one.cell) for one in missing):
-            warm_up(results.plan.single(law, cell))
+            warm_up(Case(results.plan.single(law, cell)))
     outcomes = run_all([partial(execute, task) for task in tasks], workers=workers)
     for one, outcome in zip(missing, outcomes, strict=True):
         if outcome.failure:

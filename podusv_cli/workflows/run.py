@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.messages import Check
@@ -67,9 +67,10 @@ def run_loaded(
     watch = watch or Stopwatch()
     with watch.part("load"):
         scenario = single(loaded, request.controller)
+        case = Case(scenario)
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
-        noticed = examined(scenario)
+        noticed = examined(case)
     for finding in noticed:
         request.warn(finding)
     task = Task(
@@ -77,7 +78,7 @@ def run_loaded(
         figures=DRAWN if request.figures else (), argv=request.argv, noticed=noticed,
         compiling=request.compiling,
     )  # fmt: skip
-    return replace(execute(task, progress, watch), others=others(loaded, request.controller))
+    return replace(execute(task, progress, watch, case), others=others(loaded, request.controller))
 
 
 def others(loaded: Loaded, label: str = "") -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from counting import counted
 from scenario_samples import loaded
 from storage_samples import deadline
 
+from podusv_cli.findings.finding import Case
 from podusv_cli.scenario import limits
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
@@ -190,8 +191,9 @@ control: {{period: {shape["period"]}}}
 log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
 """
     scenario = loaded(text).scenario
-    recording = execute.simulated(scenario, execute.Stopwatch())
-    recording, _ = execute.monitored(scenario, recording)
+    case = Case(scenario)
+    recording = execute.simulated(case, execute.Stopwatch())
+    recording, _ = execute.monitored(case, recording)
     expected = estimate(scenario)
     assert expected.steps == 10
     assert expected.rows == len(recording["time"])

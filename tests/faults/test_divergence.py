@@ -15,6 +15,7 @@ from podusv_cli.components.controllers.base import Slots
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import Signal
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running import watch as march
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.check import check_law
@@ -96,7 +97,7 @@ def test_a_memory_of_another_size_is_refused():
             return ((Signal("integrals", "m", "two integrals", axes=("axis",)), 2),)
 
     with pytest.raises(LawError, match=r"memory of shape \(0,\), its slots are \(2,\)"):
-        check_law(adrift(controller=Forgetful()))
+        check_law(Plan(adrift(controller=Forgetful()), TimeGrid(0.01, 1)))
 
 
 def test_what_a_law_raises_is_not_taken_for_the_end_of_its_thread():
@@ -181,6 +182,7 @@ def test_numbers_that_overflow_are_left_for_the_run_to_tell():
         def law(t, x, memory, target, k, table, tau, rate, signals, work):  # type: ignore[no-untyped-def, override]
             tau[:] = np.float64(1e200) * np.float64(1e200)
 
-    assert corrected(start=(1e200, 0.0, 0.0, 0.0, 0.0, 0.0)).first_memory().size
-    check_law(adrift(controller=Overflowing()))
+    far = corrected(start=(1e200, 0.0, 0.0, 0.0, 0.0, 0.0))
+    assert Plan(far, TimeGrid(0.01, 1)).first_memory.size
+    check_law(Plan(adrift(controller=Overflowing()), TimeGrid(0.01, 1)))
     assert run(adrift(controller=Overflowing()), 1.0, compiled=False).status == "diverged"

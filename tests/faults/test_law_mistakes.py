@@ -135,8 +135,9 @@ DECLARED: dict[type[Controller], str] = {
 
 def begun(loop: ClosedLoop) -> None:
     """All that is done before a run."""
-    check_law(loop)
-    marcher(Plan(loop, TimeGrid(0.01, 1)), compiled=True)
+    plan = Plan(loop, TimeGrid(0.01, 1))
+    check_law(plan)
+    marcher(plan, compiled=True)
 
 
 def refused(law: type[Controller]) -> str:

@@ -20,6 +20,7 @@ from command_samples import ROOT
 from counts import count
 
 from podusv_cli import cli
+from podusv_cli.findings.finding import Case
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.load import load, resolved_yaml
 from podusv_cli.storage import provenance
@@ -136,7 +137,7 @@ def test_no_number_ends_in_a_traceback(tmp_path, monkeypatch):
     every = list(tries())
     chosen = [DIVERGING, *random.Random(1).sample(every, min(MOST, len(every)))]
     for config in sorted({one.config for one in chosen}):
-        warm_up(load(ROOT / config).scenario.alone())  # here, and not in every process
+        warm_up(Case(load(ROOT / config).scenario.alone()))  # here, and not in every process
     commands = [words(number, one) for number, one in enumerate(chosen)]
     fork = get_context("fork")
     with ProcessPoolExecutor(available_workers(), mp_context=fork, initializer=careless) as pool:

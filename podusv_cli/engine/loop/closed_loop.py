@@ -16,15 +16,13 @@ from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.base import KNOWN, OWN, Measurement
 from podusv_cli.components.measurements.exact import Exact
-from podusv_cli.components.paths.base import TARGET, Path
+from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import signal
 from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.kernel import Vector, bundle, kernel
-from podusv_cli.core.kernel import call as call_kernel
+from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import LOOP, Signal
-from podusv_cli.engine.loop.recent import Recall, call
 
 STATE = tuple(state.name for state in signal.STATE)
 DEMAND = ("tau_u_cmd", "tau_r_cmd")
@@ -34,9 +32,6 @@ LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
 @kernel
 def nothing() -> None:
     """Stands for a part that a loop does not have: a kernel takes those arguments that it names."""
-
-
-AT_START = (0.0,)  # s
 
 
 @dataclass(frozen=True)
@@ -54,6 +49,12 @@ class Observer:
     def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
         """The kernel's constants in a run of this loop."""
         return {"nothing": 0.0}
+
+    def summary(
+        self, seen: Vector, failed: Callable[[str, Exception], None] | None = None
+    ) -> dict[str, float]:
+        """What these gathered numbers say of a run, by name; `failed` is told what raises."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -131,52 +132,6 @@ class ClosedLoop:
     def estimated(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""
         return self.estimator.states if self.measured else ()
-
-    def first_memory(self, recall: Recall = call) -> Vector:
-        """The law's memory at t = 0."""
-        target = np.asarray(self.first_target(recall))
-        with np.errstate(all="ignore"):  # a start beyond all numbers is for the run to tell
-            return self.controller.start(np.array(self.start), target, self.nominal)
-
-    def first_target(self, recall: Recall = call) -> Vector:
-        """Where the target is at t = 0."""
-        if not self.path.follows:
-            return np.asarray(recall(self.path.targets, AT_START)[0])
-        x, place, target = (
-            np.array(self.start),
-            np.zeros(len(self.path.places)),
-            np.zeros(len(TARGET)),
-        )
-        k, table = bundle(self.path_constants()), self.path.table()
-        call_kernel(self.path.evaluate, t=0.0, x=x, place=place, k=k, table=table, target=target)
-        return target
-
-    def path_constants(self, recall: Recall = call) -> dict[str, float]:
-        """The path's constants for this law."""
-        approach = self.controller.approach()
-        standoff = approach.standoff if approach else 0.0
-        constants: dict[str, float] = recall(self.path.constants_with, standoff)
-        return constants
-
-    def law_constants(self, recall: Recall = call) -> dict[str, float]:
-        """The law's constants, with those of the path's fillet where it has one."""
-        own: dict[str, float] = recall(self.controller.constants_with, self.nominal)
-        fillet = recall(self.path.fillet_for_law)
-        if fillet is None:
-            return own
-        corners: dict[str, float] = fillet.constants(len(recall(self.controller.table)))
-        if taken := sorted(own.keys() & corners):
-            raise LawError(
-                f"{describe(self.controller)}: path.fillet needs the name {taken[0]!r}, which is a "
-                "constant of this law; give it another name"
-            )
-        return own | corners
-
-    def law_table(self, recall: Recall = call) -> Vector:
-        """The law's table, and behind it the corners of the path's fillet."""
-        own: Vector = recall(self.controller.table)
-        fillet = recall(self.path.fillet_for_law)
-        return np.concatenate([own, fillet.rows()]) if fillet else own
 
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""

@@ -13,7 +13,10 @@ import numpy as np
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.disturbances.base import FLOW, WAVE_MOTION
 from podusv_cli.components.paths.base import TARGET
-from podusv_cli.core.kernel import Vector
+from podusv_cli.core.component import describe
+from podusv_cli.core.errors import LawError
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import call as call_kernel
 from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
@@ -32,6 +35,7 @@ from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
 from podusv_cli.engine.step.relay import relay
 
 FORCES, SEA = LOADS[:3], LOADS[3:]
+AT_START = (0.0,)  # s
 
 
 class Function(NamedTuple):
@@ -73,6 +77,11 @@ class Plan:
     def about(self) -> dict[str, Signal]:
         """Every signal that the loop logs, by name. Raises LawError where two have one name."""
         return self.loop.about()
+
+    @property
+    def sampled(self) -> bool:
+        """Whether old measurements act: with sampled control, with sensors and with a delay."""
+        return self.grid.hold_every > 0 or not self.loop.at_once
 
     @cached_property
     def states(self) -> dict[str, list[str]]:
@@ -135,35 +144,114 @@ class Plan:
 
     def _functions(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
         loop, recall = self.loop, self.recall
-        law, path, sea, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-        constants, of_path = tuple(loop.law_constants(recall)), tuple(loop.path_constants(recall))
+        law, path, sea = loop.controller, loop.path, loop.disturbance
+        names = {part: tuple(constants) for part, constants in self.constants.items()}
         rounded = recall(path.fillet_for_law) is not None
         take = sample_of_rounded(law.sample) if rounded and law.takes_samples() else law.sample
-        yield "path", path.evaluate, of_path
-        yield "locate", *_if(path.follows, lambda: path.locate, of_path)
-        loads = tuple(recall(sea.constants_with, loop.vessel))
-        yield "disturbance", sea.kernel_with(loop.vessel), loads
-        yield "law", law_of_rounded(law.law) if rounded else law.law, constants
-        yield "sample", *_if(law.takes_samples(), lambda: take, constants)
-        yield "actuator", actuator.drive_with(), tuple(recall(actuator.constants))
+        yield "path", path.evaluate, names["path"]
+        yield "locate", *_if(path.follows, lambda: path.locate, names["path"])
+        yield "disturbance", sea.kernel_with(loop.vessel), names["disturbance"]
+        yield "law", law_of_rounded(law.law) if rounded else law.law, names["law"]
+        yield "sample", *_if(law.takes_samples(), lambda: take, names["law"])
+        yield "actuator", loop.actuator.drive_with(), names["actuator"]
         told = law.wants_loads()
-        yield "after_saturation", *_if(told, lambda: law.after_saturation, constants)
-        yield from self._seeing()
-        yield "observer", self.observer.watch, tuple(recall(self.observer.constants_for, loop))
-
-    def _seeing(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-        """What `functions` has of measurement and estimator."""
-        loop, recall = self.loop, self.recall
+        yield "after_saturation", *_if(told, lambda: law.after_saturation, names["law"])
         measurement, estimator = loop.measurement, loop.estimator
         sense, correct, follow = (
             (measurement.sense, estimator.correct, estimator.follow)
             if loop.measured
             else (nothing, nothing, nothing)
         )
-        yield "measurement", sense, tuple(recall(measurement.constants_with, 1.0, 0))
-        constants = tuple(recall(estimator.constants_with, loop.nominal))
-        yield "correct", correct, constants
-        yield "follow", follow, constants
+        yield "measurement", sense, names["measurement"]
+        yield "correct", correct, names["estimator"]
+        yield "follow", follow, names["estimator"]
+        yield "observer", self.observer.watch, names["observer"]
+
+    @cached_property
+    @np.errstate(all="ignore")
+    def constants(self) -> dict[str, dict[str, float]]:
+        """The constants that the kernels of each part read, by name."""
+        loop, recall, step = self.loop, self.recall, self.grid.step
+        motion = self._of_sea(WAVE_MOTION[0])
+        return {
+            "path": self.path_constants,
+            "disturbance": recall(loop.disturbance.constants_with, loop.vessel),
+            "law": self.law_constants, "actuator": recall(loop.actuator.constants),
+            "measurement": recall(loop.measurement.constants_with, step, motion),
+            "estimator": recall(loop.estimator.constants_with, loop.nominal),
+            "vessel": recall(loop.vessel.constants),
+            "observer": recall(self.observer.constants_for, loop),
+        }  # fmt: skip
+
+    @cached_property
+    def path_constants(self) -> dict[str, float]:
+        """The path's constants for this law."""
+        approach = self.loop.controller.approach()
+        standoff = approach.standoff if approach else 0.0
+        constants: dict[str, float] = self.recall(self.loop.path.constants_with, standoff)
+        return constants
+
+    @cached_property
+    def law_constants(self) -> dict[str, float]:
+        """The law's constants, with those of the path's fillet where it has one."""
+        law = self.loop.controller
+        own: dict[str, float] = self.recall(law.constants_with, self.loop.nominal)
+        fillet = self.recall(self.loop.path.fillet_for_law)
+        if fillet is None:
+            return own
+        corners: dict[str, float] = fillet.constants(len(self.recall(law.table)))
+        if taken := sorted(own.keys() & corners):
+            raise LawError(
+                f"{describe(law)}: path.fillet needs the name {taken[0]!r}, which is a constant of "
+                "this law; give it another name"
+            )
+        return own | corners
+
+    @cached_property
+    def path_table(self) -> Vector:
+        """The path's table."""
+        table: Vector = self.recall(self.loop.path.table)
+        return table
+
+    @cached_property
+    def law_table(self) -> Vector:
+        """The law's table, and behind it the corners of the path's fillet."""
+        own: Vector = self.recall(self.loop.controller.table)
+        fillet = self.recall(self.loop.path.fillet_for_law)
+        return np.concatenate([own, fillet.rows()]) if fillet else own
+
+    @cached_property
+    def first_target(self) -> Vector:
+        """Where the target is at t = 0."""
+        path = self.loop.path
+        if not path.follows:
+            return np.asarray(self.recall(path.targets, AT_START)[0])
+        x, place, target = (
+            np.array(self.loop.start),
+            np.zeros(len(path.places)),
+            np.zeros(len(TARGET)),
+        )
+        k, table = bundle(self.path_constants), self.path_table
+        call_kernel(path.evaluate, t=0.0, x=x, place=place, k=k, table=table, target=target)
+        return target
+
+    @cached_property
+    @np.errstate(all="ignore")  # a start beyond all numbers is for the run to tell
+    def first_memory(self) -> Vector:
+        """The law's memory at t = 0."""
+        loop = self.loop
+        return loop.controller.start(np.array(loop.start), self.first_target, loop.nominal)
+
+    @cached_property
+    @np.errstate(all="ignore")
+    def _tables(self) -> tuple[Vector, Vector, Vector, Vector]:
+        """Those of disturbance, actuator, measurement and estimator."""
+        loop, recall, step, steps = self.loop, self.recall, self.grid.step, self.grid.steps
+        return (
+            recall(loop.disturbance.table_for, loop.vessel, steps * step),
+            recall(loop.actuator.table), recall(loop.measurement.table_for, step, steps),
+            recall(loop.estimator.table),
+        )  # fmt: skip
 
     @np.errstate(all="ignore")
     def vectors(self, rows: int = 1, allocate: Allocate = np.empty) -> Vectors:
@@ -171,35 +259,26 @@ class Plan:
 
         Numbers beyond all limits are for the run to tell.
         """
-        loop, grid, layout, recall = self.loop, self.grid, self.layout, self.recall
-        law, path, sea, actuator = loop.controller, loop.path, loop.disturbance, loop.actuator
-        measurement, estimator, start = loop.measurement, loop.estimator, np.array(loop.start)
-        motion = self._of_sea(WAVE_MOTION[0])
-
-        def numbers(constants: Callable[..., dict[str, float]], *given: Any) -> Vector:
-            return _numbers(recall(constants, *given))
-
+        loop, grid, layout = self.loop, self.grid, self.layout
+        law, start, estimator = loop.controller, np.array(loop.start), loop.estimator
+        sea_table, actuator_table, measurement_table, estimator_table = self._tables
+        numbers = {part: _numbers(constants) for part, constants in self.constants.items()}
         return Vectors(
-            path=_numbers(loop.path_constants(recall)), path_table=recall(path.table),
-            disturbance=numbers(sea.constants_with, loop.vessel),
-            disturbance_table=recall(sea.table_for, loop.vessel, grid.steps * grid.step),
-            law=_numbers(loop.law_constants(recall)), law_table=loop.law_table(recall),
-            actuator=numbers(actuator.constants), actuator_table=recall(actuator.table),
-            measurement=numbers(measurement.constants_with, grid.step, motion),
-            measurement_table=recall(measurement.table_for, grid.step, grid.steps),
-            estimator=numbers(estimator.constants_with, loop.nominal),
-            estimator_table=recall(estimator.table), vessel=numbers(loop.vessel.constants),
-            observer=numbers(self.observer.constants_for, loop),
+            **numbers, path_table=self.path_table, disturbance_table=sea_table,
+            law_table=self.law_table.copy(),  # a session writes to it
+            actuator_table=actuator_table, measurement_table=measurement_table,
+            estimator_table=estimator_table,
             s=np.concatenate(
-                [start, recall(actuator.rest),
+                [start, self.recall(loop.actuator.rest),
                  estimator.start(start, loop.nominal) if loop.measured else np.zeros(0),
-                 np.zeros(len(path.places)), loop.first_memory(recall)]
+                 np.zeros(len(loop.path.places)), self.first_memory]
             ),
             row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
-            sensed=measurement.first(start, grid.step),
-            relay=relay(actuator.delay(), grid), held=np.zeros(HELD_SIGNALS + len(law.signals)),
-            work=np.zeros(law.workspace()), seen=np.zeros(self.observer.size),
-            under_way=np.zeros(2), log=allocate(rows * layout.width),
+            sensed=loop.measurement.first(start, grid.step),
+            relay=relay(loop.actuator.delay(), grid),
+            held=np.zeros(HELD_SIGNALS + len(law.signals)), work=np.zeros(law.workspace()),
+            seen=np.zeros(self.observer.size), under_way=np.zeros(2),
+            log=allocate(rows * layout.width),
         )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import NoKernel, Vector, bundle, call
 from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
 from podusv_cli.engine.running.watch import Work
 
@@ -29,24 +30,25 @@ READ = ("x", "memory", "target", "table")  # arguments that a law may only read
 OF_NUMBERS = (ArithmeticError, ValueError)
 
 
-def check_law(loop: ClosedLoop) -> None:
-    """Ask the loop's path and law at the start of a run, with vectors of the declared sizes.
+def check_law(plan: Plan) -> None:
+    """Ask the plan's path and law at the start of a run, with vectors of the declared sizes.
 
     Raises LawError for signals that are undeclared or declared twice, a memory, table or outputs of
     another size, an output left unwritten, an argument written that is to be read, an exception,
     for a law that does not return, and as `check_kernel`. No number at all is left for the run to
     tell.
     """
+    loop = plan.loop
     law = loop.controller.law
     check_kernel(law)
     check_kernel(loop.path.evaluate)
     if loop.path.follows:
         check_kernel(loop.path.locate)
     with np.errstate(all="ignore"):
-        asked(partial(describe, loop.path), loop.path.table)
-        asked(partial(describe, loop.path), loop.first_target, OF_NUMBERS)
-        asked(partial(describe, loop.controller), partial(_check_declared, loop))
-        asked(partial(describe, loop.controller), partial(_ask, loop), OF_NUMBERS)
+        asked(partial(describe, loop.path), lambda: plan.path_table)
+        asked(partial(describe, loop.path), lambda: plan.first_target, OF_NUMBERS)
+        asked(partial(describe, loop.controller), partial(_check_declared, plan))
+        asked(partial(describe, loop.controller), partial(_ask, plan), OF_NUMBERS)
     check_arguments(law, READ)
 
 
@@ -79,25 +81,25 @@ def _constant(error: BaseException | None) -> str:
     return f"{in_a_line(error)}; it has {told or 'none'}"
 
 
-def _check_declared(loop: ClosedLoop) -> None:
-    law = loop.controller
-    _check_signals(loop)
-    memory, declared = loop.first_memory(), (sum(size for _, size in law.slots()),)
+def _check_declared(plan: Plan) -> None:
+    law = plan.loop.controller
+    _check_signals(plan)
+    memory, declared = plan.first_memory, (len(plan.states["law"]),)
     if np.shape(memory) != declared:
         shapes = f"it starts with a memory of shape {np.shape(memory)}, its slots are {declared}"
         raise LawError(f"{describe(law)}: {shapes}")
-    table = law.table()
+    table = plan.law_table
     if not (isinstance(table, np.ndarray) and table.dtype == np.float64 and table.ndim == 1):
         raise LawError(f"{describe(law)}: its table is no vector of float64; write np.array([1.0])")
-    for name, number in law.constants_with(loop.nominal).items():
+    for name, number in plan.law_constants.items():
         if not (name.isidentifier() and isinstance(number, Real)):
             raise LawError(f"{describe(law)}: its constant {name} = {number!r} is no named number")
 
 
-def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
+def evaluated(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     """Demand, rates and signals that the law writes at the start of a run, over `before`."""
-    law, memory, target = loop.controller, loop.first_memory(), loop.first_target()
-    x, k, table = np.array(loop.start), bundle(law.constants_with(loop.nominal)), law.table()
+    law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
+    x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
     tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
     read = {"x": x, "memory": memory, "target": target, "table": table}
     if law.takes_samples():
@@ -114,38 +116,37 @@ def evaluated(loop: ClosedLoop, before: float) -> tuple[Vector, Vector, Vector]:
     return tau, rate, signals
 
 
-def _ask(loop: ClosedLoop) -> None:
-    law, (tau, rate, signals) = loop.controller, evaluated(loop, UNWRITTEN)
-    slots = [f"the rate of {part.name}" for part, size in law.slots() for _ in range(size)]
+def _ask(plan: Plan) -> None:
+    law, (tau, rate, signals) = plan.loop.controller, evaluated(plan, UNWRITTEN)
+    slots = [f"the rate of {name}" for name in plan.states["law"]]
     names = ("tau_u_cmd", "tau_r_cmd", *(part.name for part in law.signals), *slots)
     outputs = zip(names, (*tau, *signals, *rate), strict=True)
     if left := next((name for name, number in outputs if number == UNWRITTEN), ""):
         raise LawError(f"{describe(law)}: it leaves {left} unwritten")
     if law.wants_loads():
-        k, memory = bundle(law.constants_with(loop.nominal)), loop.first_memory()
         call(
-            law.after_saturation, t=0.0, memory=memory, demand=tau, tau=np.zeros(3), k=k,
-            table=law.table(), rate=rate,
+            law.after_saturation, t=0.0, memory=plan.first_memory.copy(), demand=tau,
+            tau=np.zeros(3), k=bundle(plan.law_constants), table=plan.law_table.copy(), rate=rate,
         )  # fmt: skip
 
 
-def _check_signals(loop: ClosedLoop) -> None:
+def _check_signals(plan: Plan) -> None:
     """LawError for what the log could not take, or would mix up."""
-    law = loop.controller
+    law = plan.loop.controller
     if isinstance(law.signals, str):
         raise LawError(f"{describe(law)}: its signals are no tuple; write (Signal(...),)")
-    loop.about()
+    plan.about  # noqa: B018  names that are taken twice
     try:
-        _check_axes(loop)
+        _check_axes(plan)
     except LawError as error:
         raise LawError(f"{describe(law)}: {error}") from error
 
 
-def _check_axes(loop: ClosedLoop) -> None:
+def _check_axes(plan: Plan) -> None:
     """Every logged array has as many values along each of its axes as all others have."""
     lengths: dict[str, tuple[int, str]] = {}
-    names = {*loop.about(), PROVENANCE}
-    for part, shape in _shapes(loop):
+    names = {*plan.about, PROVENANCE}
+    for part, shape in _shapes(plan.loop):
         if part.fixed and not part.axes:
             raise LawError(f"signal {part.name}: it is fixed and has no axis; name one")
         taken = [axis for axis in part.axes if axis in names or not NAME.fullmatch(axis)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
+from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -19,17 +19,17 @@ from podusv_cli.engine.step.layout import Layout, Vectors
 from podusv_cli.engine.step.relay import COUNT, DEMANDS
 
 
-def logged_rows(loop: ClosedLoop, recording: Recording, most: int) -> Vector:
+def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
     """At most so many rows of a log, evenly spread: time, target, vessel's state, law's memory."""
     times = recording["time"]
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
-    names = [*STATE, *(part.name for part, _ in loop.controller.slots())]
+    names = [*STATE, *dict.fromkeys(plan.states["law"])]
     logged = np.column_stack([recording[name][chosen] for name in names])
-    return np.column_stack([times[chosen], loop.path.targets(times[chosen].tolist()), logged])
+    return np.column_stack([times[chosen], plan.loop.path.targets(times[chosen].tolist()), logged])
 
 
 def replayer(
-    loop: ClosedLoop, recording: Recording, *, most: int = 250, evaluations: int = 4000
+    plan: Plan, recording: Recording, *, most: int = 250, evaluations: int = 4000
 ) -> Callable[[], float]:
     """A function that times one evaluation of the law [ns], as the mean of one replay.
 
@@ -37,13 +37,13 @@ def replayer(
     """
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
-    rows = logged_rows(loop, recording, most)
+    rows, loop = logged_rows(plan, recording, most), plan.loop
     count, width = rows.shape
     rounds = -(-evaluations // count)
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
-    constants = loop.controller.constants_with(loop.nominal)
+    constants = plan.law_constants
     p = np.array(list(constants.values()))
-    buffers = (rows.ravel(), p, loop.controller.table(), np.zeros(2), np.zeros(room))
+    buffers = (rows.ravel(), p, plan.law_table, np.zeros(2), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compile.routine(
         compile.Piece(rk4.evaluate_all, signatures.EVALUATE_ALL)

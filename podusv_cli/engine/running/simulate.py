@@ -73,7 +73,7 @@ def ready(plan: Plan, compiled: bool, compiling: Callable[[float], None] | None 
     `compiling` is called with the fraction that is compiled, if there is anything to compile.
     Raises LawError.
     """
-    check_law(plan.loop)
+    check_law(plan)
     plan.loop.check_fit(plan.grid.step)
     asked(lambda: "the closed loop", plan.vectors)
     marcher(plan, compiled, compiling)
