@@ -12,8 +12,9 @@ import numpy as np
 
 from podusv_cli.scenario.load import load, tree_yaml
 from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.study.record import about
+from podusv_cli.studies.study.runs import Unit, UnitResult
 from podusv_cli.studies.study.store import SCENARIO, Store
-from podusv_cli.studies.study.unit import Unit, UnitResult
 from podusv_cli.workflows import studies, sweep
 
 CONFIG = Path(__file__).parents[1] / "configs/studies/hull_and_sea.yaml"
@@ -24,13 +25,13 @@ DRAWS, SIZE = 250_000, 4096  # of each of four laws; of a unit
 def units(folder: Path) -> None:
     """One in a hundred runs diverges."""
     loaded = load(CONFIG, [f"sweep.draws={DRAWS}", *NO_LOGS])
-    store, chance = Store(folder, plan(loaded)), np.random.default_rng(1)
+    store, chance = Store(folder, about(plan(loaded))), np.random.default_rng(1)
     store.open("now")
     (folder / SCENARIO).write_text(tree_yaml(loaded))
-    for law in store.plan.laws:
+    for law in store.about.laws:
         for first in range(0, DRAWS, SIZE):
             n = min(SIZE, DRAWS - first)
-            metrics = {name: chance.lognormal(0.0, 0.3, n) for name in store.plan.metrics}
+            metrics = {name: chance.lognormal(0.0, 0.3, n) for name in store.about.measured}
             status = (chance.random(n) < 0.01).astype(np.uint8)
             causes = tuple("the state is not finite" if code else "" for code in status)
             until = np.full(n, 310.0)

@@ -5,6 +5,7 @@ from pathlib import Path
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.study.dispatch import Processes, dispatch
 from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.store import SCENARIO, Store
 
 TEXT = """
@@ -37,9 +38,10 @@ def small(**changes):
 
 def made(folder: Path, workers=1, part=(1, 1), **changes):
     """The store of the study, simulated into a folder; runs.h5 where it is whole."""
-    store = Store(folder, small(**changes))
+    planned = small(**changes)
+    store = Store(folder, about(planned))
     store.open("now")
-    _, whole = dispatch(store, lambda tally: None, Processes(workers), part=part)
+    _, whole = dispatch(store, planned, lambda tally: None, Processes(workers), part=part)
     if whole and part == (1, 1):
         store.write_runs()
     return store

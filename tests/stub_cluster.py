@@ -8,7 +8,7 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.study import remote
 from podusv_cli.studies.study.plan import digest
 from podusv_cli.studies.study.remote import Reply
-from podusv_cli.studies.study.unit import Unit, UnitResult
+from podusv_cli.studies.study.runs import Unit, UnitResult
 
 REPORT = {
     "podusv": "1.0", "numpy": "2.0", "the kernels of pid": "abc", "the study": "def",

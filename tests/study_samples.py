@@ -3,13 +3,20 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.sections import Claim
+from podusv_cli.studies.study import summary as tables
 from podusv_cli.studies.study.claims import ParsedClaim, judge, parse
 from podusv_cli.studies.study.verdict import StudyVerdict
+
+summary = partial(tables.summary, level=0.95, metrics=METRICS)
+pairs = partial(tables.pairs, margin=0.01, level=0.95, metrics=METRICS)
+sensitivity = partial(tables.sensitivity, level=0.95, metrics=METRICS)
 
 
 @dataclass(frozen=True)
@@ -63,11 +70,11 @@ def claim(
     expect: str, laws: Sequence[str], tolerance: float = 0.0, name: str = "S1"
 ) -> ParsedClaim:
     stated = Claim(says="One is better.", source="ours", expect=expect, tolerance=tolerance)
-    return ParsedClaim(name, stated, parse(expect, laws))
+    return ParsedClaim(name, stated, parse(expect, laws, METRICS))
 
 
 def judged(runs: Made, *expected: str, tolerance: float = 0.0, level: float = 0.95) -> Any:
     """Verdicts on claims put like this; a single one alone."""
     claims = [claim(text, runs.laws, tolerance, f"S{i}") for i, text in enumerate(expected, 1)]
-    verdicts: list[StudyVerdict] = judge(claims, runs, level)
+    verdicts: list[StudyVerdict] = judge(claims, runs, level, METRICS)
     return verdicts if len(verdicts) > 1 else verdicts[0]

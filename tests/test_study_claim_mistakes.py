@@ -7,6 +7,7 @@ import pytest
 from podusv_cli.comparison.curves import REDUCERS
 from podusv_cli.comparison.expressions import OPERATIONS
 from podusv_cli.expressions.reading import FUNCTIONS, ExpressionError
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.studies.study.claims import parse
 from podusv_cli.studies.study.expressions import parse_success
 from podusv_cli.studies.study.samples import STATISTICS
@@ -57,7 +58,7 @@ def test_the_functions_of_both_languages_are_known_to_their_messages() -> None:
 @pytest.mark.parametrize("text", MISTAKES)
 def test_every_mistake_is_told_with_what_to_write(text: str) -> None:
     with pytest.raises(ExpressionError) as error:
-        parse(text, LAWS)
+        parse(text, LAWS, METRICS)
     assert MISTAKES[text] in str(error.value)
 
 
@@ -73,12 +74,12 @@ def test_every_mistake_is_told_with_what_to_write(text: str) -> None:
 )
 def test_every_mistake_in_success_is_told(text: str, told: str) -> None:
     with pytest.raises(ExpressionError) as error:
-        parse_success(text)
+        parse_success(text, METRICS)
     assert told in str(error.value)
 
 
 def test_an_expression_that_python_finds_odd_gives_no_warning(
     recwarn: pytest.WarningsRecorder,
 ) -> None:
-    parse("failures(pid) < 0.5and failures(li) < 0.5", LAWS)
+    parse("failures(pid) < 0.5and failures(li) < 0.5", LAWS, METRICS)
     assert not recwarn.list

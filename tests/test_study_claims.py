@@ -12,6 +12,7 @@ from scipy.stats import binomtest
 from study_samples import Made, claim, judged, study
 
 from podusv_cli.expressions.verdict import as_markdown
+from podusv_cli.metrics.table import METRICS
 from podusv_cli.studies.study import statistics as st
 from podusv_cli.studies.study.claims import judge
 from podusv_cli.studies.study.expressions import parse_success, succeeded
@@ -147,13 +148,13 @@ def test_a_run_that_finished_without_success_is_failed_and_the_worst() -> None:
 
 
 def test_success_is_a_condition_on_one_run() -> None:
-    tree = parse_success("finished and z_e_steady <= 1.5")
+    tree = parse_success("finished and z_e_steady <= 1.5", METRICS)
     values = {"z_e_steady": np.array([1.0, 1.6, 1.0, nan])}
     finished = np.array([True, True, False, True])
-    assert succeeded(tree, values, finished).tolist() == [True, False, False, False]
+    assert succeeded(tree, values, finished, METRICS).tolist() == [True, False, False, False]
     for unknown in ("not z_e_steady > 1.5", "not settling_time < 9"):
         ended = np.array([False])
-        assert not succeeded(parse_success(unknown), {}, ended).any()
+        assert not succeeded(parse_success(unknown, METRICS), {}, ended, METRICS).any()
 
 
 # verdicts ----------------------------------------------------------------------------------------
@@ -195,7 +196,7 @@ def test_claims_are_judged_together_as_holm_says() -> None:
         p = [2 * min(bdtr(k, 60, 0.5), bdtr(60 - k, 60, 0.5)) for k in yes]
         steps = np.maximum.accumulate(np.sort(p) * [3, 2, 1])  # Holm's adjusted probabilities
         wrong = dict(zip(np.argsort(p).tolist(), steps, strict=True))
-        verdicts = judge(claims, study(**dict(zip("abc", numbers, strict=True))), 0.95)
+        verdicts = judge(claims, study(**dict(zip("abc", numbers, strict=True))), 0.95, METRICS)
         expected = [bool(yes[i] > 30) if wrong[i] <= 0.05 else None for i in range(3)]
         assert [verdict.answer for verdict in verdicts] == expected
         met.add(sum(answer is None for answer in expected))

@@ -14,9 +14,10 @@ from podusv_cli.studies.study import cluster as clusters
 from podusv_cli.studies.study import dispatch as marching
 from podusv_cli.studies.study.cluster import Cluster
 from podusv_cli.studies.study.dispatch import dispatch
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.remote import BITS, Expectation, StudyText
+from podusv_cli.studies.study.runs import STATUSES
 from podusv_cli.studies.study.store import Store
-from podusv_cli.studies.study.unit import STATUSES
 
 OTHER_BITS = REPORT | {f"{BITS}pid": "124"}
 OTHER_NUMPY = REPORT | {"numpy": "1.9"}
@@ -53,15 +54,16 @@ def stub(names="ab", **others):
 
 
 def marched(folder, client, tell=lambda tally: None, mixed=False, **changes):
-    store, engine = Store(folder, small(**changes)), cluster(client, mixed)
+    plan, engine = small(**changes), cluster(client, mixed)
+    store = Store(folder, about(plan))
     store.open("now")
-    return store, engine, dispatch(store, tell, engine)
+    return store, engine, dispatch(store, plan, tell, engine)
 
 
 def statuses(store):
     store.write_runs()
     words = np.array(STATUSES)
-    return {law: words[store.runs().status(law)[0]] for law in store.plan.laws}
+    return {law: words[store.runs().status(law)[0]] for law in store.about.laws}
 
 
 def test_every_run_is_made_once_and_every_result_released(tmp_path):
@@ -152,7 +154,7 @@ def test_a_lost_scheduler_is_a_sentence_and_units_are_kept(tmp_path):
     client = stub(lost_after=3)
     with pytest.raises(StorageError, match="connection to the scheduler was lost"):
         marched(tmp_path / "study", client)
-    there = Store(tmp_path / "study", small()).covered()
+    there = Store(tmp_path / "study", about(small())).covered()
     assert sum(int(mask.sum()) for mask in there.values()) == 3 * marching.FIRST
 
 
@@ -165,7 +167,7 @@ def test_an_interrupt_keeps_what_is_written_and_cancels_the_rest(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         marched(tmp_path / "study", client, tell)
-    there = Store(tmp_path / "study", small()).covered()
+    there = Store(tmp_path / "study", about(small())).covered()
     assert sum(int(mask.sum()) for mask in there.values()) == 24
     assert len(client.cancelled) == client.submitted - 3
     _, _, (tally, whole) = marched(tmp_path / "study", stub())

@@ -14,6 +14,7 @@ from small_study import TEXT, made, small
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.study.cluster import connected
 from podusv_cli.studies.study.dispatch import dispatch
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.remote import StudyText
 from podusv_cli.studies.study.store import RUNS, Store
 
@@ -31,7 +32,7 @@ def distributed():
 @pytest.mark.slow
 def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
     whole = (made(tmp_path / "local").folder / RUNS).read_bytes()
-    store, killed = Store(tmp_path / "study", small()), []
+    store, killed = Store(tmp_path / "study", about(small())), []
     store.open("now")
 
     def tell(tally):
@@ -44,7 +45,7 @@ def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
         connected(local.scheduler_address, recipe, store.seal, mixed=False) as engine,
     ):
-        _, finished = dispatch(store, tell, engine)
+        _, finished = dispatch(store, small(), tell, engine)
     assert finished
     assert killed
     store.write_runs()

@@ -82,8 +82,6 @@ WAYS = {
     "link": None,
 }
 COMMANDS = {
-    "status": ("sweep", "status"),
-    "report": ("sweep", "report", "--no-figures"),
     "draw": ("sweep", "draw", "--law", "pid", "--draw", "1"),
     "run": ("sweep", "run", "--no-figures"),
     "tune": ("tune",),

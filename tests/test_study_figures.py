@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from study_samples import study
+from study_samples import pairs, sensitivity, study
 
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.studies.study import figures
-from podusv_cli.studies.study.summary import pairs, sensitivity
 
 inf, nan = math.inf, math.nan
 A = np.r_[np.linspace(1.0, 2.0, 150), [inf] * 50]

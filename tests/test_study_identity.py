@@ -13,8 +13,10 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.study import plan as plans
 from podusv_cli.studies.study import store as stores
 from podusv_cli.studies.study.dispatch import ENDED, Driver
+from podusv_cli.studies.study.record import about
+from podusv_cli.studies.study.runs import Unit
 from podusv_cli.studies.study.store import RUNS, Store
-from podusv_cli.studies.study.unit import Unit, crashed
+from podusv_cli.studies.study.unit import crashed
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 
@@ -51,15 +53,12 @@ def test_claims_that_a_study_does_not_judge_are_named(tmp_path):
     assert "claims (M) are about single runs" in warnings[0]
 
 
-def test_runs_of_other_kernels_are_read_and_told(whole, tmp_path, updated, podusv):
+def test_runs_of_other_kernels_are_read(whole, tmp_path, updated, podusv):
     before, table = (whole / RUNS).read_bytes(), tmp_path / "runs.csv"
     updated()
     folder = shutil.copytree(whole, tmp_path / "study")
     for command, *options in (("status",), ("export", "--out", table), ("report", "--no-figures")):
-        said = podusv("sweep", command, folder, *options)
-        assert said.code == 0
-        assert f"warning: the runs in {folder} are of other kernels" in said.err
-        assert "(laws: pid, li)" in said.err
+        assert podusv("sweep", command, folder, *options).code == 0
     assert {count for _, _, count in studies.status(folder).rows} == {8}
     assert len(table.read_text().splitlines()) == 1 + 2 * 8
     assert (folder / RUNS).read_bytes() == before
@@ -69,15 +68,6 @@ def test_runs_of_other_kernels_are_not_added_to(whole, updated):
     updated()
     with pytest.raises(UsageError, match=r"another study: pid\[0\] kernels: .*, not another dig"):
         sweep.run(whole, sweep.Request(figures=False), lambda tally: None)
-
-
-def test_no_log_is_made_for_runs_of_other_kernels(whole, tmp_path, updated):
-    folder = shutil.copytree(whole, tmp_path / "study")
-    kept = TEXT.replace("draws: 40", "draws: 8\n  keep: {draws: [0]}")
-    (folder / stores.SCENARIO).write_text(kept)
-    updated()
-    sweep.report(folder, sweep.Request(figures=False))
-    assert not list(folder.glob("logs/*"))
 
 
 def test_shards_of_other_kernels_are_named_and_not_missing(tmp_path, updated):
@@ -93,10 +83,8 @@ def test_shards_that_agree_are_joined_with_the_kernels_that_they_have(tmp_path, 
     shards = [placed(made(tmp_path / f"{n}", part=(n, 2), draws=8), 8) for n in (1, 2)]
     made(tmp_path / "one", draws=8)
     updated()
-    warnings = []
-    merge(shards, tmp_path / "all", sweep.Request(figures=False, warn=warnings.append))
+    merge(shards, tmp_path / "all", sweep.Request(figures=False))
     assert (tmp_path / "all" / RUNS).read_bytes() == (tmp_path / "one" / RUNS).read_bytes()
-    assert len(warnings) == 1
 
 
 def test_force_begins_a_study_anew_and_spares_what_is_no_study(whole, tmp_path):
@@ -132,9 +120,8 @@ def test_force_begins_a_study_anew_and_spares_what_is_no_study(whole, tmp_path):
 def test_a_scenario_that_is_not_the_one_of_the_runs_is_refused(whole, tmp_path):
     folder = shutil.copytree(whole, tmp_path / "study")
     (folder / stores.SCENARIO).write_text(TEXT.replace("seed: 7", "seed: 8"))
-    for command in (studies.stored, studies.status):
-        with pytest.raises(UsageError, match=r"not the scenario .*: sweep.seed: 8, not 7; restore"):
-            command(folder)
+    with pytest.raises(UsageError, match=r"not the scenario .*: sweep.seed: 8, not 7; restore"):
+        studies.draw(folder, "pid", 0, 0, tmp_path / "one.yaml")
 
 
 @pytest.mark.slow
@@ -219,7 +206,7 @@ def placed_in(path, dataset):
 )
 def test_every_array_of_the_table_is_sealed(tmp_path, dataset):
     store = made(tmp_path / "study", draws=2)
-    store.write(crashed(Unit("pid", 0, 1, 1), store.plan.metrics, "it ended its process"))
+    store.write(crashed(Unit("pid", 0, 1, 1), store.about.measured, "it ended its process"))
     store.write_runs()
     table, (place, size) = store.folder / RUNS, placed_in(store.folder / RUNS, dataset)
     sound = bytearray(table.read_bytes())
@@ -243,10 +230,11 @@ def test_a_table_of_the_first_format_is_read(whole, tmp_path):
 
 
 def test_a_run_that_ends_its_process_is_told_alike_by_every_engine(tmp_path):
-    store = Store(tmp_path / "study", small(draws=1))
+    plan = small(draws=1)
+    store = Store(tmp_path / "study", about(plan))
     store.open("now")
     for end in ("exit code -9", "the worker ended"):
-        driver = Driver(store, lambda tally: None, float("inf"), (1, 1))
+        driver = Driver(store, plan, lambda tally: None, float("inf"), (1, 1))
         (number, _, unit), *_ = driver
         driver.done(number, Outcome(failure=end, killed=True))
         (result,) = store.results()

@@ -14,6 +14,7 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import provenance
 from podusv_cli.studies.study import store as stores
 from podusv_cli.studies.study.joining import _machine, gaps, join
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows import sweep as workflow
 from podusv_cli.workflows.merge import merge
@@ -58,7 +59,7 @@ def test_runs_that_two_folders_have_alike_are_no_clash(shards, whole, tmp_path):
 def altered(folder, to, metric="iae", machine="another processor"):
     """A copy of a shard in which the last run of a law has another number, and its machine."""
     shutil.copytree(folder, to)
-    store = Store(to, small())
+    store = Store(to, about(small()))
     result = next(r for r in store.results() if r.unit.law == "li")
     numbers = result.metrics[metric].copy()
     numbers[-1] += 1e-9
@@ -96,7 +97,7 @@ def test_other_numbers_are_refused_with_the_machines_and_nothing_is_written(shar
 )
 def test_another_status_or_cause_is_another_run(shards, tmp_path, name, other):
     shutil.copytree(shards[0], tmp_path / "other")
-    store = Store(tmp_path / "other", small())
+    store = Store(tmp_path / "other", about(small()))
     store.write(replace(next(store.results()), **other))
     with pytest.raises(StorageError, match=rf"\({name} of draw 0\)"):
         merged([shards[0], store.folder], tmp_path / "all")
@@ -106,7 +107,7 @@ def test_a_missing_shard_is_told(shards, tmp_path):
     done = merged([shards[0], *shards[2:6], shards[7]], tmp_path / "most")
     assert done.results is None
     assert done.missing_runs == ("missing: draws 5 to 9, 30 to 34 of every law and cell",)
-    store = Store(tmp_path / "most", small())
+    store = Store(tmp_path / "most", about(small()))
     next(store.folder.glob("units/li-*")).unlink()
     assert [line.split(" of ")[1] for line in gaps(store)] == ["pid", "li"]
 
@@ -130,7 +131,10 @@ def test_each_file_is_read_a_fixed_number_of_times(shards, tmp_path, monkeypatch
     monkeypatch.setattr(
         stores, "read", lambda path, seal: (reads.append(path), real(path, seal))[1]
     )
-    into, others = Store(tmp_path / "all", small()), [Store(f, small()) for f in shards]
+    into, others = (
+        Store(tmp_path / "all", about(small())),
+        [Store(f, about(small())) for f in shards],
+    )
     into.open("now")
     join(into, others)
     assert len(reads) == 2 * 2 * SHARDS  # compared, then written: two laws in each shard

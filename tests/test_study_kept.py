@@ -3,7 +3,6 @@
 import json
 import math
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from command_samples import commanded, one_line
 from small_study import written
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.studies.study import keep
@@ -199,16 +197,15 @@ def test_every_sitting_is_kept(study, tmp_path):
 
 def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):
     runs = study.results.runs
-    assert list(runs.drawn) == sorted(study.results.plan.sweep.vary)
+    assert list(runs.drawn) == sorted(study.results.about.quantities)
     assert set(runs.drawn["start.y"].tolist()) <= {0.0, 2.5}
-    assert set(judged(study.results.plan, runs).sensitivity.quantity) == set(runs.drawn)
+    assert set(judged(study.results.about, runs).sensitivity.quantity) == set(runs.drawn)
 
 
 def test_seeds_have_no_sensitivity_because_their_numbers_have_no_order(study):
-    plan, runs = study.results.plan, study.results.runs
-    seeds = plan.sweep.vary | {"start.y": Quantity(seed=True)}
-    sweep = plan.sweep.model_copy(update={"vary": seeds})
-    seeded = replace(plan, scenario=plan.scenario.model_copy(update={"sweep": sweep}))
+    about, runs = study.results.about, study.results.runs
+    seed = about.quantities["start.y"].model_copy(update={"is_seed": True})
+    seeded = about.model_copy(update={"quantities": about.quantities | {"start.y": seed}})
     assert set(judged(seeded, runs).sensitivity.quantity) == set(runs.drawn) - {"start.y"}
 
 

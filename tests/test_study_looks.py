@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 from installed_sample import LAB, install
+from loop_counts import COUNTED, loop_counts
 from plugin_samples import LAW
 from small_study import TEXT
 from test_plugins import MORE
 
 from podusv_cli.core.plugins import MODULES, installed
-from podusv_cli.workflows import sweep
+from podusv_cli.workflows import studies, sweep
 
 MARK = Path("imported")
 TRACE = "\nfrom pathlib import Path\nPath({!r}).touch()\n"
@@ -70,6 +71,22 @@ def test_a_look_executes_no_plug_in(study, planted, tmp_path, monkeypatch, podus
     assert not (planted / MARK).exists()
 
 
+@pytest.mark.parametrize("words", LOOKS.values(), ids=LOOKS)
+def test_a_look_builds_no_loop_and_reads_no_scenario(study, tmp_path, monkeypatch, podusv, words):
+    monkeypatch.chdir(tmp_path)
+    calls = loop_counts(monkeypatch)
+    (study / "scenario.yaml").write_text("not a scenario")
+    said = podusv("sweep", words[0], study, *words[1:])
+    assert said.code == 0, said.err
+    assert not calls
+
+
+def test_what_a_look_does_without_is_counted(study, tmp_path, monkeypatch):
+    calls = loop_counts(monkeypatch)
+    studies.draw(study, "pid", 1, 0, tmp_path / "one.yaml", trusted=True)
+    assert {*calls} == {owner.__name__ for owner, _ in COUNTED}
+
+
 def test_what_is_told_without_plug_ins_is_what_was_told_with_them(study, tmp_path, podusv):
     told = ("summary.csv", "pairs.csv", "claims.json", "runs.h5")
     before = {name: (study / name).read_bytes() for name in told}
@@ -112,26 +129,30 @@ def test_what_needs_the_code_asks_for_trust(study, planted, tmp_path, monkeypatc
 def test_logs_are_made_where_the_plug_ins_are_trusted(study, podusv):
     shutil.rmtree(study / "logs")
     said = podusv("sweep", "report", study, "--no-figures")
-    assert "no logs of kept runs are made" in said.err
+    assert f"they are made by: podusv sweep run {study} --trust" in said.err
     assert not (study / "logs").exists()
-    assert podusv("sweep", "report", study, "--no-figures", "--trust").code == 0
+    assert podusv("sweep", "run", study, "--no-figures", "--trust").code == 0
     assert len(list((study / "logs").iterdir())) == 3 * 2
 
 
 ODD = {
-    "name": {"metrics_of_plugins": {"<script>": {}}},
-    "unit": {"metrics_of_plugins": {"largest_east": {"unit": "\n"}}},
-    "unknown": {"metrics": ["iae", "largest_west"]},
-    "twice": {"metrics": ["iae", "iae"]},
+    "name": {"metrics": {"<script>": {"name": "<script>"}}},
+    "other": {"metrics": {"iae": {}}},
+    "unit": {"metrics": {"largest_east": {"unit": "\n"}}},
+    "unknown": {"measured": ["iae", "largest_west"]},
+    "twice": {"measured": ["iae", "iae"]},
+    "fewer": {"measured": ["iae"]},
+    "law": {"laws": ["mine", "pid", "lee"]},
+    "cell": {"cells": ["", "", ""]},
 }
 
 
 @pytest.mark.parametrize("change", ODD.values(), ids=ODD)
 def test_odd_words_in_the_record_are_refused_in_a_sentence(study, podusv, change):
     record = json.loads((study / "study.json").read_text())
-    plain = record["metrics_of_plugins"]["largest_east"]
-    metrics = {name: plain | new for name, new in change.get("metrics_of_plugins", {}).items()}
-    record |= change | ({"metrics_of_plugins": metrics} if metrics else {})
+    plain = record["metrics"]["largest_east"]
+    metrics = {name: plain | new for name, new in change.get("metrics", {}).items()}
+    record |= change | {"metrics": record["metrics"] | metrics}
     (study / "study.json").write_text(json.dumps(record))
     before = (study / "runs.h5").read_bytes()
     said = podusv("sweep", "report", study, "--no-figures")
@@ -177,7 +198,8 @@ def test_another_scenario_is_still_refused(study, podusv, old, new):
     text = path.read_text()
     assert old in text
     path.write_text(text.replace(old, new))
-    said = podusv("sweep", "status", study)
+    words = ("sweep", "draw", study, "--law", "pid", "--draw", "1", "--trust")
+    said = podusv(*words)
     assert said.code == 2
     assert "is not the scenario of the runs" in said.err
 

@@ -10,19 +10,22 @@ from small_study import TEXT, small, written
 
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.studies.study.dispatch import Driver
+from podusv_cli.studies.study.record import about
+from podusv_cli.studies.study.runs import Unit
 from podusv_cli.studies.study.store import Store
-from podusv_cli.studies.study.unit import Unit, make
+from podusv_cli.studies.study.unit import make
 from podusv_cli.workflows import sweep
 
 
 def partial_study(folder, **ranges):
     """A study of 40 draws, of which each law has only some."""
     config = written(folder / "small.yaml")
-    store, texts = sweep._planned(config, sweep.Request(out=folder / "study"))
+    plan, place, texts = sweep._planned(config, sweep.Request(out=folder / "study"))
+    store = Store(place, about(plan))
     store.open("now", texts)
     for law, pieces in ranges.items():
         for first, count in pieces:
-            store.write(make(store.plan, Unit(law, 0, first, count)))
+            store.write(make(plan, Unit(law, 0, first, count)))
     return store
 
 
@@ -58,8 +61,10 @@ def test_laws_without_a_common_draw_are_not_compared(tmp_path):
 
 
 def test_laws_advance_together(tmp_path):
-    store = Store(tmp_path / "study", small(draws=1000, grid="{disturbance.scale: [0.5, 1]}"))
-    driver = Driver(store, lambda tally: None, float("inf"), (1, 1))
+    plan = small(draws=1000, grid="{disturbance.scale: [0.5, 1]}")
+    driver = Driver(
+        Store(tmp_path / "study", about(plan)), plan, lambda tally: None, float("inf"), (1, 1)
+    )
     reached = dict.fromkeys(driver.missing(), 0)
     for _, (_, _, unit) in zip(range(100), driver, strict=False):
         reached[unit.law, unit.cell] = unit.first + unit.count

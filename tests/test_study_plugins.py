@@ -12,9 +12,11 @@ from test_study_dask import DASK, PATIENCE, background, until
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.studies.study import remote
 from podusv_cli.studies.study.joining import digests
+from podusv_cli.studies.study.plan import digest
 from podusv_cli.studies.study.remote import StudyText
+from podusv_cli.studies.study.runs import Unit
 from podusv_cli.studies.study.store import RUNS, SCENARIO
-from podusv_cli.studies.study.unit import Unit, make
+from podusv_cli.studies.study.unit import make
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
@@ -81,13 +83,13 @@ def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):
     """It gets the text, and makes the same bits."""
     study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
     text, unit = (study / SCENARIO).read_text(), Unit("mine", 0, 0, 4)
-    store = studies.stored(study, trusted=True)
-    recipe = StudyText(text, tuple(store.plan.scenario.plugin_files().items()))
-    ours = digests(make(store.plan, unit))
+    plan = studies.planned(study, trusted=True)
+    recipe = StudyText(text, tuple(plan.scenario.plugin_files().items()))
+    ours = digests(make(plan, unit))
     study.rename(tmp_path / "gone")
     theirs = digests(make(remote._plan(recipe), unit))
     assert np.array_equal(ours, theirs)
-    assert remote.report(recipe.text, recipe.plugins)["the study"] == store.seal
+    assert remote.report(recipe.text, recipe.plugins)["the study"] == digest(plan.identity)
 
 
 @pytest.mark.slow

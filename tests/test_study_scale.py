@@ -12,6 +12,7 @@ from stub_cluster import REPORT, StubClient
 from test_study_cluster import cluster, instant  # noqa: F401  # a fixture
 
 from podusv_cli.studies.study.dispatch import AIM, dispatch
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.store import Store
 
 WORKERS = [f"tcp://10.0.0.{number}:8786" for number in range(200)]
@@ -21,9 +22,9 @@ def marched(folder, draws):
     """A study whose units have 8 runs: the store, the stub, and what `march` said."""
     plan = small(draws=draws)
     client = StubClient(plan.metrics, dict.fromkeys(WORKERS, REPORT), seconds=AIM / 8)
-    store = Store(folder, plan)
+    store = Store(folder, about(plan))
     store.open("now")
-    return store, client, dispatch(store, lambda tally: None, cluster(client))
+    return store, client, dispatch(store, plan, lambda tally: None, cluster(client))
 
 
 @pytest.mark.slow

@@ -18,10 +18,11 @@ from podusv_cli.studies.study import runs_file, runs_writer
 from podusv_cli.studies.study import unit as units
 from podusv_cli.studies.study.draws import drawn, draws
 from podusv_cli.studies.study.plan import watching
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.results import judged
+from podusv_cli.studies.study.runs import Unit
 from podusv_cli.studies.study.sessions import Session, sessions
 from podusv_cli.studies.study.store import RUNS, UNITS, Store
-from podusv_cli.studies.study.unit import Unit
 from podusv_cli.workflows import studies, sweep
 
 
@@ -35,7 +36,7 @@ def content(store):
 
 
 def test_a_run_of_the_table_is_the_run_that_simulate_makes(whole):
-    runs, plan = whole.runs(), whole.plan
+    runs, plan = whole.runs(), small()
     for law, number in (("pid", 0), ("li", 39)):
         (draw,) = draws(plan.sweep, number, 1)
         one = drawn(plan.single(law, 0), plan.sweep.vary, draw)
@@ -128,7 +129,7 @@ def finishing(monkeypatch, act):
 def test_a_unit_that_comes_while_the_table_is_written_is_kept(whole, tmp_path, monkeypatch):
     store = made(tmp_path / "study", part=(1, 2))
     late = Unit("pid", 0, 20, 4)
-    finishing(monkeypatch, lambda: store.write(units.make(store.plan, late)))
+    finishing(monkeypatch, lambda: store.write(units.make(small(), late)))
     store.write_runs()
     assert store.covered()["pid", 0].sum() == 24
     monkeypatch.undo()
@@ -137,19 +138,19 @@ def test_a_unit_that_comes_while_the_table_is_written_is_kept(whole, tmp_path, m
 
 
 def replace_folder(store, folder):
-    return Store(folder, store.plan)
+    return Store(folder, store.about)
 
 
 def test_another_study_is_refused_with_what_is_different(whole):
-    other = Store(whole.folder, small(seed=8))
+    other = Store(whole.folder, about(small(seed=8)))
     with pytest.raises(UsageError, match=r"another study: sweep.seed: 7, not 8; name another"):
         other.open("now")
 
 
 def test_words_and_claims_do_not_make_another_study(whole):
     same = small(level=0.9, success="finished and iae <= 3")
-    assert same.identity == whole.plan.identity
-    assert small(seed=8).identity != whole.plan.identity
+    assert same.identity == small().identity
+    assert small(seed=8).identity != small().identity
 
 
 @pytest.mark.slow
@@ -174,12 +175,12 @@ def test_a_run_that_kills_its_process_is_found(tmp_path, monkeypatch):
 
 
 def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
-    store = Store(tmp_path / "late", small())
+    store = Store(tmp_path / "late", about(small()))
     store.open("now")
     clock = iter(range(10**6))
     monkeypatch.setattr(marching.time, "monotonic", lambda: float(next(clock)))
     engine = marching.Processes(1)
-    tally, whole = marching.dispatch(store, lambda tally: None, engine, seconds=2.0)
+    tally, whole = marching.dispatch(store, small(), lambda tally: None, engine, seconds=2.0)
     assert not whole
     assert 0 < tally.made < tally.wanted
     assert sum(int(mask.sum()) for mask in store.covered().values()) == tally.made
@@ -233,7 +234,7 @@ def test_a_sitting_keeps_those_that_others_noted_meanwhile(tmp_path):
 
 def test_draws_beyond_those_asked_for_are_refused(whole, tmp_path):
     shutil.copytree(whole.folder, tmp_path / "study")
-    fewer = Store(tmp_path / "study", small(draws=8))
+    fewer = Store(tmp_path / "study", about(small(draws=8)))
     with pytest.raises(StorageError, match="there are runs of 40 draws"):
         fewer.write_runs()
     assert (fewer.folder / RUNS).read_bytes() == (whole.folder / RUNS).read_bytes()
@@ -242,7 +243,7 @@ def test_draws_beyond_those_asked_for_are_refused(whole, tmp_path):
 def test_success_is_evaluated_once_for_each_law(whole, monkeypatch):
     runs, real, times = whole.runs(), runs_file.succeeded, []
     monkeypatch.setattr(runs_file, "succeeded", lambda *given: (times.append(1), real(*given))[1])
-    judged(whole.plan, runs)
+    judged(whole.about, runs)
     assert len(times) == 2
 
 

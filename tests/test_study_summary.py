@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import spearmanr
-from study_samples import Made, study
+from study_samples import Made, pairs, sensitivity, study, summary
 
 from podusv_cli.studies.study import statistics as st
-from podusv_cli.studies.study.summary import as_csv, pairs, sensitivity, summary
+from podusv_cli.studies.study.summary import as_csv
 
 inf, nan = math.inf, math.nan
 

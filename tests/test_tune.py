@@ -14,7 +14,7 @@ import pytest
 from tune_samples import planned, searched, toy, tuned
 
 from podusv_cli.scenario.load import load
-from podusv_cli.studies.study.unit import UnitResult
+from podusv_cli.studies.study.runs import UnitResult
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.sampler import Sampler

@@ -13,7 +13,7 @@ from tune_samples import contents, toy, tuned
 
 from podusv_cli.studies.study import cluster as clusters
 from podusv_cli.studies.study import remote
-from podusv_cli.studies.study.unit import Unit
+from podusv_cli.studies.study.runs import Unit
 from podusv_cli.workflows import tune as workflow
 
 SMALL = ("tune.budget=40", "tune.train=2", "tune.validate=8")

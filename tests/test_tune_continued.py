@@ -10,6 +10,7 @@ import pytest
 from tune_samples import contents, planned, searched, toy, tuned
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import sampler, trials
@@ -111,7 +112,7 @@ def validation(folder, gain):
     found = Trial(0, 0, {"gain": gain}, 4, FINISHED, 1.0, (), 1.0, 0.0)
     plan = planned(folder)
     made = plan.variant(contestants(plan, {"toy": [found]}), VALIDATE, 12)
-    return Store(folder / FOLDER, made)
+    return Store(folder / FOLDER, about(made))
 
 
 def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
@@ -121,7 +122,7 @@ def test_runs_of_other_gains_are_replaced_wherever_that_was_killed(tmp_path):
         (earlier.folder / name).write_bytes(b"of other gains")
 
     def begin():
-        _clear(later.folder, later.plan)
+        _clear(later)
         later.open("later")
 
     at_every_call(begin)

@@ -156,7 +156,7 @@ def status(study: Study, as_json: options.AsJson = False) -> None:
     """Say how far a study is: the runs of every law and cell that are made."""
     from podusv_cli.workflows import studies
 
-    made = studies.status(study, warn)
+    made = studies.status(study)
     if as_json:
         echo_json({"format": 1, "folder": str(study), "made": made.as_json()})
         return
@@ -166,15 +166,15 @@ def status(study: Study, as_json: options.AsJson = False) -> None:
 
 @command
 def report(
-    study: Study, figures: options.Figures = True, trust: options.Trust = False,
-    as_json: options.AsJson = False, quiet: options.Quiet = False,
+    study: Study, figures: options.Figures = True, as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
 ) -> None:  # fmt: skip
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
     from podusv_cli.workflows.many_runs import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = Request(argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn)
+        request = Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
         done = workflow.report(study, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -184,7 +184,6 @@ def merge(
     studies: Annotated[list[Path], typer.Argument(metavar="STUDY...", help="Folders of shards.")],
     out: Annotated[Path, typer.Option(help="Folder of the whole study.")],
     figures: options.Figures = True,
-    trust: options.Trust = False,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -193,7 +192,7 @@ def merge(
     from podusv_cli.workflows.many_runs import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
-        request = Request(argv=sys.argv, figures=figures, trust=trust, say=line.say, warn=line.warn)
+        request = Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
         done = joining.merge(studies, out, request)
     _tell(done, as_json=as_json, quiet=quiet)
 
@@ -231,4 +230,4 @@ def export(
     """Write all runs as one table: a row a run, with its draw, status and metrics."""
     from podusv_cli.workflows import studies
 
-    echo_path(studies.export(study, form, out, warn))
+    echo_path(studies.export(study, form, out))

@@ -72,6 +72,11 @@ class Component(BaseModel):
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     @property
+    def label(self) -> str:
+        """Its kind."""
+        return str(type(self).model_fields["kind"].default)
+
+    @property
     def by_rule(self) -> tuple[str, ...]:
         """The fields that have a rule and no number of the scenario's own."""
         given = self.model_fields_set
@@ -93,7 +98,7 @@ class Component(BaseModel):
         except (ArithmeticError, ValueError):
             number = math.nan
         if not 0.0 < number < math.inf:
-            what = f"{self.noun} {type(self).model_fields['kind'].default}"
+            what = f"{self.noun} {self.label}"
             raise SizingError(
                 f"{name} of {what} does not follow from hull and actuator ({facts.in_words()}); "
                 "give it a number, or check vessel and actuator"
@@ -223,8 +228,8 @@ def wrong_default(owner: Component) -> str:
 
 def describe(owner: Component) -> str:
     """`law mine (mine.py, line 12)`: a component's kind, and where its class is written."""
-    kind, place = type(owner), ""
+    place = ""
     with suppress(OSError, TypeError):  # made where there is no source
-        name = Path(inspect.getsourcefile(kind) or "").name
-        place = f" ({name}, line {inspect.getsourcelines(kind)[1]})"
-    return f"{owner.noun} {kind.model_fields['kind'].default}{place}"
+        name = Path(inspect.getsourcefile(type(owner)) or "").name
+        place = f" ({name}, line {inspect.getsourcelines(type(owner))[1]})"
+    return f"{owner.noun} {owner.label}{place}"

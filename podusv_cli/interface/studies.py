@@ -19,8 +19,8 @@ from podusv_cli.interface.scenarios import Changes, Source, assignments, loaded
 from podusv_cli.scenario.plugins import continue_with
 from podusv_cli.studies.study.outputs import as_frame
 from podusv_cli.studies.study.results import Results, judged
+from podusv_cli.studies.study.runs import STATUSES
 from podusv_cli.studies.study.store import RUNS
-from podusv_cli.studies.study.unit import STATUSES
 from podusv_cli.workflows import studies as folders
 from podusv_cli.workflows import sweep as sweeping
 from podusv_cli.workflows.many_runs import Request
@@ -179,7 +179,7 @@ def open_study(folder: Place) -> Study:
     if not (place / RUNS).exists():
         report = continue_with("sweep report", place)
         raise UsageError(f"{place} has no {RUNS} yet; it is made by: {report}")
-    return Study(place, judged(store.plan, store.runs()))
+    return Study(place, judged(store.about, store.runs()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -100,11 +100,11 @@ def _nis(seen: Vector, step: float) -> float:
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 nees = Metric(
     "nees", "1", "mean squared error of the estimate over its covariance, steady window; 6 where "
-    "the filter is consistent", OF, ratio(SQUARE, TIME), 7,
+    "the filter is consistent", OF, ratio(SQUARE, TIME), place=7,
     words="consistency of the estimate (NEES)",
 )  # fmt: skip
 nis = Metric(
     "nis", "1", "mean squared innovation over its variance, steady window; 1 where the filter is "
-    "consistent", OF, _nis, 7,
+    "consistent", OF, _nis, place=7,
     words="consistency of the innovation (NIS)",
 )  # fmt: skip

@@ -40,7 +40,7 @@ def _rms(position: int) -> Result:
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 position = Metric(
     "estimate_position_rms", "m", "rms distance between estimated and true position", OF,
-    _rms(POSITION), 7,
+    _rms(POSITION), place=7,
     words="error of the estimated position, rms", headline=True,
 )  # fmt: skip
 heading = Metric(
@@ -49,12 +49,12 @@ heading = Metric(
     "rms error of the estimated heading",
     OF,
     _rms(HEADING),
-    7,
+    place=7,
     words="error of the estimated heading, rms",
 )
 velocity = Metric(
     "estimate_velocity_rms", "m/s", "rms error of the estimated velocity, surge and sway together",
-    OF, _rms(VELOCITY), 7,
+    OF, _rms(VELOCITY), place=7,
     words="error of the estimated velocity, rms",
 )  # fmt: skip
 yaw_rate = Metric(
@@ -63,6 +63,6 @@ yaw_rate = Metric(
     "rms error of the estimated yaw rate",
     OF,
     _rms(YAW_RATE),
-    7,
+    place=7,
     words="error of the estimated yaw rate, rms",
 )

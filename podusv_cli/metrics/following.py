@@ -54,12 +54,18 @@ e_ct_integral = Metric(
     "integral of the cross-track error's size",
     OF,
     gathered(ABSOLUTE),
-    1,
+    place=1,
     words="cross-track error, integrated",
     headline=True,
 )
 e_ct_rms = Metric(
-    "e_ct_rms", "m", "rms of the cross-track error", OF, _rms, 1, words="cross-track error, rms"
+    "e_ct_rms",
+    "m",
+    "rms of the cross-track error",
+    OF,
+    _rms,
+    place=1,
+    words="cross-track error, rms",
 )
 e_ct_max = Metric(
     "e_ct_max",
@@ -67,22 +73,22 @@ e_ct_max = Metric(
     "largest cross-track error",
     OF,
     lambda seen, step: float(seen[LARGEST]),
-    1,
+    place=1,
     words="largest cross-track error",
     headline=True,
 )
 e_ct_steady = Metric(
     "e_ct_steady", "m", "mean of the cross-track error's size over the steady window", OF,
-    ratio(LATE_ERROR, LATE), 1,
+    ratio(LATE_ERROR, LATE), place=1,
     words="steady cross-track error", headline=True,
 )  # fmt: skip
 path_time = Metric(
     "path_time", "s", "time at which the last waypoint is reached", OF,
-    lambda seen, step: float(seen[ARRIVED]) if seen[DONE] == 1.0 else math.nan, 1, happens=True,
-    words="reached the last waypoint after", headline=True,
+    lambda seen, step: float(seen[ARRIVED]) if seen[DONE] == 1.0 else math.nan,
+    place=1, happens=True, words="reached the last waypoint after", headline=True,
 )  # fmt: skip
 path_done = Metric(
     "path_done", "1", "share of the legs that are done at the end", OF,
-    lambda seen, step: float(seen[DONE]), 1, margin=True,
+    lambda seen, step: float(seen[DONE]), place=1, margin=True,
     words="share of the legs done", headline=True,
 )  # fmt: skip

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import check_words
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.layout import Layout
 
@@ -88,7 +88,7 @@ class Accumulator:
 
 
 @dataclass(frozen=True)
-class Metric:
+class Metric(MetricAbout):
     """A number that characterises a run; smaller is better for all but a `margin`.
 
     `result` takes the accumulator's numbers and the step [s], and is NaN for a run that ended
@@ -105,39 +105,14 @@ class Metric:
     a reader sees first.
     """
 
-    name: str
-    unit: str
-    meaning: str
     accumulator: Accumulator | None = None
     result: Result = lambda seen, step: math.nan
-    place: int = 100
-    happens: bool = False
-    counts_standoff: bool = False
-    margin: bool = False
-    symbol: str = ""
-    of_log: Callable[[Recording], float] | None = None
-    words: str = ""
-    headline: bool = False
-
-    def __post_init__(self) -> None:
-        """Check the words. Raises ValueError."""
-        texts = (self.unit, self.meaning, self.symbol, self.words)
-        check_words("metric", self.name, *texts)
+    of_log: Callable[[Recording], float] | None = field(default=None, kw_only=True)
 
     @property
-    def row(self) -> str:
-        """What a table calls it."""
-        return self.words or self.meaning
-
-    @property
-    def undefined(self) -> str:
-        """What a table has for a run that finished without the number."""
-        return "never" if self.happens else "-"
-
-    @property
-    def infinite(self) -> str:
-        """What it means that a number of many runs is infinite."""
-        return "never" if self.happens else "failed"
+    def about(self) -> MetricAbout:
+        """The metric without its functions."""
+        return MetricAbout(**{own.name: getattr(self, own.name) for own in fields(MetricAbout)})
 
 
 def gathered(position: int) -> Result:

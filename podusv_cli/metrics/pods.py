@@ -47,22 +47,22 @@ def _constants(layout: Measured) -> dict[str, float]:
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 at_speed_limit = Metric(
     "at_speed_limit", "1", "part of the time with a propeller commanded to its speed limit", OF,
-    ratio(SPEED, TIME), 6,
+    ratio(SPEED, TIME), place=6,
     words="share of time at a propeller's speed limit",
 )  # fmt: skip
 at_angle_limit = Metric(
     "at_angle_limit", "1", "part of the time with a pod commanded to its angle limit", OF,
-    ratio(ANGLE, TIME), 6,
+    ratio(ANGLE, TIME), place=6,
     words="share of time at a pod's angle limit",
 )  # fmt: skip
 at_rate_limit = Metric(
     "at_rate_limit", "1", "part of the time with a pod's angle at its rate limit", OF,
-    ratio(RATE, TIME), 6,
+    ratio(RATE, TIME), place=6,
     words="share of time at a pod's rate limit",
 )  # fmt: skip
 energy = Metric(
     "energy_pod", "J", "integral of the propellers' power, where it is known", OF,
-    gathered(ENERGY), 6,
+    gathered(ENERGY), place=6,
     words="work of the propellers",
 )  # fmt: skip
 travel = Metric(
@@ -71,5 +71,5 @@ travel = Metric(
     "total travel of all pods' angles, a measure of steering wear",
     OF,
     gathered(TRAVEL),
-    6,
+    place=6,
 )

@@ -130,8 +130,8 @@ def _number(
     """A gathered number, first in tables; NaN where the trial did not get so far."""
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
-        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan, 0,
-        headline=True, **words,
+        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan,
+        place=0, headline=True, **words,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from typing import Any, Literal, Self
 
 from pydantic import field_validator, model_validator
 
+from podusv_cli.core.about import Keep, StudyClaim
 from podusv_cli.core.component import Component, value
 from podusv_cli.scenario.distributions import WAYS, Distribution
 from podusv_cli.scenario.yaml_tree import bracketed
@@ -61,37 +62,6 @@ class Quantity(Distribution):
         if self.relative and words:
             raise ValueError(f"{self.given[0]}: needs numbers, choice has {words[0]!r}")
         return self
-
-
-class Keep(Component):
-    """Which runs are made again as full run folders, with log and figures."""
-
-    failed: int = value(0, "", "so many runs of every law that diverged or were no success", ge=0)
-    worst: dict[str, int] = value(
-        {}, "", "by metric: so many runs of every law, the worst that succeeded"
-    )
-    draws: tuple[int, ...] = value((), "", "these draws, of every law; the first is 0")
-
-
-class StudyClaim(Component):
-    """A sentence about all runs of a study, and how these decide on it."""
-
-    says: str = value(..., "", "the claim, in a sentence of your own")
-    source: str = value(
-        "ours", "", "where it was published; what begins with `ours` was not published: it holds "
-        "or fails, where a published claim is reproduced or not",
-    )  # fmt: skip
-    expect: str = value(
-        ..., "", "the claim as an expression over all draws; see podusv docs study_claims"
-    )
-    tolerance: float = value(
-        0.0,
-        "",
-        "relative: by how much one number must be smaller than another to count",
-        ge=0,
-        lt=1,
-    )
-    remark: str = value("", "", "choices made where the source is silent")
 
 
 class Sweep(Component):

@@ -59,7 +59,7 @@ def read(path: Path) -> dict[str, Any]:
 def read_as(path: Path, model: type[Model]) -> Model:
     """Read a JSON object of known keys; raises StorageError for a wrong one, with its place."""
     try:
-        return model.model_validate(read(path))
+        return model.model_validate_json(json.dumps(read(path)))  # where a list is a tuple, too
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))

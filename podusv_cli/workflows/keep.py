@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from podusv_cli.studies.study.keep import Kept, KeptRun, found, unmade
 from podusv_cli.studies.study.plan import Plan
 from podusv_cli.studies.study.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
+from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.run import DRAWN
 
 
@@ -40,20 +40,19 @@ def seen_from(place: Path, study: Path, one: Scenario) -> Scenario:
 
 
 def keep(
-    folder: Path, results: Results, extras: Extras, argv: Sequence[str], workers: int, *,
-    figures: bool,
-) -> list[Kept]:  # fmt: skip
+    folder: Path, plan: Plan, results: Results, extras: Extras, request: Request
+) -> list[Kept]:
     """Make those kept runs that are not there yet; all of them, compared with the table.
 
     A run that fails is missing among the `extras`. Raises StorageError only for what is not about
     one run.
     """
     missing = unmade(folder, results)
-    tasks = [_task(folder, results.plan, one, argv, figures=figures) for one in missing]
+    tasks = [_task(folder, plan, one, request) for one in missing]
     with interrupts_enabled():
         for law, cell in dict.fromkeys((one.law, one.cell) for one in missing):
-            warm_up(Case(results.plan.single(law, cell)))
-    outcomes = run_all([partial(execute, task) for task in tasks], workers=workers)
+            warm_up(Case(plan.single(law, cell)))
+    outcomes = run_all([partial(execute, task) for task in tasks], workers=request.workers)
     for one, outcome in zip(missing, outcomes, strict=True):
         if outcome.failure:
             extras.missing.append(Failure(f"{LOGS}/{one.name}", outcome.failure))
@@ -61,11 +60,9 @@ def keep(
     return found(folder, results, extras)
 
 
-def _task(
-    folder: Path, plan: Plan, one: KeptRun, argv: Sequence[str], *, figures: bool
-) -> Task:  # fmt: skip
+def _task(folder: Path, plan: Plan, one: KeptRun, request: Request) -> Task:
     scenario = alone(plan, one.law, one.cell, one.draw)
     return Task(
         scenario, resolved_yaml(scenario), folder / LOGS / one.name,
-        figures=DRAWN if figures else (), argv=argv, label=one.law,
+        figures=DRAWN if request.figures else (), argv=request.argv, label=one.law,
     )  # fmt: skip

@@ -28,14 +28,12 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     if inside := [study for study in studies if study.resolve() == out.resolve()]:
         raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
     started = datetime.now(UTC)
-    others = [stored(study, trusted=request.trust) for study in studies]
-    most = max(others, key=lambda other: other.plan.sweep.draws)
-    store = Store(out, most.plan, most.kernels)
+    others = [stored(study) for study in studies]
+    most = max(others, key=lambda other: other.about.draws)
+    store = Store(out, most.about)
     for other in others:
         store.agree(other)
-    if store.remark:
-        request.warn(store.remark)
-    plugins = record.plugin_files(most.folder, store.plan.scenario)
+    plugins = record.plugin_files(most.folder, most.about)
     texts = {SCENARIO: files.read_text(most.folder / SCENARIO), **plugins}
     with sole_writer(out), sole_writer(out, TABLES):
         return _joined(store, others, texts, started, request)
@@ -46,9 +44,9 @@ def _joined(
     request: Request,
 ) -> Swept:  # fmt: skip
     """Write the runs of the others into a study, and judge it where it is whole."""
-    out, plugged = store.folder, store.plan.scenario.plugged
+    out = store.folder
     store.open(started.isoformat(timespec="seconds"), texts)
-    session = Session(out, request.argv, started, plugged, [other.folder for other in others])
+    session = Session(out, request.argv, started, (), [other.folder for other in others])
     join(store, others)
     session.end(0)
     if mixed := mixture(out):

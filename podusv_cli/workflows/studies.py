@@ -5,24 +5,23 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.plugins import ABSENT
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import outputs, record
-from podusv_cli.studies.study.plan import KERNELS, differing, disagreements, plan
+from podusv_cli.studies.study.plan import KERNELS, Plan, differing, disagreements, plan
 from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows.keep import alone, seen_from
-from podusv_cli.workflows.many_runs import Tell, kept_scenario, silent
+from podusv_cli.workflows.many_runs import kept_scenario
 
 FORMATS = ("csv", "parquet")
 
@@ -55,46 +54,42 @@ def check_study(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
-def stored(
-    study: Path, warn: Tell = silent, *, trusted: bool = False, to_run: bool = False
-) -> Store:
-    """The store of a study's folder, for reading.
+def stored(study: Path) -> Store:
+    """The store of a study's folder, for reading; its scenario and plug-ins are not looked at.
 
-    Its plug-in files are executed only where they are `trusted`; values of study.json stand for
-    them, unless they are needed `to_run` a draw. Runs of other kernels than those of this podusv
-    are no fault; `warn` is told of them. Raises UsageError where the folder is no study, and where
-    its scenario is not the one of its runs; StorageError where that is damaged or names another
-    file; ScenarioError where its plug-ins are needed and not trusted.
+    Raises UsageError where the folder is no study, StorageError where it is damaged.
     """
     check_study(study)
-    there = record.read(study)
-    looked_at = partial(plugins.recorded, (), parts=there.parts(), metrics=there.foreign())
-    needed = partial(plugins.loaded, trusted=trusted)
-    made = plan(kept_scenario(study, plugged=needed if trusted or to_run else looked_at))
-    if ABSENT in made.scenario.plugged:
-        made = replace(made, record=there)
-    told, ours = there.identity, json_files.plain(made.stated)
-    keys = [key for key in differing(told, ours) if key in ours or not made.record]
-    if any(key not in told or not key.endswith(KERNELS) for key in keys):
+    return Store(study, record.read(study))
+
+
+def planned(study: Path, *, trusted: bool) -> Plan:
+    """The plan of a study's folder, whose plug-in files are executed if they are `trusted`.
+
+    Runs of other kernels than those of this podusv are no fault. Raises UsageError where the folder
+    is no study, and where its scenario is not the one of its runs; StorageError where that is
+    damaged or names another file; ScenarioError where its plug-ins are not trusted.
+    """
+    check_study(study)
+    made = plan(kept_scenario(study, plugged=partial(plugins.loaded, trusted=trusted)))
+    told, ours = record.begun(study).identity, json_files.plain(made.identity)
+    if keys := [key for key in differing(told, ours) if not key.endswith(KERNELS)]:
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
             f"{disagreements(ours, told, keys)}; restore the file, or use the podusv that "
             "made them"
         )
-    store = Store(study, made, {key: told[key] for key in keys})
-    if store.remark:
-        warn(store.remark)
-    return store
+    return made
 
 
-def status(study: Path, warn: Tell = silent) -> Made:
+def status(study: Path) -> Made:
     """How far a study is. Raises UsageError, StorageError."""
-    store = stored(study, warn)
+    store = stored(study)
     rows = [
-        (law, store.plan.cells[cell].label, int(there.sum()))
+        (law, store.about.cells[cell], int(there.sum()))
         for (law, cell), there in store.covered().items()
     ]
-    return Made(store.plan.sweep.draws, rows)
+    return Made(store.about.draws, rows)
 
 
 def draw(
@@ -104,7 +99,7 @@ def draw(
 
     Raises UsageError, ScenarioError where they are not, StorageError.
     """
-    made = stored(study, trusted=trusted, to_run=True).plan
+    made = planned(study, trusted=trusted)
     if law not in made.laws:
         raise UsageError(unknown(f"law {law!r}", law, made.laws))
     if cell >= len(made.cells):
@@ -124,12 +119,12 @@ def draw(
     return path
 
 
-def export(study: Path, form: str, out: Path | None, warn: Tell = silent) -> Path:
+def export(study: Path, form: str, out: Path | None) -> Path:
     """Write all runs as one table. Raises UsageError, StorageError."""
     if form not in FORMATS:
         raise UsageError(unknown(f"format {form!r}", form, FORMATS))
     path = out or study / f"runs.{form}"
-    store = stored(study, warn)
+    store = stored(study)
     if not (study / RUNS).exists():
         raise UsageError(
             f"{study} has no {RUNS} yet: podusv sweep report {shlex.quote(str(study))}"

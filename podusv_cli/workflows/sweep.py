@@ -9,22 +9,22 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.core.about import Keep
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.sweep import Keep
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
-from podusv_cli.studies.study import outputs
+from podusv_cli.studies.study import outputs, record
 from podusv_cli.studies.study.check import sweep_faults, unjudged
 from podusv_cli.studies.study.dispatch import Engine, Gaps, Tally, Tell, dispatch
 from podusv_cli.studies.study.estimate import check_fits
 from podusv_cli.studies.study.invalid import check_draws
 from podusv_cli.studies.study.joining import mixture
 from podusv_cli.studies.study.keep import contradiction, found, unmade
-from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.study.plan import Plan, plan
 from podusv_cli.studies.study.results import Results, judged
 from podusv_cli.studies.study.sessions import Session
 from podusv_cli.studies.study.store import Store
@@ -84,21 +84,22 @@ def run(config: Source, request: Request, tell: Tell) -> Swept:
     kept.
     """
     started = datetime.now(UTC)
-    store, texts = _planned(config, request)
-    check_fits(store.plan, store.folder, request.shard[1])
-    for law in store.plan.laws:  # before there is a folder that a mended law would not fit
-        store.plan.single(law, 0).ready(compiling(request, law))
+    made, folder, texts = _planned(config, request)
+    check_fits(made, folder, request.shard[1])
+    for law in made.laws:  # before there is a folder that a mended law would not fit
+        made.single(law, 0).ready(compiling(request, law))
+    store = Store(folder, record.about(made))
     with sole_writer(store.folder):
         if request.force:
             store.clear()
         store.open(started.isoformat(timespec="seconds"), texts)
-        return _run(store, request, started, tell)
+        return _run(store, made, request, started, tell)
 
 
-def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept:
+def _run(store: Store, made: Plan, request: Request, started: datetime, tell: Tell) -> Swept:
     """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
-    with engine_for(request, store.folder, store.plan.scenario, store.seal) as engine:
-        tally, whole = _marched(store, request, started, engine, tell)
+    with engine_for(request, store.folder, made.scenario, store.seal) as engine:
+        tally, whole = _marched(store, made, request, started, engine, tell)
     swept = Swept(store.folder, tally, refused=refused(engine))
     if whole and request.shard != WHOLE:
         whole = _is_whole(store)
@@ -107,14 +108,14 @@ def _run(store: Store, request: Request, started: datetime, tell: Tell) -> Swept
         return swept
     with sole_writer(store.folder, TABLES, PATIENCE, request.warn):
         store.write_runs()
-        return replace(answered(store, request), refused=swept.refused)
+        return replace(answered(store, request, made), refused=swept.refused)
 
 
 def _marched(
-    store: Store, request: Request, started: datetime, engine: Engine, tell: Tell
+    store: Store, made: Plan, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> tuple[Tally, bool]:
     """Simulate what is missing, and note the session; how far it is, and if it is whole."""
-    session = Session(store.folder, request.argv, started, store.plan.scenario.plugged)
+    session = Session(store.folder, request.argv, started, made.scenario.plugged)
     seen = Tally(0)
 
     def told(tally: Tally) -> None:
@@ -124,22 +125,24 @@ def _marched(
 
     try:
         return dispatch(
-            store, told, engine, seconds=request.seconds, part=request.shard,
-            begin=partial(_announce, store, request),
+            store, made, told, engine, seconds=request.seconds, part=request.shard,
+            begin=partial(_announce, store.folder, made, request),
         )  # fmt: skip
     except KeyboardInterrupt as stop:
-        made = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
-        raise interrupted(made, "sweep run", store.folder) from stop
+        kept = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
+        raise interrupted(kept, "sweep run", store.folder) from stop
     finally:
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
         session.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
 
 
-def _announce(store: Store, request: Request, missing: Gaps, alone: Mapping[str, str]) -> None:
+def _announce(
+    folder: Path, made: Plan, request: Request, missing: Gaps, alone: Mapping[str, str]
+) -> None:
     """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one."""
-    if missing and (mixed := mixture(store.folder)):
+    if missing and (mixed := mixture(folder)):
         request.warn(mixed)
-    if missing and (invalid := check_draws(store.plan)).count:
+    if missing and (invalid := check_draws(made)).count:
         request.warn(invalid.in_words())
     for law, why in alone.items():
         request.warn(one_by_one(law, why))
@@ -151,15 +154,15 @@ def _is_whole(store: Store) -> bool:
     return tally.made == tally.wanted
 
 
-def _planned(config: Source, request: Request) -> tuple[Store, dict[str, str]]:
-    """The store of a new study, or of one that is to be continued; its scenario and plug-ins."""
+def _planned(config: Source, request: Request) -> tuple[Plan, Path, dict[str, str]]:
+    """A new study, or one that is to be continued: plan, folder, scenario and plug-ins."""
     if there := folder_of(config):
         check_study(there)
     loaded = loaded_for("sweep", NO_SWEEP, config, request, [sweep_faults])
     if remark := unjudged(loaded.scenario):
         request.warn(remark)
     own = there or default_folder(loaded.scenario)
-    return Store(request.out or own, plan(loaded)), scenario_texts(loaded)
+    return plan(loaded), request.out or own, scenario_texts(loaded)
 
 
 def default_folder(scenario: Scenario) -> Path:
@@ -167,35 +170,33 @@ def default_folder(scenario: Scenario) -> Path:
     return RESULTS / f"{scenario.name}-sweep"
 
 
-def answered(store: Store, request: Request) -> Swept:
+def answered(store: Store, request: Request, made: Plan | None = None) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
+    With the plan of the study, the logs that it is to keep are made, too.
     Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
     """
     with interrupts_deferred():
-        results = judged(store.plan, store.runs())
+        results = judged(store.about, store.runs())
         outputs.write_tables(store.folder, results)
         extras, whole = Extras(), results.made == results.wanted
-        make = partial(
-            keep, store.folder, results, extras, request.argv, request.workers,
-            figures=request.figures,
-        )  # fmt: skip
-        if results.plan.sweep.keep != Keep():
-            request.say("making the logs that are kept")
-        if whole and store.plan.record and unmade(store.folder, results):
-            request.warn(
-                f"no logs of kept runs are made, as this would execute the plug-in files in "
-                f"{store.folder}; read them, then allow it with --trust"
-            )
-        adds = whole and not store.plan.record and not store.kernels
-        kept = make() if adds else found(store.folder, results, extras)
+        if whole and made:
+            if store.about.keep != Keep():
+                request.say("making the logs that are kept")
+            kept = keep(store.folder, made, results, extras, request)
+        else:
+            kept = found(store.folder, results, extras)
+        if whole and not made and unmade(store.folder, results):
+            again = plugins.continue_with("sweep run", store.folder)
+            request.warn(f"logs of kept runs are missing; they are made by: {again}")
         if contradicted := contradiction(kept):
             results = results.without_verdicts(contradicted)
             outputs.write_tables(store.folder, results)
         request.say("drawing figures and writing the report")
         outputs.write_report(store.folder, results, kept, extras, figures=request.figures)
         status: Status = "finished" if whole else "interrupted"
-        finish(store.folder, extras, "runs, tables and verdicts", "sweep report", status)
+        command = "sweep run" if made else "sweep report"
+        finish(store.folder, extras, "runs, tables and verdicts", command, status)
         tally = Tally(results.wanted, results.made)
         return Swept(store.folder, tally, results, tuple(extras.missing))
 
@@ -205,12 +206,12 @@ def report(study: Path, request: Request) -> Swept:
     started = datetime.now(UTC)
     check_study(study)
     with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked
-        store = stored(study, request.warn, trusted=request.trust)
+        store = stored(study)
         if not Tally.of(store.covered()).made:
             raise UsageError(
                 f"{study} has no runs yet: {plugins.continue_with('sweep run', study)}"
             )
-        Session(study, request.argv, started, store.plan.scenario.plugged).end(0)
+        Session(study, request.argv, started, ()).end(0)
         store.write_runs()
         if not store.runs().common.any():
             raise UsageError(

@@ -16,6 +16,7 @@ from storage_samples import Saboteur, fails
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import files
+from podusv_cli.studies.study.record import about
 from podusv_cli.studies.study.store import RUNS, Store
 from podusv_cli.workflows import sweep
 
@@ -107,7 +108,7 @@ def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path):
         folder = tmp_path / str(share)
         with pytest.raises(StorageError, match="the disk is full"):
             written_within(folder, share * needed)
-        kept.append(sum(int(m.sum()) for m in Store(folder, small()).covered().values()))
+        kept.append(sum(int(m.sum()) for m in Store(folder, about(small())).covered().values()))
         assert content(made(folder)) == content(whole)
     assert 0 == kept[0] < kept[1] < kept[2] < 2 * small().sweep.draws
 

@@ -83,11 +83,6 @@ class Controller(Component):
     # What a finding advises where a saturated actuator winds the law's memory up
     against_windup: ClassVar[str] = "tell it the loads that act (wants_loads, after_saturation)"
 
-    @property
-    def label(self) -> str:
-        """The law's kind."""
-        return str(type(self).model_fields["kind"].default)
-
     law: ClassVar[Callable[..., None]] = staticmethod(absent("law"))
     sample: ClassVar[Callable[..., None]] = staticmethod(absent("sample"))
     after_saturation: ClassVar[Callable[..., None]] = staticmethod(absent("after_saturation"))

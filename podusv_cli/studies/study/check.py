@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.core.plugins import ABSENT
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.expressions.reading import ExpressionError
@@ -48,10 +47,8 @@ def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
     if sweep is None:
         return []
     laws = list(_laws(scenario, sweep))
-    # Without its plug-ins, nothing can be drawn; study.json says of what draws the runs are. What
-    # contradicts itself without a draw does so with every one.
-    none = ABSENT in scenario.plugged or scenario.conflicts()
-    draws = () if none else _vary(singles(scenario), sweep)
+    # What contradicts itself without a draw does so with every one.
+    draws = () if scenario.conflicts() else _vary(singles(scenario), sweep)
     return laws or [
         *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
         *_claims(scenario, sweep),

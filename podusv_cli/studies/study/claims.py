@@ -19,13 +19,11 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from podusv_cli.core.about import MetricAbout, StudyClaim
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS
 from podusv_cli.expressions.reading import function, known, number, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Logic, all_of
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.sweep import StudyClaim
 from podusv_cli.studies.study.expressions import OverLaws
 from podusv_cli.studies.study.runs import Mask, StudyRuns
 from podusv_cli.studies.study.samples import ALONE, FAILURES, SAMPLERS, SHARE, STATISTICS, Sample
@@ -98,7 +96,7 @@ class _Example:
         return np.zeros((1, 1), bool)
 
 
-def parse(text: str, laws: Sequence[str], metrics: Mapping[str, Metric] = METRICS) -> Parsed:
+def parse(text: str, laws: Sequence[str], metrics: Mapping[str, MetricAbout]) -> Parsed:
     """A claim about these laws. Raises ExpressionError."""
     tree = syntax_tree(text, EXAMPLE)
     tried = _Evaluation(_Example(laws, list(metrics)), Parsed(tree), metrics)
@@ -108,7 +106,7 @@ def parse(text: str, laws: Sequence[str], metrics: Mapping[str, Metric] = METRIC
 
 def judge(
     claims: Sequence[ParsedClaim], runs: StudyRuns, level: float,
-    metrics: Mapping[str, Metric] = METRICS,
+    metrics: Mapping[str, MetricAbout],
 ) -> list[StudyVerdict]:  # fmt: skip
     """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
     tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
@@ -126,7 +124,7 @@ class _Evaluation(Logic):
 
     runs: StudyRuns
     parsed: Parsed
-    metrics: Mapping[str, Metric]
+    metrics: Mapping[str, MetricAbout]
     tolerance: float = 0.0
     level: float = 0.5
     whole: bool = True

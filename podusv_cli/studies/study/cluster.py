@@ -21,7 +21,7 @@ from podusv_cli.studies.study import remote
 from podusv_cli.studies.study.dispatch import Done, Engine, Processes, Units
 from podusv_cli.studies.study.plan import Variant
 from podusv_cli.studies.study.remote import Expectation, Reply, StudyText
-from podusv_cli.studies.study.unit import Unit
+from podusv_cli.studies.study.runs import Unit
 
 WINDOW = 2  # units under way for each thread of a worker, so that none waits for this process
 LOOK = 2.0  # s, after which it is looked again which workers there are

@@ -16,10 +16,10 @@ import numpy as np
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Job, Outcome, available_workers, run_each
 from podusv_cli.studies.study.plan import LawInCell, Plan
-from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.runs import STATUSES, Mask, Unit, UnitResult
 from podusv_cli.studies.study.runs_file import stretches
 from podusv_cli.studies.study.store import Store
-from podusv_cli.studies.study.unit import STATUSES, Unit, UnitResult, crashed, make, prepare
+from podusv_cli.studies.study.unit import crashed, make, prepare
 
 FIRST = 8  # draws of a unit before it is known how long a run takes
 AIM = 4.0  # s of computing that a unit is to take
@@ -121,9 +121,9 @@ class Processes:
 class Driver:
     """Hands out units, keeps what comes back, and finds the run that ends its process."""
 
-    def __init__(self, store: Store, tell: Tell, until: float, part: Shard) -> None:
+    def __init__(self, store: Store, plan: Plan, tell: Tell, until: float, part: Shard) -> None:
         """Units of this part are handed out until the monotonic time `until` [s]."""
-        self.store, self.plan, self._tell, self._until = store, store.plan, tell, until
+        self.store, self.plan, self._tell, self._until = store, plan, tell, until
         there, inside = store.covered(), np.zeros(self.plan.sweep.draws, bool)
         inside[shard(len(inside), *part)] = True
         self._gaps = {key: stretches(inside & np.logical_not(mask)) for key, mask in there.items()}
@@ -206,7 +206,8 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def dispatch(
-    store: Store, tell: Tell, engine: Engine, *, seconds: float = math.inf, part: Shard = (1, 1),
+    store: Store, plan: Plan, tell: Tell, engine: Engine, *, seconds: float = math.inf,
+    part: Shard = (1, 1),
     begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
 ) -> tuple[Tally, bool]:  # fmt: skip
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
@@ -216,10 +217,10 @@ def dispatch(
     Every unit is on the disk before the next is handed out. Raises PodusvError where a unit cannot
     be made at all or not be written, KeyboardInterrupt after an interrupt; what is made is kept.
     """
-    driver = Driver(store, tell, time.monotonic() + seconds, part)
+    driver = Driver(store, plan, tell, time.monotonic() + seconds, part)
     missing = driver.missing()
     # Before the fork, so that no process compiles it again.
-    reasons = {law: prepare(store.plan, law, cell) for law, cell in missing}
+    reasons = {law: prepare(plan, law, cell) for law, cell in missing}
     begin(missing, {law: why for law, why in reasons.items() if why})
     driver.tally.began = time.monotonic()  # compiling and timing are over
     finished = engine(driver, driver.done)

@@ -16,12 +16,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS, below
 from podusv_cli.expressions.reading import function, known, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Walk
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import METRICS
 from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
 
 # A failed run's metric in arithmetic: larger than any number of a run, and the same for all, so
@@ -34,7 +33,7 @@ FINISHED, SUCCESS = "finished", "success"
 class OfRuns(Walk):
     """One walk over an expression about runs; `tolerance` is the margin of its comparisons."""
 
-    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)
+    metrics: Mapping[str, MetricAbout]
     tolerance: float = 0.0
     both_failed: list[Any] = field(default_factory=list)  # where both sides of a comparison are inf
     close: list[Any] = field(default_factory=list)  # where they differ by the margin or less
@@ -125,7 +124,7 @@ class OfOneRun(OfRuns):
         return Condition.known(self.ended)
 
 
-def parse_success(text: str, metrics: Mapping[str, Metric] = METRICS) -> ast.expr:
+def parse_success(text: str, metrics: Mapping[str, MetricAbout]) -> ast.expr:
     """The syntax tree of a condition for success. Raises ExpressionError."""
     tree = syntax_tree(text, "finished and z_e_steady <= 1.5")
     succeeded(tree, {}, np.ones(1, bool), metrics)
@@ -134,7 +133,7 @@ def parse_success(text: str, metrics: Mapping[str, Metric] = METRICS) -> ast.exp
 
 def succeeded(
     tree: ast.expr, values: Mapping[str, Vector], finished: Mask,
-    metrics: Mapping[str, Metric] = METRICS,
+    metrics: Mapping[str, MetricAbout],
 ) -> Mask:  # fmt: skip
     """Which runs of a law are a success; one is not where the condition is unknown."""
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes

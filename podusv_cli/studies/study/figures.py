@@ -23,7 +23,6 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.quantities import raised
 from podusv_cli.figures.shown import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import legend, new_figure
-from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.study import statistics
 from podusv_cli.studies.study.expressions import FINISHED, parse_success, succeeded
@@ -129,7 +128,7 @@ def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[
 
     A run that fails for another reason has infinity.
     """
-    tree = parse_success(results.plan.sweep.success, results.known)
+    tree = parse_success(results.about.success, results.known)
     parts = tree.values if isinstance(tree, ast.BoolOp) else [tree]
     for part in parts:
         match part:
@@ -155,12 +154,12 @@ def _limited(
 
 
 def _heatmaps(results: Results) -> Iterator[Sketch]:
-    grid = results.plan.sweep.grid
+    grid = results.about.grid
     if not grid:
         return
     first, *rest = grid
-    across = [as_yaml(value) for value in grid[first]]
-    down = [", ".join(map(as_yaml, values)) for values in product(*(grid[key] for key in rest))]
+    across = grid[first]
+    down = [", ".join(values) for values in product(*(grid[key] for key in rest))]
     for name in ("failed", *results.shown):
         panels = {law: _panel(results, law, name, len(across)) for law in results.runs.laws}
         label = "failed [1]" if name == "failed" else _label(results, name)

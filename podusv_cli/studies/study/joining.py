@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.runs import Mask, UnitResult
 from podusv_cli.studies.study.runs_file import stretches
 from podusv_cli.studies.study.sessions import NAME, sessions
 from podusv_cli.studies.study.store import Store
-from podusv_cli.studies.study.unit import UnitResult
 
 SIZE = 8  # bytes of a run's digest
 NOWHERE = -1  # the folder of a run that none has yet
@@ -38,7 +37,7 @@ class Comparison:
 
     def __init__(self, first: Store) -> None:
         """Nothing is seen yet of the study that this store belongs to."""
-        draws, places = first.plan.sweep.draws, first.covered()
+        draws, places = first.about.draws, first.covered()
         self._digests = {place: np.zeros(draws, np.uint64) for place in places}
         self._origins = {place: np.full(draws, NOWHERE, np.int32) for place in places}
         self._stores: list[Store] = []
@@ -59,7 +58,7 @@ class Comparison:
         unit, folder = new.unit, self._stores[-1].folder
         first = unit.first + int(np.argmax(other))
         names = ", ".join(_differing(new, earlier, first))
-        cell = self._stores[-1].plan.cells[unit.cell].label
+        cell = self._stores[-1].about.cells[unit.cell]
         raise StorageError(
             f"{folder}: {_ranges(other, unit.first)} of {unit.law}{f' at {cell}' if cell else ''} "
             f"with other numbers than in {earlier.folder} ({names} of draw {first}); {folder} was "
@@ -136,7 +135,7 @@ def gaps(store: Store) -> list[str]:
     covered = store.covered()
     for (law, cell), there in covered.items():
         if not there.all():
-            label = store.plan.cells[cell].label
+            label = store.about.cells[cell]
             told = lacking.setdefault(_ranges(np.logical_not(there)), [])
             told.append(f"{law}{f' at {label}' if label else ''}")
     every = len(covered)

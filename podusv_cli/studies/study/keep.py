@@ -57,7 +57,7 @@ def wanted(results: Results) -> list[KeptRun]:
     Failed runs are the first that diverged or were no success; a run that crashed, hung or was
     invalid has no log. The worst have the largest value of a metric among those that succeeded.
     """
-    keep = results.plan.sweep.keep
+    keep = results.about.keep
     found: dict[tuple[str, int, int], KeptRun] = {}
     for law in results.runs.laws:
         for one in (

@@ -19,10 +19,9 @@ from podusv_cli.storage.run_folder import MISSING
 from podusv_cli.studies.study import summary
 from podusv_cli.studies.study.keep import Kept, tracks
 from podusv_cli.studies.study.results import Results
-from podusv_cli.studies.study.runs import AXES, ENDING
+from podusv_cli.studies.study.runs import AXES, ENDING, STATUSES
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.sessions import timing
-from podusv_cli.studies.study.unit import STATUSES
 
 FIGURES, REPORT = "figures", "report.html"
 

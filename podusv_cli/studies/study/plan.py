@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.components.controllers.base import Controller
+from podusv_cli.core.about import Keep
 from podusv_cli.core.errors import UsageError
 from podusv_cli.engine.machine.object_cache import ingredients
 from podusv_cli.engine.step import rk4 as closed_loop
 from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.sweep import Keep, Sweep
+from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.study.cells import Cell, cells
 from podusv_cli.studies.study.check import sweep_faults
 from podusv_cli.studies.study.draws import SWEEP
-from podusv_cli.studies.study.record import Record
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
@@ -50,7 +50,6 @@ class Plan:
     scenario: Scenario
     cells: tuple[Cell, ...]
     variant: Variant | None = None  # which one of the study it is, if any
-    record: Record | None = None  # stands for plug-ins that are not loaded
 
     @property
     def sweep(self) -> Sweep:
@@ -72,12 +71,9 @@ class Plan:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
-        names = set(self.record.metrics) if self.record else self._measured()
-        return tuple(name for name in self.scenario.known_metrics() if name in names)
-
-    def _measured(self) -> set[str]:
         loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
-        return {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
+        names = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
+        return tuple(name for name in self.scenario.known_metrics() if name in names)
 
     def single(self, law: str, cell: int) -> Scenario:
         """The scenario of one law in one cell."""
@@ -86,11 +82,6 @@ class Plan:
     @cached_property
     def identity(self) -> dict[str, Any]:
         """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
-        return self.record.identity if self.record else self.stated
-
-    @cached_property
-    def stated(self) -> dict[str, Any]:
-        """The identity as the scenario has it; without what only plug-ins that are absent know."""
         sweep = self.sweep
         told: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
         if self.stream != SWEEP:
@@ -102,11 +93,10 @@ class Plan:
                 single = self.single(law, cell.index)
                 kept = {
                     key: value for key, value in values(single).items()
-                    if key.partition(".")[0] not in (*COSMETIC, *single.recorded)
+                    if key.partition(".")[0] not in COSMETIC
                 }  # fmt: skip
                 told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                if not self.record:
-                    told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
+                told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return told
 
     def varied(self, variant: Variant) -> Plan:

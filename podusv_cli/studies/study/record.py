@@ -1,112 +1,89 @@
-"""study.json: what a study is, how many draws were asked for, and what its plug-ins brought."""
+"""study.json: what a study says about itself, from its plan to whoever reads its runs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ConfigDict, PositiveInt, field_validator
-
+from podusv_cli.core.about import QuantityAbout, StudyAbout, StudyIdentity
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import digest
-from podusv_cli.metrics.metric import Accumulator, Metric
-from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import BASES, FOLDER, Parts
+from podusv_cli.scenario.phrases import as_yaml
+from podusv_cli.scenario.plugins import FOLDER
+from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
+from podusv_cli.studies.study.draws import SWEEP
+from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.study.words import in_words
 
-# Stands for what a plug-in's metric gathers during a run; it gathers nothing.
-GATHERED = Accumulator(lambda *_: None, lambda _: 0, lambda _: {})
-
-
-class Asked(BaseModel):
-    """What one `podusv sweep run` asked for."""
-
-    model_config = ConfigDict(strict=True, frozen=True)
-    draws: PositiveInt
-    started: str
+FORMAT = 2
 
 
-class MetricOfPlugin(BaseModel):
-    """A metric of a plug-in without its functions; fields as `Metric` has them."""
-
-    model_config = ConfigDict(strict=True, frozen=True)
-    unit: str
-    meaning: str
-    place: int
-    happens: bool
-    counts_standoff: bool
-    symbol: str
-
-
-class Record(BaseModel):
-    """What is read of study.json; only a study with plug-ins has its metrics there."""
-
-    model_config = ConfigDict(strict=True, frozen=True)
-    draws: PositiveInt
-    identity: dict[str, Any]
-    history: list[Asked]
-    metrics: list[str] = []
-    metrics_of_plugins: dict[str, MetricOfPlugin] = {}
-
-    @field_validator("metrics_of_plugins")
-    @classmethod
-    def _possible(cls, given: dict[str, MetricOfPlugin]) -> dict[str, MetricOfPlugin]:
-        _metrics(given)  # ValueError for a name or unit that no metric has
-        return given
-
-    def parts(self) -> Parts:
-        """Section, kind and field names of every component that the runs had."""
-        return tuple(dict.fromkeys(_parts(self.identity)))
-
-    def foreign(self) -> tuple[Metric, ...]:
-        """The metrics of plug-ins, as values that can be told and not gathered."""
-        return _metrics(self.metrics_of_plugins)
+def about(plan: Plan) -> StudyAbout:
+    """What a plan's study says about itself."""
+    scenario, sweep = plan.scenario, plan.sweep
+    seas = scenario.disturbances().values()
+    return StudyAbout(
+        name=scenario.name, description=scenario.description,
+        duration=scenario.simulation.duration, steady_fraction=scenario.metrics.steady_fraction,
+        settling_radius=scenario.metrics.settling_radius,
+        parts={
+            "path": scenario.path.label, "disturbance": ", ".join(one.label for one in seas),
+            "actuator": scenario.actuator.label,
+        },
+        plugins={n: one.sha256 for n, one in scenario.plugins.items() if n.endswith(".py")},
+        laws=plan.laws, cells=tuple(cell.label for cell in plan.cells),
+        grid={key: tuple(map(as_yaml, given)) for key, given in sweep.grid.items()},
+        draws=sweep.draws, seed=sweep.seed, design=sweep.design, success=sweep.success,
+        level=sweep.level, keep=sweep.keep, claims=sweep.claims,
+        quantities={
+            name: QuantityAbout(keys=one.targets(name), drawn=in_words(one), is_seed=one.seed)
+            for name, one in sweep.vary.items()
+        },
+        metrics={n: m.about for n, m in scenario.known_metrics().items() if m.accumulator},
+        measured=plan.metrics, identity=json_files.plain(plan.identity), history=(),
+    )  # fmt: skip
 
 
-def _metrics(given: Mapping[str, MetricOfPlugin]) -> tuple[Metric, ...]:
-    return tuple(
-        Metric(name, accumulator=GATHERED, **one.model_dump()) for name, one in given.items()
-    )
+def drawing(study: StudyIdentity) -> tuple[Sweep, str]:
+    """How the quantities of a study are drawn, and the stream of its draws."""
+    head = "sweep.vary."
+    own = study.identity
+    vary = {key.removeprefix(head): one for key, one in own.items() if key.startswith(head)}
+    told = {"seed": own["sweep.seed"], "design": own["sweep.design"], "vary": vary}
+    sweep = Sweep.model_validate_json(json.dumps({**told, "draws": study.draws}))
+    return sweep, own.get("stream", SWEEP)
 
 
-def read(folder: Path) -> Record:
-    """The record of a study's folder. Raises StorageError."""
-    return json_files.read_as(folder / STUDY, Record)
+def read(folder: Path) -> StudyAbout:
+    """What the study in a folder says about itself. Raises StorageError."""
+    if json_files.read(folder / STUDY).get("format") == 1:
+        raise StorageError(
+            f"cannot read {folder / STUDY}: an older podusv wrote it; podusv sweep run {folder} "
+            "writes it anew, and keeps all runs that are there"
+        )
+    return json_files.read_as(folder / STUDY, StudyAbout)
 
 
-def plugin_files(folder: Path, scenario: Scenario) -> dict[str, str]:
+def begun(folder: Path) -> StudyIdentity:
+    """What the runs in a folder depend on, whichever podusv made them. Raises StorageError."""
+    return json_files.read_as(folder / STUDY, StudyIdentity)
+
+
+def write(folder: Path, study: StudyAbout) -> None:
+    """Write study.json. Raises StorageError."""
+    content = {"format": FORMAT, **study.model_dump(exclude_defaults=True)}
+    files.write_bytes(folder / STUDY, json_files.encode(content))
+
+
+def plugin_files(folder: Path, study: StudyAbout) -> dict[str, str]:
     """The text of each plug-in file in a study's folder, by its name there; none is executed.
 
     Raises StorageError for a file that is not the one of the study's runs.
     """
-    own = {name: one for name, one in scenario.plugins.items() if name.endswith(".py")}
-    texts = {name: files.read_text(folder / FOLDER / Path(name).name) for name in own}
+    texts = {name: files.read_text(folder / FOLDER / Path(name).name) for name in study.plugins}
     for name, text in texts.items():
-        if name != f"{FOLDER}/{Path(name).name}" or digest(text) != own[name].sha256:
+        if name != f"{FOLDER}/{Path(name).name}" or digest(text) != study.plugins[name]:
             raise StorageError(f"{folder / name} is not the plug-in file of the runs in {folder}")
     return texts
-
-
-def of_plugins(known: Mapping[str, Metric], own: Mapping[str, Metric]) -> dict[str, Any]:
-    """Those known metrics that are not podusv's own, as `MetricOfPlugin` reads them."""
-    return {
-        name: {fact: getattr(metric, fact) for fact in MetricOfPlugin.model_fields}
-        for name, metric in known.items() if name not in own
-    }  # fmt: skip
-
-
-def _parts(identity: Mapping[str, Any]) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Of keys such as `law[0].controller.gain`, and of lists such as `law[0].disturbance`."""
-    sections: dict[tuple[str, str], dict[str, Any]] = {}
-    for key, content in identity.items():
-        run, _, inside = key.partition("].")
-        section, _, field = inside.partition(".")
-        if section in BASES and field:
-            sections.setdefault((run, section), {})[field.partition(".")[0]] = content
-        for one in content if section in BASES and isinstance(content, list) and not field else ():
-            if isinstance(one, dict):
-                yield section, str(one.get("kind")), frozenset(one)
-    for (_, section), fields in sections.items():
-        yield section, str(fields.get("kind")), frozenset(fields)

@@ -23,7 +23,8 @@ from podusv_cli.storage.provenance import processor
 from podusv_cli.studies.study.dispatch import timed
 from podusv_cli.studies.study.joining import digests
 from podusv_cli.studies.study.plan import Plan, Variant, digest, plan
-from podusv_cli.studies.study.unit import Unit, make
+from podusv_cli.studies.study.runs import Unit
+from podusv_cli.studies.study.unit import make
 
 PLANS = 2  # plans that a worker keeps
 CANARY = 2  # draws of each law, of which every worker has to compute the same bits

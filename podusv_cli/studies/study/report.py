@@ -11,16 +11,12 @@ import numpy as np
 from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Failure
-from podusv_cli.scenario.phrases import as_yaml
-from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.study.bars import bars
 from podusv_cli.studies.study.keep import Kept
 from podusv_cli.studies.study.results import Results
-from podusv_cli.studies.study.runs import Mask
+from podusv_cli.studies.study.runs import STATUSES, Mask
 from podusv_cli.studies.study.sessions import sessions
 from podusv_cli.studies.study.statistics import Interval, digits
-from podusv_cli.studies.study.unit import STATUSES
-from podusv_cli.studies.study.words import in_words
 
 FEW = 5  # laws, whose pairs are no more than ten
 FIRST = 20  # rows of a table of runs
@@ -51,15 +47,14 @@ def page(
     missing: Sequence[Failure],
 ) -> str:  # fmt: skip
     """The whole report."""
-    plan, beside = results.plan, _beside(figures, len(results.runs.laws))
+    about, beside = results.about, _beside(figures, len(results.runs.laws))
     ordered = [*beside, *(picture for picture in figures if picture not in beside)]
     numbered = [*enumerate(ordered, 1)]
     return environment("podusv_cli.studies.study").get_template("study.html.j2").render(
-        title=f"{plan.scenario.name}: a study",
+        title=f"{about.name}: a study",
         folder=folder,
         results=results,
-        scenario=plan.scenario,
-        sweep=plan.sweep,
+        about=about,
         several=len(results.runs.cells) > 1,
         answers=by_answer(results.verdicts),
         claims=[(v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)],
@@ -69,8 +64,8 @@ def page(
         pairs=_pairs(results),
         numbers=_numbers(results),
         metrics={name: results.known[name] for name in results.shown},
-        varied=_varied(plan.sweep, results),
-        grid=[(key, ", ".join(map(as_yaml, given))) for key, given in plan.sweep.grid.items()],
+        varied=_varied(results),
+        grid=[(key, ", ".join(given)) for key, given in about.grid.items()],
         kept=kept,
         beside=numbered[: len(beside)],
         figures=numbered,
@@ -148,16 +143,16 @@ def _numbers(results: Results) -> list[list[str]]:
     ]  # fmt: skip
 
 
-def _varied(sweep: Sweep, results: Results) -> list[tuple[str, str, str]]:
+def _varied(results: Results) -> list[tuple[str, str, str]]:
     """Every drawn quantity: its keys, how it is drawn, and the scenario's own values."""
-    own, run = results.plan.identity, f"{results.runs.laws[0]}[0]"
+    own, run = results.about.identity, f"{results.runs.laws[0]}[0]"
     return [
         (
-            ", ".join(quantity.targets(name)),
-            in_words(quantity),
-            ", ".join(value_text(own.get(f"{run}.{key}")) for key in quantity.targets(name)),
+            ", ".join(quantity.keys),
+            quantity.drawn,
+            ", ".join(value_text(own.get(f"{run}.{key}")) for key in quantity.keys),
         )
-        for name, quantity in sweep.vary.items()
+        for quantity in results.about.quantities.values()
     ]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from podusv_cli.metrics.metric import Metric
+from podusv_cli.core.about import MetricAbout, StudyAbout
 from podusv_cli.studies.study import claims, summary, verdict
-from podusv_cli.studies.study.plan import Plan
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.statistics import Interval, digits
 
@@ -24,7 +23,7 @@ MARGIN = 0.01  # relative, of pairs
 class Results:
     """The tables and verdicts of a study's runs, as far as these are made."""
 
-    plan: Plan
+    about: StudyAbout
     runs: Table
     summary: pd.DataFrame
     pairs: pd.DataFrame
@@ -33,10 +32,10 @@ class Results:
     verdicts: Sequence[verdict.StudyVerdict]
     contradicted: str = ""  # why no claim is judged: a kept log has other numbers than the table
 
-    @cached_property
-    def known(self) -> dict[str, Metric]:
+    @property
+    def known(self) -> Mapping[str, MetricAbout]:
         """All metrics, with those of plug-ins."""
-        return self.plan.scenario.known_metrics()
+        return self.about.metrics
 
     @cached_property
     def broken(self) -> int:
@@ -66,7 +65,7 @@ class Results:
     @property
     def level(self) -> float:
         """The confidence of all intervals; NaN where the draws allow none."""
-        return self.plan.sweep.level if self.plan.sweep.independent else np.nan
+        return self.about.level if self.about.independent else np.nan
 
     @property
     def shown(self) -> list[str]:
@@ -75,7 +74,7 @@ class Results:
         Runs without any of the most common, as manoeuvring trials are, have those that a reader
         sees first in their place; such metrics always come before the others.
         """
-        told = " ".join(claim.expect for claim in self.plan.sweep.claims.values())
+        told = " ".join(claim.expect for claim in self.about.claims.values())
         gathered = self.runs.metrics
         headlines = [m for m in gathered if self.known[m].headline]
         usual = [m for m in gathered if m in ALWAYS] or headlines
@@ -117,20 +116,20 @@ class Results:
         }
 
 
-def judged(plan: Plan, runs: Table) -> Results:
+def judged(about: StudyAbout, runs: Table) -> Results:
     """All tables and verdicts of a study's runs."""
-    sweep, known = plan.sweep, plan.scenario.known_metrics()
+    level, known = about.level, about.metrics
     parsed = [
-        claims.ParsedClaim(name, claim, claims.parse(claim.expect, plan.laws, known))
-        for name, claim in sweep.claims.items()
+        claims.ParsedClaim(name, claim, claims.parse(claim.expect, about.laws, known))
+        for name, claim in about.claims.items()
     ]
-    numbers = {q: values for q, values in runs.drawn.items() if not sweep.vary[q].seed}
+    numbers = {q: values for q, values in runs.drawn.items() if not about.quantities[q].is_seed}
     tables = (
-        summary.summary(runs, sweep.level, known), summary.pairs(runs, MARGIN, sweep.level, known),
-        summary.sensitivity(runs, numbers, sweep.level, known),
+        summary.summary(runs, level, known), summary.pairs(runs, MARGIN, level, known),
+        summary.sensitivity(runs, numbers, level, known),
     )  # fmt: skip
     laws, pairs, sensitivity = (
-        table if sweep.independent else summary.without_intervals(table) for table in tables
+        table if about.independent else summary.without_intervals(table) for table in tables
     )
-    verdicts = claims.judge(parsed, runs, sweep.level, known)
-    return Results(plan, runs, laws, pairs, sensitivity, parsed, verdicts)
+    verdicts = claims.judge(parsed, runs, level, known)
+    return Results(about, runs, laws, pairs, sensitivity, parsed, verdicts)

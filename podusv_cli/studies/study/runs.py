@@ -1,15 +1,16 @@
-"""The runs of a study, as its statistics, tables and claims need them."""
+"""The runs of a study: units of them as they are made, and all as statistics need them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
-from podusv_cli.metrics.metric import Metric
 
 Mask = NDArray[Any]  # of booleans
 # Columns of the table of all runs, ahead of the drawn quantities and behind them.
@@ -19,6 +20,51 @@ SEAL = "sha256"  # of `status`, `until` and the metrics, in the order of the fil
 SEAL_OF_THE_REST = "sha256_rest"  # of axes, causes and drawn quantities; the first tables have none
 DRAWN = "drawn"  # the group of drawn quantities
 OWN = (*AXES, *FAILED, "status", "until", DRAWN, SEAL, SEAL_OF_THE_REST)  # are no metrics
+
+
+# How a run can end. The position is the code in files; "missing" is a run that is not made yet.
+STATUSES = ("finished", "diverged", "hung", "crashed", "invalid", "missing")
+BROKEN = ("hung", "crashed", "invalid")  # no results of the law
+NOT_MADE = STATUSES.index("missing")
+Codes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, order=True)
+class Unit:
+    """Draws `first` to `first + count - 1` of a law in a cell."""
+
+    law: str
+    cell: int
+    first: int
+    count: int
+
+    @property
+    def draws(self) -> range:
+        """The numbers of the draws."""
+        return range(self.first, self.first + self.count)
+
+    def halves(self) -> tuple[Unit, Unit]:
+        """The unit as two, to find a run that crashes."""
+        half = self.count // 2
+        return (
+            Unit(self.law, self.cell, self.first, half),
+            Unit(self.law, self.cell, self.first + half, self.count - half),
+        )
+
+
+@dataclass(frozen=True)
+class UnitResult:
+    """What came of a unit; one number a draw.
+
+    `metrics` by name, NaN where a run ended before one is defined. `status` holds positions in
+    STATUSES, `until` the time that a run reached [s], `causes` why it did not finish, else "".
+    """
+
+    unit: Unit
+    metrics: Mapping[str, Vector]
+    status: Codes
+    until: Vector
+    causes: tuple[str, ...]
 
 
 class StudyRuns(Protocol):
@@ -56,7 +102,7 @@ class StudyRuns(Protocol):
         """Whether the run crashed, hung or was invalid: no result of the law."""
 
 
-def worst(about: Metric, values: Vector, failed: Mask) -> Vector:
+def worst(about: MetricAbout, values: Vector, failed: Mask) -> Vector:
     """A metric with the worst, +inf, for failed runs and for the time of what never happened."""
     never = np.isnan(values) if about.happens else False
     return np.where(failed | never, np.inf, values)

@@ -13,16 +13,28 @@ from typing import Any
 import h5py
 import numpy as np
 
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import METRICS
 from podusv_cli.storage import hdf5
-from podusv_cli.studies.study.expressions import FINISHED, parse_success, succeeded
-from podusv_cli.studies.study.runs import AXES, DRAWN, FAILED, OWN, SEAL, SEAL_OF_THE_REST, Mask
-from podusv_cli.studies.study.unit import BROKEN, NOT_MADE, STATUSES, Codes, Unit, UnitResult
+from podusv_cli.studies.study.expressions import parse_success, succeeded
+from podusv_cli.studies.study.runs import (
+    AXES,
+    BROKEN,
+    DRAWN,
+    FAILED,
+    NOT_MADE,
+    OWN,
+    SEAL,
+    SEAL_OF_THE_REST,
+    STATUSES,
+    Codes,
+    Mask,
+    Unit,
+    UnitResult,
+)
 
-Known = Mapping[str, Metric]
+Known = Mapping[str, MetricAbout]
 ROWS = 4096  # runs read or written at a time
 
 
@@ -52,7 +64,7 @@ def digest_of_the_rest(file: h5py.File) -> str:
 class Table:
     """runs.h5, open for reading, as `StudyRuns`; arrays are read when they are asked for."""
 
-    def __init__(self, path: Path, success: str = FINISHED, known: Known = METRICS) -> None:
+    def __init__(self, path: Path, success: str, known: Known) -> None:
         """`success` is the expression for a run's. Raises StorageError for a damaged file."""
         self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)

@@ -12,15 +12,22 @@ from typing import Any
 import h5py
 import numpy as np
 
+from podusv_cli.core.about import StudyAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage.files import new_file, storage_errors
 from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
+from podusv_cli.studies.study import record
 from podusv_cli.studies.study.draws import table
-from podusv_cli.studies.study.plan import Plan
-from podusv_cli.studies.study.runs import DRAWN, SEAL, SEAL_OF_THE_REST
+from podusv_cli.studies.study.runs import (
+    DRAWN,
+    NOT_MADE,
+    SEAL,
+    SEAL_OF_THE_REST,
+    STATUSES,
+    UnitResult,
+)
 from podusv_cli.studies.study.runs_file import ROWS, digest, digest_of_the_rest
-from podusv_cli.studies.study.unit import NOT_MADE, STATUSES, UnitResult
 
 BLOCK = 2**20  # bytes written and read at a time
 NUMBERS = "iuf"  # numpy's kinds of numbers
@@ -28,7 +35,7 @@ HEAD = 1200  # bytes of what the file says of an array, roughly
 Results = Callable[[], Iterable[UnitResult]]  # all runs that there are, from the first again
 
 
-def write(path: Path, plan: Plan, identity: str, results: Results) -> None:
+def write(path: Path, study: StudyAbout, identity: str, results: Results) -> None:
     """Write the table of a study, in place of an older one.
 
     Raises StorageError; the older table is then still there.
@@ -36,12 +43,12 @@ def write(path: Path, plan: Plan, identity: str, results: Results) -> None:
     part = path.with_name(temporary_name())
     try:
         causes = {
-            (plan.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
+            (study.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
             for r in results() for i, cause in enumerate(r.causes) if cause
         }  # fmt: skip
-        places = _lay_out(part, plan, identity, dict(sorted(causes.items())))
+        places = _lay_out(part, study, identity, dict(sorted(causes.items())))
         with storage_errors(f"cannot write {path}"):
-            _fill(part, plan, places, results())
+            _fill(part, study, places, results())
             os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
@@ -71,32 +78,31 @@ class Extent:
 
 
 def _lay_out(
-    part: Path, plan: Plan, identity: str, causes: Mapping[tuple[int, int, int], str]
+    part: Path, study: StudyAbout, identity: str, causes: Mapping[tuple[int, int, int], str]
 ) -> dict[str, Extent]:
     """Make the file with everything but long arrays; the places of these."""
-    layout, places, wanted = LogLayout(), dict[str, Extent](), plan.sweep.draws
-    cells, known = [cell.label for cell in plan.cells], plan.scenario.known_metrics()
-    shape = len(plan.laws), len(cells), wanted
+    layout, places, wanted = LogLayout(), dict[str, Extent](), study.draws
+    (sweep, stream), shape = record.drawing(study), (len(study.laws), len(study.cells), wanted)
     with h5py.File(layout, "w", **FILE, **UNDATED) as file:
-        title = plan.scenario.name
-        describe(file, {"title": title, "identity": identity, "status": " ".join(STATUSES)})
-        scales = [_labels(file, "law", plan.laws), _labels(file, "cell", cells)]
+        describe(file, {"title": study.name, "identity": identity, "status": " ".join(STATUSES)})
+        scales = [_labels(file, "law", study.laws), _labels(file, "cell", study.cells)]
         scales.append(_labels(file, "draw", np.arange(wanted, dtype=np.int32)))
-        for name, first in table(plan.sweep, 0, 1, plan.stream).items():
+        for name, first in table(sweep, 0, 1, stream).items():
             if first.dtype.kind in NUMBERS:
                 path = f"{DRAWN}/{name}"
                 places[path] = _extent(file, path, first.dtype, (wanted,), ())
             else:
-                words = table(plan.sweep, 0, wanted, plan.stream)[name]
+                words = table(sweep, 0, wanted, stream)[name]
                 file.create_dataset(f"{DRAWN}/{name}", data=_column(words))
         file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
         file.create_dataset("failed_cause", data=_labelled(list(causes.values()) or [""]))
         kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
-        kinds |= dict.fromkeys(plan.metrics, np.float64)
+        kinds |= dict.fromkeys(study.measured, np.float64)
         for name, kind in kinds.items():
             places[name] = _extent(file, name, kind, shape, scales)
-        for name in plan.metrics:
-            describe(file[name], {"units": known[name].unit, "long_name": known[name].meaning})
+        for name in study.measured:
+            own = study.metrics[name]
+            describe(file[name], {"units": own.unit, "long_name": own.meaning})
         for seal in (SEAL, SEAL_OF_THE_REST):
             places[seal] = _extent(file, seal, np.uint8, (64,), ())
     with new_file(part, layout.size) as out:
@@ -146,16 +152,18 @@ def _column(drawn: Any) -> Any:
     return _labelled(values.tolist()) if values.dtype.kind == "U" else values
 
 
-def _fill(part: Path, plan: Plan, places: dict[str, Extent], results: Iterable[UnitResult]) -> None:
+def _fill(
+    part: Path, study: StudyAbout, places: dict[str, Extent], results: Iterable[UnitResult]
+) -> None:
     """Write the long arrays, piece by piece. (An array in memory that is the file would take as
     much memory, and a full disk would end the process.)
     """
     seal, rest = places.pop(SEAL), places.pop(SEAL_OF_THE_REST)
-    wanted = plan.sweep.draws
+    wanted, (sweep, stream) = study.draws, record.drawing(study)
     drawn = {name: places.pop(name) for name in list(places) if name.startswith(f"{DRAWN}/")}
     with part.open("r+b", buffering=0) as out:
         for first in range(0, wanted if drawn else 0, ROWS):
-            columns = table(plan.sweep, first, min(ROWS, wanted - first), plan.stream)
+            columns = table(sweep, first, min(ROWS, wanted - first), stream)
             for name, extent in drawn.items():
                 column = columns[name.removeprefix(f"{DRAWN}/")]
                 write_at(out, extent.place(first), extent.content(column))
@@ -168,7 +176,7 @@ def _fill(part: Path, plan: Plan, places: dict[str, Extent], results: Iterable[U
                     f"cannot write runs.h5 of {wanted} draws: there are runs of "
                     f"{unit.draws.stop} draws, which another process has added; run it again"
                 )
-            at = (plan.laws.index(unit.law), unit.cell, unit.first)
+            at = (study.laws.index(unit.law), unit.cell, unit.first)
             arrays = {**result.metrics, "status": result.status, "until": result.until}
             for name, numbers in arrays.items():
                 write_at(out, places[name].place(*at), places[name].content(numbers))

@@ -27,44 +27,27 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.about import Asked, StudyAbout
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.plugins import FOLDER, continue_with
-from podusv_cli.storage import files, json_files, manifest
+from podusv_cli.storage import files, manifest
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record, runs_file, runs_writer
-from podusv_cli.studies.study.plan import Plan, digest, disagreements
-from podusv_cli.studies.study.runs import Mask
-from podusv_cli.studies.study.unit import Unit, UnitResult
+from podusv_cli.studies.study.plan import digest, disagreements
+from podusv_cli.studies.study.runs import Mask, Unit, UnitResult
 
 UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
 UNFINISHED = (SCENARIO, UNITS, RUNS, FOLDER, "provenance.json")  # in any study's folder
-FORMAT = 1
 SEAL = "sha256"
 
 
 class Store:
     """A study's folder."""
 
-    def __init__(
-        self, folder: Path, plan: Plan, kernels: Mapping[str, str] = MappingProxyType({})
-    ) -> None:
-        """`kernels` are digests in the runs' identity that are not those of this podusv."""
-        self.folder, self.plan, self.kernels = folder, plan, kernels
-        self.identity = {**plan.identity, **kernels}
-        self.seal = digest(self.identity)
-
-    @property
-    def remark(self) -> str:
-        """What a reader of the study has to know; "" where there is nothing."""
-        if not self.kernels:
-            return ""
-        laws = dict.fromkeys(key.rpartition("[")[0] for key in self.kernels)
-        return (
-            f"the runs in {self.folder} are of other kernels than those of this podusv (laws: "
-            f"{', '.join(laws)}); they are shown as they are, and no runs or logs are added"
-        )
+    def __init__(self, folder: Path, about: StudyAbout) -> None:
+        """`about` is the study of its runs."""
+        self.folder, self.about, self.seal = folder, about, digest(about.identity)
 
     def open(self, started: str, texts: Mapping[str, str] = MappingProxyType({})) -> None:
         """Make the folder, or check that it holds this very study, and note what is asked for.
@@ -73,31 +56,27 @@ class Store:
         written. Raises UsageError where it holds another study, naming what is different, and
         StorageError.
         """
-        history: list[Any] = []
+        history: tuple[Asked, ...] = ()
         known = (self.folder / STUDY).exists()
         if known:
-            there = record.read(self.folder)
+            there = record.begun(self.folder)
             self._agree(self.folder, there.identity)
-            history = [asked.model_dump() for asked in there.history]
-            if self.plan.sweep.draws < there.draws:
+            history = there.history
+            if self.about.draws < there.draws:
                 raise UsageError(
                     f"{self.folder} has {there.draws} draws; ask for as many or more, or name "
                     "another folder with --out, or begin anew with --force"
                 )
         elif not files.is_empty(self.folder):
             raise UsageError(f"{self.folder} is no study and not empty; name another with --out")
-        asked = {"draws": self.plan.sweep.draws, "started": started}
-        content = {
-            "format": FORMAT, "name": self.plan.scenario.name, "draws": self.plan.sweep.draws,
-            "laws": self.plan.laws, "cells": [cell.label for cell in self.plan.cells],
-            "identity": self._identity(), "history": [*history, asked], **self._metrics(),
-        }  # fmt: skip
+        asked = Asked(draws=self.about.draws, started=started)
+        self.about = self.about.model_copy(update={"history": (*history, asked)})
         # With more draws in study.json than in the scenario, the study could not be continued. And
         # without study.json, a folder that is not empty is no study.
         if known:
             files.write_texts(self.folder, texts)
         files.make_folder(self.folder)
-        files.write_bytes(self.folder / STUDY, json_files.encode(content))
+        record.write(self.folder, self.about)
         files.make_folder(self.folder / UNITS)
         if not known:
             files.write_texts(self.folder, texts)
@@ -109,29 +88,16 @@ class Store:
         """
         manifest.remove(self.folder, "study", STUDY, UNFINISHED)
 
-    def _metrics(self) -> dict[str, Any]:
-        """What a reader without the study's plug-ins has to know of its metrics."""
-        scenario = self.plan.scenario
-        if not scenario.plugins:
-            return {}
-        own = metrics_with((), scenario.metrics.named())
-        known = {name: scenario.known_metrics()[name] for name in self.plan.metrics}
-        return {"metrics": list(known), "metrics_of_plugins": record.of_plugins(known, own)}
-
     def agree(self, other: Store) -> None:
         """Raise UsageError where another folder holds another study, naming what is different."""
-        self._agree(other.folder, other._identity(), "leave it out")
+        self._agree(other.folder, other.about.identity, "leave it out")
 
     def _agree(
         self, folder: Path, identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:  # fmt: skip
-        if found := disagreements(identity, self._identity()):
+        if found := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {found}; {remedy}")
-
-    def _identity(self) -> dict[str, Any]:
-        """The identity as JSON gives it back."""
-        return json_files.plain(self.identity)
 
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
@@ -157,8 +123,8 @@ class Store:
         StorageError.
         """
         paths = [path for path in self._units() if read(path, self.seal)]
-        runs_writer.write(self.folder / RUNS, self.plan, self.seal, lambda: self._these(paths))
-        if all(self.runs().tried(law).all() for law in self.plan.laws):
+        runs_writer.write(self.folder / RUNS, self.about, self.seal, lambda: self._these(paths))
+        if all(self.runs().tried(law).all() for law in self.about.laws):
             with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):
                 for path in paths:
                     path.unlink(missing_ok=True)
@@ -167,23 +133,23 @@ class Store:
         """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
         there = (result for earlier in self._earlier() for result in earlier.results())
         for result in chain(there, filter(None, (read(path, self.seal) for path in paths))):
-            if not set(result.metrics) <= set(self.plan.metrics):
+            if not set(result.metrics) <= set(self.about.measured):
                 raise StorageError(
                     f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the "
                     "runs; restore the file"
                 )
             undefined = np.full(result.unit.count, np.nan)  # of laws that do not have a metric
-            metrics = {name: result.metrics.get(name, undefined) for name in self.plan.metrics}
+            metrics = {name: result.metrics.get(name, undefined) for name in self.about.measured}
             yield replace(result, metrics=metrics)
 
     def runs(self) -> runs_file.Table:
         """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
         path = self.folder / RUNS
         try:
-            known = self.plan.scenario.known_metrics()
-            found = runs_file.Table(path, self.plan.sweep.success, known)
+            found = runs_file.Table(path, self.about.success, self.about.metrics)
             found.check()
-            if found.identity != self.seal:
+            own = self.about.laws, self.about.cells
+            if found.identity != self.seal or (found.laws, found.cells) != own:
                 raise StorageError(f"cannot read {path}: its runs are of another study")
         except StorageError as error:
             raise StorageError(
@@ -200,9 +166,9 @@ class Store:
     def covered(self) -> dict[tuple[str, int], Mask]:
         """By law and cell, which of the wanted draws are there."""
         there = {
-            (law, cell.index): np.zeros(self.plan.sweep.draws, bool)
-            for law in self.plan.laws
-            for cell in self.plan.cells
+            (law, cell): np.zeros(self.about.draws, bool)
+            for law in self.about.laws
+            for cell in range(len(self.about.cells))
         }
         for earlier in self._earlier():
             for (law, cell), mask in there.items():

@@ -9,20 +9,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.storage import csv_files
 from podusv_cli.studies.study import statistics
 from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
 
-LEVEL = 0.95
-MARGIN = 0.01  # relative; of pairs
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-Known = Mapping[str, Metric]
+Known = Mapping[str, MetricAbout]
 
 
-def summary(runs: StudyRuns, level: float = LEVEL, metrics: Known = METRICS) -> pd.DataFrame:
+def summary(runs: StudyRuns, level: float, metrics: Known) -> pd.DataFrame:
     """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
     rows = [
         {**_failures(runs, law, cell, level), "metric": name, "unit": metrics[name].unit,
@@ -34,13 +31,14 @@ def summary(runs: StudyRuns, level: float = LEVEL, metrics: Known = METRICS) -> 
 
 
 def pairs(
-    runs: StudyRuns, margin: float = MARGIN, level: float = LEVEL, metrics: Known = METRICS,
+    runs: StudyRuns, margin: float, level: float, metrics: Known,
     names: Mapping[str, str] | None = None,
 ) -> pd.DataFrame:  # fmt: skip
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
-    Of the draws that both laws met. A win is a smaller metric by more than the margin. `names` are
-    those of the runs' laws that are compared, by their names in the table; by default all.
+    Of the draws that both laws met. A win is a smaller metric by more than the margin, which is
+    relative. `names` are those of the runs' laws that are compared, by their names in the table; by
+    default all.
     """
     laws = names or {law: law for law in runs.laws}
     rows = [
@@ -56,7 +54,7 @@ def pairs(
 
 
 def sensitivity(
-    runs: StudyRuns, draws: Mapping[str, Any], level: float = LEVEL, metrics: Known = METRICS
+    runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics: Known
 ) -> pd.DataFrame:
     """Spearman's rank correlation of every metric with every drawn number, by law and cell.
 
@@ -92,15 +90,15 @@ def as_csv(frame: pd.DataFrame) -> str:
 
 def _names(runs: StudyRuns, metrics: Known) -> list[str]:
     """The metrics of these runs in the order of tables, without measured times."""
-    return [name for name in metrics if name in runs.metrics and name not in CLOCKED]
+    return [name for name in metrics if name in runs.metrics and not metrics[name].clocked]
 
 
-def values_of(runs: StudyRuns, law: str, cell: int, about: Metric) -> Vector:
+def values_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vector:
     """A metric of every draw of a cell; +inf for a run that failed."""
     return worst(about, runs.metric(law, about.name)[cell], ~runs.success(law)[cell])
 
 
-def has(runs: StudyRuns, law: str, cell: int, about: Metric) -> bool:
+def has(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> bool:
     """Whether the law has the metric: a run that succeeded has it, or there is no such run."""
     succeeded = runs.done(law)[cell] & runs.success(law)[cell]
     values = values_of(runs, law, cell, about)[succeeded]

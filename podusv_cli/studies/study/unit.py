@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
-from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.batch import Lazily, simulate_many
@@ -16,50 +13,7 @@ from podusv_cli.engine.running.simulate import ready
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.studies.study.draws import drawn, draws
 from podusv_cli.studies.study.plan import Plan, watching
-
-# How a run can end. The position is the code in files; "missing" is a run that is not made yet.
-STATUSES = ("finished", "diverged", "hung", "crashed", "invalid", "missing")
-BROKEN = ("hung", "crashed", "invalid")  # no results of the law
-NOT_MADE = STATUSES.index("missing")
-Codes = npt.NDArray[np.uint8]
-
-
-@dataclass(frozen=True, order=True)
-class Unit:
-    """Draws `first` to `first + count - 1` of a law in a cell."""
-
-    law: str
-    cell: int
-    first: int
-    count: int
-
-    @property
-    def draws(self) -> range:
-        """The numbers of the draws."""
-        return range(self.first, self.first + self.count)
-
-    def halves(self) -> tuple[Unit, Unit]:
-        """The unit as two, to find a run that crashes."""
-        half = self.count // 2
-        return (
-            Unit(self.law, self.cell, self.first, half),
-            Unit(self.law, self.cell, self.first + half, self.count - half),
-        )
-
-
-@dataclass(frozen=True)
-class UnitResult:
-    """What came of a unit; one number a draw.
-
-    `metrics` by name, NaN where a run ended before one is defined. `status` holds positions in
-    STATUSES, `until` the time that a run reached [s], `causes` why it did not finish, else "".
-    """
-
-    unit: Unit
-    metrics: Mapping[str, Vector]
-    status: Codes
-    until: Vector
-    causes: tuple[str, ...]
+from podusv_cli.studies.study.runs import STATUSES, Unit, UnitResult
 
 
 def prepare(

@@ -16,7 +16,8 @@ import numpy as np
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Progress, run_all
 from podusv_cli.studies.study.draws import uniforms
-from podusv_cli.studies.study.unit import Unit, UnitResult, make
+from podusv_cli.studies.study.runs import Unit, UnitResult
+from podusv_cli.studies.study.unit import make
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
 from podusv_cli.studies.tuning.space import Gain, with_gains
 

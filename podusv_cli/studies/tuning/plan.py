@@ -16,7 +16,7 @@ from podusv_cli.studies.study import plan as study
 from podusv_cli.studies.study.cells import Cell
 from podusv_cli.studies.study.check import singles
 from podusv_cli.studies.study.expressions import parse_success, succeeded
-from podusv_cli.studies.study.unit import STATUSES, UnitResult
+from podusv_cli.studies.study.runs import STATUSES, UnitResult
 from podusv_cli.studies.tuning.objective import (
     Inequality,
     Outcomes,

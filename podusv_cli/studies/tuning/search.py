@@ -15,7 +15,7 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.study import plan as study
-from podusv_cli.studies.study.unit import STATUSES, Unit, UnitResult
+from podusv_cli.studies.study.runs import STATUSES, Unit, UnitResult
 from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.objective import Outcomes, evaluate, excess
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan

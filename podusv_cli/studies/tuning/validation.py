@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from podusv_cli.storage import files, json_files
+from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.study import record
 from podusv_cli.studies.study.dispatch import Engine, Tally, dispatch
-from podusv_cli.studies.study.plan import Plan, disagreements
 from podusv_cli.studies.study.runs_file import Table
 from podusv_cli.studies.study.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning.plan import VALIDATE, Named, TunePlan
@@ -57,24 +56,24 @@ def validate(
     Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.
     """
     made = plan.variant(contestants(plan, winners), VALIDATE, plan.tune.validate)
-    store = Store(folder / FOLDER, made)
-    _clear(store.folder, made)
+    store = Store(folder / FOLDER, record.about(made))
+    _clear(store)
     store.open(started)
-    dispatch(store, tell, engine)
+    dispatch(store, made, tell, engine)
     store.write_runs()
     return store.runs()
 
 
-def _clear(folder: Path, plan: Plan) -> None:
+def _clear(store: Store) -> None:
     """Remove the runs of other gains, which an earlier session with a smaller budget found.
 
     study.json goes last, because a folder without it that is not empty is no study.
     """
+    folder = store.folder
     if not (folder / STUDY).exists():
         return
-    told = record.read(folder)
-    same = not disagreements(told.identity, json_files.plain(plan.identity))
-    if same and told.draws <= plan.sweep.draws:
+    told = record.begun(folder)
+    if told.identity == store.about.identity and told.draws <= store.about.draws:
         return
     with files.storage_errors(f"cannot remove old runs in {folder}"):
         if (folder / UNITS).exists():
