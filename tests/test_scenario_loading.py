@@ -90,6 +90,7 @@ MISTAKES = {
     "path: {kind: line, course: 0,3}\n": "keys are words, found 3; write a decimal point: 0.3",
     "path: {kind: line, course: 0,05}\n": "keys are words, found '05'; write a decimal point: 0.05",
     "path: {kind: line, course: -1,5, x: 2}\n": "found 5; write a decimal point: -1.5",
+    "path: {kind: line, course:0,3}\n": "write a blank after the colon: course: 0 (allowed: ",
     "description: {gain} of a law\n": "put a text that begins with a bracket or a brace in quotes",
     "description: [gain] of a law\n": "put a text that begins with a bracket or a brace in quotes",
     "description: {gain}\n": "found a mapping of keys; put text with braces in quotes",
@@ -100,6 +101,11 @@ MISTAKES = {
 def test_a_comma_for_a_point_and_braces_without_quotes_are_named(line):
     faults = told(f"{SOUND}{line}" if "path" not in line else re.sub("path: .*\n", line, SOUND))
     assert MISTAKES[line] in faults[0]
+
+
+def test_a_comma_for_a_point_is_named_without_a_blank_before_the_number():
+    faults = told(re.sub("path: .*\n", "path: {kind: line, course:-1,5}\n", SOUND))
+    assert [one.endswith("found 5; write a decimal point: -1.5") for one in faults] == [False, True]
 
 
 def test_a_key_that_is_a_number_is_no_decimal_comma():

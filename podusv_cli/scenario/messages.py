@@ -93,10 +93,16 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     name = str(complaint["loc"][-1])
     route = (*section.path, name)
     node = follow(root, route)[-1]
-    hint = _elsewhere(section, name) or did_you_mean(name, section.keys)
+    hint = _joined(section, name) or _elsewhere(section, name) or did_you_mean(name, section.keys)
     several = _several(section, follow(root, section.path)[-1])
     told = several or f"{hint} (allowed: {', '.join(section.keys)})"
     yield Fault(node.key_mark or node.mark, dotted(route), f"unknown key{told}")
+
+
+def _joined(section: Key, name: str) -> str:
+    """`; write a blank after the colon: x: 1`, for `{x:1}`."""
+    key, _, number = name.partition(":")
+    return f"; write a blank after the colon: {key}: {number}" if key in section.keys else ""
 
 
 def _several(section: Key, given: Node) -> str:

@@ -319,9 +319,9 @@ class _Reader:
 
 
 def _decimal_comma(event: Any, before: dict[str, Node]) -> str:
-    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}`; else ""."""
-    last = next(reversed(before.values()), None)
-    number = last.text if last else ""
+    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}` or in `{x:1,5}`; else ""."""
+    name, last = next(reversed(before.items()), ("", None))
+    number = (last.text if last else "") or name.rpartition(":")[2]
     fraction = isinstance(event, yaml.ScalarEvent) and event.value.isdigit() and not event.style
     whole = INTEGER.fullmatch(number)
     return f"; write a decimal point: {number}.{event.value}" if fraction and whole else ""
