@@ -26,6 +26,7 @@ from benchmarks.mutant_table import SURVIVES, TABLE
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PACKAGE, TESTS = "podusv_cli", "tests"
+CODE = {".py", ".js"}
 LIMIT = 600  # s; a test that takes longer with a fault has noticed it
 KILLED, SURVIVED, EXPECTED = "killed", "SURVIVED", "survives as marked"
 GONE, AMBIGUOUS, UNTESTED = "GONE", "AMBIGUOUS", "NO SUCH TEST"
@@ -91,8 +92,9 @@ def copied(folder: Path) -> Path:
 
 
 def holding(folder: Path, text: str) -> list[Path]:
-    """The file of every occurrence of a text in the Python files of a folder."""
-    counts = {path: path.read_text().count(text) for path in sorted(folder.rglob("*.py"))}
+    """The file of every occurrence of a text in the code of a folder."""
+    code = (path for path in sorted(folder.rglob("*")) if path.suffix in CODE)
+    counts = {path: path.read_text().count(text) for path in code}
     return [path for path, count in counts.items() for _ in range(count)]
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -18,12 +18,16 @@ from podusv_cli.components.actuators.command import Command
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.disturbances.current import Current
 from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.components.disturbances.total import Total
 from podusv_cli.components.disturbances.waves import Waves
-from podusv_cli.components.measurements.sensors import Sensor, Sensors
+from podusv_cli.components.estimators.passive_observer import PassiveObserver
+from podusv_cli.components.measurements.base import FRESH, Measurement
+from podusv_cli.components.measurements.sensors import MEASURED, Sensor, Sensors
 from podusv_cli.core.kernel import LANES, Vector, kernel, shared
 from podusv_cli.core.registry import kinds
+from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import compile, wide_numba
@@ -141,22 +145,26 @@ def test_runs_of_another_choice_march_beside_their_like() -> None:
     same(*both(loops))
 
 
-# Parts of a loop that runs side by side have to share: a delay, the periods of sensors, which there
-# are, and where the parts of a list of loads begin.
+# Parts of a loop that runs side by side have to share: a delay, the periods of sensors, and where
+# the tables of a list of loads begin, which nothing else tells of two currents.
 OTHERS: list[tuple[str, list[Any]]] = [
     ("actuator", [Saturated(command=Command(delay=d)) for d in (0.03, 0.11, 0.0)]),
     ("measurement", [
-        Sensors(position=Sensor(period=p, delay=d, noise=0.1), velocity=v)
-        for p, d, v in ((0.07, 0.02, Sensor()), (0.03, 0.0, Sensor()), (0.07, 0.02, None))
+        Sensors(position=Sensor(period=p, delay=d, noise=0.1))
+        for p, d in ((0.07, 0.02), (0.03, 0.0))
     ]),
     ("disturbance", [
         Total(parts=(Waves(height=0.2, period=1.5, components=n), HarmonicDisturbance()))
         for n in (8, 40)
     ]),
+    ("disturbance", [
+        Total(parts=(Current(speed_std=0.1, interval=i), Waves(height=0.2, period=1.5)))
+        for i in (0.1, 0.2)
+    ]),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("part", "others"), OTHERS, ids=[part for part, _ in OTHERS])
+@pytest.mark.parametrize(("part", "others"), OTHERS)
 def test_runs_of_other_delays_march_beside_their_like(part: str, others: list[Any]) -> None:
     """And of other periods of sensors, and other tables: whatever lanes share sorts them."""
     base = replace(loop("pid"), actuator=Saturated(command=Command(delay=0.05)))
@@ -166,6 +174,58 @@ def test_runs_of_other_delays_march_beside_their_like(part: str, others: list[An
     ]
     together, alone = both(loops, replace(GRID, steps=60))
     assert why_alone(Plan.watched(loops[0], GRID, Observer())) == ""
+    assert "invalid" not in alone.status
+    same(together, alone)
+
+
+class AllBut(Measurement):
+    """The state as it is, without one of its numbers."""
+
+    kind: Literal["all_but"] = "all_but"
+    lacking: float = 3.0
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        return tuple(one for one, has in zip(MEASURED, self.measured(), strict=True) if has)
+
+    def measured(self) -> tuple[bool, ...]:
+        return tuple(i != self.lacking for i in range(6))
+
+    @staticmethod
+    @kernel
+    def sense(instant: float, x: Vector, k: Any, seen: Vector) -> None:
+        for i in range(6):
+            if float(i) != k.lacking:
+                seen[i] = x[i]
+                seen[FRESH + i] = 1.0
+
+
+@kernel
+def fourth_measured(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+    """Add up the number that is logged fourth of those measured: u, or v where u has no sensor."""
+    seen[0] += weight * row[int(k.place) + 3]
+
+
+class OfMeasured(Observer):
+    """Knows where the row has the measured numbers."""
+
+    def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
+        return {"place": float(Plan.watched(loop, GRID, Observer()).layout.sensed)}
+
+
+def test_runs_of_other_quantities_measured_march_beside_their_like() -> None:
+    """Where as many are: of six numbers u is not measured, or v is not."""
+    loops = [
+        replace(one, measurement=AllBut(lacking=3.0 + i % 2), estimator=PassiveObserver())
+        for i, one in enumerate(scattered(loop("pid"), 5) + scattered(loop("pid"), 6))
+    ]
+    watching, grid = OfMeasured(fourth_measured), replace(GRID, steps=60)
+    assert why_alone(Plan.watched(loops[0], grid, watching)) == ""
+    together, alone = (
+        simulate_many(loops, grid, observer=watching, side_by_side=chosen)
+        for chosen in (True, False)
+    )
+    assert "invalid" not in alone.status, alone.cause
     same(together, alone)
 
 
