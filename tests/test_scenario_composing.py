@@ -113,6 +113,25 @@ def test_a_boat_whose_law_changes_its_kind_still_comes_to_its_target():
     assert kept.metrics["z_e_steady"] < 1e-3 < 10.0 < lost.metrics["z_e_steady"]
 
 
+def test_a_law_that_is_written_out_says_which_numbers_another_kind_keeps_of_it():
+    """They may have come from the old law's rules; T_v is 1.25 by momentum_vector's own."""
+    free = "controller: {kind: velocity_vector, omega_u: 9.0}"
+    write("free.yaml", re.sub("controller: .*", free, STEERED))
+    new, wholly = "controller.kind=momentum_vector", load("free.yaml").scenario
+    own = load("free.yaml", [new])
+    assert own.dropped == ()
+    write("written.yaml", resolved_yaml(wholly))
+    kept = load("written.yaml", [new])
+    assert kept.scenario.controller.T_v == wholly.controller.T_v != own.scenario.controller.T_v
+    (told,) = (one for one in kept.dropped if "keeps" in one)
+    assert f"keeps omega_u: 9.0, omega_v: {wholly.controller.omega_v}, " in told
+    assert f" T_v: {wholly.controller.T_v}, which may have been defaults of velocity_v" in told
+    assert told.endswith("; null takes those of momentum_vector")
+    listed = re.findall(r"(\w+): [\d.]+", told.partition(" keeps ")[2])
+    asked = load("written.yaml", [new, *(f"controller.{n}=null" for n in listed if n != "omega_u")])
+    assert asked.scenario.controller == own.scenario.controller
+
+
 def test_a_path_of_another_kind_keeps_course_and_speed():
     write("path.yaml", STEERED.replace("kind: line", "kind: sinusoid, amplitude: 4.0"))
     for changes in (["path.kind=line"], ["path={kind: line}"]):

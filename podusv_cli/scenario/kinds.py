@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from podusv_cli.scenario.keys import Key
@@ -12,8 +13,8 @@ from podusv_cli.scenario.yaml_tree import Node, Route, bracketed, dotted, merge,
 def kept(root: Node, top: Key, dropped: list[str]) -> Node:
     """The tree whose sections have what they keep of those that they stand in place of.
 
-    `top` are the scenario's keys. For each section that keeps not everything, a sentence with the
-    values is appended to `dropped`.
+    `top` are the scenario's keys. For each section that keeps not everything, or numbers that may
+    be defaults of the other kind, a sentence with the values is appended to `dropped`.
     """
     return _kept(root, top, (), dropped)
 
@@ -21,7 +22,7 @@ def kept(root: Node, top: Key, dropped: list[str]) -> Node:
 def _kept(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
     if node.instead_of:
         base = _kept(node.instead_of, key, at, dropped)
-        dropped += _lost(base, node, key, at)
+        dropped += [*_lost(base, node, key, at), *_sized_for_another(base, node, key, at)]
         node = over(base, replace(node, instead_of=None), key)
     item = key.item(0)
     if isinstance(node.content, tuple):
@@ -73,14 +74,43 @@ def _lost(base: Node, own: Node, key: Key, at: Route) -> list[str]:
         for name, part in base.mapping.items()
         if not (_taken(name, base, new, key) or name in own.mapping or _usual(part, old, name))
     }
-    if not lost:
+    return (
+        [f"{_changed(own, at)} in place of {old.kind}, which loses {_told(lost)}"] if lost else []
+    )
+
+
+def _sized_for_another(base: Node, own: Node, key: Key, at: Route) -> list[str]:
+    """The numbers that a section keeps of another one and may be those of its rules, in a sentence.
+
+    A section that is written out has them all as numbers, as if each had been chosen.
+    """
+    old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
+    if not old or not new or old.kind == new.kind or not base.mapping.keys() >= old.keys.keys():
         return []
-    told = ", ".join(f"{name}: {as_yaml(plain(part))}" for name, part in lost.items())
-    place = own.mapping["kind"]
+    if any(plain(base.mapping[name]) is None for name in old.model.rules):
+        return []  # so that the numbers are given ones
+    sized = {
+        name: part
+        for name, part in base.mapping.items()
+        if name in {*old.model.rules} & {*new.model.rules}
+        and name not in own.mapping
+        and _taken(name, base, new, key)
+    }
+    if not sized:
+        return []
     return [
-        f"{place.mark}: {bracketed(dotted(at))}: kind {new.kind} in place of {old.kind}, which "
-        f"loses {told}"
+        f"{_changed(own, at)} keeps {_told(sized)}, which may have been defaults of {old.kind}; "
+        f"null takes those of {new.kind}"
     ]
+
+
+def _changed(own: Node, at: Route) -> str:
+    """Where a section has another kind, and which."""
+    return f"{own.mapping['kind'].mark}: {bracketed(dotted(at))}: kind {own.word('kind')}"
+
+
+def _told(parts: Mapping[str, Node]) -> str:
+    return ", ".join(f"{name}: {as_yaml(plain(part))}" for name, part in parts.items())
 
 
 def _usual(part: Node, kind: Key, name: str) -> bool:
