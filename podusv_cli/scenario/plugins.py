@@ -21,8 +21,6 @@ from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.component import Component, Recorded, value
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
-from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.phrases import did_you_mean, found, quoted
@@ -34,7 +32,6 @@ from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
 FINISHED = ("manifest.json", "study.json", "tune.json")  # folders of podusv have one of these
-Parts = Sequence[tuple[str, str, frozenset[str]]]  # section, kind and fields of components
 BASES: dict[str, type[Component]] = {
     "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
     "estimator": Estimator, "controller": Controller,
@@ -212,17 +209,13 @@ def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
     return False
 
 
-def recorded(
-    files: Sequence[str], root: Node, faults: list[Fault], *, parts: Parts = (),
-    metrics: Sequence[Metric] = (),
-) -> tuple[Node, Plugins]:  # fmt: skip
-    """The tree of a finished run or study, and what stands in for its plug-ins.
+def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
+    """The tree of a finished run, and what stands in for its plug-ins.
 
     The files in its folder are not read, so that looking at it runs nobody's code. Those that
     the user names (`files`) and installed packages are, and where they are the very ones that were
     used, their components, too. Where one is not at hand, ABSENT is among the plug-ins, and all
-    other components are kept as plain values. `parts` and `metrics` are components that the tree's
-    own need not have, and metrics, of a study's runs.
+    other components are kept as plain values.
     """
     own = root.mapping.get(KEY)
     used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()
@@ -230,9 +223,7 @@ def recorded(
     known = tuple(p if p.sha256 in used else p.without_components() for p in here)
     if not used - {plugin.sha256 for plugin in here}:
         return root, known
-    unknown = tuple(("metrics", one) for one in metrics if one.name not in metrics_with(known))
-    told = Plugin("metrics of the study", digest(repr(metrics)), offers=unknown)
-    return root, (*known, ABSENT, told, *_stand_ins(root, parts, scenario_class(known)))
+    return root, (*known, ABSENT, *_stand_ins(root, scenario_class(known)))
 
 
 def continue_with(command: str, folder: File) -> str:
@@ -241,12 +232,12 @@ def continue_with(command: str, folder: File) -> str:
     return f"podusv {command} {shlex.quote(str(folder))}{trust}"
 
 
-def _stand_ins(root: Node, parts: Parts, known: type[Scenario]) -> Plugins:
+def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
     unknown: dict[tuple[str, str], frozenset[str]] = {}
-    own = ((section, node.word("kind"), node.mapping) for section, node in _components(root))
-    for section, kind, names in (*own, *parts):
+    for section, node in _components(root):
+        kind = node.word("kind")
         if kind and kind not in kinds_of(known, section):
-            fields = {name for name in names if name.isidentifier() and name[0] != "_"}
+            fields = {name for name in node.mapping if name.isidentifier() and name[0] != "_"}
             unknown[section, kind] = unknown.get((section, kind), frozenset()) | fields - {"kind"}
     return tuple(_stand_in(*key, names) for key, names in unknown.items())
 
