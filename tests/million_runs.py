@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.scenario.load import load, tree_yaml
-from podusv_cli.studies.study.plan import plan
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.runs import Unit, UnitResult
-from podusv_cli.studies.study.store import SCENARIO, Store
+from podusv_cli.studies.counting.runs import Unit, UnitResult
+from podusv_cli.studies.making.plan import plan
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import SCENARIO, Store
 from podusv_cli.workflows import studies, sweep
 
 CONFIG = Path(__file__).parents[1] / "configs/studies/hull_and_sea.yaml"

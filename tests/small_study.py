@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.study.dispatch import Processes, dispatch
-from podusv_cli.studies.study.plan import plan
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.store import SCENARIO, Store
+from podusv_cli.studies.making.dispatch import Processes, dispatch
+from podusv_cli.studies.making.plan import plan
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import SCENARIO, Store
 
 TEXT = """
 name: small

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from podusv_cli.process.workers import Outcome
-from podusv_cli.studies.study import remote
-from podusv_cli.studies.study.plan import digest
-from podusv_cli.studies.study.remote import Reply
-from podusv_cli.studies.study.runs import Unit, UnitResult
+from podusv_cli.studies.counting.runs import Unit, UnitResult
+from podusv_cli.studies.making import remote
+from podusv_cli.studies.making.plan import digest
+from podusv_cli.studies.making.remote import Reply
 
 REPORT = {
     "podusv": "1.0", "numpy": "2.0", "the kernels of pid": "abc", "the study": "def",

@@ -10,9 +10,9 @@ import numpy as np
 
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.sections import Claim
-from podusv_cli.studies.study import summary as tables
-from podusv_cli.studies.study.claims import ParsedClaim, judge, parse
-from podusv_cli.studies.study.verdict import StudyVerdict
+from podusv_cli.studies.counting.claims import ParsedClaim, judge, parse
+from podusv_cli.studies.counting.verdict import StudyVerdict
+from podusv_cli.studies.telling import summary as tables
 
 summary = partial(tables.summary, level=0.95, metrics=METRICS)
 pairs = partial(tables.pairs, margin=0.01, level=0.95, metrics=METRICS)

@@ -14,7 +14,7 @@ from scipy import special, stats
 
 from podusv_cli.core.portable import exponential, logarithm, standard_normal
 from podusv_cli.scenario.distributions import Bounded, Distribution, LogNormal, Normal
-from podusv_cli.studies.study.draws import uniforms
+from podusv_cli.studies.making.draws import uniforms
 
 SHARES = np.array([2.0**-53, 1e-9, 0.01, 0.075, 0.25, 0.5, 0.75, 0.925, 0.99, 1 - 2.0**-52])
 U = uniforms(1, "u", 0, 20_000)

@@ -16,12 +16,12 @@ from scenario_samples import SOUND
 from podusv_cli.comparison.claims import parse_claims, peaks
 from podusv_cli.core import escaping
 from podusv_cli.core.spectrum import periodogram
-from podusv_cli.figures import style
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.drawing import FIGURES, draw
-from podusv_cli.figures.shown import FEWEST, LOOKS, dressed, nth_style, places
-from podusv_cli.figures.style import WIDTHS, axis_label, house_style, image, new_figure
+from podusv_cli.figures.looks import LOOKS, nth_style
+from podusv_cli.figures.shown import FEWEST, axis_label, dressed, label, places
+from podusv_cli.figures.style import WIDTHS, house_style, image, new_figure
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.members import from_folder
 
@@ -68,9 +68,9 @@ GRIDS = {
 def test_every_panel_shows_its_signal_of_every_run(two, name):
     found = panels(drawn(name, two))
     assert list(found) == list(GRIDS[name])
-    for label, expected in GRIDS[name].items():
-        assert [curve.get_label() for curve in found[label].lines] == ["a", "b"]
-        for run, curve in zip(two, found[label].lines, strict=True):
+    for signal, expected in GRIDS[name].items():
+        assert [curve.get_label() for curve in found[signal].lines] == ["a", "b"]
+        for run, curve in zip(two, found[signal].lines, strict=True):
             assert np.array_equal(curve.get_xdata(), run.recording["time"])
             assert curve.get_ydata() == pytest.approx(expected(run.recording), abs=1e-12)
 
@@ -178,7 +178,7 @@ def test_thinning_keeps_the_extremes_of_every_bin_in_order():
 
 def test_every_signal_has_a_label_with_its_unit():
     for signal in ABOUT.values():
-        symbol, unit = style.label(signal).removesuffix("]").split(" [")
+        symbol, unit = label(signal).removesuffix("]").split(" [")
         assert symbol == f"${signal.symbol}$"
         assert unit.replace("$", "").replace("^", "") == signal.unit
     assert axis_label(shown(("a", recording())), "f_hat_u") == r"$\hat f_u$ [m/s$^2$]"

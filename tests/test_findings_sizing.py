@@ -13,7 +13,7 @@ from podusv_cli.findings.sizing import gains_for_another_hull
 from podusv_cli.findings.units import other_unit
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.making.plan import plan
 
 SHIPPED = [
     path for path in sorted((PACKAGE.parent / "configs").rglob("*.yaml"))

@@ -17,7 +17,7 @@ import podusv
 from podusv_cli.components.controllers.policy import Policy
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import bundle, call
-from podusv_cli.studies.study import draws
+from podusv_cli.studies.making import draws
 
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed: podusv[gym]")
 import gymnasium.utils.env_checker

@@ -37,7 +37,7 @@ from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import METRICS, metrics_with, observer
 from podusv_cli.metrics.windows import CROSSED, NAMED, SETTLING, find, settle, settled_from
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.study.expressions import parse_success
+from podusv_cli.studies.counting.expressions import parse_success
 
 
 def gathered(

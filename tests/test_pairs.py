@@ -31,7 +31,7 @@ from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.check import gathered_metrics
+from podusv_cli.studies.making.check import gathered_metrics
 from podusv_cli.workflows import export as exporting
 from podusv_cli.workflows import rerun as repeating
 from podusv_cli.workflows import studies

@@ -13,8 +13,8 @@ from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, shipped_bench
 from podusv_cli.studies.bench.page import as_markdown
 from podusv_cli.studies.bench.standing import middle
-from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.plan import plan
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.plan import TunePlan
 

@@ -27,8 +27,8 @@ from podusv_cli.scenario.address import content
 from podusv_cli.scenario.explain import explain
 from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.draws import drawn, draws
+from podusv_cli.studies.making.check import sweep_faults
+from podusv_cli.studies.making.draws import drawn, draws
 from podusv_cli.studies.tuning.space import gains
 
 LAWS = [kind for kind in kinds("controllers").values() if kind.rules]

@@ -10,8 +10,8 @@ from test_sweep_checking import BASE, swept, vary
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.load import load, load_text, tree_yaml
 from podusv_cli.scenario.sweep import Quantity
-from podusv_cli.studies.study.cells import cells
-from podusv_cli.studies.study.check import sweep_faults
+from podusv_cli.studies.making.cells import cells
+from podusv_cli.studies.making.check import sweep_faults
 
 
 def test_cells_are_all_combinations_and_count_as_if_written_in_the_file() -> None:

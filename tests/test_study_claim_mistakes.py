@@ -8,9 +8,9 @@ from podusv_cli.comparison.curves import REDUCERS
 from podusv_cli.comparison.expressions import OPERATIONS
 from podusv_cli.expressions.reading import FUNCTIONS, ExpressionError
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.studies.study.claims import parse
-from podusv_cli.studies.study.expressions import parse_success
-from podusv_cli.studies.study.samples import STATISTICS
+from podusv_cli.studies.counting.claims import parse
+from podusv_cli.studies.counting.expressions import parse_success
+from podusv_cli.studies.counting.samples import STATISTICS
 
 LAWS = ["proposed", "pid", "li"]
 MISTAKES = {

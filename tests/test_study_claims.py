@@ -13,9 +13,9 @@ from study_samples import Made, claim, judged, study
 
 from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.studies.study import statistics as st
-from podusv_cli.studies.study.claims import judge
-from podusv_cli.studies.study.expressions import parse_success, succeeded
+from podusv_cli.studies.counting import statistics as st
+from podusv_cli.studies.counting.claims import judge
+from podusv_cli.studies.counting.expressions import parse_success, succeeded
 
 inf, nan = math.inf, math.nan
 LAWS = ["proposed", "pid", "li"]

@@ -10,14 +10,14 @@ from small_study import small
 from stub_cluster import REPORT, StubClient
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.studies.study import cluster as clusters
-from podusv_cli.studies.study import dispatch as marching
-from podusv_cli.studies.study.cluster import Cluster
-from podusv_cli.studies.study.dispatch import dispatch
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.remote import BITS, Expectation, StudyText
-from podusv_cli.studies.study.runs import STATUSES
-from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.counting.runs import STATUSES
+from podusv_cli.studies.making import cluster as clusters
+from podusv_cli.studies.making import dispatch as marching
+from podusv_cli.studies.making.cluster import Cluster
+from podusv_cli.studies.making.dispatch import dispatch
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.remote import BITS, Expectation, StudyText
+from podusv_cli.studies.making.store import Store
 
 OTHER_BITS = REPORT | {f"{BITS}pid": "124"}
 OTHER_NUMPY = REPORT | {"numpy": "1.9"}

@@ -12,11 +12,11 @@ import pytest
 from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.study.cluster import connected
-from podusv_cli.studies.study.dispatch import dispatch
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.remote import StudyText
-from podusv_cli.studies.study.store import RUNS, Store
+from podusv_cli.studies.making.cluster import connected
+from podusv_cli.studies.making.dispatch import dispatch
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.remote import StudyText
+from podusv_cli.studies.making.store import RUNS, Store
 
 PATIENCE = 60.0  # s
 # So long that an interrupt comes before the end.
@@ -111,7 +111,7 @@ def until(happened):
 
 
 def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
-    monkeypatch.setattr("podusv_cli.studies.study.cluster.PATIENCE", 0.3)
+    monkeypatch.setattr("podusv_cli.studies.making.cluster.PATIENCE", 0.3)
     with (
         pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
         connected("tcp://127.0.0.1:9", StudyText(TEXT), "", mixed=False),

@@ -28,7 +28,7 @@ from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.study.draws import drawn, draws, seeds, table, uniforms, words
+from podusv_cli.studies.making.draws import drawn, draws, seeds, table, uniforms, words
 
 VARY = """
 sweep:

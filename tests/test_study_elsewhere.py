@@ -11,7 +11,7 @@ from rerun_samples import copied
 from rerun_samples import made as made_run
 from small_study import folder_with_scenario
 
-from podusv_cli.studies.study.store import RUNS, SCENARIO, UNITS
+from podusv_cli.studies.making.store import RUNS, SCENARIO, UNITS
 
 SECRET = 0.123456789
 KEY = "drawn/vessel.m"

@@ -7,8 +7,8 @@ from plugin_samples import LAW
 from small_study import TEXT
 
 from podusv_cli.engine.running import watch as march
-from podusv_cli.studies.study.runs import STATUSES
-from podusv_cli.studies.study.sessions import sessions
+from podusv_cli.studies.counting.runs import STATUSES
+from podusv_cli.studies.making.sessions import sessions
 from podusv_cli.workflows import sweep
 
 START = """\

@@ -13,7 +13,7 @@ import pytest
 from study_samples import pairs, sensitivity, study
 
 from podusv_cli.figures.style import house_style, image
-from podusv_cli.studies.study import figures
+from podusv_cli.studies.telling import figures
 
 inf, nan = math.inf, math.nan
 A = np.r_[np.linspace(1.0, 2.0, 150), [inf] * 50]
@@ -99,7 +99,7 @@ def test_the_same_study_gives_the_same_picture_whatever_it_is_made_of() -> None:
 @pytest.mark.slow
 def test_statistics_and_claims_of_studies_import_no_matplotlib() -> None:
     code = (
-        "import sys, podusv_cli.studies.study.claims, podusv_cli.studies.study.summary; "
+        "import sys, podusv_cli.studies.counting.claims, podusv_cli.studies.telling.summary; "
         "sys.exit('matplotlib' in sys.modules or 'scipy.stats' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

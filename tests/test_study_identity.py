@@ -10,13 +10,13 @@ from small_study import TEXT, made, small, written
 
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.process.workers import Outcome
-from podusv_cli.studies.study import plan as plans
-from podusv_cli.studies.study import store as stores
-from podusv_cli.studies.study.dispatch import ENDED, Driver
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.runs import Unit
-from podusv_cli.studies.study.store import RUNS, Store
-from podusv_cli.studies.study.unit import crashed
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making import plan as plans
+from podusv_cli.studies.making import store as stores
+from podusv_cli.studies.making.dispatch import ENDED, Driver
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import RUNS, Store
+from podusv_cli.studies.making.unit import crashed
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 

@@ -12,10 +12,10 @@ from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.storage import provenance
-from podusv_cli.studies.study import store as stores
-from podusv_cli.studies.study.joining import _machine, gaps, join
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
+from podusv_cli.studies.making import store as stores
+from podusv_cli.studies.making.joining import _machine, gaps, join
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import RUNS, SCENARIO, Store
 from podusv_cli.workflows import sweep as workflow
 from podusv_cli.workflows.merge import merge
 

@@ -13,8 +13,8 @@ from small_study import written
 from podusv_cli.core.errors import UsageError
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
-from podusv_cli.studies.study import keep
-from podusv_cli.studies.study.results import judged
+from podusv_cli.studies.telling import keep
+from podusv_cli.studies.telling.results import judged
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge

@@ -184,7 +184,7 @@ def test_a_study_of_an_installed_package_asks_for_no_trust(tmp_path, podusv):
     made = podusv("sweep", "run", "lab.yaml", "--out", study, "--workers", "1", "--no-figures")
     assert made.code == 0, made.err
     shutil.rmtree(study / "logs")
-    said = podusv("sweep", "report", study, "--no-figures")
+    said = podusv("sweep", "run", study, "--no-figures")
     assert (said.code, "trust" in said.err) == (0, False)
     assert len(list((study / "logs").iterdir())) == 3
 

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from podusv_cli.studies.study import statistics as st
+from podusv_cli.studies.counting import statistics as st
 
 inf, nan = math.inf, math.nan
 

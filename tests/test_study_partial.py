@@ -9,11 +9,11 @@ import pytest
 from small_study import TEXT, small, written
 
 from podusv_cli.core.errors import ScenarioError, UsageError
-from podusv_cli.studies.study.dispatch import Driver
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.runs import Unit
-from podusv_cli.studies.study.store import Store
-from podusv_cli.studies.study.unit import make
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making.dispatch import Driver
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import Store
+from podusv_cli.studies.making.unit import make
 from podusv_cli.workflows import sweep
 
 

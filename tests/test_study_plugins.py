@@ -10,13 +10,13 @@ from small_study import TEXT
 from test_study_dask import DASK, PATIENCE, background, until
 
 from podusv_cli.core.errors import LawError, ScenarioError
-from podusv_cli.studies.study import remote
-from podusv_cli.studies.study.joining import digests
-from podusv_cli.studies.study.plan import digest
-from podusv_cli.studies.study.remote import StudyText
-from podusv_cli.studies.study.runs import Unit
-from podusv_cli.studies.study.store import RUNS, SCENARIO
-from podusv_cli.studies.study.unit import make
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making import remote
+from podusv_cli.studies.making.joining import digests
+from podusv_cli.studies.making.plan import digest
+from podusv_cli.studies.making.remote import StudyText
+from podusv_cli.studies.making.store import RUNS, SCENARIO
+from podusv_cli.studies.making.unit import make
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge

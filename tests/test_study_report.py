@@ -13,7 +13,7 @@ from test_report_chase import WIDTHS, browsed, needs_browser
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
-from podusv_cli.studies.study import bars, figures, outputs, report
+from podusv_cli.studies.telling import bars, figures, outputs, report
 from podusv_cli.workflows import sweep
 
 SUCCESS = "  success: finished and iae <= 0.215\n  claims:\n"

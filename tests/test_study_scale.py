@@ -11,9 +11,9 @@ from small_study import small
 from stub_cluster import REPORT, StubClient
 from test_study_cluster import cluster, instant  # noqa: F401  # a fixture
 
-from podusv_cli.studies.study.dispatch import AIM, dispatch
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.making.dispatch import AIM, dispatch
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import Store
 
 WORKERS = [f"tcp://10.0.0.{number}:8786" for number in range(200)]
 
@@ -75,6 +75,6 @@ def test_a_million_runs(tmp_path):
 def test_a_worker_loads_nothing_large_that_it_does_not_need():
     """They take 30 to 70 MB each, of 150 that a worker may have."""
     large = {"scipy.stats", "pandas", "matplotlib", "jinja2"}
-    script = f"import sys, podusv_cli.studies.study.remote; print({large} & set(sys.modules))"
+    script = f"import sys, podusv_cli.studies.making.remote; print({large} & set(sys.modules))"
     command = [sys.executable, "-c", script]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "set()\n"

@@ -13,16 +13,17 @@ from small_study import TEXT, made, small, written
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.simulate import simulate
-from podusv_cli.studies.study import dispatch as marching
-from podusv_cli.studies.study import runs_file, runs_writer
-from podusv_cli.studies.study import unit as units
-from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.plan import watching
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.results import judged
-from podusv_cli.studies.study.runs import Unit
-from podusv_cli.studies.study.sessions import Session, sessions
-from podusv_cli.studies.study.store import RUNS, UNITS, Store
+from podusv_cli.studies.counting import runs_file
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making import dispatch as marching
+from podusv_cli.studies.making import runs_writer
+from podusv_cli.studies.making import unit as units
+from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.plan import watching
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.sessions import Session, sessions
+from podusv_cli.studies.making.store import RUNS, UNITS, Store
+from podusv_cli.studies.telling.results import judged
 from podusv_cli.workflows import studies, sweep
 
 

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import spearmanr
 from study_samples import Made, pairs, sensitivity, study, summary
 
-from podusv_cli.studies.study import statistics as st
-from podusv_cli.studies.study.summary import as_csv
+from podusv_cli.studies.counting import statistics as st
+from podusv_cli.studies.telling.summary import as_csv
 
 inf, nan = math.inf, math.nan
 

@@ -8,9 +8,9 @@ from small_study import made
 from test_study_store import finishing
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.study import store as stores
-from podusv_cli.studies.study.runs import Unit, UnitResult
-from podusv_cli.studies.study.store import UNITS, decoded, encoded, read
+from podusv_cli.studies.counting.runs import Unit, UnitResult
+from podusv_cli.studies.making import store as stores
+from podusv_cli.studies.making.store import UNITS, decoded, encoded, read
 
 
 def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):

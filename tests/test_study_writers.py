@@ -15,7 +15,7 @@ from small_study import TEXT, folder_with_scenario, made, written
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import writer
 from podusv_cli.storage.writer import TABLES, sole_writer
-from podusv_cli.studies.study.store import SCENARIO
+from podusv_cli.studies.making.store import SCENARIO
 from podusv_cli.workflows import sweep
 
 

@@ -16,10 +16,10 @@ from podusv_cli.scenario.explain import explain
 from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
-from podusv_cli.studies.study.cells import MOST, cells
-from podusv_cli.studies.study.check import singles, sweep_faults
-from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.invalid import invalid_runs
+from podusv_cli.studies.making.cells import MOST, cells
+from podusv_cli.studies.making.check import singles, sweep_faults
+from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.invalid import invalid_runs
 
 ROOT = Path(__file__).parents[1]
 BASE = """\

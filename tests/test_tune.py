@@ -14,7 +14,7 @@ import pytest
 from tune_samples import planned, searched, toy, tuned
 
 from podusv_cli.scenario.load import load
-from podusv_cli.studies.study.runs import UnitResult
+from podusv_cli.studies.counting.runs import UnitResult
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.sampler import Sampler
@@ -118,7 +118,7 @@ def test_the_found_scenario_extends_the_searched_one(done):
 def test_numbers_of_the_report_come_from_draws_that_no_search_has_seen(done):
     drawn = done.results.runs.drawn["start.psi"]
     plan = done.results.plan
-    from podusv_cli.studies.study.draws import SWEEP, table
+    from podusv_cli.studies.making.draws import SWEEP, table
     from podusv_cli.studies.tuning.plan import TRAIN
 
     others = [table(plan.scenario.sweep, 0, 500, s)["start.psi"] for s in (SWEEP, TRAIN)]
@@ -128,7 +128,7 @@ def test_numbers_of_the_report_come_from_draws_that_no_search_has_seen(done):
 
 def test_the_found_gains_give_the_numbers_of_the_validation(done):
     """One run of the validation again, by hand."""
-    from podusv_cli.studies.study.unit import Unit, make
+    from podusv_cli.studies.making.unit import Unit, make
     from podusv_cli.studies.tuning.plan import VALIDATE
 
     scenario = load(done.folder / "tuned.yaml").scenario

@@ -15,7 +15,7 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text, resolved_yaml
 from podusv_cli.scenario.tune import Range
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, RANGE
-from podusv_cli.studies.study.draws import SWEEP, table, words
+from podusv_cli.studies.making.draws import SWEEP, table, words
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.objective import (
     Outcomes,

@@ -11,9 +11,9 @@ import pytest
 from stub_cluster import KilledWorker, StubClient
 from tune_samples import contents, toy, tuned
 
-from podusv_cli.studies.study import cluster as clusters
-from podusv_cli.studies.study import remote
-from podusv_cli.studies.study.runs import Unit
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making import cluster as clusters
+from podusv_cli.studies.making import remote
 from podusv_cli.workflows import tune as workflow
 
 SMALL = ("tune.budget=40", "tune.train=2", "tune.validate=8")

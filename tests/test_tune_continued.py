@@ -10,8 +10,8 @@ import pytest
 from tune_samples import contents, planned, searched, toy, tuned
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.store import RUNS, UNITS, Store
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.plan import VALIDATE

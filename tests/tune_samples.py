@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from podusv_cli.scenario.load import load, load_text
-from podusv_cli.studies.study.dispatch import Processes
-from podusv_cli.studies.study.unit import prepare
+from podusv_cli.studies.making.dispatch import Processes
+from podusv_cli.studies.making.unit import prepare
 from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.dispatch import dispatch

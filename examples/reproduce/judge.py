@@ -24,10 +24,10 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.sweep import Sweep
-from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.plan import Plan
-from podusv_cli.studies.study.unit import Unit, UnitResult, make, prepare
+from podusv_cli.studies.counting import statistics
+from podusv_cli.studies.making.check import sweep_faults
+from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.unit import Unit, UnitResult, make, prepare
 from podusv_cli.studies.tuning import searches
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.objective import Outcomes, excess

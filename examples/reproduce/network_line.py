@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
-from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import house_style, image, new_figure
 from podusv_cli.scenario.load import load
 from podusv_cli.theory.loop_margins import loop_margins

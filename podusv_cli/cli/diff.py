@@ -125,7 +125,7 @@ def changes_in_words(changes: Mapping[str, Change]) -> str:
 
 def change_in_words(key: str, change: Change) -> str:
     """`a 1 -> 2`, with - for no value."""
-    from podusv_cli.scenario.phrases import as_yaml
+    from podusv_cli.core.phrases import as_yaml
 
     one, other = ("-" if value is None else as_yaml(value) for value in change)
     return f"{key} {one} -> {other}"

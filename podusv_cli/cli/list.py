@@ -48,7 +48,7 @@ def list(
     `podusv explain NAME` tells more about each.
     """
     from podusv_cli.core.errors import UsageError
-    from podusv_cli.scenario.phrases import unknown
+    from podusv_cli.core.phrases import unknown
     from podusv_cli.scenario.plugins import on_hand
 
     every = [*parts(on_hand(plugin or ()))]

@@ -19,7 +19,7 @@ from podusv_cli.core.quantities import time_in_words
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from podusv_cli.studies.study.dispatch import Tally
+    from podusv_cli.studies.making.dispatch import Tally
 
 PATIENCE = 0.7  # s before a bar appears
 PERIOD = 0.2  # s between two numbers of a study's line

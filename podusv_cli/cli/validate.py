@@ -41,7 +41,7 @@ def validate(
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
     from podusv_cli.scenario.plugins import of_files
-    from podusv_cli.studies.study.check import sweep_faults
+    from podusv_cli.studies.making.check import sweep_faults
     from podusv_cli.workflows.execute import examined, warm_up
 
     checks = (unknown_codes, limits(allow_large), sweep_faults, _tune_faults)
@@ -74,10 +74,10 @@ def _tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
 
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     """How many runs the study has, and which draws the scenario cannot take."""
-    from podusv_cli.studies.study.check import unjudged
-    from podusv_cli.studies.study.estimate import check_fits
-    from podusv_cli.studies.study.invalid import check_draws
-    from podusv_cli.studies.study.plan import plan
+    from podusv_cli.studies.making.check import unjudged
+    from podusv_cli.studies.making.estimate import check_fits
+    from podusv_cli.studies.making.invalid import check_draws
+    from podusv_cli.studies.making.plan import plan
     from podusv_cli.studies.tuning.plan import TunePlan
     from podusv_cli.workflows.sweep import default_folder
 
@@ -106,9 +106,9 @@ def _tell_marches(scenario: Scenario) -> None:
 
 def _explain(loaded: Loaded) -> None:
     from podusv_cli.core.component import BY_RULE
+    from podusv_cli.core.phrases import as_yaml
     from podusv_cli.findings.proof import argument, conditions
     from podusv_cli.scenario.load import values
-    from podusv_cli.scenario.phrases import as_yaml
 
     echo(argument(loaded.scenario))
     for line in conditions(loaded.scenario):

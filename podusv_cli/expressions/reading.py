@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Collection
 from typing import NoReturn
 
-from podusv_cli.scenario.phrases import unknown
+from podusv_cli.core.phrases import unknown
 
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down

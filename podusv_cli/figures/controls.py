@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from podusv_cli.figures.curves import Span, compress, differ, draw_curve, draw_signal
 from podusv_cli.figures.panels import PEAKS, TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import axis_label, legend, new_figure
+from podusv_cli.figures.shown import Shown, axis_label
+from podusv_cli.figures.style import legend, new_figure
 
 EARLY = 0.005  # of the run: where the peaks are
 EARLY_ROWS = 20  # at least

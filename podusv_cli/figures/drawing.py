@@ -10,6 +10,7 @@ import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown
@@ -18,7 +19,6 @@ from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import Progress, run_shares
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 
 
 def _place(sheet: Sheet) -> tuple[int, str]:

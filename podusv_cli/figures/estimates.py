@@ -15,8 +15,8 @@ from podusv_cli.core.signal import STATE
 from podusv_cli.figures.curves import draw_curve, draw_run, scaling, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, legend, new_figure, unit
+from podusv_cli.figures.shown import Shown, about, unit
+from podusv_cli.figures.style import legend, new_figure
 
 PANEL_HEIGHT = 1.15  # inches
 TRUE: dict[str, Any] = {"linewidth": 3.5, "alpha": 0.3, "linestyle": "-"}

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from podusv_cli.figures.curves import compress, draw_run, draw_signal, scaling
 from podusv_cli.figures.panels import PEAKS, grid
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, axis_label, legend, unit
+from podusv_cli.figures.shown import Shown, about, axis_label, unit
+from podusv_cli.figures.style import legend
 
 PAIRS = (("alpha_u", "beta_u"), ("alpha_r", "beta_r"))
 ERRORS = ("y_u", "y_r")

@@ -12,8 +12,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import draw_shared
 from podusv_cli.figures.panels import grid
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, axis_label, constants, legend
+from podusv_cli.figures.shown import Shown, about, axis_label, constants
+from podusv_cli.figures.style import legend
 
 SEA = ("b_u", "b_v", "b_r")
 

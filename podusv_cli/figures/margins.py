@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
-from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.theory.loop_margins import AXES, LoopMargins
 

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from podusv_cli.figures.curves import compress, draw_signal
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.sheet import Family, Sheet, figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import axis_label, constants, legend, new_figure
+from podusv_cli.figures.shown import Shown, axis_label, constants
+from podusv_cli.figures.style import legend, new_figure
 
 Scale = Callable[[Axes, Sequence[Shown]], None]
 

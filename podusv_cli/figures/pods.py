@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import THIN, draw_curve, draw_run, scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import axis_label, constants, legend, new_figure
+from podusv_cli.figures.shown import Shown, axis_label, constants
+from podusv_cli.figures.style import legend, new_figure
 
 ROWS = (("n", "n_cmd"), ("n_part", "n_part_cmd"), ("delta", "delta_cmd"), ("power", ""))
 PANEL_HEIGHT = 1.5  # inches

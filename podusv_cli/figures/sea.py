@@ -12,8 +12,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import Span, draw_shared, draw_signal
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, axis_label, constants, legend, new_figure
+from podusv_cli.figures.shown import Shown, about, axis_label, constants
+from podusv_cli.figures.style import legend, new_figure
 
 ELEVATION = "zeta"
 SIGNALS = (ELEVATION, "V_w", "V_c", "beta_c")  # the wind's direction does not change

@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from podusv_cli.core import escaping
+from podusv_cli.core import escaping, quantities
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import Signal
+from podusv_cli.figures.looks import nth_style
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import derived
 
-# Okabe and Ito's palette and four of Tol's, with line styles and markers that tell the curves apart
-# in grey print too.
-LOOKS: tuple[tuple[str, Any, str], ...] = (
-    ("#0072B2", "-", "o"),
-    ("#D55E00", (0, (5, 1.5)), "s"),
-    ("#009E73", (0, (1.2, 1.2)), "^"),
-    ("#CC79A7", (0, (6, 1.5, 1.2, 1.5)), "D"),
-    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1)), "v"),
-    ("#E69F00", (0, (9, 2)), "P"),
-    ("#332288", (0, (2.5, 1.2)), "<"),
-    ("#882255", (0, (8, 1.2, 3, 1.2)), ">"),
-    ("#999933", (0, (4, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2)), "X"),
-    ("#7A4B12", (0, (1.2, 2.4)), "*"),
-)
 MARKS = 24  # on the curves of a panel together
 FEWEST, MOST = 3, 8  # on a curve
-TARGET_LOOK: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": "-"}
 ALONE = 9  # places of a run that is shown alone, both ends among them
 
 
@@ -119,15 +106,46 @@ class Shown:
         return float(self.signal(name)[self.row(t)])
 
 
+def about(runs: Sequence[Shown], name: str) -> Signal:
+    """What a signal is, by the first of the runs that have it, else as podusv derives it."""
+    having = [run for run in runs if run.has(name)]
+    if not having:
+        return derived.DERIVED[name].signal
+    return derived.about(having[0].recording, name, having[0].scenario.plugged)
+
+
+def axis_label(runs: Sequence[Shown], name: str) -> str:
+    """Symbol and unit of a signal as an axis shows them."""
+    return label(about(runs, name))
+
+
+def constants(runs: Sequence[Shown], names: Iterable[str]) -> dict[str, str]:
+    """The signals that no run changes, each with its value in words; none where all are such."""
+    held: dict[str, str] = {}
+    names = [name for name in names if any(run.has(name) for run in runs)]
+    for name in names:
+        values = {run.name: run.signal(name) for run in runs if run.has(name)}
+        if all(np.ptp(value) == 0.0 for value in values.values()):
+            levels = {label: f"{value.flat[0]:.4g}" for label, value in values.items()}
+            told = ", ".join(f"{level} ({label})" for label, level in levels.items())
+            level = told if len({*levels.values()}) > 1 else next(iter(levels.values()))
+            held[name] = f"${about(runs, name).symbol}$ = {level} {unit(about(runs, name))}"
+    return held if len(held) < len(names) else {}
+
+
+def label(signal: Signal) -> str:
+    """Symbol and unit of a signal."""
+    return f"${signal.symbol}$ [{unit(signal)}]"
+
+
+def unit(signal: Signal) -> str:
+    """Unit of a signal with its powers raised."""
+    return quantities.raised(signal.unit)
+
+
 def shortened(text: str, most: int) -> str:
     """A text, or as much of it as so many letters and three dots are."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
-
-
-def nth_style(place: int) -> tuple[str, Any, str]:
-    """Colour, line style and marker of the run in this place; the first 100 differ."""
-    count = len(LOOKS)
-    return LOOKS[place % count][0], *LOOKS[(place + place // count) % count][1:]
 
 
 def places(place: int, count: int) -> Vector:

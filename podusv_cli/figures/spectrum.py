@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures.curves import mark
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import about, legend, new_figure, remark, unit
+from podusv_cli.figures.shown import Shown, about, unit
+from podusv_cli.figures.style import legend, new_figure, remark
 
 DEMANDS = {"tau_u_cmd": "b_u", "tau_r_cmd": "b_r"}  # what the law demands, and what disturbs it
 AXES = {"tau_u_cmd": "surge", "tau_r_cmd": "yaw"}

@@ -1,9 +1,9 @@
-"""The look that all figures share: sizes, colours, line styles, labels, legend, saving."""
+"""The look that all figures share: sizes, style files, legend, saving."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
-from podusv_cli.core import quantities
-from podusv_cli.core.signal import Signal
 from podusv_cli.figures.page import Page
-from podusv_cli.figures.shown import Shown
-from podusv_cli.theory import derived
 
 FORMATS = ("png", "pdf", "svg")
 # By name, the style files of a style, each on top of those before it.
@@ -73,47 +69,10 @@ def new_figure(columns: int, height: float) -> Page:
     return figure
 
 
-def about(runs: Sequence[Shown], name: str) -> Signal:
-    """What a signal is, by the first of the runs that have it, else as podusv derives it."""
-    having = [run for run in runs if run.has(name)]
-    if not having:
-        return derived.DERIVED[name].signal
-    return derived.about(having[0].recording, name, having[0].scenario.plugged)
-
-
-def axis_label(runs: Sequence[Shown], name: str) -> str:
-    """Symbol and unit of a signal as an axis shows them."""
-    return label(about(runs, name))
-
-
-def constants(runs: Sequence[Shown], names: Iterable[str]) -> dict[str, str]:
-    """The signals that no run changes, each with its value in words; none where all are such."""
-    held: dict[str, str] = {}
-    names = [name for name in names if any(run.has(name) for run in runs)]
-    for name in names:
-        values = {run.name: run.signal(name) for run in runs if run.has(name)}
-        if all(np.ptp(value) == 0.0 for value in values.values()):
-            levels = {label: f"{value.flat[0]:.4g}" for label, value in values.items()}
-            told = ", ".join(f"{level} ({label})" for label, level in levels.items())
-            level = told if len({*levels.values()}) > 1 else next(iter(levels.values()))
-            held[name] = f"${about(runs, name).symbol}$ = {level} {unit(about(runs, name))}"
-    return held if len(held) < len(names) else {}
-
-
 def remark(axes: Axes, text: str) -> None:
     """A line of text in the middle of a panel that has nothing to draw."""
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="#444444")
     axes.set(xticks=[], yticks=[])
-
-
-def label(signal: Signal) -> str:
-    """Symbol and unit of a signal."""
-    return f"${signal.symbol}$ [{unit(signal)}]"
-
-
-def unit(signal: Signal) -> str:
-    """Unit of a signal with its powers raised."""
-    return quantities.raised(signal.unit)
 
 
 def legend(figure: Page, thin: str = "", held: Mapping[str, str] = MappingProxyType({})) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures.shown import TARGET_LOOK, Shown
+from podusv_cli.figures.looks import TARGET_LOOK
+from podusv_cli.figures.shown import Shown
 
 POINTS = 3000  # of a track, at most about
 

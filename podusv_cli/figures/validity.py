@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from podusv_cli.figures.curves import draw_signal
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown
-from podusv_cli.figures.style import axis_label, legend, new_figure
+from podusv_cli.figures.shown import Shown, axis_label
+from podusv_cli.figures.style import legend, new_figure
 
 THIN = 0.6  # points: bounds, each in its run's line style
 REACH = 2.0  # widths; farther from every node a network says next to nothing

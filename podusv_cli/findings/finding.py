@@ -13,13 +13,13 @@ from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.finding import Finding, FindingKind
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 
 # A kind of finding may be in the file of the component that it is about.
 PARTS = ("paths", "disturbances", "actuators", "measurements", "estimators", "controllers")

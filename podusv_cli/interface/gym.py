@@ -13,6 +13,7 @@ import numpy.typing as npt
 from podusv_cli.components.controllers.policy import INPUTS, OUTPUTS, observed
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.abreast import Abreast
 from podusv_cli.engine.running.batch_threads import Common
@@ -21,10 +22,9 @@ from podusv_cli.interface.border import explained
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.interface.session import DEMAND, Session, marcher_of, waiting
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.sweep import Sweep
-from podusv_cli.studies.study.check import gathered_metrics, sweep_faults
-from podusv_cli.studies.study.draws import SOBOL_BITS, SWEEP, drawn, draws
+from podusv_cli.studies.making.check import gathered_metrics, sweep_faults
+from podusv_cli.studies.making.draws import SOBOL_BITS, SWEEP, drawn, draws
 
 try:
     import gymnasium

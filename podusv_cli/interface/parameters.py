@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.phrases import as_yaml, unknown
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
@@ -25,7 +26,6 @@ from podusv_cli.scenario.address import (
 )
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import as_yaml, unknown
 from podusv_cli.scenario.yaml_tree import Route, bracketed, route
 
 Columns = dict[str, list[Any]]  # by key, with one value a run

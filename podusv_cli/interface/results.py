@@ -15,10 +15,10 @@ import pandas as pd
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Recording
 from podusv_cli.interface.border import explained
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.theory import derived
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.pieces import Mark, Pieces
 from podusv_cli.engine.running.simulate import Marcher, marcher
@@ -20,7 +21,6 @@ from podusv_cli.interface.functions import open_run, request
 from podusv_cli.interface.results import Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.workflows import run as running
 
 Status = Literal["running", "finished", "diverged"]

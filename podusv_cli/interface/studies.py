@@ -17,10 +17,10 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.interface.results import NO_XARRAY
 from podusv_cli.interface.scenarios import Changes, Source, assignments, loaded
 from podusv_cli.scenario.plugins import continue_with
-from podusv_cli.studies.study.outputs import as_frame
-from podusv_cli.studies.study.results import Results, judged
-from podusv_cli.studies.study.runs import STATUSES
-from podusv_cli.studies.study.store import RUNS
+from podusv_cli.studies.counting.runs import STATUSES
+from podusv_cli.studies.making.store import RUNS
+from podusv_cli.studies.telling.outputs import as_frame
+from podusv_cli.studies.telling.results import Results, judged
 from podusv_cli.workflows import studies as folders
 from podusv_cli.workflows import sweep as sweeping
 from podusv_cli.workflows.many_runs import Request

@@ -14,10 +14,10 @@ from pydantic import ValidationError
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError, SizingError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.phrases import hint
 from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import hint
 from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
 
 # The sections in which runs of one compiled loop may differ.

@@ -10,11 +10,11 @@ from functools import cache
 from podusv_cli.core import registry
 from podusv_cli.core.component import BY_RULE, Component
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.core.phrases import as_yaml, did_you_mean
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.keys import NAME, NO_DEFAULT, NUMBER, Key, either, keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
-from podusv_cli.scenario.phrases import as_yaml, did_you_mean
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route, with_dotted_key
 

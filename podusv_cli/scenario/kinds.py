@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from podusv_cli.core.phrases import as_yaml
 from podusv_cli.scenario.keys import Key
-from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.yaml_tree import Node, Route, bracketed, dotted, merge, plain
 
 

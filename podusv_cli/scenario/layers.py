@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial, reduce
 
+from podusv_cli.core.phrases import found
 from podusv_cli.scenario.named_files import ELSEWHERE
-from podusv_cli.scenario.phrases import found
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_DEPTH, MAX_NODES, plain_node, read, read_text
 from podusv_cli.scenario.yaml_tree import (

@@ -9,9 +9,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from podusv_cli.core.errors import SizingError
+from podusv_cli.core.phrases import did_you_mean, found, hint, unknown, without_case
 from podusv_cli.scenario.keys import NAME, NUMBER, Key, either, limits
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import did_you_mean, found, hint, unknown, without_case
 from podusv_cli.scenario.presets import stands_in
 from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
 

@@ -20,10 +20,10 @@ from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.component import Component, Recorded, value
 from podusv_cli.core.errors import LawError, ScenarioError
+from podusv_cli.core.phrases import did_you_mean, found, quoted
 from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import Scenario, scenario_class
-from podusv_cli.scenario.phrases import did_you_mean, found, quoted
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import read_text

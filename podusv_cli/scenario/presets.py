@@ -12,11 +12,11 @@ from pathlib import Path
 
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 from podusv_cli.core.component import Component, Presets
+from podusv_cli.core.phrases import found, quoted, unknown
 from podusv_cli.core.plugins import ABSENT, Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.kinds import over
 from podusv_cli.scenario.named_files import with_files
-from podusv_cli.scenario.phrases import found, quoted, unknown
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX
 from podusv_cli.scenario.yaml_text import read

@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from podusv_cli.scenario.phrases import did_you_mean
+from podusv_cli.core.phrases import did_you_mean
 
 PREFIX = "podusv:"
 RENAMED = "renamed.txt"  # beside the scenarios: a folder's old name and its new one, a line each

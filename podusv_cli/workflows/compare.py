@@ -19,6 +19,7 @@ from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Status
 from podusv_cli.findings.finding import Case, merged
 from podusv_cli.metrics.cost import law_costs
@@ -28,7 +29,6 @@ from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enable
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
 from podusv_cli.scenario.load import resolved_yaml
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up

@@ -11,8 +11,8 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.phrases import did_you_mean, unknown
 from podusv_cli.scenario import shipped
-from podusv_cli.scenario.phrases import did_you_mean, unknown
 
 CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
 CAPTION = re.compile(r"^   :caption: (.+)$")

@@ -12,6 +12,7 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Recording
 from podusv_cli.export import c, objects
 from podusv_cli.export.check import ABOUT, FMU, SAMPLES
@@ -21,7 +22,6 @@ from podusv_cli.export.link import linker, this_machine
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import installed
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario import shipped
 from podusv_cli.scenario.layers import extended_files
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.schema import TITLE, schema_text
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.storage import files

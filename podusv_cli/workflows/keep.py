@@ -14,10 +14,10 @@ from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
-from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.keep import Kept, KeptRun, found, unmade
-from podusv_cli.studies.study.plan import Plan
-from podusv_cli.studies.study.results import Results
+from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.telling.keep import Kept, KeptRun, found, unmade
+from podusv_cli.studies.telling.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
 from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.run import DRAWN

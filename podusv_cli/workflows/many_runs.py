@@ -20,10 +20,10 @@ from podusv_cli.scenario.load import LOOKED_AT, Loaded, Plugged, load, load_stor
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, manifest
-from podusv_cli.studies.study.cluster import engine
-from podusv_cli.studies.study.dispatch import Engine, Shard
-from podusv_cli.studies.study.remote import StudyText
-from podusv_cli.studies.study.store import SCENARIO
+from podusv_cli.studies.making.cluster import engine
+from podusv_cli.studies.making.dispatch import Engine, Shard
+from podusv_cli.studies.making.remote import StudyText
+from podusv_cli.studies.making.store import SCENARIO
 
 WHOLE: Shard = (1, 1)  # the only shard
 Tell = Callable[..., None]

@@ -9,11 +9,11 @@ from pathlib import Path
 from podusv_cli.core.errors import UsageError
 from podusv_cli.storage import files
 from podusv_cli.storage.writer import TABLES, sole_writer
-from podusv_cli.studies.study import record
-from podusv_cli.studies.study.dispatch import Tally
-from podusv_cli.studies.study.joining import gaps, join, mixture
-from podusv_cli.studies.study.sessions import Session
-from podusv_cli.studies.study.store import SCENARIO, Store
+from podusv_cli.studies.making import record
+from podusv_cli.studies.making.dispatch import Tally
+from podusv_cli.studies.making.joining import gaps, join, mixture
+from podusv_cli.studies.making.sessions import Session
+from podusv_cli.studies.making.store import SCENARIO, Store
 from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.studies import stored
 from podusv_cli.workflows.sweep import Swept, answered

@@ -13,9 +13,9 @@ from string import Template
 
 from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.phrases import unknown
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import kinds_of
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.storage import files as storage

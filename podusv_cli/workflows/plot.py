@@ -18,6 +18,7 @@ import numpy as np
 from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures import panels
 from podusv_cli.figures.animation import animate, file_name
@@ -26,7 +27,6 @@ from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown, dressed
 from podusv_cli.figures.style import STYLES, Look
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder

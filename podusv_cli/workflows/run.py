@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.phrases import unknown
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, resolved_yaml
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute

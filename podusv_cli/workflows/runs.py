@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.scenario.phrases import unknown
+from podusv_cli.core.phrases import unknown
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Node, find, plain, route
 from podusv_cli.storage import files, json_files

@@ -12,14 +12,15 @@ from typing import Any
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.phrases import unknown
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import resolved_yaml
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.studies.study import outputs, record
-from podusv_cli.studies.study.plan import KERNELS, Plan, differing, disagreements, plan
-from podusv_cli.studies.study.store import RUNS, SCENARIO, Store
+from podusv_cli.studies.making import record
+from podusv_cli.studies.making.plan import KERNELS, Plan, differing, disagreements, plan
+from podusv_cli.studies.making.store import RUNS, SCENARIO, Store
+from podusv_cli.studies.telling import outputs
 from podusv_cli.workflows.keep import alone, seen_from
 from podusv_cli.workflows.many_runs import kept_scenario
 

@@ -17,17 +17,18 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
-from podusv_cli.studies.study import outputs, record
-from podusv_cli.studies.study.check import sweep_faults, unjudged
-from podusv_cli.studies.study.dispatch import Engine, Gaps, Tally, Tell, dispatch
-from podusv_cli.studies.study.estimate import check_fits
-from podusv_cli.studies.study.invalid import check_draws
-from podusv_cli.studies.study.joining import mixture
-from podusv_cli.studies.study.keep import contradiction, found, unmade
-from podusv_cli.studies.study.plan import Plan, plan
-from podusv_cli.studies.study.results import Results, judged
-from podusv_cli.studies.study.sessions import Session
-from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.making import record
+from podusv_cli.studies.making.check import sweep_faults, unjudged
+from podusv_cli.studies.making.dispatch import Engine, Gaps, Tally, Tell, dispatch
+from podusv_cli.studies.making.estimate import check_fits
+from podusv_cli.studies.making.invalid import check_draws
+from podusv_cli.studies.making.joining import mixture
+from podusv_cli.studies.making.plan import Plan, plan
+from podusv_cli.studies.making.sessions import Session
+from podusv_cli.studies.making.store import Store
+from podusv_cli.studies.telling import outputs
+from podusv_cli.studies.telling.keep import contradiction, found, unmade
+from podusv_cli.studies.telling.results import Results, judged
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
     WHOLE,

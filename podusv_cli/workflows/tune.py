@@ -14,11 +14,11 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files
 from podusv_cli.storage.writer import sole_writer
-from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.dispatch import Engine, Tally
-from podusv_cli.studies.study.plan import digest
-from podusv_cli.studies.study.sessions import Session
-from podusv_cli.studies.study.unit import prepare
+from podusv_cli.studies.making.check import sweep_faults
+from podusv_cli.studies.making.dispatch import Engine, Tally
+from podusv_cli.studies.making.plan import digest
+from podusv_cli.studies.making.sessions import Session
+from podusv_cli.studies.making.unit import prepare
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import outputs
 from podusv_cli.studies.tuning.check import tune_faults

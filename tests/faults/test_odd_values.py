@@ -16,8 +16,8 @@ from podusv_cli.engine.running.simulate import ready
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.plan import plan
+from podusv_cli.studies.making.check import sweep_faults
+from podusv_cli.studies.making.plan import plan
 from podusv_cli.studies.tuning.check import tune_faults
 
 SEED = 20261123

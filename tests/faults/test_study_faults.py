@@ -16,8 +16,8 @@ from storage_samples import Saboteur, fails
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import files
-from podusv_cli.studies.study.record import about
-from podusv_cli.studies.study.store import RUNS, Store
+from podusv_cli.studies.making.record import about
+from podusv_cli.studies.making.store import RUNS, Store
 from podusv_cli.workflows import sweep
 
 KILLS, WRITES = count(2, 200), count(4, 60)

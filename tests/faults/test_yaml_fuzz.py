@@ -17,9 +17,9 @@ from storage_samples import deadline
 from podusv_cli.comparison.claims import parse_claims
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load
-from podusv_cli.studies.study.cells import cells
-from podusv_cli.studies.study.check import singles, sweep_faults
-from podusv_cli.studies.study.invalid import invalid_runs
+from podusv_cli.studies.making.cells import cells
+from podusv_cli.studies.making.check import singles, sweep_faults
+from podusv_cli.studies.making.invalid import invalid_runs
 
 CONFIGS = ROOT / "configs"
 MEBIBYTE = 1024 if sys.platform == "linux" else 1024**2  # in units of ru_maxrss

@@ -13,11 +13,11 @@ from itertools import product
 from pathlib import Path
 
 from podusv_cli.core.errors import ScenarioError, UsageError
+from podusv_cli.core.phrases import unknown
 from podusv_cli.scenario import shipped
 from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import unknown
 from podusv_cli.scenario.yaml_text import read_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.shown import nth_style
+from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.bench.runs import BenchRun
 from podusv_cli.studies.bench.standing import leaderboard, profile

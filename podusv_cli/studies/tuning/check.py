@@ -8,7 +8,7 @@ from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.scenario.yaml_tree import Route
-from podusv_cli.studies.study.check import singles
+from podusv_cli.studies.making.check import singles
 from podusv_cli.studies.tuning.objective import parse_inequality, parse_objective
 from podusv_cli.studies.tuning.space import space_faults
 

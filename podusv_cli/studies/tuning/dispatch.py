@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Outcome
-from podusv_cli.studies.study import plan as study
-from podusv_cli.studies.study.dispatch import Engine, Tally
-from podusv_cli.studies.study.runs import Unit, UnitResult
-from podusv_cli.studies.study.unit import crashed
+from podusv_cli.studies.counting.runs import Unit, UnitResult
+from podusv_cli.studies.making import plan as study
+from podusv_cli.studies.making.dispatch import Engine, Tally
+from podusv_cli.studies.making.unit import crashed
 from podusv_cli.studies.tuning.search import Search
 
 Tell = Callable[[Tally, Sequence[Search]], None]

@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from podusv_cli.core import escaping
-from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.sketch import COLUMNS, Sketch
-from podusv_cli.studies.study.figures import ratios
+from podusv_cli.studies.telling.figures import ratios
 from podusv_cli.studies.tuning.results import Results
 from podusv_cli.studies.tuning.space import Gain, units_of
 from podusv_cli.studies.tuning.trials import FINISHED

@@ -14,8 +14,8 @@ from podusv_cli.scenario.plugins import FOLDER
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.storage import files, json_files, manifest
-from podusv_cli.studies.study.plan import disagreements
-from podusv_cli.studies.study.store import SCENARIO
+from podusv_cli.studies.making.plan import disagreements
+from podusv_cli.studies.making.store import SCENARIO
 from podusv_cli.studies.tuning import sampler, trials, validation
 from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.results import Results

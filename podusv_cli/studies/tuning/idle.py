@@ -15,9 +15,9 @@ import numpy as np
 
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Progress, run_all
-from podusv_cli.studies.study.draws import uniforms
-from podusv_cli.studies.study.runs import Unit, UnitResult
-from podusv_cli.studies.study.unit import make
+from podusv_cli.studies.counting.runs import Unit, UnitResult
+from podusv_cli.studies.making.draws import uniforms
+from podusv_cli.studies.making.unit import make
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
 from podusv_cli.studies.tuning.space import Gain, with_gains
 

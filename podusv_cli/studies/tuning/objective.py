@@ -22,10 +22,10 @@ from podusv_cli.expressions.margins import SIGNS
 from podusv_cli.expressions.reading import function, known, literal, number, refuse, syntax_tree
 from podusv_cli.expressions.walk import ARITHMETIC, Condition
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.expressions import OfRuns
-from podusv_cli.studies.study.runs import Mask
-from podusv_cli.studies.study.samples import FAILURES, MEDIAN, QUANTILE, Wording, part_of
+from podusv_cli.studies.counting import statistics
+from podusv_cli.studies.counting.expressions import OfRuns
+from podusv_cli.studies.counting.runs import Mask
+from podusv_cli.studies.counting.samples import FAILURES, MEDIAN, QUANTILE, Wording, part_of
 
 EXAMPLE, INEQUALITY = "median(iae)", "failures <= 0.05"
 STATISTICS = (MEDIAN, QUANTILE)

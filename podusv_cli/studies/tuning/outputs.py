@@ -7,8 +7,8 @@ from pathlib import Path
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
-from podusv_cli.studies.study.outputs import publish
-from podusv_cli.studies.study.summary import as_csv
+from podusv_cli.studies.telling.outputs import publish
+from podusv_cli.studies.telling.summary import as_csv
 from podusv_cli.studies.tuning.results import Results
 
 

@@ -12,11 +12,11 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
-from podusv_cli.studies.study import plan as study
-from podusv_cli.studies.study.cells import Cell
-from podusv_cli.studies.study.check import singles
-from podusv_cli.studies.study.expressions import parse_success, succeeded
-from podusv_cli.studies.study.runs import STATUSES, UnitResult
+from podusv_cli.studies.counting.expressions import parse_success, succeeded
+from podusv_cli.studies.counting.runs import STATUSES, UnitResult
+from podusv_cli.studies.making import plan as study
+from podusv_cli.studies.making.cells import Cell
+from podusv_cli.studies.making.check import singles
 from podusv_cli.studies.tuning.objective import (
     Inequality,
     Outcomes,

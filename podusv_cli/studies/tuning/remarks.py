@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from podusv_cli.studies.study.statistics import Interval, digits
+from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.tuning.plan import ENOUGH, is_few
 from podusv_cli.studies.tuning.results import MARGIN, Results
 from podusv_cli.studies.tuning.trials import FINISHED

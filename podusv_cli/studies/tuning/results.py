@@ -13,9 +13,10 @@ import numpy as np
 import pandas as pd
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.studies.study import statistics, summary
-from podusv_cli.studies.study.runs_file import Table
-from podusv_cli.studies.study.statistics import Interval
+from podusv_cli.studies.counting import statistics
+from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.statistics import Interval
+from podusv_cli.studies.telling import summary
 from podusv_cli.studies.tuning import searches
 from podusv_cli.studies.tuning.objective import (
     Inequality,

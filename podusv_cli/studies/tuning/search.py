@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.study import plan as study
-from podusv_cli.studies.study.runs import STATUSES, Unit, UnitResult
+from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
+from podusv_cli.studies.making import plan as study
 from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.objective import Outcomes, evaluate, excess
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan

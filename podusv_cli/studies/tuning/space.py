@@ -11,13 +11,13 @@ from pydantic import ValidationError
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import unit_of
+from podusv_cli.core.phrases import did_you_mean
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import did_you_mean
 from podusv_cli.scenario.tune import AROUND, Range, Tune
-from podusv_cli.studies.study.plan import changed
+from podusv_cli.studies.making.plan import changed
 
 DIGITS = 4  # of a gain that is tried, so that a scenario shows all of them
 BOUNDARY = 0.02  # of a range: a gain that is nearer to an end is at its bound

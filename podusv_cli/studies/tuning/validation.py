@@ -9,10 +9,10 @@ from pathlib import Path
 
 from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.studies.study import record
-from podusv_cli.studies.study.dispatch import Engine, Tally, dispatch
-from podusv_cli.studies.study.runs_file import Table
-from podusv_cli.studies.study.store import RUNS, UNITS, Store
+from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.making import record
+from podusv_cli.studies.making.dispatch import Engine, Tally, dispatch
+from podusv_cli.studies.making.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning.plan import VALIDATE, Named, TunePlan
 from podusv_cli.studies.tuning.trials import Trial, best
 

@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 
 from podusv_cli.core.about import MetricAbout, StudyAbout
-from podusv_cli.studies.study import claims, summary, verdict
-from podusv_cli.studies.study.runs_file import Table
-from podusv_cli.studies.study.statistics import Interval, digits
+from podusv_cli.studies.counting import claims, verdict
+from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.statistics import Interval, digits
+from podusv_cli.studies.telling import summary
 
 ALWAYS = ("iae", "z_e_steady", "e_ct_rms")  # metrics that the answer has beside those of claims
 MARGIN = 0.01  # relative, of pairs

@@ -11,9 +11,9 @@ from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.batch import Lazily, simulate_many
 from podusv_cli.engine.running.simulate import ready
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.plan import Plan, watching
-from podusv_cli.studies.study.runs import STATUSES, Unit, UnitResult
+from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
+from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.plan import Plan, watching
 
 
 def prepare(

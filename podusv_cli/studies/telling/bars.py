@@ -7,10 +7,10 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from podusv_cli.studies.study.claims import Link, ParsedClaim
-from podusv_cli.studies.study.samples import FAILURES, SHARE
-from podusv_cli.studies.study.statistics import Interval, digits
-from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
+from podusv_cli.studies.counting.claims import Link, ParsedClaim
+from podusv_cli.studies.counting.samples import FAILURES, SHARE
+from podusv_cli.studies.counting.statistics import Interval, digits
+from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
 
 SIGNS: dict[type[ast.cmpop], str] = {
     ast.Lt: "below", ast.LtE: "at most", ast.Gt: "above", ast.GtE: "at least",

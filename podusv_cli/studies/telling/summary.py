@@ -12,8 +12,8 @@ import pandas as pd
 from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import csv_files
-from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
+from podusv_cli.studies.counting import statistics
+from podusv_cli.studies.counting.runs import Mask, StudyRuns, worst
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 Known = Mapping[str, MetricAbout]

@@ -15,10 +15,10 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS
 from podusv_cli.expressions.reading import function, number, refuse
 from podusv_cli.expressions.walk import Condition
-from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.expressions import OverLaws
-from podusv_cli.studies.study.runs import Mask
-from podusv_cli.studies.study.statistics import Interval
+from podusv_cli.studies.counting import statistics
+from podusv_cli.studies.counting.expressions import OverLaws
+from podusv_cli.studies.counting.runs import Mask
+from podusv_cli.studies.counting.statistics import Interval
 
 
 @dataclass(frozen=True)

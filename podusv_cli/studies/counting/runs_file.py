@@ -17,8 +17,8 @@ from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import hdf5
-from podusv_cli.studies.study.expressions import parse_success, succeeded
-from podusv_cli.studies.study.runs import (
+from podusv_cli.studies.counting.expressions import parse_success, succeeded
+from podusv_cli.studies.counting.runs import (
     AXES,
     BROKEN,
     DRAWN,

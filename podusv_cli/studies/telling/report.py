@@ -11,12 +11,12 @@ import numpy as np
 from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Failure
-from podusv_cli.studies.study.bars import bars
-from podusv_cli.studies.study.keep import Kept
-from podusv_cli.studies.study.results import Results
-from podusv_cli.studies.study.runs import STATUSES, Mask
-from podusv_cli.studies.study.sessions import sessions
-from podusv_cli.studies.study.statistics import Interval, digits
+from podusv_cli.studies.counting.runs import STATUSES, Mask
+from podusv_cli.studies.counting.statistics import Interval, digits
+from podusv_cli.studies.making.sessions import sessions
+from podusv_cli.studies.telling.bars import bars
+from podusv_cli.studies.telling.keep import Kept
+from podusv_cli.studies.telling.results import Results
 
 FEW = 5  # laws, whose pairs are no more than ten
 FIRST = 20  # rows of a table of runs
@@ -50,7 +50,7 @@ def page(
     about, beside = results.about, _beside(figures, len(results.runs.laws))
     ordered = [*beside, *(picture for picture in figures if picture not in beside)]
     numbered = [*enumerate(ordered, 1)]
-    return environment("podusv_cli.studies.study").get_template("study.html.j2").render(
+    return environment("podusv_cli.studies.telling").get_template("study.html.j2").render(
         title=f"{about.name}: a study",
         folder=folder,
         results=results,

@@ -32,9 +32,10 @@ from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.scenario.plugins import FOLDER, continue_with
 from podusv_cli.storage import files, manifest
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.studies.study import record, runs_file, runs_writer
-from podusv_cli.studies.study.plan import digest, disagreements
-from podusv_cli.studies.study.runs import Mask, Unit, UnitResult
+from podusv_cli.studies.counting import runs_file
+from podusv_cli.studies.counting.runs import Mask, Unit, UnitResult
+from podusv_cli.studies.making import record, runs_writer
+from podusv_cli.studies.making.plan import digest, disagreements
 
 UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it

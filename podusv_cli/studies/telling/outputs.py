@@ -16,12 +16,12 @@ from podusv_cli.process.extras import Extras
 from podusv_cli.storage import csv_files, files
 from podusv_cli.storage.json_files import encode
 from podusv_cli.storage.run_folder import MISSING
-from podusv_cli.studies.study import summary
-from podusv_cli.studies.study.keep import Kept, tracks
-from podusv_cli.studies.study.results import Results
-from podusv_cli.studies.study.runs import AXES, ENDING, STATUSES
-from podusv_cli.studies.study.runs_file import Table
-from podusv_cli.studies.study.sessions import timing
+from podusv_cli.studies.counting.runs import AXES, ENDING, STATUSES
+from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.making.sessions import timing
+from podusv_cli.studies.telling import summary
+from podusv_cli.studies.telling.keep import Kept, tracks
+from podusv_cli.studies.telling.results import Results
 
 FIGURES, REPORT = "figures", "report.html"
 
@@ -52,12 +52,12 @@ def write_report(
     What fails is noted in the `extras`. Files of an earlier report that are not made again are
     removed: they would tell of other runs.
     """
-    from podusv_cli.studies.study import report
+    from podusv_cli.studies.telling import report
 
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
         from podusv_cli.studies.sketch import rendered  # matplotlib is slow to import
-        from podusv_cli.studies.study.figures import sketches
+        from podusv_cli.studies.telling.figures import sketches
 
         drawn, shown = rendered(sketches(results, tracks(kept, extras)), extras)
     page = extras.made(REPORT, lambda: report.page(folder, results, kept, shown, extras.missing))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Self
 
 from podusv_cli.expressions.verdict import ANSWERS, Verdict
-from podusv_cli.studies.study.samples import Sample
-from podusv_cli.studies.study.statistics import Interval
+from podusv_cli.studies.counting.samples import Sample
+from podusv_cli.studies.counting.statistics import Interval
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS, below
 from podusv_cli.expressions.reading import function, known, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Walk
-from podusv_cli.studies.study.runs import Mask, StudyRuns, worst
+from podusv_cli.studies.counting.runs import Mask, StudyRuns, worst
 
 # A failed run's metric in arithmetic: larger than any number of a run, and the same for all, so
 # that both failing gives a ratio of 1 and a difference of 0. What exceeds REAL is infinite.

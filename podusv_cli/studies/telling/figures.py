@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.quantities import raised
-from podusv_cli.figures.shown import TARGET_LOOK, nth_style
+from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import legend, new_figure
+from podusv_cli.studies.counting import statistics
+from podusv_cli.studies.counting.expressions import FINISHED, parse_success, succeeded
 from podusv_cli.studies.sketch import COLUMNS, Sketch
-from podusv_cli.studies.study import statistics
-from podusv_cli.studies.study.expressions import FINISHED, parse_success, succeeded
-from podusv_cli.studies.study.keep import Track
-from podusv_cli.studies.study.results import Results
-from podusv_cli.studies.study.summary import has, values_of
+from podusv_cli.studies.telling.keep import Track
+from podusv_cli.studies.telling.results import Results
+from podusv_cli.studies.telling.summary import has, values_of
 
 MOST_CELLS = 6  # of which each has figures of its own
 POINTS = 400  # of a curve

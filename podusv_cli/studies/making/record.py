@@ -7,15 +7,15 @@ from pathlib import Path
 
 from podusv_cli.core.about import QuantityAbout, StudyAbout, StudyIdentity
 from podusv_cli.core.errors import StorageError
+from podusv_cli.core.phrases import as_yaml
 from podusv_cli.core.plugins import digest
-from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.plugins import FOLDER
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.studies.study.draws import SWEEP
-from podusv_cli.studies.study.plan import Plan
-from podusv_cli.studies.study.words import in_words
+from podusv_cli.studies.making.draws import SWEEP
+from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.words import in_words
 
 FORMAT = 2
 

@@ -10,10 +10,10 @@ from math import prod
 from typing import Any
 
 from podusv_cli.core.errors import ScenarioError
+from podusv_cli.core.phrases import as_yaml
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import as_yaml
 from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, plain, route
 
 MOST = 1000  # cells

@@ -17,11 +17,11 @@ from typing import Any
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
-from podusv_cli.studies.study import remote
-from podusv_cli.studies.study.dispatch import Done, Engine, Processes, Units
-from podusv_cli.studies.study.plan import Variant
-from podusv_cli.studies.study.remote import Expectation, Reply, StudyText
-from podusv_cli.studies.study.runs import Unit
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making import remote
+from podusv_cli.studies.making.dispatch import Done, Engine, Processes, Units
+from podusv_cli.studies.making.plan import Variant
+from podusv_cli.studies.making.remote import Expectation, Reply, StudyText
 
 WINDOW = 2  # units under way for each thread of a worker, so that none waits for this process
 LOOK = 2.0  # s, after which it is looked again which workers there are

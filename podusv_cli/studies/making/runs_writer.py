@@ -17,9 +17,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage.files import new_file, storage_errors
 from podusv_cli.storage.log import FILE, UNDATED, LogLayout, describe, write_at
-from podusv_cli.studies.study import record
-from podusv_cli.studies.study.draws import table
-from podusv_cli.studies.study.runs import (
+from podusv_cli.studies.counting.runs import (
     DRAWN,
     NOT_MADE,
     SEAL,
@@ -27,7 +25,9 @@ from podusv_cli.studies.study.runs import (
     STATUSES,
     UnitResult,
 )
-from podusv_cli.studies.study.runs_file import ROWS, digest, digest_of_the_rest
+from podusv_cli.studies.counting.runs_file import ROWS, digest, digest_of_the_rest
+from podusv_cli.studies.making import record
+from podusv_cli.studies.making.draws import table
 
 BLOCK = 2**20  # bytes written and read at a time
 NUMBERS = "iuf"  # numpy's kinds of numbers

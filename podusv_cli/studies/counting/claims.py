@@ -24,11 +24,11 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS
 from podusv_cli.expressions.reading import function, known, number, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Logic, all_of
-from podusv_cli.studies.study.expressions import OverLaws
-from podusv_cli.studies.study.runs import Mask, StudyRuns
-from podusv_cli.studies.study.samples import ALONE, FAILURES, SAMPLERS, SHARE, STATISTICS, Sample
-from podusv_cli.studies.study.statistics import holm
-from podusv_cli.studies.study.verdict import Statistic, StudyVerdict
+from podusv_cli.studies.counting.expressions import OverLaws
+from podusv_cli.studies.counting.runs import Mask, StudyRuns
+from podusv_cli.studies.counting.samples import ALONE, FAILURES, SAMPLERS, SHARE, STATISTICS, Sample
+from podusv_cli.studies.counting.statistics import holm
+from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
 
 EXAMPLE = "share(a.iae < b.iae) >= 0.95"
 # of a number on the left of a comparison

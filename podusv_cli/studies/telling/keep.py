@@ -18,8 +18,8 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.storage.run_folder import LOGS, Run, open_run
-from podusv_cli.studies.study.results import Results
-from podusv_cli.studies.study.runs_file import Table
+from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.telling.results import Results
 
 POINTS = 2000  # of a kept run's curve in a figure
 Track = tuple[Vector, Vector]  # time [s] and distance to the target [m]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.phrases import did_you_mean, found, unknown
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.expressions.reading import ExpressionError
@@ -24,14 +25,13 @@ from podusv_cli.scenario.address import (
 )
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.phrases import did_you_mean, found, unknown
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, route
-from podusv_cli.studies.study.claims import parse
-from podusv_cli.studies.study.draws import drawn
-from podusv_cli.studies.study.expressions import parse_success
-from podusv_cli.studies.study.runs import AXES, ENDING, OWN
+from podusv_cli.studies.counting.claims import parse
+from podusv_cli.studies.counting.expressions import parse_success
+from podusv_cli.studies.counting.runs import AXES, ENDING, OWN
+from podusv_cli.studies.making.draws import drawn
 
 # Shares at which a distribution is tried; its ends and its middle may be rounder than its draws.
 TRIED = np.array([0.000871, 0.381966, 0.998713])

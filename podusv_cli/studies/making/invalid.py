@@ -9,9 +9,9 @@ from random import Random
 from podusv_cli.scenario.address import ValueRefused
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
-from podusv_cli.studies.study.check import singles
-from podusv_cli.studies.study.draws import drawn, draws
-from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.making.check import singles
+from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.plan import Plan
 
 MOST_TRIED = 2000  # runs, about a second
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.storage.run_folder import check_free_space
-from podusv_cli.studies.study import runs_writer
-from podusv_cli.studies.study.plan import Plan
+from podusv_cli.studies.making import runs_writer
+from podusv_cli.studies.making.plan import Plan
 
 HELD_BYTES = 32  # of a run in memory while tables are made: four numbers
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.study.runs import Mask, UnitResult
-from podusv_cli.studies.study.runs_file import stretches
-from podusv_cli.studies.study.sessions import NAME, sessions
-from podusv_cli.studies.study.store import Store
+from podusv_cli.studies.counting.runs import Mask, UnitResult
+from podusv_cli.studies.counting.runs_file import stretches
+from podusv_cli.studies.making.sessions import NAME, sessions
+from podusv_cli.studies.making.store import Store
 
 SIZE = 8  # bytes of a run's digest
 NOWHERE = -1  # the folder of a run that none has yet

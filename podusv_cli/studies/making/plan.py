@@ -20,9 +20,9 @@ from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
-from podusv_cli.studies.study.cells import Cell, cells
-from podusv_cli.studies.study.check import sweep_faults
-from podusv_cli.studies.study.draws import SWEEP
+from podusv_cli.studies.making.cells import Cell, cells
+from podusv_cli.studies.making.check import sweep_faults
+from podusv_cli.studies.making.draws import SWEEP
 
 # Sections of a scenario that change no number of a study.
 COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")

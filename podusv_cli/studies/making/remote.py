@@ -20,11 +20,11 @@ from podusv_cli.process.interrupts import Interrupts
 from podusv_cli.process.workers import Outcome, outcome_of
 from podusv_cli.scenario.load import load_text
 from podusv_cli.storage.provenance import processor
-from podusv_cli.studies.study.dispatch import timed
-from podusv_cli.studies.study.joining import digests
-from podusv_cli.studies.study.plan import Plan, Variant, digest, plan
-from podusv_cli.studies.study.runs import Unit
-from podusv_cli.studies.study.unit import make
+from podusv_cli.studies.counting.runs import Unit
+from podusv_cli.studies.making.dispatch import timed
+from podusv_cli.studies.making.joining import digests
+from podusv_cli.studies.making.plan import Plan, Variant, digest, plan
+from podusv_cli.studies.making.unit import make
 
 PLANS = 2  # plans that a worker keeps
 CANARY = 2  # draws of each law, of which every worker has to compute the same bits

@@ -15,11 +15,11 @@ import numpy as np
 
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Job, Outcome, available_workers, run_each
-from podusv_cli.studies.study.plan import LawInCell, Plan
-from podusv_cli.studies.study.runs import STATUSES, Mask, Unit, UnitResult
-from podusv_cli.studies.study.runs_file import stretches
-from podusv_cli.studies.study.store import Store
-from podusv_cli.studies.study.unit import crashed, make, prepare
+from podusv_cli.studies.counting.runs import STATUSES, Mask, Unit, UnitResult
+from podusv_cli.studies.counting.runs_file import stretches
+from podusv_cli.studies.making.plan import LawInCell, Plan
+from podusv_cli.studies.making.store import Store
+from podusv_cli.studies.making.unit import crashed, make, prepare
 
 FIRST = 8  # draws of a unit before it is known how long a run takes
 AIM = 4.0  # s of computing that a unit is to take

@@ -1,1 +1,0 @@
-"""Studies: thousands of drawn runs of several laws, judged with their uncertainty."""

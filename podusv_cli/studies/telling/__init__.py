@@ -1,0 +1,1 @@
+"""What a finished study says: tables, verdicts, figures, the page; knows no scenario."""
