@@ -16,7 +16,7 @@ from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.abreast import Abreast
-from podusv_cli.engine.running.batch_threads import Common
+from podusv_cli.engine.running.batch_threads import BatchRun
 from podusv_cli.engine.running.lanes import Sorter, why_alone
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
@@ -260,7 +260,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
                 f"podusv.gym: these runs cannot march side by side ({why}); take Gymnasium's "
                 "SyncVectorEnv of podusv.gym.Env"
             )
-        self._common, self._sorter = Common(plan), Sorter(0, True)
+        self._plan, self._sorter = plan, Sorter(0, True)
         self._sorter.choose(plan)
         self._marches: list[Abreast] = []
         self._views = np.zeros((INPUTS, count))
@@ -311,11 +311,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         assert advance is not None
         for place, seed in zip(places, seeds, strict=True):
             loop = self._task.drawn(seed, self.np_random).closed_loop()
-            run = self._common.run(place, self._common.planned(loop))
+            run = BatchRun.of(place, self._plan.like(loop))
             groups.append(self._sorter.sorted(run.vectors, run))
         groups += self._sorter.rest()
         self._gathered[places] = 0.0
-        return [Abreast(self._common.plan, g, advance, observed, INPUTS) for g in groups if g]
+        return [Abreast(self._plan, g, advance, observed, INPUTS) for g in groups if g]
 
     def _observed(self) -> tuple[Vector, Info]:
         """What all see, where a run is terminated what it saw last; the time of every run [s]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -28,7 +28,7 @@ from podusv_cli.engine.loop.closed_loop import (
     Observer,
     nothing,
 )
-from podusv_cli.engine.loop.recent import Recall, call
+from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.loop.rounded import law_of_rounded, sample_of_rounded
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
@@ -55,18 +55,33 @@ def unwatched(plan: Plan) -> Observer:
 class Plan:
     """A loop, a grid, and all that follows from both; made once, and handed down.
 
-    `probe` gives the observer of the run. `recall` calls methods of components.
+    `probe` gives the observer of the run. `recall` asks components, and remembers their answers.
     """
 
     loop: ClosedLoop
     grid: TimeGrid
     probe: Callable[[Plan], Observer] = unwatched
-    recall: Recall = call
+    recall: Recent = field(default_factory=Recent)
 
     @classmethod
     def watched(cls, loop: ClosedLoop, grid: TimeGrid, observer: Observer) -> Plan:
         """With an observer that is there already."""
         return cls(loop, grid, lambda plan: observer)
+
+    def like(self, loop: ClosedLoop) -> Plan:
+        """The plan of a loop that differs in numbers only; parts of both are asked once.
+
+        Raises ValueError for a loop of another structure, LawError for parts that do not fit.
+        """
+        loop.check_fit(self.grid.step)
+        plan = replace(self, loop=loop, probe=lambda plan: self.observer)
+        if plan.structure != self.structure:
+            raise ValueError(
+                f"it has another structure than the batch: {_kinds(loop)} with {plan.layout}, "
+                f"not {_kinds(self.loop)} with {self.layout}; runs of one batch differ in "
+                "numbers only"
+            )
+        return plan
 
     @cached_property
     def observer(self) -> Observer:
@@ -183,7 +198,7 @@ class Plan:
             "observer": recall(self.observer.constants_for, loop),
         }  # fmt: skip
 
-    @cached_property
+    @property
     def path_constants(self) -> dict[str, float]:
         """The path's constants for this law."""
         approach = self.loop.controller.approach()
@@ -191,7 +206,7 @@ class Plan:
         constants: dict[str, float] = self.recall(self.loop.path.constants_with, standoff)
         return constants
 
-    @cached_property
+    @property
     def law_constants(self) -> dict[str, float]:
         """The law's constants, with those of the path's fillet where it has one."""
         law = self.loop.controller
@@ -207,13 +222,13 @@ class Plan:
             )
         return own | corners
 
-    @cached_property
+    @property
     def path_table(self) -> Vector:
         """The path's table."""
         table: Vector = self.recall(self.loop.path.table)
         return table
 
-    @cached_property
+    @property
     def law_table(self) -> Vector:
         """The law's table, and behind it the corners of the path's fillet."""
         own: Vector = self.recall(self.loop.controller.table)
@@ -226,11 +241,8 @@ class Plan:
         path = self.loop.path
         if not path.follows:
             return np.asarray(self.recall(path.targets, AT_START)[0])
-        x, place, target = (
-            np.array(self.loop.start),
-            np.zeros(len(path.places)),
-            np.zeros(len(TARGET)),
-        )
+        x, place = np.array(self.loop.start), np.zeros(len(path.places))
+        target = np.zeros(len(TARGET))
         k, table = bundle(self.path_constants), self.path_table
         call_kernel(path.evaluate, t=0.0, x=x, place=place, k=k, table=table, target=target)
         return target
@@ -242,34 +254,25 @@ class Plan:
         loop = self.loop
         return loop.controller.start(np.array(loop.start), self.first_target, loop.nominal)
 
-    @cached_property
-    @np.errstate(all="ignore")
-    def _tables(self) -> tuple[Vector, Vector, Vector, Vector]:
-        """Those of disturbance, actuator, measurement and estimator."""
-        loop, recall, step, steps = self.loop, self.recall, self.grid.step, self.grid.steps
-        return (
-            recall(loop.disturbance.table_for, loop.vessel, steps * step),
-            recall(loop.actuator.table), recall(loop.measurement.table_for, step, steps),
-            recall(loop.estimator.table),
-        )  # fmt: skip
-
     @np.errstate(all="ignore")
     def vectors(self, rows: int = 1, allocate: Allocate = np.empty) -> Vectors:
         """The loop's vectors, ready for the march to begin, with room for so many logged rows.
 
         Numbers beyond all limits are for the run to tell.
         """
-        loop, grid, layout = self.loop, self.grid, self.layout
+        loop, grid, layout, recall = self.loop, self.grid, self.layout, self.recall
         law, start, estimator = loop.controller, np.array(loop.start), loop.estimator
-        sea_table, actuator_table, measurement_table, estimator_table = self._tables
+        sea, end = loop.disturbance, grid.steps * grid.step
         numbers = {part: _numbers(constants) for part, constants in self.constants.items()}
         return Vectors(
-            **numbers, path_table=self.path_table, disturbance_table=sea_table,
+            **numbers, path_table=self.path_table,
+            disturbance_table=recall(sea.table_for, loop.vessel, end),
             law_table=self.law_table.copy(),  # a session writes to it
-            actuator_table=actuator_table, measurement_table=measurement_table,
-            estimator_table=estimator_table,
+            actuator_table=recall(loop.actuator.table),
+            measurement_table=recall(loop.measurement.table_for, grid.step, grid.steps),
+            estimator_table=recall(estimator.table),
             s=np.concatenate(
-                [start, self.recall(loop.actuator.rest),
+                [start, recall(loop.actuator.rest),
                  estimator.start(start, loop.nominal) if loop.measured else np.zeros(0),
                  np.zeros(len(loop.path.places)), self.first_memory]
             ),
@@ -280,6 +283,11 @@ class Plan:
             seen=np.zeros(self.observer.size), under_way=np.zeros(2),
             log=allocate(rows * layout.width),
         )  # fmt: skip
+
+
+def _kinds(loop: ClosedLoop) -> str:
+    parts = (loop.path, loop.disturbance, loop.actuator, loop.controller)
+    return ", ".join(type(part).__name__ for part in parts)
 
 
 def _names(signals: tuple[Signal, ...]) -> list[str]:

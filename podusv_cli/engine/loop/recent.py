@@ -6,25 +6,12 @@ is called again on the very same objects need not compute again.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
-
-
-class Recall(Protocol):
-    """Calls a method of a component."""
-
-    def __call__(self, method: Callable[..., Any], /, *given: Any) -> Any:
-        """What the method gives for these arguments."""
+from typing import Any, NamedTuple
 
 
 class _Kept(NamedTuple):
     objects: tuple[Any, ...]
     result: Any
-
-
-def call(method: Callable[..., Any], /, *given: Any) -> Any:
-    """What the method gives, computed anew."""
-    return method(*given)
 
 
 class Recent:

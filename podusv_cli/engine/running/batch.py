@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -20,10 +20,10 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.batch_threads import BatchRun, Common, Group
+from podusv_cli.engine.running.batch_threads import BatchRun, Group, alone, together
 from podusv_cli.engine.running.lanes import FEWEST, Sorter
-from podusv_cli.engine.running.simulate import why
-from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.running.simulate import Marcher, marcher, why
+from podusv_cli.engine.running.watch import Bell, Ending
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
@@ -134,7 +134,7 @@ class _Runs:
         like: Plan | None, progress: Callable[[float], None] | None, lanes: bool | None,
     ) -> None:  # fmt: skip
         self._loops, self._grid, self._batch, self._observer = loops, grid, batch, observer
-        self._common = Common(like) if like else None
+        self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)
         self._lanes = Sorter(len(loops) * (grid.steps + 1), lanes)
         self._ready: list[Group] = []
@@ -168,11 +168,16 @@ class _Runs:
 
     def _together(self, runs: list[BatchRun]) -> None:
         """Have runs march side by side, or one by one where that takes no longer."""
-        assert self._common is not None
         if len(runs) >= FEWEST and self._lanes.advance:
-            self._ready.append(self._common.together(runs, self._lanes.advance))
+            self._ready.append(together(runs, self._lanes.advance, self._bell))
         else:
-            self._ready += map(self._common.alone, runs)
+            self._ready += (alone(run, self._march, self._bell) for run in runs)
+
+    @cached_property
+    def _march(self) -> Marcher:
+        """What makes the compiled march of a run by itself."""
+        assert self._plan is not None
+        return marcher(self._plan, True)
 
     def _start(self, workers: int, wait: Callable[[], None]) -> None:
         """Start all threads that are ready, and wait while there are enough."""
@@ -185,32 +190,26 @@ class _Runs:
 
     def _made(self, position: int) -> BatchRun | None:
         """The run, or None and an entry of why there is none."""
-        if self._settled:
-            return self._contained(position, partial(self._run, position))
         plan = self._contained(position, partial(self._checked, position))
         if plan is None:
             return None
-        self._settle(plan)
-        return self._contained(position, partial(self._run, position, plan))
+        if not self._settled:
+            self._settle(plan)
+        return self._contained(position, partial(BatchRun.of, position, plan))
 
     def _settle(self, plan: Plan) -> None:
         """Have the march compiled, by the first plan."""
-        common = self._common = self._common or Common(plan)
+        self._plan = self._plan or plan
         self._lanes.choose(plan)
         if not self._lanes.advance:
-            common.advance  # noqa: B018  a kernel that cannot be compiled ends the batch
+            self._march  # noqa: B018  a kernel that cannot be compiled ends the batch
         self._settled = True
-
-    def _run(self, position: int, plan: Plan | None = None) -> BatchRun:
-        assert self._common is not None
-        return self._common.run(position, plan or self._checked(position))
 
     def _checked(self, position: int) -> Plan:
         """The plan of a run."""
         try:
             loop = self._loops[position]
-            own = Common(Plan.watched(loop, self._grid, self._observer))
-            return (self._common or own).planned(loop)
+            return (self._plan or Plan.watched(loop, self._grid, self._observer)).like(loop)
         except (PodusvError, ValueError) as error:
             raise InvalidLoop(str(error)) from error
 
@@ -239,9 +238,8 @@ class _Runs:
         """Enter how the runs of a thread ended; which of several hangs, shows each alone."""
         if thread.work.result is None and len(thread.runs) > 1:
             thread.work.stop()
-            assert self._common is not None
-            again = [self._common.run(run.position, run.plan) for run in thread.runs]
-            self._ready += map(self._common.alone, again)
+            again = (BatchRun.of(run.position, run.plan) for run in thread.runs)
+            self._ready += (alone(run, self._march, self._bell) for run in again)
             return
         for run, ending in zip(thread.runs, thread.endings(False), strict=True):
             self._batch.note(run, ending)
