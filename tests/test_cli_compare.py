@@ -218,19 +218,21 @@ FIVE = BASE.replace("duration: 1.0", "duration: 0.1, compiled: false") + (
 def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(podusv, monkeypatch):
     config = write("five.yaml", FIVE)
     whole = podusv(config, "--out", "x").out.splitlines()
-    assert whole[0].split() == ["metric", "unit", "one", "another", "third", "the_fourth", "last"]
+    labels = ["one", "another", "third", "the_fourth", "last"]
+    assert whole[0].split() == ["unit", *labels, "name"]
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
     out = podusv(config, "--out", "y").out
     assert max(map(len, out.splitlines())) <= 80
-    first, second = (part.splitlines() for part in out.split("\n\n"))
-    for lines, labels in ((first, ["one", "another", "third"]), (second, ["the_fourth", "last"])):
-        assert lines[0].split() == ["metric", "unit", *labels]
-        assert [line.split()[0] for line in lines[: len(first)]] == [
-            line.split()[0] for line in whole[: len(first)]
+    tables = [part.splitlines() for part in out.split("\n\n")]
+    assert [word for lines in tables for word in lines[0].split()[1:]] == [*labels, "name"]
+    words, count = whole[0].index("one"), len(tables[0])
+    for lines in tables:
+        assert [line[:words].rstrip() for line in lines[:count]] == [
+            line[:words].rstrip() for line in whole[:count]
         ]
-        starts = [lines[0].index(label) for label in labels]
-        assert all(line[start - 1] == " " for line in lines[: len(first)] for start in starts)
+        starts = [lines[0].index(label) for label in lines[0].split()]
+        assert all(line[start - 1] == " " for line in lines[:count] for start in starts)
 
 
 def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):
