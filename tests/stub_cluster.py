@@ -12,7 +12,6 @@ from podusv_cli.studies.making.remote import Reply
 
 REPORT = {
     "podusv": "1.0", "numpy": "2.0", "the kernels of pid": "abc", "the study": "def",
-    f"{remote.BITS}pid": "123",
 }  # fmt: skip
 
 
@@ -107,6 +106,6 @@ class StubClient:
         self.made.append((worker, unit))
         self.reports |= self.join
         outcome = None
-        if digest(remote.comparable(told, mixed=future.options["mixed"])) == expected:
+        if digest(told) == expected:
             outcome = Outcome((invented(unit, self.metrics), self.seconds * unit.count))
         return Reply(worker, "a stub", told, outcome)

@@ -16,10 +16,9 @@ from podusv_cli.studies.making import dispatch as marching
 from podusv_cli.studies.making.cluster import Cluster
 from podusv_cli.studies.making.dispatch import dispatch
 from podusv_cli.studies.making.record import about
-from podusv_cli.studies.making.remote import BITS, Expectation, StudyText
+from podusv_cli.studies.making.remote import StudyText
 from podusv_cli.studies.making.store import Store
 
-OTHER_BITS = REPORT | {f"{BITS}pid": "124"}
 OTHER_NUMPY = REPORT | {"numpy": "1.9"}
 
 
@@ -41,8 +40,8 @@ class Impatient(SimpleQueue):
         return super().get(timeout=timeout)
 
 
-def cluster(client, mixed=False):
-    made = Cluster(client, StudyText("text"), Expectation(REPORT, mixed))
+def cluster(client):
+    made = Cluster(client, StudyText("text"), REPORT)
     made._finished = Impatient()
     made._finished.client = client
     return made
@@ -53,8 +52,8 @@ def stub(names="ab", **others):
     return StubClient(plan.metrics, dict.fromkeys(names, REPORT), **others)
 
 
-def marched(folder, client, tell=lambda tally: None, mixed=False, **changes):
-    plan, engine = small(**changes), cluster(client, mixed)
+def marched(folder, client, tell=lambda tally: None, **changes):
+    plan, engine = small(**changes), cluster(client)
     store = Store(folder, about(plan))
     store.open("now")
     return store, engine, dispatch(store, plan, tell, engine)
@@ -86,8 +85,6 @@ def test_a_foreign_worker_is_refused_by_name_before_the_march(tmp_path):
         "worker tcp://b:1 computes with something else: numpy is 1.9, not 2.0; install there what "
         "is installed here, or leave the worker out"
     )
-    with pytest.raises(UsageError, match=r"numpy is 1\.9"):
-        cluster(client, mixed=True).check()
 
 
 @pytest.mark.parametrize("name", REPORT)
@@ -103,13 +100,8 @@ def test_a_cluster_without_workers_is_refused():
         cluster(stub("")).check()
 
 
-def test_other_bits_need_to_be_allowed_and_are_then_told(tmp_path):
-    client = stub("a")
-    client.reports["b"] = OTHER_BITS
-    with pytest.raises(UsageError, match=r"the bits of pid is 124, not 123; allow it with --allow"):
-        cluster(client).check()
-    cluster(client, mixed=True).check()
-    _, engine, (_, whole) = marched(tmp_path / "study", client, mixed=True)
+def test_which_worker_made_which_draws_is_told(tmp_path):
+    _, engine, (_, whole) = marched(tmp_path / "study", stub("ab"))
     assert whole
     told = {one["worker"]: one["units"] for one in engine.told()["workers"]}
     assert told["a"] == ["pid[0] draws 0 to 39"]

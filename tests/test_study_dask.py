@@ -43,7 +43,7 @@ def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
     recipe = StudyText(TEXT)
     with (
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
-        connected(local.scheduler_address, recipe, store.seal, mixed=False) as engine,
+        connected(local.scheduler_address, recipe, store.seal) as engine,
     ):
         _, finished = dispatch(store, small(), tell, engine)
     assert finished
@@ -114,6 +114,6 @@ def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
     monkeypatch.setattr("podusv_cli.studies.making.cluster.PATIENCE", 0.3)
     with (
         pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
-        connected("tcp://127.0.0.1:9", StudyText(TEXT), "", mixed=False),
+        connected("tcp://127.0.0.1:9", StudyText(TEXT), ""),
     ):
         pass

@@ -40,9 +40,6 @@ Workers = Annotated[
 Scheduler = Annotated[
     str, typer.Option(help="Dask scheduler whose workers compute, as tcp://host:8786.")
 ]
-AllowMixed = Annotated[
-    bool, typer.Option(help="Its workers may compute other bits than this machine.")
-]
 AllowLarge = Annotated[
     bool, typer.Option("--allow-large", help="Also more than 1e8 steps, a log above 4 GB.")
 ]

@@ -56,7 +56,6 @@ def run(
         str, typer.Option(help="A part of the study, as 3/20: for `podusv sweep merge`.")
     ] = "",
     scheduler: options.Scheduler = "",
-    allow_mixed: options.AllowMixed = False,
     trust: options.Trust = False,
     force: Annotated[
         bool, typer.Option("--force", help="Remove the study that is there, and begin anew.")
@@ -77,7 +76,7 @@ def run(
     changes = [*(assign or ()), *([f"sweep.draws={draws}"] if draws else [])]
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
-            changes, out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed, trust,
+            changes, out, workers, sys.argv, plugin or (), figures, scheduler, trust,
             seconds(until), part_of(shard), force, line.say, line.warn,
         )  # fmt: skip
         done = workflow.run(Path(config), request, line.tell)

@@ -25,7 +25,6 @@ def tune(
     ] = None,
     workers: options.Workers = 0,
     scheduler: options.Scheduler = "",
-    allow_mixed: options.AllowMixed = False,
     trust: options.Trust = False,
     force: Annotated[
         bool, typer.Option("--force", help="Remove the search that is there, and begin anew.")
@@ -46,7 +45,7 @@ def tune(
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
-            assign or (), out, workers, sys.argv, plugin or (), figures, scheduler, allow_mixed,
+            assign or (), out, workers, sys.argv, plugin or (), figures, scheduler,
             trust, say=line.say, warn=line.warn, force=force,
             begin=silent if quiet or as_json else line.note,
         )  # fmt: skip

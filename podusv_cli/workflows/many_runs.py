@@ -47,7 +47,6 @@ class Request:
     plugins: Sequence[str] = ()
     figures: bool = True
     scheduler: str = ""  # of a Dask cluster, as tcp://host:port
-    mixed: bool = False  # whether its workers may compute other bits than this machine
     trust: bool = False  # whether plug-in files of the folder may be executed
     seconds: float = math.inf  # of computing, after which no unit of a study is begun
     shard: Shard = WHOLE
@@ -117,7 +116,7 @@ def engine_for(
 ) -> AbstractContextManager[Engine]:
     """Where the units of a folder are made, whose study has this seal."""
     recipe = StudyText(files.read_text(folder / SCENARIO), tuple(scenario.plugin_files().items()))
-    return engine(request.scheduler, request.workers, recipe, seal, mixed=request.mixed)
+    return engine(request.scheduler, request.workers, recipe, seal)
 
 
 def refused(engine: Engine) -> tuple[str, ...]:

@@ -20,8 +20,8 @@ from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making import remote
 from podusv_cli.studies.making.dispatch import Done, Engine, Processes, Units
-from podusv_cli.studies.making.plan import Variant
-from podusv_cli.studies.making.remote import Expectation, Reply, StudyText
+from podusv_cli.studies.making.plan import Variant, digest
+from podusv_cli.studies.making.remote import Reply, Report, StudyText
 
 WINDOW = 2  # units under way for each thread of a worker, so that none waits for this process
 LOOK = 2.0  # s, after which it is looked again which workers there are
@@ -45,16 +45,16 @@ class Task:
 
 
 def engine(
-    scheduler: str, workers: int, study: StudyText, identity: str, *, mixed: bool
+    scheduler: str, workers: int, study: StudyText, identity: str
 ) -> AbstractContextManager[Engine]:
     """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
     if not scheduler:
         return nullcontext(Processes(workers))
-    return connected(scheduler, study, identity, mixed=mixed)
+    return connected(scheduler, study, identity)
 
 
 @contextmanager
-def connected(address: str, study: StudyText, identity: str, *, mixed: bool) -> Iterator[Cluster]:
+def connected(address: str, study: StudyText, identity: str) -> Iterator[Cluster]:
     """The cluster of a scheduler, its workers checked; `identity` is the digest of the study's.
 
     Raises UsageError without Dask and for a worker that does not fit, StorageError without a
@@ -62,7 +62,7 @@ def connected(address: str, study: StudyText, identity: str, *, mixed: bool) -> 
     """
     with _client(address) as client:
         ours = remote.report(study.text, study.plugins) | {"the study": identity}
-        cluster = Cluster(client, study, Expectation(ours, mixed))
+        cluster = Cluster(client, study, ours)
         cluster.check()
         yield cluster
 
@@ -84,9 +84,9 @@ def _client(address: str) -> Any:
 class Cluster:
     """Makes units on the workers of a cluster; an engine of `march`."""
 
-    def __init__(self, client: Any, study: StudyText, expectation: Expectation) -> None:
+    def __init__(self, client: Any, study: StudyText, ours: Report) -> None:
         """Take a client of Dask, the study, and what every worker has to report."""
-        self._client, self._study, self._expectation = client, study, expectation
+        self._client, self._study, self._ours = client, study, ours
         self._threads, self._looked = dict[str, int](), -LOOK
         self._running, self._finished = dict[Any, Task](), SimpleQueue[Any]()
         self._again, self._suspects = deque[Task](), deque[Task]()
@@ -119,8 +119,8 @@ class Cluster:
             raise UsageError(f"worker {worker} cannot load the study: {_words(error)}") from error
         finally:
             future.release()
-        if differing := self._expectation.differing(told):
-            raise UsageError(f"worker {worker} computes with something else: {differing}")
+        if wrong := remote.differing(self._ours, told):
+            raise UsageError(f"worker {worker} computes with something else: {wrong}")
 
     def __call__(self, units: Units, done: Done) -> bool:
         """As `march.Engine` says. Raises StorageError where the scheduler is lost."""
@@ -177,8 +177,8 @@ class Cluster:
     def _submit(self, task: Task) -> None:
         future = self._client.submit(
             remote.made, self._study.text, self._study.plugins, astuple(task.unit),
-            self._expectation.expected, astuple(task.variant) if task.variant else None,
-            mixed=self._expectation.mixed, pure=False,
+            digest(self._ours), astuple(task.variant) if task.variant else None,
+            pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
         )  # fmt: skip
         self._running[future] = task
@@ -212,7 +212,7 @@ class Cluster:
         if reply.outcome is None:
             self._refused[reply.worker] = (
                 f"worker {reply.worker} got no units, because it computes with something else: "
-                f"{self._expectation.differing(reply.report)}"
+                f"{remote.differing(self._ours, reply.report)}"
             )
             self._again.append(task)
         elif reply.outcome.killed and not task.alone:

@@ -5,9 +5,7 @@ Everything that is sent to a worker is text and numbers. The worker makes the pl
 
 from __future__ import annotations
 
-import hashlib
 import platform
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from importlib.metadata import version
@@ -22,14 +20,10 @@ from podusv_cli.scenario.load import load_text
 from podusv_cli.storage.provenance import processor
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making.dispatch import timed
-from podusv_cli.studies.making.joining import digests
 from podusv_cli.studies.making.plan import Plan, Variant, digest, plan
-from podusv_cli.studies.making.unit import make
 
 PLANS = 2  # plans that a worker keeps
-CANARY = 2  # draws of each law, of which every worker has to compute the same bits
 PACKAGES = ("numpy", "numba", "llvmlite")
-BITS = "the bits of "  # and a law
 Report = dict[str, str]
 Plugins = tuple[tuple[str, str], ...]  # name and text of each file
 
@@ -71,44 +65,23 @@ def _report(recipe: StudyText) -> Report:
         sources = [made.identity[f"{law}[{cell.index}] kernels"] for cell in made.cells]
         told[f"the kernels of {law}"] = digest(dict.fromkeys(sources))
     told["the study"] = digest(made.identity)
-    for law in made.laws:
-        canary = digests(make(made, Unit(law, 0, 0, min(CANARY, made.sweep.draws))))
-        told[f"{BITS}{law}"] = hashlib.sha256(canary.tobytes()).hexdigest()[:16]
     return told
 
 
 def report(text: str, plugins: Plugins) -> Report:
-    """Versions, digests of all kernels and of the study, and digests of the bits of some runs."""
+    """Versions, and digests of all kernels and of the study."""
     return dict(_report(StudyText(text, plugins)))
 
 
-@dataclass(frozen=True)
-class Expectation:
-    """The report that workers have to give; with `mixed` the bits of runs may be others."""
-
-    report: Mapping[str, str]
-    mixed: bool = False
-
-    @property
-    def expected(self) -> str:
-        """A digest of what has to be the same."""
-        return digest(comparable(self.report, mixed=self.mixed))
-
-    def differing(self, told: Mapping[str, str]) -> str:
-        """What is different in a worker's report, and a remedy; "" where nothing is."""
-        found = [
-            f"{name} is {told.get(name, 'not there')}, not {word}"
-            for name, word in comparable(self.report, mixed=self.mixed).items()
-            if told.get(name) != word
-        ]
-        bits = all(line.startswith(BITS) for line in found)
-        remedy = "allow it with --allow-mixed" if bits else "install there what is installed here"
-        return f"{'; '.join(found)}; {remedy}, or leave the worker out" if found else ""
-
-
-def comparable(told: Mapping[str, str], *, mixed: bool) -> Report:
-    """The part of a report that has to be the same on all workers."""
-    return {name: word for name, word in told.items() if not (mixed and name.startswith(BITS))}
+def differing(ours: Report, theirs: Report) -> str:
+    """What is different in a worker's report, and a remedy; "" where nothing is."""
+    found = [
+        f"{name} is {theirs.get(name, 'not there')}, not {word}"
+        for name, word in ours.items()
+        if theirs.get(name) != word
+    ]
+    remedy = "install there what is installed here, or leave the worker out"
+    return f"{'; '.join(found)}; {remedy}" if found else ""
 
 
 @dataclass(frozen=True)
@@ -126,13 +99,13 @@ class Reply:
 
 def made(
     text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str,
-    variant: tuple[Any, ...] | None = None, *, mixed: bool,
+    variant: tuple[Any, ...] | None = None,
 ) -> Reply:  # fmt: skip
     """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
     from distributed import get_worker
 
     told, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)
-    if digest(comparable(told, mixed=mixed)) == expected:
+    if digest(told) == expected:
         plan = _variant(recipe, variant) if variant else _plan(recipe)
         job = partial(timed, plan, Unit(*unit))
         outcome = outcome_of(job, lambda fraction: None, Interrupts())
