@@ -36,14 +36,8 @@ def test_a_page_in_a_pipe_is_its_markdown_with_links_that_can_be_followed(
     assert not {f"podusv:{path}" for path in named} & {*shipped.names()}
 
 
-def test_a_heading_is_shown_with_what_is_below_it(podusv: Command) -> None:
-    said = podusv("docs", "docs/studies.md#on-many-machines").out
-    assert said.startswith("## On many machines\n")
-    assert "\n### Dask\n" in said
-    assert len(re.findall(r"^## ", said, re.M)) == 1
-    wrong = podusv("docs", "studies#dusk")
-    assert (wrong.code, wrong.out) == (2, "")
-    assert "unknown heading 'dusk' of studies; did you mean 'dask'?" in wrong.err
+def test_a_page_may_be_named_as_its_file_is(podusv: Command) -> None:
+    assert podusv("docs", "docs/studies.md").out == podusv("docs", "studies").out
 
 
 def test_a_comment_in_code_is_no_heading() -> None:
@@ -54,9 +48,9 @@ def test_a_comment_in_code_is_no_heading() -> None:
 @pytest.mark.parametrize(
     ("words", "first"),
     [
-        ("resume", "podusv docs studies#resume-a-study  Resume a study"),
+        ("resume", "podusv docs studies  Resume a study"),
         ("Monte Carlo", "podusv docs studies  Studies: Monte Carlo over hulls, seas and starts"),
-        ("sensor noise", "podusv docs measurements#noise-bias-and-delay-what-a-sensor-does"),
+        ("sensor noise", "podusv docs measurements  Noise, bias and delay"),
         ("waypoints", "podusv docs "),
     ],
 )

@@ -130,7 +130,7 @@ def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) 
     assert "\nmu_2017/corrected\n" in podusv("init")
     assert said(python, "-m", "podusv", "--version", cwd=empty) == f"podusv {__version__}\n"
     assert "open this page in a browser: " in podusv("demo --no-browser --out demo")
-    assert podusv("docs resume").startswith("podusv docs studies#resume-a-study")
+    assert podusv("docs resume").startswith("podusv docs studies  Resume a study")
     assert podusv("docs results/README").startswith("# What was found\n")
     assert podusv("init mu_2017/corrected").endswith("next: podusv run corrected.yaml\n")
     short = "--set simulation.duration=2"

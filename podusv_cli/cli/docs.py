@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from typing import Annotated
 
@@ -19,8 +18,7 @@ def docs(
         list[str] | None,
         typer.Argument(
             metavar="[PAGE or WORD]...",
-            help="A page (studies), a heading of one (studies#shards), or words to look for; "
-            "without any, all pages are listed.",
+            help="A page (studies), or words to look for; without any, all pages are listed.",
             show_default=False,
             autocompletion=completion.pages,
         ),
@@ -28,7 +26,7 @@ def docs(
 ) -> None:
     """Show the pages that come with podusv, or find those that have a word.
 
-    On a terminal a page is shown in a pager; q leaves it. In a pipe it is Markdown.
+    In a pipe a page is Markdown.
     """
     from podusv_cli.workflows import docs as workflow
 
@@ -50,21 +48,18 @@ def _list(wanted: str) -> None:
 
     found = search(wanted)
     for section, line in found[:SHOWN]:
-        echo_entry(f"podusv docs {section.name}", line, facts=section.heading)
+        echo_entry(f"podusv docs {section.page}", line, facts=section.heading)
     if len(found) > SHOWN:
         echo(f"and {len(found) - SHOWN} more places")
 
 
 def _show(page: str) -> None:
-    """Print Markdown: rendered and paged on a terminal, as it is in a pipe."""
+    """Print Markdown: rendered on a terminal, as it is in a pipe."""
     if not sys.stdout.isatty():
         typer.echo(page, nl=False)
         return
     from rich.console import Console
     from rich.markdown import Markdown
 
-    # less: leave at once what fits on the screen, pass colours on, leave the page on the screen
-    os.environ.setdefault("LESS", "FRX")
-    console = Console(width=min(WIDEST, columns()))
-    with console.pager(styles=supports_colours(sys.stdout)):
-        console.print(Markdown(page, hyperlinks=False, code_theme="bw"))
+    console = Console(width=min(WIDEST, columns()), no_color=not supports_colours(sys.stdout))
+    console.print(Markdown(page, hyperlinks=False, code_theme="bw"))

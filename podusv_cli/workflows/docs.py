@@ -11,7 +11,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.phrases import did_you_mean, unknown
+from podusv_cli.core.phrases import did_you_mean
 from podusv_cli.scenario import shipped
 
 CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
@@ -33,11 +33,6 @@ class Section:
     level: int
     heading: str
     text: str
-
-    @property
-    def name(self) -> str:
-        """What `podusv docs` takes: the page, or the page and the heading's anchor."""
-        return self.page if self.level == 1 else f"{self.page}#{anchor(self.heading)}"
 
     def score(self, words: Sequence[re.Pattern[str]]) -> int:
         """How well the section answers; 0 where a word is missing."""
@@ -75,26 +70,16 @@ def names() -> tuple[str, ...]:
 
 
 def page(name: str) -> str:
-    """A page as Markdown, or the part of it below a heading: `studies`, `studies#in-shards`.
-
-    A name may be written as a file's, too (`docs/studies.md`). Raises UsageError for a heading that
-    the page does not have.
-    """
-    short, _, wanted = _short(name).partition("#")
-    parts = sections(short)
-    anchors = [anchor(part.heading) for part in parts]
-    if not wanted:
-        return _whole(parts)
-    if wanted not in anchors:
-        raise UsageError(unknown(f"heading {wanted!r} of {short}", wanted, anchors))
-    first = anchors.index(wanted)
-    rest = (i for i in range(first + 1, len(parts)) if parts[i].level <= parts[first].level)
-    return _whole(parts[first : next(rest, len(parts))])
+    """A page as Markdown; its name may be written as a file's, too (`docs/studies.md`)."""
+    short = _short(name)
+    there = posixpath.dirname(f"{_place(short)}.md")
+    text = _file(short).read_text("utf-8")
+    return CONFIG.sub(_shipped, LINK.sub(lambda link: _reachable(link, there), text))
 
 
 def is_page(name: str) -> bool:
-    """Whether a word is the name of a page, with or without a heading."""
-    return _short(name).partition("#")[0] in names()
+    """Whether a word is the name of a page."""
+    return _short(name) in names()
 
 
 def search(text: str) -> list[tuple[Section, str]]:
@@ -132,31 +117,25 @@ def _sections(name: str, text: str) -> Iterator[Section]:
     yield Section(name, level, heading, "\n".join(lines))
 
 
-def _whole(parts: Sequence[Section]) -> str:
-    marked = (f"{'#' * part.level} {part.heading}\n{part.text}" for part in parts)
-    there = posixpath.dirname(f"{_place(parts[0].page)}.md")
-    text = LINK.sub(lambda link: _reachable(link, there, parts[0].page), "\n".join(marked))
-    return CONFIG.sub(_shipped, text) + "\n"
-
-
 def _shipped(file: re.Match[str]) -> str:
     """A scenario's file as every installation names it; the file where it is not shipped."""
     scenario = shipped.PREFIX + file[1]
     return scenario if scenario in shipped.names() else file[0]
 
 
-def _reachable(link: re.Match[str], folder: str, page: str) -> str:
+def _reachable(link: re.Match[str], folder: str) -> str:
     """A link to where a reader without a checkout gets; its words alone where there is nothing."""
     picture, words, target = link.groups()
     if picture:
         return f"[figure: {words}]"
     if "://" in target:
         return link[0]
-    path, _, heading = target.partition("#")
-    place = posixpath.normpath(posixpath.join(folder, path)) if path else f"docs/{page}.md"
-    named = f"{_short(place)}{'#' if heading else ''}{heading}"
-    if is_page(named):
-        shown = f"`podusv docs {named}`"
+    path = target.partition("#")[0]
+    if not path:
+        return words
+    place = posixpath.normpath(posixpath.join(folder, path))
+    if is_page(place):
+        shown = f"`podusv docs {_short(place)}`"
         return shown if words.endswith(".md") else f"{words} ({shown})"
     scenario = shipped.PREFIX + place.removeprefix("configs/")
     return f"`{scenario}`" if scenario in shipped.names() else words
@@ -167,15 +146,9 @@ def _plain(line: str) -> str:
     return LINK.sub(lambda link: link[2], line)
 
 
-def anchor(heading: str) -> str:
-    """What `#...` names a heading by, as GitHub forms it."""
-    return re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-")
-
-
 def _short(name: str) -> str:
     """A page's name of its file's in a checkout."""
-    path, mark, heading = name.partition("#")
-    return f"{path.removeprefix('docs/').removesuffix('.md')}{mark}{heading}"
+    return name.removeprefix("docs/").removesuffix(".md")
 
 
 def _place(name: str) -> str:
