@@ -380,7 +380,7 @@ TABLE: dict[str, list[Row]] = {
     ("stuck = abs(crab) >= k.crab_m and rate * crab > 0.0", "stuck = False",
      "test_the_learnt_angle_stays_within_its_limit"),
     ("    u_d = a * F\n", "    u_d = a\n",
-     SURVIVES + "test_the_wanted_velocity_and_its_rate_are_those_of_the_derivation"),
+     "test_surge_is_wanted_as_far_as_the_bow_points_there_and_N_m_turns_it"),
 ],
 "actuators": [
     ("return self.cuts and not self.is_relayed", "return self.cuts",

@@ -16,6 +16,7 @@ from law_samples import STEADY, WRONG, rms, task
 from test_pod import pods
 
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.controllers.velocity_steering import Aim, Wanted, surge_demand
 from podusv_cli.components.controllers.velocity_vector import VelocityVector, guidance
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.paths.circle import Circle
@@ -100,6 +101,16 @@ def test_the_yaw_rate_s_rate_is_the_derivative_of_the_limited_angle():
     sigma = 1 / sp.sqrt(1 + (k_psi * chi / r_m) ** 2)
     assert sp.simplify(sp.diff(chi * sigma, chi) - sigma**3) == 0
     assert sp.limit(k_psi * chi * sigma, chi, sp.oo) == r_m
+
+
+@pytest.mark.parametrize(("tau_r", "part"), [(2.0 * LAW.N_m, 0.5), (0.5 * LAW.N_m, 1.0)])
+def test_surge_is_wanted_as_far_as_the_bow_points_there_and_N_m_turns_it(tau_r, part):
+    """A bow 60 degrees beside a wanted velocity of 0.8 m/s: half of 0.4 m/s, and half of that."""
+    bow, tau = Aim(side=1.0, speed=0.8, chi_e=np.pi / 3), np.array([0.0, -tau_r])
+    wanted = Wanted(a=0.4, b=np.sqrt(0.48), A_a=0.0, turn=0.0, backward=False)
+    u_d = surge_demand(np.zeros(6), np.zeros(6), wanted, bow, K, tau)
+    assert u_d == pytest.approx(0.4 * 0.5 * part, rel=1e-12)
+    assert tau == pytest.approx([NONLINEAR.m11 * LAW.k_u * u_d, -tau_r], rel=1e-12)
 
 
 # --- what is promised: no offset, whatever the law was told
