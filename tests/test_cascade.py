@@ -172,3 +172,32 @@ def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None
     assert len(found)
     for claim, row in found.iterrows():
         assert told[str(claim)] == in_words(row)
+
+
+def whole_loop() -> Any:
+    """The loop about a turn of 0.05 rad/s at 0.05 m/s, as deviations (u, v, r, psi, z1, z2).
+
+    The source's public programs leave the moment (m11 - m22) u v to the yaw loop, so that yaw does
+    see the position: through u and v.
+    """
+    v = -M11 * TURN / D22 * 0.05
+    for _ in range(50):
+        v = -M11 * TURN / D22 * math.sqrt(0.05**2 - v * v)
+    u, k_u, k_v, k_1, k_2 = math.sqrt(0.05**2 - v * v), *np.abs(GAINS)
+    return np.array([
+        [-(D11 + k_u) / M11, (M22 * TURN + k_v) / M11, M22 * v / M11, 0, -k_1 / M11, k_2 / M11],
+        [-M11 * TURN / M22, -D22 / M22, -M11 * u / M22, 0, 0, 0],
+        [(M11 - M22) * v / M33, (M11 - M22) * u / M33, -(D33 + 9.02) / M33, -6.74 / M33, 0, 0],
+        [0, 0, 1, 0, 0, 0],
+        [1, 0, 0, -v, 0, TURN],
+        [0, 1, 0, u, -TURN, 0],
+    ])  # fmt: skip
+
+
+def test_the_rate_of_decay_is_that_of_the_loop_by_hand(tmp_path: Path) -> None:
+    rate = -np.linalg.eigvals(whole_loop()).real.max()
+    assert rate == pytest.approx(0.0357, abs=5e-5)
+    done = podusv.compare(CONFIGS / "circle.yaml", out=tmp_path / "out", figures=False)
+    assert done.table.loc["decay_rate", "about_target"] == pytest.approx(rate, rel=1e-5)
+    at = done["cascade"].log["z_e"].sel(time=[100.0, 150.0])
+    assert math.log(float(at[0] / at[1])) / 50.0 == pytest.approx(rate, rel=3e-3)

@@ -10,7 +10,7 @@ from known_signals import ABOUT
 from test_reproduction import rerun
 
 from podusv_cli.comparison.claims import ParsedClaim, judge
-from podusv_cli.comparison.curves import Curve, pointwise
+from podusv_cli.comparison.curves import Curve, decay, pointwise
 from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.sections import Claim
@@ -260,3 +260,12 @@ def test_curves_of_different_logs_meet_at_the_same_times():
     difference = pointwise(np.subtract, pair)
     assert difference.time.tolist() == fine.tolist()
     assert not difference.values.any()
+
+
+def test_the_decay_of_a_signal_is_the_rate_of_its_exponential():
+    t = np.linspace(2.0, 7.0, 31)
+    for scale in (3.0, -3.0):
+        assert decay(t, scale * np.exp(-0.3 * t)) == pytest.approx(0.3, rel=1e-12)
+    assert decay(t, np.exp(0.3 * t)) == pytest.approx(-0.3, rel=1e-12)
+    assert math.isnan(decay(t, t - 2.0))  # 0 has no logarithm
+    assert math.isnan(decay(t[:1], t[:1]))

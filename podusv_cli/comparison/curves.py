@@ -149,6 +149,14 @@ def rms_above(t: Vector, y: Vector, omega: float) -> float:
     return float(np.sqrt(np.sum(power[rates > omega]))) if len(rates) else np.nan
 
 
+@np.errstate(all="ignore")
+def decay(t: Vector, y: Vector) -> float:
+    """Rate [1/s] at which |y| falls: the slope of the straight line through ln |y|."""
+    return (
+        -float(np.polyfit(t - t.mean(), np.log(abs(y)), 1)[0]) if len(t) > 1 and y.all() else np.nan
+    )
+
+
 # of times [s] and values, and of settings; a single sample has no variation and no integral
 REDUCERS: dict[str, Callable[..., Any]] = {
     "max": lambda t, y: np.max(y),
@@ -158,6 +166,7 @@ REDUCERS: dict[str, Callable[..., Any]] = {
     "variation": lambda t, y: np.sum(np.abs(np.diff(y))) if len(t) > 1 else np.nan,
     "integral": lambda t, y: np.trapezoid(y, t) if len(t) > 1 else np.nan,
     "rms_above": rms_above,
+    "decay": decay,
 }
 # What stands between the signal and the window; nothing for the others.
 SETTINGS = {"rms_above": "an angular frequency in rad/s"}

@@ -22,14 +22,20 @@ def with_margins(
 
     A run whose loop has no margins has none; `extras` says why.
     """
-    wanted = {name for claim in claims for name in _named(claim)} & OF_LOOP.keys()
-    return [_measured(entry, wanted, extras) for entry in entries] if wanted else list(entries)
+    named = {pair for claim in claims for pair in _named(claim)}
+    wanted = {
+        e.label: {n for label, n in named if label == e.label and n in OF_LOOP} for e in entries
+    }
+    return [_measured(e, wanted[e.label], extras) if wanted[e.label] else e for e in entries]
 
 
-def _named(claim: ParsedClaim) -> Iterator[str]:
-    """The names after a dot in a claim's expressions."""
+def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
+    """The runs and what of them stands in a claim's expressions."""
     for tree in filter(None, (claim.expect, claim.given)):
-        yield from (node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute))
+        for node in ast.walk(tree):
+            match node:
+                case ast.Attribute(value=ast.Name(id=label), attr=name):
+                    yield label, name
 
 
 def _measured(entry: Entry, wanted: set[str], extras: Extras) -> Entry:

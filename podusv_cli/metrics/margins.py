@@ -32,11 +32,14 @@ peak_S_u = _number("peak_S_u", "1", "largest sensitivity of the surge loop")
 peak_S_r = _number("peak_S_r", "1", "largest sensitivity of the yaw loop")
 peak_T_u = _number("peak_T_u", "1", "largest complementary sensitivity of the surge loop")
 peak_T_r = _number("peak_T_r", "1", "largest complementary sensitivity of the yaw loop")
+decay_rate = _number(
+    "decay_rate", "1/s", "rate at which the slowest motion about the steady one dies out"
+)
 OF_LOOP = {
     metric.name: metric
     for metric in (
         phase_margin_u, phase_margin_r, gain_margin_u, gain_margin_r, gain_reduction_u,
         gain_reduction_r, delay_margin_u, delay_margin_r, delay_margin, delay_margin_loads,
-        peak_S_u, peak_S_r, peak_T_u, peak_T_r,
+        peak_S_u, peak_S_r, peak_T_u, peak_T_r, decay_rate,
     )
 }  # fmt: skip

@@ -46,6 +46,11 @@ class LoopMargins:
         return stable(self.linear.A)
 
     @property
+    def decay_rate(self) -> float:
+        """The distance of the slowest pole from the imaginary axis [1/s]; negative if unstable."""
+        return -float(self.poles.real.max())
+
+    @property
     def open(self) -> tuple[str, ...]:
         """The loops that are open: what acts on the hull does not answer its motion."""
         rows = zip(AXES, self.linear.C, strict=True)
@@ -57,7 +62,7 @@ class LoopMargins:
             f"{name}_{AXES[axis]}": float(getattr(loop, name))
             for axis, loop in self.loops.items() for name in NUMBERS
         }  # fmt: skip
-        together = ("delay_margin", "delay_margin_loads")
+        together = ("delay_margin", "delay_margin_loads", "decay_rate")
         return found | {name: float(getattr(self, name)) for name in together}
 
 
