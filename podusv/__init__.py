@@ -8,7 +8,7 @@ from podusv_cli import __version__ as __version__
 
 __all__ = [
     "Bench", "Comparison", "PodusvError", "Run", "Scenario", "Study", "Tuning", "bench", "compare",
-    "load", "open_run", "open_session", "open_study", "optimum", "run", "simulate",
+    "doubt", "load", "open_run", "open_session", "open_study", "optimum", "run", "simulate",
     "simulate_many", "sweep", "tune", "verify",
 ]  # fmt: skip
 

@@ -7,6 +7,7 @@ from podusv_cli.interface import Study as Study
 from podusv_cli.interface import Tuning as Tuning
 from podusv_cli.interface import bench as bench
 from podusv_cli.interface import compare as compare
+from podusv_cli.interface import doubt as doubt
 from podusv_cli.interface import load as load
 from podusv_cli.interface import open_run as open_run
 from podusv_cli.interface import open_session as open_session

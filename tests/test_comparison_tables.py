@@ -166,7 +166,7 @@ def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
     rest = {
         "name", "description", "controller", "controllers", "claims", "silence", "plugins", "sweep",
-        "tune", "measurement", "estimator",
+        "tune", "doubt", "measurement", "estimator",
     }  # fmt: skip
     assert sections | rest == set(type(scenario()).model_fields)
 

@@ -42,6 +42,7 @@ def test_logarithm_and_exponential_are_the_librarys_to_the_last_places() -> None
     ("made", "u", "known"),
     [
         ({"uniform": (0.7, 1.3)}, [0.0, 0.25, 0.5, 1.0], [0.7, 0.85, 1.0, 1.3]),
+        ({"log_uniform": (0.25, 4.0)}, [0.0, 0.25, 0.5, 1.0], [0.25, 0.5, 1.0, 4.0]),
         ({"triangular": (0.0, 1.0, 3.0)}, [1 / 12, 1 / 3, 5 / 6], [0.5, 1.0, 2.0]),
         ({"triangular": (0.0, 0.0, 1.0)}, [0.0, 0.75], [0.0, 0.5]),
         ({"triangular": (0.0, 1.0, 1.0)}, [0.25, 1.0], [0.5, 1.0]),
@@ -58,6 +59,7 @@ def test_values_worked_out_by_hand(made: Any, u: list[float], known: list[float]
 # The distribution functions of scipy, which are not made from these inverses.
 FREQUENCIES: list[tuple[dict[str, Any], Any]] = [
     ({"uniform": (-2.0, 5.0)}, stats.uniform(-2, 7)),
+    ({"log_uniform": (0.2, 3.0)}, stats.loguniform(0.2, 3.0)),
     ({"triangular": (-1.0, 0.5, 4.0)}, stats.triang(0.3, -1, 5)),
     ({"normal": Normal(mean=-1.0, sigma=0.2)}, stats.norm(-1, 0.2)),
     ({"normal": Normal(sigma=3.0, within=(-1.0, 6.0))}, stats.truncnorm(-1 / 3, 2, 0, 3)),
@@ -131,6 +133,8 @@ def test_choices_and_whole_numbers_are_equally_likely_and_keep_their_types() -> 
         ({"uniform": (1.3, 0.7)}, "uniform: 1.3 is not below 0.7"),
         ({"uniform": (1.0, 1.0)}, "uniform: 1 is not below 1"),
         ({"uniform": (-1.7e308, 1.7e308)}, "too far apart"),
+        ({"log_uniform": (0.0, 1.0)}, "log_uniform: 0 is not above 0"),
+        ({"log_uniform": (2.0, 1.0)}, "log_uniform: 2 is not below 1"),
         ({"triangular": (0.0, 5.0, 1.0)}, r"triangular: write \[low, mode, high\]; 5 is not"),
         ({"triangular": (1.0, 1.0, 1.0)}, "triangular: 1 is not below 1"),
         ({"choice": ()}, "choice: is empty"),

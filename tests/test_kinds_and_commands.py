@@ -53,6 +53,16 @@ def bench(podusv: Command, kind: str) -> Said:
     return podusv("bench", "bench", "--no-figures", "--out", "benched")
 
 
+def doubt(podusv: Command, kind: str) -> Said:
+    """A claim that holds, on draws of what the scenario has."""
+    text = Path("a.yaml").read_text()
+    law = re.search(r"controller: {kind: (\w+)", text)
+    assert law
+    claim = f"claims: {{C: {{says: It ends., expect: finished({law[1]})}}}}\ndoubt: {{draws: 2}}\n"
+    Path("d.yaml").write_text(text + claim)
+    return podusv("doubt", "d.yaml", "--no-figures", "--workers", "1")
+
+
 def gym(podusv: Command, kind: str) -> Said:
     """Two steps of an environment."""
     pytest.importorskip("gymnasium")
@@ -89,6 +99,7 @@ COMMANDS: dict[str, Callable[[Command, str], Said]] = {
     "sweep": of_scenario("sweep", "run", "a.yaml", "--no-figures", "--workers", "1"),
     "tune": of_scenario("tune", "a.yaml", "--no-figures", "--workers", "1"),
     "bench": bench,
+    "doubt": doubt,
     "verify": of_scenario("verify", "a.yaml", "--tolerance", "1e9"),
     "margins": of_scenario("margins", "a.yaml"),
     "optimum": of_scenario("optimum", "a.yaml", "--no-figures"),
@@ -114,6 +125,7 @@ SLOW = {
     *((kind, "export") for kind in KINDS if kind != "plug-in"),
     *((kind, "tune") for kind in ("pods", "sensors", "legs", "plug-in")),
     ("policy", "margins"), ("plug-in", "margins"),
+    *((kind, "doubt") for kind in ("trial", "sensors", "pods")),
 }  # fmt: skip
 
 

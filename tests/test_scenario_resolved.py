@@ -166,7 +166,9 @@ def test_keys_stand_in_the_order_of_the_fields_behind_the_kind():
     assert HEADING.count("\n") == 1
     node = read(text, "a.yaml", [])
     assert node is not None
-    assert [*node.mapping, "sweep", "tune"] == list(Scenario.model_fields)  # no run has these
+    assert [*node.mapping, "sweep", "tune", "doubt"] == list(
+        Scenario.model_fields
+    )  # no run has these
     law = list(node.mapping["controller"].mapping)
     assert law[:3] == ["kind", "k_ze", "k_psie"]
 

@@ -60,3 +60,11 @@ def test_a_layer_above_replaces_distributions_and_takes_out_quantities() -> None
     assert sweep.vary["start.y"] == Quantity(uniform=(0.0, 1.0))
     assert (sweep.draws, sweep.grid) == (7, {"disturbance.scale": (0.5, 2)})
     assert swept(below, ["sweep=null"]).scenario.sweep is None
+
+
+def test_a_grid_from_the_command_line_leaves_the_name_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(BASE + "  {draws: 2, vary: {start.x: {uniform: [0, 1]}}}\n", "utf-8")
+    made = cells(load(file, ["sweep.grid={vessel.m: [20.0, 30.0]}"]))
+    assert [cell.scenario.name for cell in made] == ["mine", "mine"]
+    assert [cell.scenario.vessel.m for cell in made] == [20.0, 30.0]

@@ -24,7 +24,7 @@ from podusv_cli.cli.exit_codes import (
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
     "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
-    "explain", "list", "schema", "new", "bench", "tune", "docs", "demo", "runs", "export",
+    "explain", "list", "schema", "new", "bench", "tune", "doubt", "docs", "demo", "runs", "export",
 )  # fmt: skip
 
 # What others call it, and the command that does it.

@@ -54,7 +54,7 @@ class RunsVerdict(Verdict):
     @property
     def timed(self) -> bool:
         """Whether the claim is about measured times, which are different in every comparison."""
-        return any(f".{name}" in self.claim.expect for name in CLOCKED)
+        return is_timed(self.claim)
 
     def evidence(self) -> str:
         """The numbers and the reason, in one line."""
@@ -75,6 +75,11 @@ class RunsVerdict(Verdict):
             "numbers": numbers,
             "reason": self.reason,
         }
+
+
+def is_timed(claim: Claim) -> bool:
+    """Whether a claim is about measured times, which are different in every comparison."""
+    return any(f".{name}" in claim.expect for name in CLOCKED)
 
 
 def parse_claims(loaded: Loaded) -> list[ParsedClaim]:

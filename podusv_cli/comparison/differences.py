@@ -9,7 +9,10 @@ from typing import Any
 from podusv_cli.pages.page import flat, value_text
 
 PROSE = (".source", ".validity")
-IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", "sweep", "tune")
+IGNORED = (
+    "name", "description", "controller", "controllers", "claims", "silence", "sweep", "tune",
+    "doubt",
+)  # fmt: skip
 
 
 def differences(

@@ -13,9 +13,10 @@ simulate_many, verify = explained(functions.simulate_many), explained(functions.
 optimum, open_session = explained(functions.optimum), explained(session.open_session)
 sweep, open_study = explained(studies.sweep), explained(studies.open_study)
 tune, bench = explained(studies.tune), explained(studies.bench)
+doubt = explained(functions.doubt)
 
 __all__ = [
     "Bench", "Comparison", "PodusvError", "Run", "Scenario", "Study", "Tuning", "bench", "compare",
-    "load", "open_run", "open_session", "open_study", "optimum", "run", "simulate",
+    "doubt", "load", "open_run", "open_session", "open_study", "optimum", "run", "simulate",
     "simulate_many", "sweep", "tune", "verify",
 ]  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,19 +15,22 @@ import pandas as pd
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
+from podusv_cli.doubt.check import doubt_faults
+from podusv_cli.doubt.outputs import table
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.findings.finding import Case, postflight
 from podusv_cli.interface.border import ParameterError
 from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
-from podusv_cli.interface.scenarios import Changes, Source, loaded
+from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
 from podusv_cli.verification import verify as verification
 from podusv_cli.workflows import compare as comparing
+from podusv_cli.workflows import doubt as doubting
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
 from podusv_cli.workflows.gather import Item, from_folder, from_scenario, gathered
@@ -209,6 +213,30 @@ def verify(
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)
     frame.index = pd.MultiIndex.from_tuples(list(rows), names=["run", "number"])
     return frame
+
+
+def doubt(
+    source: Source, changes: Changes | None = None, *,
+    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+    workers: int = 0,
+) -> pd.DataFrame:  # fmt: skip
+    """What the verdicts on a scenario's claims hang on, as `podusv doubt` finds it.
+
+    A row a claim: `verdict`, the `word` for what it hangs on, how many draws `kept` or `turned` it,
+    the `nearest` key that turns it and at which value, and the distance as a share of the key's
+    scale. `out` has all turns, all draws and the page. Raises UsageError without claims,
+    ScenarioError, StorageError.
+
+    >>> import podusv
+    >>> claim = {"says": "It is near.", "expect": "pid.z_e_steady <= 1"}
+    >>> short = {"simulation.duration": 30.0, "doubt.draws": 20, "claims": {"A": claim}}
+    >>> podusv.doubt("podusv:own_vessel.yaml", short, out="doubts").loc["A", "verdict"]
+    'not reproduced'
+    """
+    given = loaded(source, changes, (*CHECKS, doubt_faults))
+    done = doubting.doubt_of(given, replace(request(out, force, figures), workers=workers))
+    head, *rows = table(done.answers)
+    return pd.DataFrame(rows, columns=list(head)).set_index("claim")
 
 
 def _single(given: Loaded) -> Scenario:

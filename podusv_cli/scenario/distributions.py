@@ -18,7 +18,7 @@ from pydantic import model_validator
 
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.portable import exponential, standard_normal
+from podusv_cli.core.portable import exponential, logarithm, standard_normal
 
 LEAST = 1e-6  # the share of a distribution that `within` has to leave
 LARGEST = 2**53  # whole number: all up to this are exact as floats
@@ -125,6 +125,18 @@ def _uniform(bounds: Interval, u: Vector) -> Numbers:
     return np.clip(low + u * (high - low), low, high)
 
 
+def _rising(name: str, bounds: Interval) -> None:
+    _ordered(name, bounds)
+    if bounds[0] <= 0.0:
+        raise ValueError(f"{name}: {bounds[0]:g} is not above 0")
+
+
+def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
+    low, high = bounds
+    ends = logarithm(np.array(bounds))
+    return np.clip(exponential(ends[0] + u * (ends[1] - ends[0])), low, high)
+
+
 def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
     low, mode, high = corners
     width, rise, fall = high - low, mode - low, high - mode
@@ -168,6 +180,7 @@ def _sound(name: str, content: Any) -> None:
 # For every key of `Distribution`: what else has to hold, and the values for u.
 WAYS: dict[str, tuple[Callable[[str, Any], None], Callable[[Any, Vector], Numbers]]] = {
     "uniform": (_ordered, _uniform),
+    "log_uniform": (_rising, _log_uniform),
     "normal": (_sound, _at),
     "lognormal": (_sound, _at),
     "triangular": (_corners, _triangular),
@@ -183,6 +196,9 @@ class Distribution(Component):
     uniform: Interval | None = value(None, "", "[low, high]: all between them are equally likely")
     normal: Normal | None = value(None, "", "a normal distribution")
     lognormal: LogNormal | None = value(None, "", "its logarithm is normal; for factors")
+    log_uniform: Interval | None = value(
+        None, "", "[low, high]: the logarithm is equally likely everywhere between; for factors"
+    )
     triangular: tuple[float, float, float] | None = value(
         None, "", "[low, mode, high]: likeliest at the mode, falling to both sides"
     )

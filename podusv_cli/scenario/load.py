@@ -36,7 +36,7 @@ from podusv_cli.scenario.yaml_tree import (
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
-STUDIES = ("sweep", "tune")  # sections that only studies have
+STUDIES = ("sweep", "tune", "doubt")  # sections that only studies have
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 

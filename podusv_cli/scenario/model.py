@@ -33,6 +33,7 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.metrics.windows import NAMED
 from podusv_cli.scenario.conflicts import conflicts
+from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.sections import (
     NAME,
     Claim,
@@ -121,6 +122,9 @@ class Scenario(Component):
     tune: Tune | None = value(
         None, "", "how `podusv tune` searches for gains of the laws; see podusv docs tuning"
     )
+    doubt: Doubt | None = value(
+        None, "", "what `podusv doubt` moves to see whether verdicts turn; see podusv docs doubt"
+    )
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """Pickle by value where plug-ins made the class, which another process has to make anew."""
@@ -142,7 +146,7 @@ class Scenario(Component):
     def alone(self) -> Scenario:
         """The scenario of one run: `controller` only, without comparison and studies."""
         return self.model_copy(
-            update={"controllers": {}, "claims": {}, "sweep": None, "tune": None}
+            update={"controllers": {}, "claims": {}, "sweep": None, "tune": None, "doubt": None}
         )
 
     def singles(self) -> dict[str, Scenario]:

@@ -11,13 +11,14 @@ LONGEST_PLACE = 9  # digits of a place in a list; Python refuses to read thousan
 Route = tuple[str | int, ...]
 # The keys of a quantity that a study draws, and those of them that say how it is drawn.
 QUANTITY = {
-    "uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle", "times", "plus",
-    "seed", "keys",
+    "uniform", "log_uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle",
+    "times", "plus", "seed", "keys",
 }  # fmt: skip
 NAMED_BY_KEYS = (
     ("sweep", "vary"),
     ("sweep", "grid"),
     ("tune", "space"),
+    ("doubt", "vary"),
 )  # sections whose entries have names with dots
 RANGE = {"log", "around", "keep"}  # and some of the above: what a gain may be
 DISTRIBUTIONS = QUANTITY - {"keys"}
@@ -137,6 +138,13 @@ def follow(root: Node, route: Route) -> list[Node]:
 
 def _items(content: Any) -> tuple[Node, ...]:
     return content if isinstance(content, tuple) else ()
+
+
+def placed(key: str, node: Node, root: Node) -> Node:
+    """The tree that has nothing but a value at a key; it stands where `root` does."""
+    for step in reversed(route(key)):
+        node = Node({str(step): node}, node.mark)
+    return replace(node, mark=root.mark)
 
 
 def find(root: Node, route: Route) -> Node | None:

@@ -14,10 +14,10 @@ from podusv_cli.core.phrases import as_yaml
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, plain, route
+from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, placed, plain, route
 
 MOST = 1000  # cells
-FIXED = ("extends", "plugins", "sweep", "tune", "name", "claims")  # the same in all cells
+FIXED = ("extends", "plugins", "sweep", "tune", "doubt", "name", "claims")  # the same in all cells
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,8 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
 def _made(loaded: Loaded, check: Check | None, told: dict[Hashable, None]) -> Iterator[Cell]:
     grid = _grid(loaded)
     for index, nodes in enumerate(product(*grid.values())):
-        top = reduce(merge, map(_placed, grid, nodes), Node({}, loaded.root.mark))
+        each = [placed(key, node, loaded.root) for key, node in zip(grid, nodes, strict=True)]
+        top = reduce(merge, each, Node({}, loaded.root.mark))
         values = tuple(zip(grid, map(plain, nodes), strict=True))
         checks = [_within(check, _label(values))] if check else []
         try:
@@ -75,13 +76,6 @@ def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:
     grid = find(loaded.root, ("sweep", "grid"))
     entries = grid.mapping.items() if grid else ()
     return {key: node.content for key, node in entries if node.content is not None}
-
-
-def _placed(key: str, node: Node) -> Node:
-    """The tree that has nothing but a value at a key."""
-    for step in reversed(route(key)):
-        node = Node({str(step): node}, node.mark)
-    return node
 
 
 def _check_grid(loaded: Loaded) -> None:

@@ -35,7 +35,8 @@ from podusv_cli.studies.making.draws import drawn
 
 # Shares at which a distribution is tried; its ends and its middle may be rounder than its draws.
 TRIED = np.array([0.000871, 0.381966, 0.998713])
-REAL = ("uniform", "normal", "lognormal", "triangular", "angle")  # draw other than whole numbers
+# draw other than whole numbers
+REAL = ("uniform", "normal", "lognormal", "log_uniform", "triangular", "angle")
 MOST_TRIED = 50  # values of a choice
 FREE_NAME = "; a quantity with a name of your own needs `keys`, as in keys: [vessel.m, vessel.I_z]"
 Faults = Iterator[tuple[Route, str]]

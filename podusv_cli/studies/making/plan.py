@@ -25,7 +25,9 @@ from podusv_cli.studies.making.check import sweep_faults
 from podusv_cli.studies.making.draws import SWEEP
 
 # Sections of a scenario that change no number of a study.
-COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", "sweep", "tune")
+COSMETIC = (
+    "name", "description", "log", "silence", "claims", "controllers", "sweep", "tune", "doubt",
+)  # fmt: skip
 MOST_NAMED = 4  # keys that a message about another study names
 LawInCell = tuple[str, int]  # a law, and the number of a cell
 KERNELS = " kernels"  # ends the key of the digest of a law's compiled source

@@ -1,0 +1,135 @@
+"""One choice at a time: which values turn a verdict, and where the nearest of them lies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.doubt.choices import Choice
+from podusv_cli.doubt.judged import Judge, Judged, moved
+
+NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
+BETWEEN = 0.1  # of the range: where it looks between, for verdicts that turn and turn back
+SHARP = 1.02  # ratio of distances to which a turn is known
+EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A value of one choice, and what the claims say there."""
+
+    value: Any
+    judged: Judged
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Where a verdict turns: the nearest value that turns it, and the farthest before it.
+
+    `distance` is that of the value from the scenario's own; 0 for words.
+    """
+
+    choice: Choice
+    value: Any
+    held: Any
+    distance: float
+
+    @property
+    def share(self) -> float:
+        """The distance over the choice's scale; infinite where there is no distance."""
+        return self.distance / self.choice.range.scale if self.choice.range else math.inf
+
+    @property
+    def by_rounding(self) -> bool:
+        """Whether one unit in the last place turns it."""
+        return self.distance > 0.0 and self.held == self.choice.own and self.share < NEAR
+
+
+@dataclass(frozen=True)
+class Alone:
+    """All that was tried of one choice."""
+
+    choice: Choice
+    trials: tuple[Trial, ...]
+
+    def acts(self, claim: str, base: Judged) -> bool:
+        """Whether any value changes a number of the claim."""
+        return any(not t.judged.failed and not t.judged.same(claim, base) for t in self.trials)
+
+    def turns(self, claim: str, base: Judged) -> list[Turn]:
+        """Where a claim's verdict turns: for words each that does, for numbers on each side."""
+        turned = [t for t in self.trials if t.judged.turned(claim, base)]
+        if not self.choice.range:
+            return [Turn(self.choice, t.value, self.choice.own, 0.0) for t in turned]
+        sides = ([t for t in turned if (t.value > self.choice.own) == up] for up in (True, False))
+        return [self._nearest(side) for side in sides if side]
+
+    def _nearest(self, turned: Sequence[Trial]) -> Turn:
+        own = self.choice.own
+        first = min(turned, key=lambda t: abs(t.value - own))
+        inside = [
+            t.value for t in self.trials
+            if not t.judged.failed and (t.value > own) == (first.value > own)
+            and abs(t.value - own) < abs(first.value - own)
+        ]  # fmt: skip
+        held = max(inside, key=lambda value: abs(value - own), default=own)
+        return Turn(self.choice, first.value, held, abs(first.value - own))
+
+
+def explored(choice: Choice, judge: Judge, base: Judged) -> Alone:
+    """Try the values of a choice, and find where verdicts turn."""
+    if not choice.range:
+        return Alone(choice, tuple(Trial(v, judge(moved(choice, v))) for v in choice.values))
+    trials = {end: judge(moved(choice, end)) for end in ends(choice)}
+    acting = [
+        claim for claim in base.answers if any(_acts(j, claim, base) for j in trials.values())
+    ]
+    if acting:
+        for end in list(trials):
+            _searched(choice, end, judge, base, trials)
+    return Alone(choice, tuple(Trial(*one) for one in trials.items()))
+
+
+def _acts(judged: Judged, claim: str, base: Judged) -> bool:
+    return not judged.failed and not judged.same(claim, base)
+
+
+def ends(choice: Choice) -> list[float]:
+    """The two ends of the range, without the choice's own value."""
+    assert choice.range
+    way, own = choice.range.alone, choice.own
+    drawn = way.distribution.at(np.array(EDGES)).tolist()
+    return [end for end in (way.value(own, one) for one in drawn) if end != own]
+
+
+def _searched(
+    choice: Choice, end: float, judge: Judge, base: Judged, trials: dict[float, Judged]
+) -> None:
+    """Look between the own value and an end, and bisect what turns, into `trials`."""
+
+    def tried(distance: float) -> Judged:
+        value = choice.own + math.copysign(distance, end - choice.own)
+        if value not in trials:
+            trials[value] = judge(moved(choice, value))
+        return trials[value]
+
+    assert choice.range
+    scale = choice.range.scale
+    whole, near, last = abs(end - choice.own), NEAR * scale, math.ulp(choice.own or scale)
+    for distance in (BETWEEN * whole, near):
+        tried(distance)
+    for claim in base.answers:
+        reached = [d for d in (near, BETWEEN * whole, whole) if tried(d).turned(claim, base)]
+        if not reached:
+            continue
+        turned = min(reached)
+        held = {near: last, BETWEEN * whole: near, whole: BETWEEN * whole}[turned]
+        if turned == near and tried(last).turned(claim, base):
+            continue
+        while turned / held > SHARP:
+            middle = math.sqrt(turned * held)
+            turned, held = (middle, held) if tried(middle).turned(claim, base) else (turned, middle)

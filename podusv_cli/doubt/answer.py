@@ -1,0 +1,227 @@
+"""What is said of a claim: its verdict, what the verdict hangs on, and a word for both."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.doubt.alone import Alone, Turn
+from podusv_cli.doubt.events import Event, nearest_event
+from podusv_cli.doubt.judged import Judged
+from podusv_cli.doubt.together import Draws, Explained, counted, explained
+
+KNIFE, FRAGILE = 1e-3, 0.1  # of a choice's scale, within which a verdict turns
+LEVEL = 0.95  # of the bound on the share of draws that turn a verdict where none does
+WORDS = ("knife's edge", "fragile", "under conditions", "in combination only", "robust")
+
+
+Spread = tuple[float, float, float]  # 5, 50 and 95 %; NaN where no draw has the number
+
+
+class Compared(NamedTuple):
+    """A number of a claim, and what it is compared with: a limit, or another number.
+
+    Against another number it is the ratio of the two, with a limit of 1.
+    """
+
+    left: str
+    right: str
+    limit: float
+
+    @property
+    def text(self) -> str:
+        """The number as the claim has it."""
+        return f"({self.left}) / ({self.right})" if self.right else self.left
+
+    def of(self, numbers: Mapping[str, float]) -> float:
+        """The number among those of a verdict; NaN where it is missing."""
+        left, right = (numbers.get(text, math.nan) for text in (self.left, self.right))
+        with np.errstate(all="ignore"):
+            return float(np.divide(left, right)) if self.right else left
+
+    def spread(self, claim: str, worlds: Sequence[Judged]) -> Spread:
+        """Its spread over the draws that have it."""
+        drawn = np.array([self.of(one.numbers.get(claim, {})) for one in worlds])
+        finite = drawn[np.isfinite(drawn)]
+        low, middle, high = np.quantile(finite if len(finite) else math.nan, (0.05, 0.5, 0.95))
+        return float(low), float(middle), float(high)
+
+    def margin(self, numbers: Mapping[str, float], spread: Spread) -> float:
+        """Its distance from the limit, in half-widths of the spread; infinite where that is 0."""
+        low, _, high = spread
+        return abs(self.of(numbers) - self.limit) / (0.5 * (high - low)) if high > low else math.inf
+
+
+def compared(expect: str) -> list[Compared]:
+    """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
+    tree = ast.parse(expect, mode="eval").body
+    found = []
+    for node in (node for node in ast.walk(tree) if isinstance(node, ast.Compare)):
+        found += [_link(*pair) for pair in pairwise([node.left, *node.comparators])]
+    return found or [Compared(ast.unparse(tree), "", 0.5)]
+
+
+def _link(left: ast.expr, right: ast.expr) -> Compared:
+    for number, limit in ((left, right), (right, left)):
+        with suppress(ValueError):  # not a plain number
+            return Compared(ast.unparse(number), "", float(ast.literal_eval(limit)))
+    return Compared(ast.unparse(left), ast.unparse(right), 1.0)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A claim's verdict and what it hangs on.
+
+    `turns` are those of the same task, the nearest first; `neighbours` those by which the task is
+    another. `kept`, `turned`, `unknown` and `failed` count draws of all choices at once: with the
+    verdict, with the opposite, without an answer, and without a world.
+    """
+
+    verdict: RunsVerdict
+    turns: tuple[Turn, ...]
+    neighbours: tuple[Turn, ...]
+    explained: tuple[Explained, ...]
+    kept: int
+    turned: int
+    unknown: int
+    failed: int
+    tried: int  # choices that were moved
+    acted: int  # of which so many change a number of the claim
+    number: Compared  # which of its numbers is nearest to its limit
+    spread: Spread  # of this number over the draws
+    event: Event | None = None  # nearest to a window of the claim, in the scenario itself
+
+    @property
+    def draws(self) -> int:
+        """How many draws there are."""
+        return self.kept + self.turned + self.unknown + self.failed
+
+    @property
+    def word(self) -> str:
+        """What the verdict is for this task; "" where nobody can tell."""
+        return _word(self, self.turns, self.turned)
+
+    @property
+    def word_for_neighbours(self) -> str:
+        """What it is where the task may be another, too."""
+        return _word(self, (*self.turns, *self.neighbours), self.turned)
+
+    @property
+    def bound(self) -> float:
+        """The largest share of draws that may turn it, at 95 % confidence, where none does."""
+        known = self.kept + self.turned
+        return 1.0 - (1.0 - LEVEL) ** (1.0 / known) if known and not self.turned else math.nan
+
+    @property
+    def margin(self) -> float:
+        """How far its number is from the limit, in half-widths of 5 to 95 % of the draws.
+
+        Infinite where the draws do not change the number.
+        """
+        return self.number.margin(self.verdict.numbers, self.spread)
+
+
+def _word(answer: Answer, turns: Sequence[Turn], turned: int) -> str:
+    if answer.verdict.answer is None:
+        return ""
+    nearest = min((turn.share for turn in turns), default=math.nan)
+    reached = (nearest <= KNIFE, nearest <= FRAGILE, bool(turns), turned > 0, True)
+    return WORDS[reached.index(True)]
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What was tried: the scenario itself, each choice alone, and all choices at once."""
+
+    base: Judged
+    alone: Sequence[Alone]
+    draws: Draws
+    worlds: Sequence[Judged]
+
+
+def answers(
+    parsed: Sequence[ParsedClaim], entries: Mapping[str, Entry], tried: Tried
+) -> list[Answer]:
+    """An answer on every claim; `entries` are the runs of the scenario itself."""
+    return [
+        replace(
+            _answer(_verdict(one, tried.base), labels_of(one), tried),
+            event=nearest_event(one, entries),
+        )
+        for one in parsed
+    ]
+
+
+def _verdict(parsed: ParsedClaim, base: Judged) -> RunsVerdict:
+    return RunsVerdict(
+        parsed.name, parsed.claim, base.answers[parsed.name], dict(base.numbers[parsed.name])
+    )
+
+
+def labels_of(claim: ParsedClaim) -> frozenset[str]:
+    """The names in a claim's expressions, of runs among them."""
+    trees = filter(None, (claim.expect, claim.given))
+    return frozenset(n.id for tree in trees for n in ast.walk(tree) if isinstance(n, ast.Name))
+
+
+def _answer(verdict: RunsVerdict, labels: frozenset[str], tried: Tried) -> Answer:
+    claim, base, worlds = verdict.name, tried.base, tried.worlds
+    moved = [
+        one for one in tried.alone
+        if one.choice.labels & labels and not one.choice.is_contrast(labels)
+    ]  # fmt: skip
+    turns = sorted(
+        (t for one in moved for t in one.turns(claim, base)), key=lambda turn: turn.share
+    )
+    acting = {one.choice.name: one.acts(claim, base) for one in tried.alone}
+    turned, known = counted(claim, worlds, base)
+    failed = sum(bool(one.failed) for one in worlds)
+    return Answer(
+        verdict, tuple(t for t in turns if not t.choice.task),
+        tuple(t for t in turns if t.choice.task),
+        tuple(explained(tried.draws, turned, known, acting)),
+        int((known & ~turned).sum()), int(turned.sum()), int((~known).sum()) - failed, failed,
+        len(moved), sum(acting[one.choice.name] for one in moved), *_nearest(verdict, worlds),
+    )  # fmt: skip
+
+
+def _nearest(verdict: RunsVerdict, worlds: Sequence[Judged]) -> tuple[Compared, Spread]:
+    """The number of a claim that is nearest to its limit, in half-widths of its draws."""
+    spreads = {n: n.spread(verdict.name, worlds) for n in compared(verdict.claim.expect)}
+    number = min(spreads, key=lambda n: n.margin(verdict.numbers, spreads[n]))
+    return number, spreads[number]
+
+
+def as_json(answer: Answer) -> dict[str, Any]:
+    """An answer as plain data."""
+    return {
+        **answer.verdict.as_json(), "word": answer.word,
+        "word_for_neighbours": answer.word_for_neighbours,
+        "draws": {n: getattr(answer, n) for n in ("kept", "turned", "unknown", "failed")},
+        "choices": {"moved": answer.tried, "acted": answer.acted},
+        "turns": [turn_as_json(turn) for turn in (*answer.turns, *answer.neighbours)],
+        "explained": [
+            {"key": e.choice.name, "part": e.part, "inside": e.inside, "outside": e.outside}
+            for e in answer.explained
+        ],
+        "number": answer.number.text, "limit": answer.number.limit, "spread": answer.spread,
+        "event": answer.event and answer.event._asdict(),
+    }  # fmt: skip
+
+
+def turn_as_json(turn: Turn) -> dict[str, Any]:
+    """A turn as plain data; a share of None where there is no distance."""
+    return {
+        "key": turn.choice.name, "own": turn.choice.own, "turns_at": turn.value, "held": turn.held,
+        "unit": turn.choice.unit, "distance": turn.distance,
+        "share": turn.share if math.isfinite(turn.share) else None, "task": turn.choice.task,
+    }  # fmt: skip

@@ -1,0 +1,42 @@
+"""What is wrong with a scenario's key `doubt`, found before anything is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from podusv_cli.core.phrases import unknown
+from podusv_cli.doubt.choices import choices, places_of, public
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.yaml_tree import Route, bracketed
+
+Faults = Iterator[tuple[Route, str]]
+LISTED = "podusv explain"
+
+
+def doubt_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+    """Steps of the key and message for everything that is wrong; nothing without the section."""
+    return [] if scenario.doubt is None else [*_printed(scenario), *_vary(scenario)]
+
+
+def _printed(scenario: Scenario) -> Faults:
+    assert scenario.doubt
+    known = _known(scenario)
+    sections = {key[:end] for key in known for end in range(len(key)) if key[end] in ".["}
+    for place, key in enumerate(scenario.doubt.printed):
+        if bracketed(key) not in known | sections:
+            yield ("doubt", "printed", place), unknown(f"key {key!r}", key, sorted(known), LISTED)
+
+
+def _vary(scenario: Scenario) -> Faults:
+    assert scenario.doubt
+    singles, known = scenario.singles(), _known(scenario)
+    for name, quantity in scenario.doubt.vary.items():
+        for key in quantity.targets(name):
+            if not places_of(key, singles):
+                text = unknown(f"key {key!r}", key, sorted(known), LISTED)
+                yield ("doubt", "vary", name), text
+
+
+def _known(scenario: Scenario) -> set[str]:
+    """The keys of all choices."""
+    return {public(place) for one in choices(scenario.singles()) for place in one.places}

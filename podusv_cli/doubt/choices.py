@@ -1,0 +1,289 @@
+"""The choices of a comparison that its source leaves open, and the values that they may have.
+
+A choice is a value of the scenario: a number, or a word. Numbers have a range for the search one at
+a time, and a narrower one for draws of all at once. What may move by default is everything that
+`doubt.printed` does not name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from podusv_cli.core.component import Component
+from podusv_cli.scenario.address import content, described
+from podusv_cli.scenario.distributions import Distribution
+from podusv_cli.scenario.doubt import Doubt
+from podusv_cli.scenario.keys import Key, limits
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sweep import Quantity
+from podusv_cli.scenario.yaml_tree import Route, bracketed, dotted
+
+HULL: Route = ("vessel",)  # where the name of a preset stands for the whole hull
+Singles = Mapping[str, Scenario]  # the scenario of each law, by its label
+Place = tuple[str, Route]  # a law's label, and where the value stands in the scenario of its run
+GRAVITY = 9.81  # m/s2
+
+
+class Range(NamedTuple):
+    """How a number moves, as a study draws it: one at a time, and with all others.
+
+    `scale` is what its distance from the scenario's own is measured by, in the unit of the number.
+    """
+
+    alone: Quantity
+    together: Quantity
+    scale: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A value that may be another, at all places that have it together.
+
+    A number has a `range`, all else `values` to be tried in its place.
+    """
+
+    name: str  # the key that readers see
+    places: tuple[Place, ...]
+    own: Any
+    unit: str = ""
+    range: Range | None = None
+    values: tuple[Any, ...] = ()
+    task: bool = False  # whether another value is another task
+    beside: frozenset[str] = frozenset()  # laws of the same kind that differ in it
+    named: bool = False  # whether it is what distinguishes its law from those
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """The laws whose runs it moves."""
+        return frozenset(label for label, _ in self.places)
+
+    def is_contrast(self, labels: frozenset[str]) -> bool:
+        """Whether it is what a claim about these laws compares, and so has to stay."""
+        return self.named or (bool(self.labels & labels) and bool(self.beside & labels))
+
+
+Way = Callable[[float, Scenario, Key], Range | None]  # how a number of this key moves
+
+
+def _times(alone: float, together: float) -> Way:
+    """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
+
+    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
+        ends = [_inside([own / f, own * f], key) for f in (alone, together)]
+        if not own or any(low * high <= 0.0 for low, high in ends):
+            return None
+        ways = [tuple(sorted((low / own, high / own))) for low, high in ends]
+        drawn = [Quantity(times=Distribution(log_uniform=(low, high))) for low, high in ways]
+        return Range(drawn[0], drawn[1], abs(own))
+
+    return moved
+
+
+def _plus(scale: Callable[[Scenario], float], share: float) -> Way:
+    """A summand up to a share of a scale, inside the key's bounds; the same alone and together."""
+
+    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
+        unit = scale(scenario)
+        low, high = _inside([own - share * unit, own + share * unit], key)
+        drawn = Quantity(plus=Distribution(uniform=(low - own, high - own)))
+        return Range(drawn, drawn, unit)
+
+    return moved
+
+
+def _inside(ends: list[float], key: Key) -> tuple[float, float]:
+    """The ends of a range, cut off at the key's bounds."""
+    bounds = limits(key.field)
+    low, high = sorted(ends)
+    return max(low, bounds.get("ge", low)), min(high, bounds.get("le", high))
+
+
+def _speed(scenario: Scenario) -> float:
+    """The path's speed; where it has none, that at which the hull's Froude number is 0.1."""
+    own = getattr(scenario.path, "speed", 0.0)
+    return abs(own) or 0.1 * math.sqrt(GRAVITY * scenario.vessel.length)
+
+
+def _length(scenario: Scenario) -> float:
+    return scenario.vessel.length
+
+
+def _radian(scenario: Scenario) -> float:
+    return 1.0
+
+
+def _turning(scenario: Scenario) -> float:
+    """The yaw rate that goes with the speed on a circle of a hull's length."""
+    return _speed(scenario) / scenario.vessel.length
+
+
+# How the numbers of a section move, by their unit; "" is for all other units.
+RANGES: dict[str, dict[str, Way]] = {
+    "vessel": {"": _times(1.1, 1.1)},
+    "nominal": {"": _times(1.1, 1.1)},
+    "start": {
+        "m": _plus(_length, 0.5), "rad": _plus(_radian, 0.2), "m/s": _plus(_speed, 0.1),
+        "rad/s": _plus(_turning, 0.1),
+    },
+    "path": {"m": _plus(_length, 0.5), "rad": _plus(_radian, 0.2), "": _times(1.05, 1.05)},
+    "disturbance": {"rad": _plus(_radian, math.pi), "": _times(1.2, 1.2)},
+    "actuator": {"": _times(2.0, 1.25)},
+    "measurement": {"": _times(3.0, 1.25)},
+    "estimator": {"": _times(3.0, 1.25)},
+    "controller": {"": _times(3.0, 1.25)},
+}  # fmt: skip
+# Keys that have values of their own to be tried, from the scenario's own.
+TRIED: dict[str, Callable[[Any], tuple[Any, ...]]] = {
+    "simulation.step": lambda own: (own / 2.0,),
+    "simulation.duration": lambda own: (own * 1.5,),  # a shorter run ends before windows of claims
+    "control.period": lambda own: (own / 2.0, own * 2.0) if own else (),
+}
+WORDS = ("control.update",)  # beside those of the sections above
+# What another value of makes another task: where the target goes, and a hull that laws know wrongly
+TASK = ("path.", "nominal.")
+WAYS_OF_LAW = ("path.switch", "path.fillet")  # but these, which are part of a law's way
+# Fields that are no part of the motion, and which terms the equations have, 0 or 1
+FIXED = ("kind", "preset", "source", "validity", "length", "beam", "envelope", "coriolis")
+
+
+def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
+    """All choices of a comparison but those at keys that the source prints.
+
+    A value that several laws share is one choice; the source prints it if it does for one of them.
+    """
+    doubt = doubt or Doubt()
+    groups: dict[tuple[str, str], list[Place]] = defaultdict(list)
+    for label, scenario in singles.items():
+        for route, own in _leaves(scenario):
+            groups[dotted(route), repr(own)].append((label, route))
+    unprinted = [g for g in groups.values() if not any(_is_printed(public(p), doubt) for p in g)]
+    found = [one for places in unprinted for one in _of_places(places, singles)]
+    own = [_given(name, quantity, singles) for name, quantity in doubt.vary.items()]
+    taken = {place for choice in own for place in choice.places}
+    return [*_hulls(singles, doubt), *own, *(one for one in found if not taken & {*one.places})]
+
+
+def _hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
+    """The choice of a whole hull."""
+    first = next(iter(singles.values())).vessel.preset
+    others = tuple(hull for hull in doubt.hulls if hull != first)
+    if others:
+        yield Choice(
+            "vessel.preset", tuple((label, HULL) for label in singles), first, values=others
+        )
+
+
+def public(place: Place) -> str:
+    """The key as the comparison's scenario has it."""
+    label, route = place
+    return dotted(("controllers", label, *route[1:]) if route[0] == "controller" else route)
+
+
+def places_of(key: str, singles: Singles) -> list[Place]:
+    """Where a key of the comparison's scenario stands in the runs of its laws."""
+    key, known = bracketed(key), defaultdict[str, list[Place]](list)
+    for label, scenario in singles.items():
+        for route, _ in _leaves(scenario):
+            known[public((label, route))].append((label, route))
+    return known[key]
+
+
+def _is_printed(key: str, doubt: Doubt) -> bool:
+    """Whether the source prints a key, or the section or law that it is in."""
+    return any(key == one or key.startswith((f"{one}.", f"{one}[")) for one in doubt.printed)
+
+
+def _leaves(scenario: Scenario) -> Iterator[tuple[Route, Any]]:
+    """Every number and word that may move, with its place."""
+    for section in RANGES:
+        yield from _within(getattr(scenario, section), (section,))
+    for key in (*TRIED, *WORDS):
+        section, name = key.split(".")
+        yield (section, name), getattr(getattr(scenario, section), name)
+
+
+def _within(part: Any, at: Route) -> Iterator[tuple[Route, Any]]:
+    if isinstance(part, Component):
+        for name in type(part).model_fields:
+            if name not in FIXED:
+                yield from _within(getattr(part, name), (*at, name))
+    elif isinstance(part, tuple):
+        for place, one in enumerate(part):
+            if isinstance(one, Component):
+                yield from _within(one, (*at, place))
+    elif isinstance(part, (bool, int, float, str)):
+        yield at, part
+
+
+def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
+    """The choice of a value that several laws share, if there is one.
+
+    What laws know of a hull's number follows it where both are the same. That it does not, is the
+    choice of the `nominal` number, and another task.
+    """
+    base, key = _base(places, singles)
+    tried = TRIED.get(base.name, lambda own: _values(key, own))(base.own)
+    way = RANGES.get(str(places[0][1][0]), {})
+    if tried:
+        yield replace(base, values=tried)
+    elif isinstance(base.own, float) and (moves := way.get(base.unit, way.get(""))):
+        known = (*places, *_known(places, singles))
+        if found := moves(base.own, singles[places[0][0]], key):
+            yield replace(base, places=known, range=found)
+
+
+def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:
+    """A choice without other values, and its key."""
+    (label, route), name = places[0], public(places[0])
+    key, own = described(singles[label], route), content(singles[label], route)
+    task = name.startswith(TASK) and not name.startswith(WAYS_OF_LAW)
+    beside = _beside(places, singles)
+    named = bool(beside) and own != key.default
+    return Choice(name, tuple(places), own, key.unit, task=task, beside=beside, named=named), key
+
+
+def _given(name: str, quantity: Quantity, singles: Singles) -> Choice:
+    """The choice that `doubt.vary` has for a key; see `faults` for what cannot be one."""
+    places = [p for key in quantity.targets(name) for p in places_of(key, singles)]
+    base, key = _base(places, singles)
+    places = [*places, *_known(places, singles)]
+    if quantity.seed or quantity.distribution.choice:
+        values = quantity.distribution.choice or _values(key, base.own)
+        return replace(base, places=tuple(places), values=values)
+    scale = abs(base.own) or max(abs(quantity.value(base.own, 1.0)), 1.0)
+    return replace(base, places=tuple(places), range=Range(quantity, quantity, scale))
+
+
+def _known(places: Sequence[Place], singles: Singles) -> list[Place]:
+    """Where laws know the same of the hull, which moves with it."""
+    hull = [(label, at, ("nominal", *at[1:])) for label, at in places if at[0] == "vessel"]
+    return [
+        (label, known) for label, at, known in hull
+        if content(singles[label], at) == content(singles[label], known)
+    ]  # fmt: skip
+
+
+def _values(key: Key, own: Any) -> tuple[Any, ...]:
+    """The other words of a word, the next seeds of a seed, half and twice a count."""
+    if isinstance(own, bool):
+        return (not own,)
+    if isinstance(own, int):
+        return (own + 1, own + 2) if key.name == "seed" else (max(own // 2, 1), own * 2)
+    return tuple(word for word in key.choices if word != own) if isinstance(own, str) else ()
+
+
+def _beside(places: Sequence[Place], singles: Singles) -> frozenset[str]:
+    """The laws of the same kind that have another value of a law's own number or word."""
+    own = {label for label, _ in places}
+    if places[0][1][0] != "controller":
+        return frozenset()
+    kinds = {type(singles[one].controller) for one in own}
+    return frozenset(
+        other
+        for other, one in singles.items()
+        if other not in own and type(one.controller) in kinds
+    )

@@ -1,0 +1,123 @@
+"""Figures of `podusv doubt`. Import this module where a figure is drawn: matplotlib is slow."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from podusv_cli.core import escaping
+from podusv_cli.core.kernel import Vector
+from podusv_cli.doubt.alone import Alone, ends
+from podusv_cli.doubt.answer import Answer
+from podusv_cli.doubt.outputs import Told, place
+from podusv_cli.doubt.together import counted
+from podusv_cli.figures.looks import nth_style
+from podusv_cli.figures.style import legend, new_figure
+from podusv_cli.studies.sketch import COLUMNS, Sketch
+
+KEPT, TURNED, RANGE = nth_style(0)[0], "#D55E00", "#BBBBBB"
+LANES = 8  # the most choices below a curve
+ROW, LANE = 0.19, 0.3  # inches
+WIDE = 34  # letters of an axis' name on a line
+
+
+def sketches(told: Told) -> Iterator[Sketch]:
+    """For every claim the specification curve, and a row for each choice that turns it."""
+    for one in told.answers:
+        name = one.verdict.name
+        acting = [a for a in told.tried.alone if a.choice.range and a.acts(name, told.tried.base)]
+        turning = {turn.choice.name for turn in (*one.turns, *one.neighbours)}
+        rows = [alone for alone in acting if alone.choice.name in turning]
+        if acting and math.isfinite(one.spread[1]):
+            yield Sketch(
+                f"specification-{name}",
+                f"{name}: its number in all draws, sorted, and what was drawn: each column is one "
+                "draw, a mark's height in its lane is where the value is in its range",
+                partial(specification, told, one, acting),
+            )
+        if rows:
+            yield Sketch(
+                f"ranges-{name}",
+                f"{name}: the ranges of the values that turn it, one at a time; where the verdict "
+                f"is another, the range is orange ({len(acting) - len(rows)} more numbers change "
+                "its number, and never the verdict)",
+                partial(ranges, one, rows),
+            )
+
+
+def specification(told: Told, answer: Answer, acting: Sequence[Alone]) -> Figure:
+    """A claim's number over the draws, sorted, with what was drawn below."""
+    tried, name = told.tried, answer.verdict.name
+    number = answer.number
+    numbers = np.array([number.of(world.numbers.get(name, {})) for world in tried.worlds])
+    turned, _ = counted(name, tried.worlds, tried.base)
+    order = [i for i in np.argsort(numbers) if np.isfinite(numbers[i])]
+    lanes = _lanes(told, answer, {a.choice.name for a in acting}, numbers[order], order)
+    figure = new_figure(COLUMNS, 2.2 + LANE * len(lanes))
+    top, below = figure.subplots(
+        2, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, LANE * len(lanes)]}
+    )
+    for mask, colour, label in ((~turned, KEPT, "kept"), (turned, TURNED, "turned")):
+        at = [x for x, i in enumerate(order) if mask[i]]
+        top.plot(at, numbers[[order[x] for x in at]], ".", color=colour, ms=3.0, label=label)
+        for lane, column in enumerate(lanes):
+            heights = lane + 0.1 + 0.8 * tried.draws.shares[[order[x] for x in at], column]
+            below.plot(at, heights, ".", color=colour, ms=1.6)
+    own = number.of(answer.verdict.numbers)
+    if math.isfinite(own):
+        top.axhline(own, color="black", lw=0.8, ls=":", label="the scenario's own")
+    top.axhline(number.limit, color="black", lw=0.8, label="limit")
+    top.set_ylabel(textwrap.fill(escaping.figure(number.text), WIDE), fontsize=6)
+    names = [escaping.figure(tried.draws.choices[column].name) for column in lanes]
+    below.set_yticks([lane + 0.5 for lane in range(len(lanes))], names, fontsize=5.5)
+    below.set(xlabel="draws, sorted by the number", ylim=(0.0, len(lanes)))
+    legend(figure)
+    return figure
+
+
+def _lanes(
+    told: Told, answer: Answer, acting: set[str], numbers: Vector, order: Sequence[int]
+) -> list[int]:
+    """The columns of the draws that explain the turns, then those that the number follows."""
+    draws = told.tried.draws
+    ranks = np.argsort(np.argsort(numbers))
+
+    def follows(column: int) -> float:
+        with np.errstate(all="ignore"):
+            found = np.corrcoef(ranks, draws.shares[order, column])[0, 1]
+        return -abs(float(np.nan_to_num(found)))
+
+    first = [draws.choices.index(one.choice) for one in answer.explained]
+    others = [i for i, one in enumerate(draws.choices) if one.name in acting]
+    return list(dict.fromkeys([*first, *sorted(others, key=follows)]))[:LANES]
+
+
+def ranges(answer: Answer, rows: Sequence[Alone]) -> Figure:
+    """The range of each choice, from its own value to both ends, and where the verdict turns."""
+    turns = {
+        (t.choice.name, t.value > t.choice.own): t for t in (*answer.turns, *answer.neighbours)
+    }
+    figure = new_figure(COLUMNS, 0.7 + ROW * len(rows))
+    axes = figure.add_subplot()
+    for row, one in enumerate(rows):
+        axes.plot([-1.0, 1.0], [row, row], color=RANGE, lw=3.0, solid_capstyle="butt")
+        for end in ends(one.choice):
+            side = math.copysign(1.0, end - one.choice.own)
+            turn = turns.get((one.choice.name, end > one.choice.own))
+            if turn:
+                at = side * turn.distance / abs(end - one.choice.own)
+                axes.plot([at, side], [row, row], color=TURNED, lw=3.0, solid_capstyle="butt")
+                axes.annotate(
+                    escaping.figure(place(turn)), (side, row), (4 * side, 0), fontsize=5.5,
+                    textcoords="offset points", va="center", ha="left" if side > 0 else "right",
+                )  # fmt: skip
+    axes.axvline(0.0, color="black", lw=0.8)
+    axes.set_yticks(range(len(rows)), [escaping.figure(a.choice.name) for a in rows], fontsize=5.5)
+    axes.set(xlim=(-3.2, 3.2), ylim=(len(rows) - 0.5, -0.5))
+    axes.set_xticks([-1.0, 0.0, 1.0], ["lower end", "own value", "upper end"])
+    return figure

@@ -1,0 +1,154 @@
+"""Tables, figures and page of what the verdicts of a scenario hang on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from podusv_cli.core.escaping import visible
+from podusv_cli.core.phrases import as_yaml
+from podusv_cli.doubt.alone import Turn, ends
+from podusv_cli.doubt.answer import Answer, Tried, as_json
+from podusv_cli.doubt.choices import Choice
+from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage import csv_files, json_files
+from podusv_cli.storage.run_folder import RunWriter
+
+HEAD = ("claim", "verdict", "in draws", "turns at", "hangs on")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the page is about: a scenario, the answers on its claims, and all that was tried."""
+
+    scenario: Scenario
+    answers: Sequence[Answer]
+    tried: Tried
+
+
+def place(turn: Turn) -> str:
+    """Where a verdict turns: `start.psi +7e-06 rad`, or the word that turns it."""
+    choice, unit = turn.choice, f" {turn.choice.unit}" if turn.choice.unit else ""
+    if not choice.range:
+        return f"{choice.name}: {as_yaml(turn.value)} ({as_yaml(choice.own)})"
+    if turn.share < 0.01 or not choice.own:
+        return f"{choice.name} {turn.value - choice.own:+.2g}{unit}"
+    way = "from" if turn.value > choice.own else "down from"
+    return f"{choice.name} {way} {turn.value:.3g}{unit} ({choice.own:.3g})"
+
+
+def in_words(answer: Answer) -> str:
+    """What the verdict hangs on: its word, and how near the nearest place is."""
+    nearest = answer.turns[0].share if answer.turns else math.inf
+    far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
+    idle = "" if answer.acted else ": nothing that was moved acts on it"
+    return f"{answer.word}{far}{idle}"
+
+
+def _share(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
+
+
+def row(answer: Answer) -> list[str]:
+    """A claim's row of the table."""
+    kept = f"{answer.kept} of {answer.draws}"
+    others = f" and {len(answer.turns) - 1} more" if len(answer.turns) > 1 else ""
+    turns = f"{place(answer.turns[0])}{others}" if answer.turns else "-"
+    return [answer.verdict.name, answer.verdict.in_words, kept, turns, in_words(answer)]
+
+
+def write(
+    writer: RunWriter, told: Told, text: str, origin: Mapping[str, Any], extras: Extras, *,
+    figures: bool,
+) -> None:  # fmt: skip
+    """All files of the folder but the manifest; `text` is the scenario's file."""
+    writer.add("scenario.yaml", text.encode())
+    for name, text in told.scenario.plugin_files().items():
+        writer.add(name, text.encode())
+    writer.add("doubt.json", json_files.encode({"claims": [as_json(one) for one in told.answers]}))
+    for name, rows in {
+        "doubt.csv": table(told.answers), "turns.csv": _turns(told), "draws.csv": _draws(told),
+    }.items():  # fmt: skip
+        writer.add(name, csv_files.lines(rows).encode())
+    pictures = _pictures(told, extras) if figures else []
+    for one in pictures:
+        writer.add(f"figures/{one.name}.png", one.file)
+    writer.add("report.html", page(told, pictures, origin).encode())
+    writer.add_json("provenance.json", origin)
+    writer.add_missing(extras)
+
+
+def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
+    """A head, and a row a claim."""
+    yield (
+        "claim", "verdict", "word", "word_for_neighbours", "kept", "turned", "unknown", "failed",
+        "moved", "acted", "nearest", "turns_at", "nearest_share",
+    )  # fmt: skip
+    for one in answers:
+        first = one.turns[0] if one.turns else None
+        nearest = (first.choice.name, first.value, first.share) if first else ("", "", "")
+        yield (
+            one.verdict.name, one.verdict.verdict, one.word, one.word_for_neighbours, one.kept,
+            one.turned, one.unknown, one.failed, one.tried, one.acted, *nearest,
+        )  # fmt: skip
+
+
+def _turns(told: Told) -> Iterator[Sequence[Any]]:
+    yield "claim", "key", "own", "turns_at", "held", "unit", "distance", "share", "task"
+    for one in told.answers:
+        for turn in (*one.turns, *one.neighbours):
+            yield (
+                one.verdict.name, turn.choice.name, turn.choice.own, turn.value, turn.held,
+                turn.choice.unit, turn.distance, turn.share, turn.choice.task,
+            )  # fmt: skip
+
+
+def _draws(told: Told) -> Iterator[Sequence[Any]]:
+    names = [(claim, text) for claim, own in told.tried.base.numbers.items() for text in own]
+    yield (
+        "draw", *(one.name for one in told.tried.draws.choices), *told.tried.base.answers,
+        *(f"{claim}: {text}" for claim, text in names), "failed",
+    )  # fmt: skip
+    for i, world in enumerate(told.tried.worlds):
+        answers = (world.answers.get(claim) for claim in told.tried.base.answers)
+        numbers = (world.numbers.get(claim, {}).get(text, math.nan) for claim, text in names)
+        yield i, *told.tried.draws.values[i], *answers, *numbers, visible(world.failed)
+
+
+def _pictures(told: Told, extras: Extras) -> list[Picture]:
+    from podusv_cli.doubt.figures import sketches  # matplotlib is slow to import
+    from podusv_cli.studies.sketch import rendered
+
+    return rendered(sketches(told), extras)[1]
+
+
+def page(told: Told, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
+    """The page."""
+    by_claim = {
+        one.verdict.name: [
+            (i, p) for i, p in enumerate(pictures, 1) if p.name.endswith(f"-{one.verdict.name}")
+        ]
+        for one in told.answers
+    }
+    return environment("podusv_cli.doubt").get_template("doubt.html.j2").render(
+        title=f"What the verdicts of {told.scenario.name} hang on",
+        scenario=told.scenario, answers=told.answers, head=HEAD,
+        rows={one.verdict.name: row(one) for one in told.answers},
+        place=place, in_words=in_words, pictures=by_claim, draws=len(told.tried.worlds),
+        moved=[
+            (c.name, value_text(c.own), _moves(c), c.task)
+            for c in (one.choice for one in told.tried.alone)
+        ],
+        provenance=[(key, value_text(value)) for key, value in flat(origin)],
+    )  # fmt: skip
+
+
+def _moves(choice: Choice) -> str:
+    """The values that a choice had, in words."""
+    if choice.range:
+        return " to ".join(f"{end:.4g}" for end in ends(choice))
+    return ", ".join(as_yaml(value) for value in choice.values)

@@ -1,0 +1,106 @@
+"""All choices at once: how many draws keep a verdict, and which choices explain the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.core import random_words
+from podusv_cli.core.kernel import Vector
+from podusv_cli.doubt.choices import Choice
+from podusv_cli.doubt.judged import Judged, World, together
+
+STREAM = "doubt"
+PERMUTATIONS = 400
+LEVEL = 0.95  # of the band that chance stays within
+
+
+class Explained(NamedTuple):
+    """Where the draws that turn a verdict are: shares of turned draws in a part and elsewhere."""
+
+    choice: Choice
+    part: str  # `above`, `below`, `far from` or `near` the choice's own value
+    inside: float
+    outside: float
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Worlds with all choices drawn at once: `shares` in (0, 1), shape (draw, choice)."""
+
+    choices: Sequence[Choice]
+    shares: Vector
+    values: Sequence[Sequence[Any]]  # of a draw, in the order of the choices
+
+    def world(self, draw: int) -> World:
+        """The world of a draw."""
+        return together(self.choices, self.values[draw])
+
+
+def drawn(choices: Sequence[Choice], seed: int, count: int) -> Draws:
+    """Draws of all numbers among the choices but those that make another task.
+
+    A draw depends on the seed, the choice's name and the draw's number alone.
+    """
+    moving = [one for one in choices if one.range and not (one.task or one.beside)]
+    shares = np.array(
+        [random_words.uniforms((seed, STREAM, one.name), 0, count) for one in moving]
+    ).reshape(len(moving), count)
+    columns = [_values(one, u) for one, u in zip(moving, shares, strict=True)]
+    return Draws(moving, shares.T, [[column[i] for column in columns] for i in range(count)])
+
+
+def _values(choice: Choice, shares: Vector) -> list[Any]:
+    assert choice.range
+    way = choice.range.together
+    return [way.value(choice.own, d) for d in way.distribution.at(shares).tolist()]
+
+
+def explained(
+    draws: Draws, turned: npt.NDArray[np.bool_], known: npt.NDArray[np.bool_],
+    acting: Mapping[str, bool],
+) -> list[Explained]:  # fmt: skip
+    """The parts of choices in which more draws turn than chance has it, the clearest first.
+
+    Of the draws in which the claim's answer is known. The band is that of the clearest of all
+    choices after the turned draws are shuffled.
+    """
+    rows = [i for i, one in enumerate(draws.choices) if acting[one.name]]
+    turned, shares = turned[known], draws.shares[known][:, rows]
+    if not rows or not turned.any() or turned.all():
+        return []
+    parts = np.stack([shares > 0.5, abs(shares - 0.5) > 0.25])  # (part, draw, choice)
+    found = _differences(parts, turned)
+    shuffle = np.random.Generator(np.random.Philox(key=1)).permutation
+    chance = [abs(_differences(parts, shuffle(turned))).max() for _ in range(PERMUTATIONS)]
+    clear = [tuple(at) for at in np.argwhere(abs(found) > np.quantile(chance, LEVEL))]
+    order = sorted(clear, key=lambda at: -abs(found[at]))
+    return [_told(draws.choices[rows[c]], p, parts[p, :, c], turned) for p, c in order]
+
+
+def _differences(parts: Any, turned: Any) -> Any:
+    """Share of turned draws inside each part less that outside it."""
+    inside, outside = parts.sum(axis=1), (~parts).sum(axis=1)
+    with np.errstate(all="ignore"):
+        here, there = ((half * turned[:, None]).sum(axis=1) for half in (parts, ~parts))
+        return np.nan_to_num(here / inside - there / outside)
+
+
+def _told(choice: Choice, part: int, inside: Any, turned: Any) -> Explained:
+    shares = float(turned[inside].mean()), float(turned[~inside].mean())
+    more = shares[0] > shares[1]
+    word = (("below", "above"), ("near", "far from"))[part][more]
+    return Explained(choice, word, *(shares if more else shares[::-1]))
+
+
+def counted(
+    claim: str, worlds: Sequence[Judged], base: Judged
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Which draws turn a claim's verdict, and in which its answer is known."""
+    turned = np.array([one.turned(claim, base) for one in worlds], bool)
+    known = np.array([one.answers.get(claim) is not None for one in worlds], bool)
+    return turned, known

@@ -1,0 +1,220 @@
+"""`podusv doubt`: what would have to change for the verdicts on a scenario's claims to turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.comparison import claims
+from podusv_cli.comparison.claims import ParsedClaim, parse_claims
+from podusv_cli.comparison.entries import Entry, metrics_of
+from podusv_cli.comparison.margins import with_margins
+from podusv_cli.core.errors import PodusvError, UsageError
+from podusv_cli.core.recording import Recording, Status
+from podusv_cli.doubt import outputs
+from podusv_cli.doubt.alone import Alone, explored
+from podusv_cli.doubt.answer import Answer, Tried, answers, as_json, labels_of
+from podusv_cli.doubt.check import doubt_faults
+from podusv_cli.doubt.choices import HULL, Choice, Singles, choices
+from podusv_cli.doubt.judged import Judge, Judged, World
+from podusv_cli.doubt.together import Draws, drawn
+from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.process.workers import Job, run_shares
+from podusv_cli.scenario.address import Number, with_values
+from podusv_cli.scenario.doubt import Doubt
+from podusv_cli.scenario.limits import limits
+from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.yaml_tree import find, placed
+from podusv_cli.storage import provenance
+from podusv_cli.storage.run_folder import Run, RunWriter, default_folder
+from podusv_cli.workflows.execute import Stopwatch, examined, monitored, simulated, summary, warm_up
+from podusv_cli.workflows.run import RESULTS, Request, opened
+
+Progress = Callable[[str, float], None]
+BATCH = 10  # draws that a process makes before it tells
+
+
+@dataclass(frozen=True)
+class Doubted:
+    """What the verdicts of a scenario hang on, and where the tables, figures and page are."""
+
+    folder: Path
+    answers: Sequence[Answer]
+    status: Status
+    missing: tuple[Failure, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {
+            "format": 1, "status": self.status, "folder": str(self.folder),
+            "claims": [as_json(one) for one in self.answers],
+            "missing": [str(part) for part in self.missing],
+        }  # fmt: skip
+
+
+def doubt(config: Path, request: Request, progress: Progress | None = None) -> Doubted:
+    """Move all that the source of a scenario's claims leaves open, and judge them anew.
+
+    An interrupt keeps what is tried so far. Raises UsageError without claims, ScenarioError,
+    StorageError.
+    """
+    checks = (unknown_codes, limits(request.allow_large), doubt_faults)
+    return doubt_of(opened(config, request, checks), request, progress)
+
+
+def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None) -> Doubted:
+    """The same for a scenario that is loaded and checked."""
+    started, scenario = datetime.now(UTC), loaded.scenario
+    world = comparison(loaded)
+    target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
+    with (
+        interrupts_deferred(),
+        RunWriter(target, force=request.force, named=request.out is not None) as writer,
+    ):
+        told, extras = doubted(world, scenario, request, progress)
+        origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
+        outputs.write(writer, told, loaded.text, origin, extras, figures=request.figures)
+        status: Status = "interrupted" if extras.interrupted else "finished"
+        return Doubted(writer.finish(status), told.answers, status, tuple(extras.missing))
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The claims of a scenario that runs decide, the laws in them, and the same on other hulls."""
+
+    parsed: Sequence[ParsedClaim]
+    singles: Singles
+    hulls: Mapping[str, Singles]
+
+
+def comparison(loaded: Loaded) -> Compared:
+    """What there is to judge. Raises UsageError without claims, ScenarioError for a bad hull."""
+    parsed = [one for one in parse_claims(loaded) if not claims.is_timed(one.claim)]
+    if not parsed:
+        raise UsageError(
+            f"{loaded.scenario.name} has no claims that runs decide, so no verdict can turn; write "
+            "some under `claims`, as podusv docs claims shows"
+        )
+    named = {label for one in parsed for label in labels_of(one)}
+
+    def judged(scenario: Scenario) -> Singles:
+        return {label: one for label, one in scenario.singles().items() if label in named}
+
+    hulls = find(loaded.root, ("doubt", "hulls"))
+    others = {
+        node.content: judged(loaded.changed(placed("vessel.preset", node, loaded.root)))
+        for node in (hulls.content if hulls else ())
+    }
+    return Compared(parsed, judged(loaded.scenario), others)
+
+
+def doubted(
+    compared: Compared, scenario: Scenario, request: Request, progress: Progress | None
+) -> tuple[outputs.Told, Extras]:
+    """All that is tried, and what it says of every claim."""
+    for one in compared.singles.values():
+        case = Case(one)
+        examined(case)
+        with interrupts_enabled():
+            warm_up(case, request.compiling)
+    with interrupts_enabled():
+        entries = {label: _entry(label, one) for label, one in compared.singles.items()}
+    judge, asked = judging(compared, entries), scenario.doubt or Doubt()
+    tried = search(compared.singles, judge, asked, request.workers, progress)
+    extras = Extras(interrupted=len(tried.worlds) < asked.draws)
+    return outputs.Told(scenario, answers(compared.parsed, entries, tried), tried), extras
+
+
+def search(
+    singles: Singles, judge: Judge, doubt: Doubt, workers: int = 0,
+    progress: Progress | None = None,
+) -> Tried:  # fmt: skip
+    """Try every choice alone, and draw all at once; shorter after an interrupt."""
+    base, found = judge({}), choices(singles, doubt)
+    draws = drawn(found, doubt.seed, doubt.draws)
+    tell = progress or (lambda what, fraction: None)
+    alone = _made(
+        [partial(_explored, one, judge, base) for one in found],
+        partial(tell, "one at a time"), workers,
+    )  # fmt: skip
+    parts = [range(i, min(i + BATCH, doubt.draws)) for i in range(0, doubt.draws, BATCH)]
+    worlds = _made(
+        [partial(_judged, draws, part, judge) for part in parts],
+        partial(tell, "all at once"), workers,
+    )  # fmt: skip
+    return Tried(base, alone, draws, [one for part in worlds for one in part])
+
+
+def _made(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) -> list[Any]:
+    """The results of jobs up to the first that has none."""
+    outcomes = run_shares(jobs, progress, workers)
+    for outcome in outcomes:
+        if outcome.failure and not outcome.interrupted:
+            raise PodusvError(outcome.failure)
+    ended = next((i for i, one in enumerate(outcomes) if one.result is None), len(outcomes))
+    return [outcome.result for outcome in outcomes[:ended]]
+
+
+def _explored(choice: Choice, judge: Judge, base: Judged, tell: Callable[[float], None]) -> Alone:
+    with interrupts_enabled():
+        return explored(choice, judge, base)
+
+
+def _judged(draws: Draws, part: range, judge: Judge, tell: Callable[[float], None]) -> list[Judged]:
+    with interrupts_enabled():
+        return [judge(draws.world(i)) for i in part]
+
+
+def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
+    """What judges the claims in a world; `entries` are the runs that a world does not move."""
+
+    def judge(world: World) -> Judged:
+        labels = dict.fromkeys(label for label, _ in world)
+        try:
+            moved = {label: _entry(label, _changed(compared, label, world)) for label in labels}
+        except PodusvError as error:
+            return Judged({}, {}, str(error))
+        measured = with_margins([*{**entries, **moved}.values()], compared.parsed, Extras())
+        metrics = metrics_of(measured)
+        verdicts = claims.judge(compared.parsed, {e.label: e for e in measured}, metrics)
+        return Judged({v.name: v.answer for v in verdicts}, {v.name: v.numbers for v in verdicts})
+
+    return judge
+
+
+def _changed(compared: Compared, label: str, world: World) -> Scenario:
+    new = {at: Number("", value) for (one, at), value in world.items() if one == label}
+    hull = new.pop(HULL, None)
+    single = (compared.hulls[hull.value] if hull else compared.singles)[label]
+    return with_values(single, new)
+
+
+@dataclass(frozen=True)
+class InMemory(Run):
+    """A run that lies in no folder."""
+
+    kept: Recording = field(kw_only=True)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """What was recorded."""
+        return self.kept
+
+
+def _entry(label: str, scenario: Scenario) -> Entry:
+    case = Case(scenario)
+    recording = simulated(case, Stopwatch())
+    if recording.status == "interrupted":
+        raise KeyboardInterrupt
+    whole, _ = monitored(case, recording)
+    numbers = summary(case, recording, Extras())
+    return Entry(
+        label, InMemory(Path(), recording.status, dict(numbers), {}, "", kept=whole), scenario
+    )

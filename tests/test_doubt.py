@@ -1,0 +1,382 @@
+"""What verdicts hang on: turns that algebra knows, planted judges, the words, and the files."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import podusv
+from podusv_cli.comparison import claims
+from podusv_cli.comparison.entries import Entry
+from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import Signal
+from podusv_cli.doubt.alone import SHARP, explored
+from podusv_cli.doubt.answer import compared
+from podusv_cli.doubt.choices import Choice, Range, choices, public
+from podusv_cli.doubt.events import nearest_event
+from podusv_cli.doubt.judged import Judged
+from podusv_cli.doubt.together import counted, drawn, explained
+from podusv_cli.scenario.distributions import Distribution
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.sweep import Quantity
+from podusv_cli.workflows.doubt import InMemory
+
+# A hull that nothing pushes: u' = X_u u/(m - X_udot), by Fossen (2021), eq. 6.110, with u alone.
+ADRIFT = """
+name: adrift
+vessel: {preset: cybership2_linear}
+path: {kind: line, speed: 1.0}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+start: {u: 0.5}
+simulation: {step: 0.01, duration: 10.0}
+controllers:
+  a: {kind: pid, K_Pu: 0.0, K_Iu: 0.0, K_Du: 0.0, K_Pr: 0.0, K_Ir: 0.0, K_Dr: 0.0}
+claims:
+  slow: {says: It has lost speed., source: "section 1", expect: final(a.u) <= LIMIT, tolerance: 0.0}
+  still: {says: It goes straight., expect: max(abs(a.v)) <= 0.1, tolerance: 0.0}
+doubt: {draws: 40}
+"""
+
+
+def scenario(text=ADRIFT, *overrides):
+    return load_text(text, "adrift.yaml", overrides).scenario
+
+
+HULL = scenario(ADRIFT.replace("LIMIT", "1")).vessel
+MASS = HULL.m - HULL.X_udot
+
+
+def left(u=0.5, damping=HULL.X_u, mass=MASS):
+    """The speed that is left after 10 s."""
+    return u * math.exp(damping * 10.0 / mass)
+
+
+WRITTEN = ADRIFT.replace("LIMIT", f"{1.03 * left():.17g}")
+
+
+def doubted(podusv, *words, text=WRITTEN):
+    Path("adrift.yaml").write_text(text, "utf-8")
+    said = podusv("doubt", "adrift.yaml", "--out", "out", "--no-figures", *words)
+    assert said.code == 0, said.err
+    return said
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    """The folder that one process fills."""
+    at = tmp_path_factory.mktemp("doubt")
+    (at / "adrift.yaml").write_text(WRITTEN, "utf-8")
+    table = podusv.doubt(at / "adrift.yaml", out=at / "out", figures=False, workers=1)
+    return at / "out", table
+
+
+def rows(name, folder=Path("out")):
+    with Path(folder, name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_verdict_turns_where_algebra_says(out):
+    turns = {r["key"]: r for r in rows("turns.csv", out[0]) if r["claim"] == "slow"}
+    u = 0.5 * 1.03
+    X_u = MASS * math.log(1.03 * left() / 0.5) / 10.0
+    m = HULL.X_u * 10.0 / math.log(1.03 * left() / 0.5) + HULL.X_udot
+    for key, value in {"start.u": u, "vessel.X_u": X_u, "vessel.m": m}.items():
+        found, held, own = (float(turns[key][name]) for name in ("turns_at", "held", "own"))
+        assert abs(held - own) < abs(value - own) <= abs(found - own) <= SHARP * abs(held - own)
+    assert "vessel.Y_v" not in turns  # a hull that goes straight does not feel it
+    (slow, still) = rows("doubt.csv", out[0])
+    nearest = min(abs(X_u / HULL.X_u - 1.0), abs(m / HULL.m - 1.0), 0.03 * 0.5 / 1.0)
+    assert float(slow["nearest_share"]) == pytest.approx(nearest, rel=SHARP - 1.0)
+    assert (slow["word"], slow["verdict"]) == ("fragile", "reproduced")
+    assert still["word"] == "robust"
+
+
+def test_draws_are_judged_as_algebra_has_it(out):
+    drawn = rows("draws.csv", out[0])
+    for row in drawn:
+        u, X_u, m = (float(row[key]) for key in ("start.u", "vessel.X_u", "vessel.m"))
+        mass = m - float(row["vessel.X_udot"])
+        number = float(row["slow: final(a.u)"])
+        if not any(float(row[key]) for key in ("start.v", "start.r", "start.psi")):
+            assert number == pytest.approx(left(u, X_u, mass), rel=1e-9)
+        assert row["slow"] == str(number <= 1.03 * left())
+    kept = sum(row["slow"] == "True" for row in drawn)
+    assert 0 < kept < len(drawn) == 40
+    assert int(rows("doubt.csv", out[0])[0]["kept"]) == kept
+
+
+def test_one_process_or_two_find_the_same(out, podusv):
+    doubted(podusv, "--workers", "2")
+    for name in ("turns.csv", "draws.csv", "doubt.json"):
+        assert Path("out", name).read_bytes() == (out[0] / name).read_bytes()
+
+
+def test_what_the_source_prints_stays(podusv):
+    text = WRITTEN.replace("doubt: {", "doubt: {printed: [start, vessel.X_u, controllers.a], ")
+    doubted(podusv, text=text)
+    moved = [*rows("draws.csv")[0]]
+    assert "vessel.m" in moved
+    assert not {"start.u", "vessel.X_u", "controllers.a.k_ze"} & {*moved}
+    assert {row["key"] for row in rows("turns.csv")} == {"vessel.m"}
+
+
+def test_vary_has_the_ranges(podusv):
+    vary = "vary: {start.u: {times: {uniform: [0.9, 1.02]}}, start.x: {choice: [1.0, 2.0]}}"
+    doubted(podusv, text=WRITTEN.replace("doubt: {", f"doubt: {{{vary}, "))
+    turns = [r for r in rows("turns.csv") if r["key"] == "start.u"]
+    assert not turns  # 1.03 is where it would
+    assert all(0.45 <= float(row["start.u"]) <= 0.51 for row in rows("draws.csv"))
+
+
+def test_a_hull_is_tried_as_a_whole(podusv):
+    text = WRITTEN.replace("doubt: {", "doubt: {hulls: [cybership1], ").replace("<=", ">=", 1)
+    text = text.replace(f"{1.03 * left():.17g}", f"{0.9 * left():.17g}")
+    doubted(podusv, text=text)
+    (turn,) = (r for r in rows("turns.csv") if r["key"] == "vessel.preset" and r["claim"] == "slow")
+    assert turn["turns_at"] == "cybership1"
+    other = scenario(WRITTEN, "vessel.preset=cybership1").vessel
+    assert left(damping=other.X_u, mass=other.m - other.X_udot) < 0.9 * left()
+
+
+@pytest.mark.parametrize(
+    ("section", "said"),
+    [
+        ("printed: [start.w]", "doubt.printed[0]: unknown key 'start.w'; did you mean 'start."),
+        ("vary: {start.w: {plus: {uniform: [0, 1]}}}", "doubt.vary.start.w: unknown key 'start.w'"),
+        ("hulls: [otte]", "vessel.preset: unknown vessel 'otte'; did you mean 'otter'?"),
+        ("draws: 0", "doubt.draws: must be a whole number not below 1"),
+    ],
+)
+def test_mistakes_are_named(podusv, section, said):
+    text = WRITTEN.replace("doubt: {draws: 40}", f"doubt: {{{section}}}")
+    Path("adrift.yaml").write_text(text, "utf-8")
+    done = podusv("doubt", "adrift.yaml")
+    assert done.code == 2
+    assert said in " ".join(done.err.split())
+
+
+def test_without_claims_there_is_nothing_to_doubt(podusv):
+    done = podusv("doubt", "a.yaml")
+    assert done.code == 2
+    assert "has no claims that runs decide, so no verdict can turn" in " ".join(done.err.split())
+
+
+def test_python_has_the_same_table(out):
+    folder, table = out
+    assert [str(n) for n in table["kept"]] == [row["kept"] for row in rows("doubt.csv", folder)]
+    assert table.loc["slow", "nearest"] == rows("doubt.csv", folder)[0]["nearest"]
+
+
+# ---- the search, by judges of a line of Python ----
+
+
+def moving(own=1.0, name="k"):
+    quantity = Quantity(times=Distribution(log_uniform=(0.25, 4.0)))
+    return Choice(name, (("a", ("controller", name)),), own, range=Range(quantity, quantity, own))
+
+
+def by(rule):
+    """A judge of one claim about one number."""
+
+    def judge(world):
+        number = next(iter(world.values()), 1.0)
+        return Judged({"C": bool(rule(number))}, {"C": {"k": number}})
+
+    return judge
+
+
+@pytest.mark.parametrize("place", [3.3, 1.04, 1.0 + 3e-5, 0.9997, 0.31])
+def test_the_place_is_bracketed_however_near(place):
+    judge = by(lambda k: (k < place) is (place > 1.0))
+    (turn,) = explored(moving(), judge, judge({})).turns("C", judge({}))
+    assert abs(turn.held - 1.0) < abs(place - 1.0) * (1 + 1e-12)
+    assert abs(turn.value - 1.0) >= abs(place - 1.0) * (1 - 1e-12)
+    assert turn.distance <= SHARP * abs(turn.held - 1.0) * (1 + 1e-9)
+
+
+def test_a_verdict_that_the_last_digit_turns():
+    judge = by(lambda k: k == 1.0)
+    turns = explored(moving(), judge, judge({})).turns("C", judge({}))
+    assert [turn.by_rounding for turn in turns] == [True, True]
+    assert {turn.value for turn in turns} == {1.0 + math.ulp(1.0), 1.0 - math.ulp(1.0)}
+
+
+def test_a_verdict_that_turns_back_is_seen_at_a_tenth_of_the_range():
+    judge = by(lambda k: not 1.2 < k < 1.4)
+    (turn,) = explored(moving(), judge, judge({})).turns("C", judge({}))
+    assert 1.2 < turn.value < 1.2 * SHARP + 0.01
+
+
+def test_a_number_that_does_not_act_is_tried_at_its_ends_alone():
+    tried = []
+
+    def judge(world):
+        tried.append(world)
+        return Judged({"C": True}, {"C": {"k": 7.0}})
+
+    alone = explored(moving(), judge, judge({}))
+    assert len(tried) == 1 + 2
+    assert not alone.acts("C", judge({}))
+
+
+def planted(rule, count=300):
+    names = ("a", "b", "c")
+    draws = drawn([moving(name=name) for name in names], 1, count)
+    turned = np.array([rule(dict(zip(names, u, strict=True))) for u in draws.shares])
+    return explained(draws, turned, np.ones(count, bool), dict.fromkeys(names, True))
+
+
+def test_the_choice_that_turns_draws_is_named():
+    first, *_ = planted(lambda u: u["b"] > 0.7)
+    assert (first.choice.name, first.part) == ("b", "above")
+    assert first.outside == 0.0
+    assert first.inside == pytest.approx(0.6, abs=0.1)
+    first, *_ = planted(lambda u: abs(u["c"] - 0.5) > 0.4)
+    assert (first.choice.name, first.part) == ("c", "far from")
+
+
+def test_chance_explains_nothing():
+    random = np.random.default_rng(3)
+    wrongly = sum(bool(planted(lambda u: random.random() < 0.2)) for _ in range(40))
+    assert wrongly <= 6  # of 40 at 5 %: 7 or more with a chance of 0.5 %
+
+
+def test_a_draw_depends_on_its_name_and_index_alone():
+    few, many = drawn([moving(name="b")], 1, 5), drawn([moving(name="a"), moving(name="b")], 1, 9)
+    assert (few.shares[:, 0] == many.shares[:5, 1]).all()
+    assert [v[0] for v in few.values] == [v[1] for v in many.values[:5]]
+
+
+# ---- which values move, and together with which ----
+
+TWO = WRITTEN.replace(
+    "K_Dr: 0.0}",
+    "K_Dr: 0.0}\n  b: {kind: pid, k_ze: 0.2, anti_windup: auxiliary}\n  c: {kind: los_pid}",
+).replace("claims:\n", "claims:\n  less: {says: Less., expect: a.iae < b.iae}\n")
+
+
+def by_name():
+    return {one.name: one for one in choices(scenario(TWO).singles())}
+
+
+def test_a_value_that_laws_share_moves_in_all():
+    shared = by_name()["controllers.a.k_psie"]
+    assert {public(place) for place in shared.places} == {
+        "controllers.a.k_psie", "controllers.b.k_psie",
+    }  # fmt: skip
+
+
+def test_what_two_laws_differ_in_stays_in_claims_about_both():
+    own, other = by_name()["controllers.a.k_ze"], by_name()["controllers.b.k_ze"]
+    assert own.is_contrast(frozenset("ab"))
+    assert not own.is_contrast(frozenset("a"))
+    assert other.is_contrast(frozenset("b"))  # 0.2 in place of the default is what b is for
+    assert not by_name()["controllers.c.k_s"].is_contrast(frozenset("abc"))
+
+
+def test_the_hull_moves_with_what_laws_know_of_it():
+    found = by_name()
+    assert {route[0] for _, route in found["vessel.m"].places} == {"vessel", "nominal"}
+    assert not found["vessel.m"].task
+    assert {route[0] for _, route in found["nominal.m"].places} == {"nominal"}
+    assert found["nominal.m"].task
+
+
+def test_a_word_is_tried_in_all_its_forms():
+    found = by_name()
+    assert found["controllers.a.anti_windup"].values == ("auxiliary",)
+    assert found["control.update"].values == ("before",)
+    assert not found["controllers.c.k_s"].values
+
+
+def test_the_numbers_of_a_claim_with_their_limits():
+    assert compared("max(a.x) <= 0.1 and -3 > a.e") == [("max(a.x)", "", 0.1), ("a.e", "", -3.0)]
+    assert compared("1 < a.e < b.e") == [("a.e", "", 1.0), ("a.e", "b.e", 1.0)]
+    (ratio,) = compared("not b.iae > 2 * a.iae")
+    assert ratio == ("b.iae", "2 * a.iae", 1.0)
+    assert ratio.of({"b.iae": 3.0, "2 * a.iae": 4.0}) == 0.75
+    assert math.isnan(ratio.of({"b.iae": 3.0}))
+    assert compared("finished(a)")[0].of({"finished(a)": 1.0}) == 1.0
+
+
+def test_the_margin_is_counted_in_half_widths_of_the_draws():
+    (number,) = compared("a.e <= 0.5")
+    worlds = [Judged({}, {"C": {"a.e": x}}) for x in np.linspace(0.0, 1.0, 101)]
+    spread = number.spread("C", [*worlds, Judged({}, {}, "no such world")])
+    assert spread == pytest.approx((0.05, 0.5, 0.95))
+    assert number.margin({"a.e": 0.2}, spread) == pytest.approx(0.3 / 0.45)
+    assert number.margin({"a.e": 0.2}, (0.2, 0.2, 0.2)) == math.inf
+
+
+def test_worlds_that_cannot_be_are_counted():
+    worlds = [Judged({"C": True}, {}), Judged({}, {}, "no mass"), Judged({"C": False}, {})]
+    turned, known = counted("C", worlds, worlds[0])
+    assert turned.tolist() == [False, False, True]
+    assert known.tolist() == [True, False, True]
+
+
+def logged(leg):
+    """A run of ten seconds that logs a leg, as far as a claim's windows are about it."""
+    t = np.linspace(0.0, 10.0, 101)
+    signals = {"time": t, "leg": np.array([leg(one) for one in t]), "u": t}
+    about = {"leg": Signal("leg", "1", "legs done"), "u": Signal("u", "m/s", "speed")}
+    run = InMemory(
+        Path(), "finished", {}, {}, "", kept=Recording("finished", "pid", signals, about=about)
+    )
+    return {"a": Entry("a", run, scenario(WRITTEN))}
+
+
+def test_the_event_nearest_to_a_window_is_named():
+    text = WRITTEN.replace("expect: final(a.u)", "expect: 'max(abs(a.u), 2, 6.5)").replace(
+        ", tol", "', tol", 1
+    )
+    parsed, _ = claims.parse_claims(load_text(text, "a.yaml"))
+    event = nearest_event(parsed, logged(lambda t: float(t > 1.25) + float(t > 6.85)))
+    assert (event.run, event.signal, event.value, event.edge) == ("a", "leg", 2.0, 6.5)
+    assert event.gap == pytest.approx(0.4)  # logged each 0.1 s
+    assert "0.4 s after the edge of a window at 6.5 s" in str(event)
+    assert nearest_event(parsed, logged(lambda t: 0.0)) is None
+
+
+# ---- the sentences of the papers ----
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("config", "claim", "word", "key"),
+    [
+        ("lefeber_2003/line.yaml", "L6", "knife's edge", "start.psi"),
+        ("lefeber_2003/line.yaml", "L7", "robust", ""),
+        ("lefeber_2003/circle.yaml", "L3", "robust", ""),
+        ("lefeber_2003/port.yaml", "L9", "robust", ""),
+        ("fossen_2003/course.yaml", "F1", "robust", ""),
+        ("fossen_2003/course.yaml", "F2", "robust", ""),
+        ("fossen_2003/course.yaml", "F4", "knife's edge", "start.y"),
+        ("fossen_2003/cybership2.yaml", "F7", "under conditions", "controllers.paper.w"),
+    ],
+)
+def test_the_sentences_hang_on_what_reviewers_turned_them_by(podusv, config, claim, word, key):
+    podusv("doubt", f"podusv:{config}", "--out", "out", "--no-figures")
+    (found,) = (row for row in rows("doubt.csv") if row["claim"] == claim)
+    assert (found["word"], found["nearest"]) == (word, key)
+
+
+@pytest.mark.slow
+def test_the_filter_that_turns_F7_turns_single_runs(podusv):
+    """`podusv run`, beside the search's own loop: 2.1 1/s misses waypoints, 2.2 1/s does not."""
+    done = {
+        w: podusv(
+            "compare", "podusv:fossen_2003/cybership2.yaml", "--set", f"controllers.paper.w={w}",
+            "--set", f"controllers.one_length.w={w}", "--no-figures", "--json", "--out", str(w),
+        )
+        for w in (2.1, 2.2)
+    }  # fmt: skip
+    verdicts = {
+        w: {c["claim"]: c["verdict"] for c in json.loads(said.out)["claims"]}
+        for w, said in done.items()
+    }
+    assert (verdicts[2.1]["F7"], verdicts[2.2]["F7"]) == ("not reproduced", "reproduced")
