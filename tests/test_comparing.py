@@ -1,6 +1,7 @@
 """Comparisons from scenario or folder to table, verdicts, figures and report."""
 
 import json
+import math
 import re
 from html.parser import HTMLParser
 
@@ -115,8 +116,10 @@ def test_costs_are_measured_side_by_side(done, monkeypatch):
         return [{"law_ns": float(place)} for place, _ in enumerate(runs)]
 
     monkeypatch.setattr(compare, "law_costs", costs)
-    entries = compare._with_costs(list(done.result.entries), Extras())
-    assert [entry.metric("law_ns") for entry in entries] == [0.0, 1.0, 2.0]
+    first, *rest = done.result.entries
+    entries = compare._with_costs([first, *rest], [one.label for one in rest], Extras())
+    assert [entry.metric("law_ns") for entry in entries[1:]] == [0.0, 1.0]
+    assert math.isnan(entries[0].metric("law_ns"))
 
 
 class Links(HTMLParser):

@@ -12,6 +12,7 @@ import h5py
 import pytest
 import yaml
 from command_samples import BASE, Command, one_line, write
+from loop_counts import loop_counts
 from plugin_samples import LAW, SCENARIO, TWO, put
 from test_cli_words import offered_for
 
@@ -122,6 +123,18 @@ def test_a_finished_run_is_looked_at_without_reading_its_file(podusv):
     assert "0.25" in Path("d/report.html").read_text()
     assert not Path("touched").exists()
     assert podusv("rerun", "c/soft", "--trust").code == 2
+
+
+@pytest.mark.parametrize("words", [("plot",), ("diff",), ("compare", "--no-figures")])
+def test_looking_at_finished_runs_builds_no_loop(podusv, monkeypatch, words):
+    podusv("compare", put(TWO), "--out", "c", *QUIET)
+    shutil.rmtree("laws")
+    calls = loop_counts(monkeypatch)
+    command, *options = words
+    out = () if command == "diff" else ("--out", "looked")
+    figure = ("--figure", "trajectory") if command == "plot" else ()
+    assert podusv(command, "c/soft", "c/pid", *out, *figure, *options).code in (0, 3)
+    assert not calls
 
 
 def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
 from podusv_cli.comparison.claims import ParsedClaim
@@ -16,17 +16,23 @@ from podusv_cli.theory.loop_margins import loop_margins
 
 
 def with_margins(
-    entries: Sequence[Entry], claims: Sequence[ParsedClaim], extras: Extras
+    entries: Sequence[Entry], made: Collection[str], claims: Sequence[ParsedClaim], extras: Extras
 ) -> list[Entry]:
-    """The entries, each with those margins of its loop that the claims name.
+    """The entries; those `made` now, each with those margins of its loop that the claims name.
 
-    A run whose loop has no margins has none; `extras` says why.
+    A finished run, and one whose loop has no margins, has none; `extras` says why.
     """
     named = {pair for claim in claims for pair in _named(claim)}
     wanted = {
         e.label: {n for label, n in named if label == e.label and n in OF_LOOP} for e in entries
     }
-    return [_measured(e, wanted[e.label], extras) if wanted[e.label] else e for e in entries]
+    for run in (one.run for one in entries if wanted[one.label] and one.label not in made):
+        why = f"it is finished: podusv margins {run.folder}/resolved.yaml"
+        extras.missing.append(Failure(f"margins of {run.folder.name}", why))
+    return [
+        _measured(e, wanted[e.label], extras) if wanted[e.label] and e.label in made else e
+        for e in entries
+    ]
 
 
 def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
@@ -40,10 +46,7 @@ def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
 
 def _measured(entry: Entry, wanted: set[str], extras: Extras) -> Entry:
     what, scenario = f"margins of {entry.label}", entry.scenario
-    if scenario.recorded:
-        why = f"the plug-ins of its {', '.join(scenario.recorded)} are not here"
-        extras.missing.append(Failure(what, why))
-    if scenario.recorded or extras.interrupted:
+    if extras.interrupted:
         return entry
     try:
         with interrupts_enabled():

@@ -23,10 +23,15 @@ MOST_INSTANTS = 2**53  # that are distinct numbers
 def conflicts(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other."""
     parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
-    values = parts or [
-        *of_numbers(scenario), *_names(scenario), *scenario.metrics.conflicts(),
-    ]  # fmt: skip
-    return values or list(_signals(scenario))
+    return parts or [*of_numbers(scenario), *_names(scenario), *scenario.metrics.conflicts()]
+
+
+def clashes(scenario: Scenario) -> list[tuple[str, str]]:
+    """Laws of which two signals of a run would have one name; nobody asks it of a finished run.
+
+    Nothing where values contradict each other, as no loop can be planned then.
+    """
+    return [] if conflicts(scenario) else list(_signals(scenario))
 
 
 def of_numbers(scenario: Scenario) -> Conflicts:

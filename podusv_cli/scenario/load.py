@@ -14,6 +14,7 @@ from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.scenario import plugins
+from podusv_cli.scenario.conflicts import clashes
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.kinds import kept
 from podusv_cli.scenario.layers import alone, composed
@@ -73,7 +74,7 @@ class Loaded:
         root = merge(self.root, without_misfits(self.root, top, faults))
         root = kept(root, keys_of(type(self.scenario)), [])
         source = self.root.mark.source
-        return _checked(root, self.scenario.plugged, source, faults, checks)[0]
+        return _checked(root, self.scenario.plugged, source, faults, (clashes, *checks))[0]
 
 
 def load(
@@ -108,7 +109,7 @@ def load_text(
     if root is None:
         raise ScenarioError(_ordered(faults, source))
     root, known, dropped = _known(root, plugged, files, source, faults)
-    scenario, origins = _checked(root, known, source, faults, checks)
+    scenario, origins = _checked(root, known, source, faults, (clashes, *checks))
     return Loaded(scenario, origins, text, root, dropped)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -207,10 +207,9 @@ def collect(
     }
     for label, done in finished.items():
         extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
-    entries = _with_costs(
-        [Entry(m.label, runs[m.label], m.scenario) for m in members if m.label in runs], extras
-    )
-    entries = with_margins(related(entries, extras), parsed, extras)
+    entries = [Entry(m.label, runs[m.label], m.scenario) for m in members if m.label in runs]
+    entries = related(_with_costs(entries, finished, extras), extras)
+    entries = with_margins(entries, finished, parsed, extras)
     sources: dict[str, Source] = {m.label: Absent(m.scenario, endings[m.label]) for m in members}
     sources |= {entry.label: entry for entry in entries}
     numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
@@ -232,16 +231,15 @@ def collect(
     )
 
 
-def _with_costs(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
-    """The entries with the laws' cost measured here and now, side by side.
+def _with_costs(entries: Sequence[Entry], made: Collection[str], extras: Extras) -> list[Entry]:
+    """The entries; those `made` now with the laws' cost measured here and now, side by side.
 
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
-    is never compared.
+    is never compared; and a finished run is looked at without its law.
     """
     timed = [
         e for e in entries
-        if e.scenario.simulation.compiled and len(e.recording["time"])
-        and not e.scenario.recorded
+        if e.label in made and e.scenario.simulation.compiled and len(e.recording["time"])
     ]  # fmt: skip
     loops = [(entry.scenario.plan(), entry.recording) for entry in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)

@@ -181,7 +181,8 @@ def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
             moved = {label: _entry(label, _changed(compared, label, world)) for label in labels}
         except PodusvError as error:
             return Judged({}, {}, str(error))
-        measured = with_margins([*{**entries, **moved}.values()], compared.parsed, Extras())
+        every = {**entries, **moved}
+        measured = with_margins([*every.values()], every, compared.parsed, Extras())
         metrics = metrics_of(measured)
         verdicts = claims.judge(compared.parsed, {e.label: e for e in measured}, metrics)
         return Judged({v.name: v.answer for v in verdicts}, {v.name: v.numbers for v in verdicts})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from podusv_cli.comparison.claims import ParsedClaim, parse_claims
@@ -12,8 +13,10 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
+from podusv_cli.scenario.plugins import recorded
 from podusv_cli.workflows.execute import examined
-from podusv_cli.workflows.members import Member, comparable, distinct, numbered
+from podusv_cli.workflows.members import Member, distinct, numbered
+from podusv_cli.workflows.members import from_folder as members_of
 from podusv_cli.workflows.run import Request, opened
 
 
@@ -65,7 +68,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> Item:
 
 def from_folder(path: Path, files: Sequence[str] = ()) -> Item:
     """The finished runs of a folder; `files` are plug-ins. Raises UsageError, StorageError."""
-    members = comparable(path, files)
+    members = members_of(path, plugged=partial(recorded, files))
     return Item(path.resolve().name, members, [member.label for member in members])
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import csv
-import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,6 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.load import LOOKED_AT, Plugged, load_stored
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
 from podusv_cli.storage.run_folder import LOG, LOGS, STUDY, THEORY, Run, open_run
@@ -123,26 +120,6 @@ def _fault(log: Recording) -> str:
     if wild:
         return f"{wild[0]} holds something that is no finite number"
     return "" if np.all(np.diff(log["time"]) > 0.0) else "its times do not increase"
-
-
-def comparable(path: Path, files: Sequence[str] = ()) -> list[Member]:
-    """As `from_folder`; also checks that the logs hold the memory with which laws are timed."""
-    members = from_folder(path, plugged=partial(recorded, files))
-    for member in members:
-        if member.run:
-            _check_memory(member.run, member.scenario)
-    return members
-
-
-def _check_memory(run: Run, scenario: Scenario) -> None:
-    log = run.recording
-    slots = {signal.name: size for signal, size in scenario.closed_loop().controller.slots()}
-    for name, size in slots.items():
-        if name not in log or math.prod(log[name].shape[1:]) != size:
-            raise StorageError(
-                f"{run.folder / LOG}: damaged, or not of the scenario beside it: "
-                f"{name} does not have {size} values in a row"
-            )
 
 
 def distinct(members: Iterable[Member]) -> list[Member]:

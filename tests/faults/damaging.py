@@ -48,7 +48,7 @@ def _entry(path: Path) -> dict[str, Any]:
 
 def opened(folder: Path) -> tuple[Any, ...]:
     """All that plot, compare, rerun and diff take from a run folder."""
-    (part,) = members.comparable(folder)
+    (part,) = members.from_folder(folder)
     assert part.run
     log = part.run.recording
     numbers = {name: array.tobytes() for name, array in {**log.signals, **log.fixed}.items()}

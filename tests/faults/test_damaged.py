@@ -222,18 +222,6 @@ def test_a_log_that_lacks_what_every_run_has(run, tmp_path, case):
         members.from_folder(other)
 
 
-def test_a_law_is_not_timed_with_the_memory_of_another(run, tmp_path):
-    # In machine code it would read beyond the end of what it remembers.
-    def shorter(signals: dict[str, Any]) -> None:
-        for name in ("W_hat_u", "W_hat_r"):
-            del signals[name]
-
-    other = copied(run, tmp_path / "other", log_h5=relogged(run, shorter))
-    assert members.from_folder(other)  # it can be drawn
-    with pytest.raises(StorageError, match="W_hat_u does not have 27 values in a row"):
-        members.comparable(other)
-
-
 # --- comparisons
 
 
