@@ -3,10 +3,12 @@
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from html_tree import tree
 
 import podusv
 from podusv_cli.comparison import claims
@@ -169,6 +171,27 @@ def test_python_has_the_same_table(out):
     folder, table = out
     assert [str(n) for n in table["kept"]] == [row["kept"] for row in rows("doubt.csv", folder)]
     assert table.loc["slow", "nearest"] == rows("doubt.csv", folder)[0]["nearest"]
+
+
+def test_a_comparison_says_what_its_verdicts_hang_on(podusv, out):
+    Path("adrift.yaml").write_text(WRITTEN, "utf-8")
+    done = podusv(
+        "compare", "adrift.yaml", "--doubt", "--no-figures", "--out", "c", "--workers", "1"
+    )
+    assert done.code == 0, done.err
+    assert (out[0] / "turns.csv").read_bytes() == Path("c/doubt/turns.csv").read_bytes()
+    cells = ["slow", "reproduced"], ["still", "holds"]
+    shown = tree(Path("c/report.html").read_text("utf-8")).rows()
+    assert all(any(row[:2] == cell and len(row) == 5 for row in shown) for cell in cells)
+    assert re.search(r"slow +reproduced +\d+ of 40 +", done.out)
+    assert podusv("compare", "c", "--no-figures").code == 0  # of its runs alone
+
+
+def test_only_a_scenario_alone_can_be_doubted_in_a_comparison(podusv):
+    for items in (("a.yaml", "a.yaml"), (".",)):
+        done = podusv("compare", *items, "--doubt")
+        assert done.code == 2
+        assert "--doubt moves the values of one scenario" in " ".join(done.err.split())
 
 
 # ---- the search, by judges of a line of Python ----

@@ -53,6 +53,9 @@ def compare(
             autocompletion=completion.metrics,
         ),
     ] = None,
+    doubt: Annotated[
+        bool, typer.Option("--doubt", help="Say what each verdict hangs on, as podusv doubt does.")
+    ] = False,
     workers: options.Workers = 0,
     as_json: options.AsJson = False,
     allow_large: options.AllowLarge = False,
@@ -75,7 +78,7 @@ def compare(
         request = Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), [name.strip() for name in form.split(",")], workers,
-            metrics=metric or (), trust=trust, compiling=compiling(progress),
+            metrics=metric or (), doubt=doubt, trust=trust, compiling=compiling(progress),
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)
@@ -120,6 +123,8 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = ()) -> None:
     echo(NOTE)
     for v in result.verdicts:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
+    if result.doubts:
+        echo_table(list(result.doubts[0]), [list(row) for row in result.doubts[1:]])
 
 
 def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:

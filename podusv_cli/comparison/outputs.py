@@ -49,6 +49,7 @@ class Result:
     warnings: Mapping[str, Sequence[Finding]]
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # that the table knows
     peaks: Mapping[str, float] = field(default_factory=dict)  # of signals, as claims name them
+    doubts: Sequence[Sequence[str]] = ()  # head and rows of what verdicts hang on, if asked for
 
     @property
     def unsettled(self) -> list[str]:
@@ -155,5 +156,6 @@ def as_report(
         theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
         figures=pictures, provenance=provenance, chase=chase.chase(shown),
         traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled,
+        doubts=result.doubts,
     )  # fmt: skip
     return report.page(story)

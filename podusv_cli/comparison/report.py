@@ -51,6 +51,7 @@ class Story:
     traces: Mapping[str, Any] = field(default_factory=dict)  # see `traces.traces`
     metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # of the table
     unsettled: Sequence[str] = ()  # runs that do not end at their target
+    doubts: Sequence[Sequence[str]] = ()  # head and rows of what the verdicts hang on
 
 
 def page(story: Story) -> str:

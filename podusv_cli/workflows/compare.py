@@ -21,6 +21,8 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Status
+from podusv_cli.doubt.check import doubt_faults
+from podusv_cli.doubt.outputs import HEAD, row
 from podusv_cli.findings.finding import Case, merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
@@ -28,13 +30,14 @@ from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import estimate, needed
-from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
+from podusv_cli.workflows.doubt import Doubted, comparison, doubt_of
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Gathered, gather
 from podusv_cli.workflows.members import Member
-from podusv_cli.workflows.run import RESULTS, Request
+from podusv_cli.workflows.run import RESULTS, Request, opened
 
 Progress = Callable[[str, float], None]
 UNMEASURED = dict.fromkeys(CLOCKED, math.nan)
@@ -48,6 +51,7 @@ class Compared:
     result: outputs.Result
     status: Status  # "interrupted" where a run or the figures were, else "finished"
     missing: tuple[Failure, ...] = ()  # in the comparison and its runs
+    doubted: Doubted | None = None  # what the verdicts hang on, where that was asked for
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
@@ -62,6 +66,7 @@ class Compared:
             "differences": result.differences,
             "claims": [verdict.as_json() for verdict in result.verdicts],
             "missing": [str(part) for part in self.missing],
+            **({"doubt": self.doubted.as_json()["claims"]} if self.doubted else {}),
         }
 
     def warnings(self) -> list[Finding]:
@@ -90,13 +95,31 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
     runs are compared, without figures; KeyboardInterrupt if there are none. Raises UsageError,
     ScenarioError, StorageError.
     """
-    return compare_gathered(gather(items, request), items, request, progress)
+    loaded = _to_doubt(items, request) if request.doubt else None
+    return compare_gathered(gather(items, request), items, request, progress, loaded)
+
+
+def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
+    """The scenario whose verdicts are doubted. Raises UsageError unless it is the only item."""
+    if len(items) > 1 or items[0].is_dir():
+        given = ", ".join(map(str, items))
+        raise UsageError(
+            f"--doubt moves the values of one scenario, and {given} is given; name that alone, or "
+            "run podusv doubt on each"
+        )
+    loaded = opened(items[0], replace(request, warn=lambda finding: None), (doubt_faults,))
+    comparison(loaded)
+    return loaded
 
 
 def compare_gathered(
-    given: Gathered, items: Sequence[Path], request: Request, progress: Progress | None = None
-) -> Compared:
-    """The same for what is gathered already; `items` are the files and folders that it is from."""
+    given: Gathered, items: Sequence[Path], request: Request, progress: Progress | None = None,
+    loaded: Loaded | None = None,
+) -> Compared:  # fmt: skip
+    """The same for what is gathered already; `items` are the files and folders that it is from.
+
+    `loaded` is the scenario whose verdicts are doubted, if any.
+    """
     started, argv = datetime.now(UTC), list(request.argv)
     _check_figures(request, given.members)
     _check_metrics(request, given.members)
@@ -112,6 +135,12 @@ def compare_gathered(
         result = collect(given.members, outcomes, given.claims, extras)
         if extras.interrupted and not result.entries:
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
+        doubted = None
+        if loaded and not extras.interrupted:
+            own = replace(request, out=writer.folder / "doubt", force=True)
+            doubted = doubt_of(loaded, own, progress)
+            result = replace(result, doubts=[HEAD, *map(row, doubted.answers)])
+            extras.interrupted = doubted.status == "interrupted"
         plugins = dict.fromkeys(p for m in given.members for p in m.scenario.plugged)
         origin = provenance.collect(argv, started, datetime.now(UTC), plugins)
         outputs.write(writer, result, extras)
@@ -119,7 +148,8 @@ def compare_gathered(
         writer.add_json("provenance.json", origin)
         writer.add_missing(extras)
         status: Status = "interrupted" if extras.interrupted else "finished"
-        return Compared(writer.finish(status, lost), result, status, tuple(extras.missing))
+        folder = writer.finish(status, lost)
+        return Compared(folder, result, status, tuple(extras.missing), doubted)
 
 
 def _check_figures(request: Request, members: Sequence[Member]) -> None:
