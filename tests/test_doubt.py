@@ -194,6 +194,45 @@ def test_only_a_scenario_alone_can_be_doubted_in_a_comparison(podusv):
         assert "--doubt moves the values of one scenario" in " ".join(done.err.split())
 
 
+STUDY = """
+name: drawn
+vessel: {preset: cybership2_linear}
+path: {kind: line, speed: 1.0}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+start: {u: 0.5}
+simulation: {step: 0.02, duration: 2.0}
+controllers:
+  a: {kind: pid, K_Pu: 0.0, K_Iu: 0.0, K_Du: 0.0, K_Pr: 0.0, K_Ir: 0.0, K_Dr: 0.0}
+sweep:
+  draws: 30
+  success: finished and z_e_steady <= 1.5
+  vary: {vessel.m: {times: {uniform: [0.9, 1.1]}}}
+  claims:
+    near: {says: It stays near., expect: failures(a) <= 0.2}
+doubt: {printed: [controllers.a, control, path, simulation]}
+"""
+
+
+def test_a_study_hangs_on_what_it_does_not_draw(podusv):
+    """A hull adrift is 0.955 to 0.966 m behind over the last fifth of two seconds."""
+    Path("drawn.yaml").write_text(STUDY, "utf-8")
+    done = podusv("doubt", "drawn.yaml", "--out", "out", "--workers", "1")
+    assert done.code == 0, done.err
+    assert re.search(
+        r"near +holds +- +sweep.success: .* under conditions", " ".join(done.out.split())
+    )
+    (turn,) = rows("answer/turns.csv")
+    assert turn["turns_at"] == "finished and z_e_steady <= 0.75"
+    assert {one.name for one in Path("out/studies").iterdir()} == {
+        "own", "sweep.seed-1", "sweep.seed-2", "sweep.success-1", "sweep.success-2",
+    }  # fmt: skip
+    words = ("--set", "sweep.seed=2", "--no-figures", "--workers", "1", "--out", "apart")
+    assert podusv("sweep", "run", "drawn.yaml", *words).code == 0
+    apart, within = (Path(at, "claims.json") for at in ("apart", "out/studies/sweep.seed-1"))
+    assert apart.read_bytes() == within.read_bytes()
+
+
 # ---- the search, by judges of a line of Python ----
 
 
@@ -398,6 +437,7 @@ def test_the_filter_that_turns_F7_turns_single_runs(podusv):
         )
         for w in (2.1, 2.2)
     }  # fmt: skip
+    assert done[2.1].code == 0, done[2.1].err
     verdicts = {
         w: {c["claim"]: c["verdict"] for c in json.loads(said.out)["claims"]}
         for w, said in done.items()

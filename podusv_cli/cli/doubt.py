@@ -13,7 +13,7 @@ from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
 
 if TYPE_CHECKING:
-    from podusv_cli.workflows.doubt import Doubted
+    from podusv_cli.doubt.outputs import Doubted
 
 
 def doubt(

@@ -15,6 +15,7 @@ from podusv_cli.doubt.judged import Judge, Judged, moved
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
 BETWEEN = 0.1  # of the range: where it looks between, for verdicts that turn and turn back
 SHARP = 1.02  # ratio of distances to which a turn is known
+BY_SEED = 0.1
 EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
 
 
@@ -40,8 +41,13 @@ class Turn:
 
     @property
     def share(self) -> float:
-        """The distance over the choice's scale; infinite where there is no distance."""
-        return self.distance / self.choice.range.scale if self.choice.range else math.inf
+        """The distance over the choice's scale; infinite where there is none, as of words.
+
+        Another seed has that of `BY_SEED`, since nothing tells it from the scenario's own.
+        """
+        if self.choice.range:
+            return self.distance / self.choice.range.scale
+        return BY_SEED if self.choice.name.endswith("seed") else math.inf
 
     @property
     def by_rounding(self) -> bool:

@@ -12,12 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.doubt.alone import Alone, Turn
-from podusv_cli.doubt.events import Event, nearest_event
+from podusv_cli.doubt.events import Event
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import Draws, Explained, counted, explained
+from podusv_cli.expressions.verdict import Verdict
 
 KNIFE, FRAGILE = 1e-3, 0.1  # of a choice's scale, within which a verdict turns
 LEVEL = 0.95  # of the bound on the share of draws that turn a verdict where none does
@@ -86,7 +85,7 @@ class Answer:
     verdict, with the opposite, without an answer, and without a world.
     """
 
-    verdict: RunsVerdict
+    verdict: Verdict
     turns: tuple[Turn, ...]
     neighbours: tuple[Turn, ...]
     explained: tuple[Explained, ...]
@@ -96,6 +95,7 @@ class Answer:
     failed: int
     tried: int  # choices that were moved
     acted: int  # of which so many change a number of the claim
+    numbers: Mapping[str, float]  # of the claim, by their text
     number: Compared  # which of its numbers is nearest to its limit
     spread: Spread  # of this number over the draws
     event: Event | None = None  # nearest to a window of the claim, in the scenario itself
@@ -127,7 +127,7 @@ class Answer:
 
         Infinite where the draws do not change the number.
         """
-        return self.number.margin(self.verdict.numbers, self.spread)
+        return self.number.margin(self.numbers, self.spread)
 
 
 def _word(answer: Answer, turns: Sequence[Turn], turned: int) -> str:
@@ -149,32 +149,23 @@ class Tried:
 
 
 def answers(
-    parsed: Sequence[ParsedClaim], entries: Mapping[str, Entry], tried: Tried
+    verdicts: Sequence[Verdict], tried: Tried, events: Mapping[str, Event | None] | None = None
 ) -> list[Answer]:
-    """An answer on every claim; `entries` are the runs of the scenario itself."""
-    return [
-        replace(
-            _answer(_verdict(one, tried.base), labels_of(one), tried),
-            event=nearest_event(one, entries),
-        )
-        for one in parsed
-    ]
+    """An answer on every verdict; `events` are those nearest to a claim's windows, by its name."""
+    known = events or {}
+    return [replace(_answer(one, tried), event=known.get(one.name)) for one in verdicts]
 
 
-def _verdict(parsed: ParsedClaim, base: Judged) -> RunsVerdict:
-    return RunsVerdict(
-        parsed.name, parsed.claim, base.answers[parsed.name], dict(base.numbers[parsed.name])
-    )
-
-
-def labels_of(claim: ParsedClaim) -> frozenset[str]:
+def labels_of(claim: Any) -> frozenset[str]:
     """The names in a claim's expressions, of runs among them."""
-    trees = filter(None, (claim.expect, claim.given))
-    return frozenset(n.id for tree in trees for n in ast.walk(tree) if isinstance(n, ast.Name))
+    texts = filter(None, (claim.expect, getattr(claim, "given", "")))
+    nodes = (node for text in texts for node in ast.walk(ast.parse(text.strip(), mode="eval")))
+    return frozenset(node.id for node in nodes if isinstance(node, ast.Name))
 
 
-def _answer(verdict: RunsVerdict, labels: frozenset[str], tried: Tried) -> Answer:
+def _answer(verdict: Verdict, tried: Tried) -> Answer:
     claim, base, worlds = verdict.name, tried.base, tried.worlds
+    labels = labels_of(verdict.claim)
     moved = [
         one for one in tried.alone
         if one.choice.labels & labels and not one.choice.is_contrast(labels)
@@ -185,19 +176,22 @@ def _answer(verdict: RunsVerdict, labels: frozenset[str], tried: Tried) -> Answe
     acting = {one.choice.name: one.acts(claim, base) for one in tried.alone}
     turned, known = counted(claim, worlds, base)
     failed = sum(bool(one.failed) for one in worlds)
+    number, spread = _nearest(verdict, base, worlds)
     return Answer(
         verdict, tuple(t for t in turns if not t.choice.task),
         tuple(t for t in turns if t.choice.task),
         tuple(explained(tried.draws, turned, known, acting)),
         int((known & ~turned).sum()), int(turned.sum()), int((~known).sum()) - failed, failed,
-        len(moved), sum(acting[one.choice.name] for one in moved), *_nearest(verdict, worlds),
+        len(moved), sum(acting[one.choice.name] for one in moved), base.numbers[claim],
+        number, spread,
     )  # fmt: skip
 
 
-def _nearest(verdict: RunsVerdict, worlds: Sequence[Judged]) -> tuple[Compared, Spread]:
+def _nearest(verdict: Verdict, base: Judged, worlds: Sequence[Judged]) -> tuple[Compared, Spread]:
     """The number of a claim that is nearest to its limit, in half-widths of its draws."""
     spreads = {n: n.spread(verdict.name, worlds) for n in compared(verdict.claim.expect)}
-    number = min(spreads, key=lambda n: n.margin(verdict.numbers, spreads[n]))
+    own = base.numbers[verdict.name]
+    number = min(spreads, key=lambda n: n.margin(own, spreads[n]))
     return number, spreads[number]
 
 

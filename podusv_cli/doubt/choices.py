@@ -164,10 +164,10 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
     found = [one for places in unprinted for one in _of_places(places, singles)]
     own = [_given(name, quantity, singles) for name, quantity in doubt.vary.items()]
     taken = {place for choice in own for place in choice.places}
-    return [*_hulls(singles, doubt), *own, *(one for one in found if not taken & {*one.places})]
+    return [*hulls(singles, doubt), *own, *(one for one in found if not taken & {*one.places})]
 
 
-def _hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
+def hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
     """The choice of a whole hull."""
     first = next(iter(singles.values())).vessel.preset
     others = tuple(hull for hull in doubt.hulls if hull != first)

@@ -68,7 +68,7 @@ def specification(told: Told, answer: Answer, acting: Sequence[Alone]) -> Figure
         for lane, column in enumerate(lanes):
             heights = lane + 0.1 + 0.8 * tried.draws.shares[[order[x] for x in at], column]
             below.plot(at, heights, ".", color=colour, ms=1.6)
-    own = number.of(answer.verdict.numbers)
+    own = number.of(answer.numbers)
     if math.isfinite(own):
         top.axhline(own, color="black", lw=0.8, ls=":", label="the scenario's own")
     top.axhline(number.limit, color="black", lw=0.8, label="limit")

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import as_yaml
+from podusv_cli.core.recording import Status
 from podusv_cli.doubt.alone import Turn, ends
 from podusv_cli.doubt.answer import Answer, Tried, as_json
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat, value_text
-from podusv_cli.process.extras import Extras
+from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import csv_files, json_files
 from podusv_cli.storage.run_folder import RunWriter
@@ -28,6 +30,24 @@ class Told:
     scenario: Scenario
     answers: Sequence[Answer]
     tried: Tried
+
+
+@dataclass(frozen=True)
+class Doubted:
+    """What the verdicts of a scenario hang on, and where the tables, figures and page are."""
+
+    folder: Path
+    answers: Sequence[Answer]
+    status: Status
+    missing: tuple[Failure, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {
+            "format": 1, "status": self.status, "folder": str(self.folder),
+            "claims": [as_json(one) for one in self.answers],
+            "missing": [str(part) for part in self.missing],
+        }  # fmt: skip
 
 
 def place(turn: Turn) -> str:
@@ -55,7 +75,7 @@ def _share(share: float) -> str:
 
 def row(answer: Answer) -> list[str]:
     """A claim's row of the table."""
-    kept = f"{answer.kept} of {answer.draws}"
+    kept = f"{answer.kept} of {answer.draws}" if answer.draws else "-"
     others = f" and {len(answer.turns) - 1} more" if len(answer.turns) > 1 else ""
     turns = f"{place(answer.turns[0])}{others}" if answer.turns else "-"
     return [answer.verdict.name, answer.verdict.in_words, kept, turns, in_words(answer)]

@@ -65,6 +65,10 @@ class Verdict(ABC):
     def evidence(self) -> str:
         """The numbers and the reasons, in one line."""
 
+    @abstractmethod
+    def as_json(self) -> dict[str, object]:
+        """The verdict as plain data, what is infinite or undefined as None."""
+
     def row(self) -> str:
         """The verdict as a row of a table in Markdown."""
         claim, given = self.claim, getattr(self.claim, "given", "")

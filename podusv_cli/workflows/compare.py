@@ -22,7 +22,7 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Status
 from podusv_cli.doubt.check import doubt_faults
-from podusv_cli.doubt.outputs import HEAD, row
+from podusv_cli.doubt.outputs import HEAD, Doubted, row
 from podusv_cli.findings.finding import Case, merged
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED
@@ -33,7 +33,7 @@ from podusv_cli.scenario.limits import estimate, needed
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
-from podusv_cli.workflows.doubt import Doubted, comparison, doubt_of
+from podusv_cli.workflows.doubt import comparison, doubt_of
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Gathered, gather
 from podusv_cli.workflows.members import Member

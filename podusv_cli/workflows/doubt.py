@@ -10,20 +10,21 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.comparison import claims
-from podusv_cli.comparison.claims import ParsedClaim, parse_claims
+from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict, parse_claims
 from podusv_cli.comparison.entries import Entry, metrics_of
 from podusv_cli.comparison.margins import with_margins
 from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import Alone, explored
-from podusv_cli.doubt.answer import Answer, Tried, answers, as_json, labels_of
+from podusv_cli.doubt.answer import Tried, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import HULL, Choice, Singles, choices
+from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.together import Draws, drawn
 from podusv_cli.findings.finding import Case, unknown_codes
-from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Job, run_shares
 from podusv_cli.scenario.address import Number, with_values
@@ -34,6 +35,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import find, placed
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import Run, RunWriter, default_folder
+from podusv_cli.workflows.doubt_study import doubt_study
 from podusv_cli.workflows.execute import Stopwatch, examined, monitored, simulated, summary, warm_up
 from podusv_cli.workflows.run import RESULTS, Request, opened
 
@@ -41,35 +43,20 @@ Progress = Callable[[str, float], None]
 BATCH = 10  # draws that a process makes before it tells
 
 
-@dataclass(frozen=True)
-class Doubted:
-    """What the verdicts of a scenario hang on, and where the tables, figures and page are."""
-
-    folder: Path
-    answers: Sequence[Answer]
-    status: Status
-    missing: tuple[Failure, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """What `--json` prints."""
-        return {
-            "format": 1, "status": self.status, "folder": str(self.folder),
-            "claims": [as_json(one) for one in self.answers],
-            "missing": [str(part) for part in self.missing],
-        }  # fmt: skip
-
-
-def doubt(config: Path, request: Request, progress: Progress | None = None) -> Doubted:
+def doubt(config: Path, request: Request, progress: Progress | None = None) -> outputs.Doubted:
     """Move all that the source of a scenario's claims leaves open, and judge them anew.
 
-    An interrupt keeps what is tried so far. Raises UsageError without claims, ScenarioError,
-    StorageError.
+    The claims are those of its study, if it has any, else those on runs. An interrupt keeps what is
+    tried so far. Raises UsageError without claims, ScenarioError, StorageError.
     """
     checks = (unknown_codes, limits(request.allow_large), doubt_faults)
-    return doubt_of(opened(config, request, checks), request, progress)
+    loaded = opened(config, request, checks)
+    if loaded.scenario.sweep and loaded.scenario.sweep.claims:
+        return doubt_study(config, loaded, request, progress)
+    return doubt_of(loaded, request, progress)
 
 
-def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None) -> Doubted:
+def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None) -> outputs.Doubted:
     """The same for a scenario that is loaded and checked."""
     started, scenario = datetime.now(UTC), loaded.scenario
     world = comparison(loaded)
@@ -82,7 +69,7 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
         origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
         outputs.write(writer, told, loaded.text, origin, extras, figures=request.figures)
         status: Status = "interrupted" if extras.interrupted else "finished"
-        return Doubted(writer.finish(status), told.answers, status, tuple(extras.missing))
+        return outputs.Doubted(writer.finish(status), told.answers, status, tuple(extras.missing))
 
 
 @dataclass(frozen=True)
@@ -102,7 +89,7 @@ def comparison(loaded: Loaded) -> Compared:
             f"{loaded.scenario.name} has no claims that runs decide, so no verdict can turn; write "
             "some under `claims`, as podusv docs claims shows"
         )
-    named = {label for one in parsed for label in labels_of(one)}
+    named = {label for one in parsed for label in labels_of(one.claim)}
 
     def judged(scenario: Scenario) -> Singles:
         return {label: one for label, one in scenario.singles().items() if label in named}
@@ -129,7 +116,14 @@ def doubted(
     judge, asked = judging(compared, entries), scenario.doubt or Doubt()
     tried = search(compared.singles, judge, asked, request.workers, progress)
     extras = Extras(interrupted=len(tried.worlds) < asked.draws)
-    return outputs.Told(scenario, answers(compared.parsed, entries, tried), tried), extras
+    verdicts = [
+        RunsVerdict(
+            one.name, one.claim, tried.base.answers[one.name], dict(tried.base.numbers[one.name])
+        )
+        for one in compared.parsed
+    ]
+    events = {one.name: nearest_event(one, entries) for one in compared.parsed}
+    return outputs.Told(scenario, answers(verdicts, tried, events), tried), extras
 
 
 def search(

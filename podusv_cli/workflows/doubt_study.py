@@ -1,0 +1,103 @@
+"""`podusv doubt` of a study: the same study with one value changed, over and over."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from podusv_cli.core.errors import PodusvError
+from podusv_cli.doubt import outputs
+from podusv_cli.doubt.alone import Alone, Trial
+from podusv_cli.doubt.answer import Tried, answers
+from podusv_cli.doubt.choices import Choice
+from podusv_cli.doubt.judged import Judged
+from podusv_cli.doubt.of_study import overrides, study_choices
+from podusv_cli.doubt.together import Draws
+from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.load import Loaded
+from podusv_cli.storage import provenance
+from podusv_cli.storage.run_folder import RunWriter
+from podusv_cli.studies.counting.verdict import StudyVerdict
+from podusv_cli.workflows import many_runs, sweep
+from podusv_cli.workflows.run import RESULTS, Request
+
+Progress = Callable[[str, float], None]
+NO_LOGS = "sweep.keep=null"  # the study's own has them
+
+
+@dataclass(frozen=True)
+class Studies:
+    """A study and its folder; the same study with other values goes beside it."""
+
+    config: Path
+    folder: Path
+    request: Request
+
+    def judged(self, name: str, new: list[str]) -> tuple[Judged, list[StudyVerdict]]:
+        """The verdicts of the study with new values; what is there already is not made again."""
+        own = many_runs.Request(
+            overrides=[*self.request.overrides, NO_LOGS, *new],
+            out=self.folder / "studies" / name, workers=self.request.workers, figures=False,
+            argv=self.request.argv, plugins=self.request.plugins, trust=self.request.trust,
+        )  # fmt: skip
+        try:
+            done = sweep.run(self.config, own, lambda tally: None)
+        except PodusvError as error:
+            return Judged({}, {}, str(error)), []
+        assert done.results
+        verdicts = list(done.results.verdicts)
+        return Judged(
+            {v.name: v.answer for v in verdicts}, {v.name: _numbers(v) for v in verdicts}
+        ), verdicts
+
+
+def _numbers(verdict: StudyVerdict) -> dict[str, float]:
+    return {
+        f"{part.statistic} at {part.cell}" if part.cell else part.statistic: part.estimate
+        for part in verdict.parts
+    }
+
+
+def doubt_study(
+    config: Path, loaded: Loaded, request: Request, progress: Progress | None = None
+) -> outputs.Doubted:
+    """Move what a study does not draw, one value at a time, and judge its claims anew.
+
+    Every study stays in the folder, so that an interrupted search goes on where it was. Raises
+    ScenarioError, StorageError.
+    """
+    started, scenario = datetime.now(UTC), loaded.scenario
+    folder = request.out or RESULTS / f"{scenario.name}-doubt"
+    studies, found = Studies(config, folder, request), study_choices(scenario)
+    tell = progress or (lambda what, fraction: None)
+    base, verdicts = studies.judged("own", [])
+    if base.failed:
+        raise PodusvError(base.failed)
+    alone = []
+    for done, choice in enumerate(found):
+        tell("one at a time", done / len(found))
+        alone.append(Alone(choice, tuple(_trials(studies, choice, loaded))))
+    tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
+    told = outputs.Told(scenario, answers(verdicts, tried), tried)
+    origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
+    extras = Extras()
+    with RunWriter(folder / "answer", force=True, named=True) as writer:
+        outputs.write(writer, told, loaded.text, origin, extras, figures=False)
+        return outputs.Doubted(writer.finish("finished"), told.answers, "finished")
+
+
+def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[Trial]:
+    return [
+        Trial(value, studies.judged(_name(choice, i), overrides(choice, value, loaded.scenario))[0])
+        for i, value in enumerate(choice.values, 1)
+    ]
+
+
+def _name(choice: Choice, place: int) -> str:
+    """The folder of the study with a choice's other value."""
+    return f"{re.sub(r'[^A-Za-z0-9_.]+', '-', choice.name)}-{place}"
