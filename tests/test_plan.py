@@ -8,13 +8,12 @@ from functools import wraps
 import pytest
 
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
-from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.workflows.run import Request, run_loaded
 
 ONCE = dict.fromkeys(
-    ("plan", "closed_loop", "metrics_of", "about", "_functions", "path", "measurement"), 1
+    ("plan", "closed_loop", "metrics_of", "about", "drive_with", "path", "measurement"), 1
 )
 
 
@@ -43,7 +42,7 @@ def test_a_run_plans_once(config, controller, of_law, tmp_path, monkeypatch):
 
     for owner, name in (
         (Scenario, "plan"), (Scenario, "closed_loop"), (Scenario, "metrics_of"),
-        (ClosedLoop, "about"), (Plan, "_functions"),
+        (ClosedLoop, "about"), (type(scenario.actuator), "drive_with"),
     ):  # fmt: skip
         count(owner, name, name)
     for part in ("path", "measurement"):

@@ -96,16 +96,17 @@ def linearised(loop: ClosedLoop, along: Course, step: float, *, compiled: bool =
     side has no derivative there.
     """
     loop = idealised(loop)
-    plan = Plan(loop, TimeGrid(step, max(round(along.time / step), 1)))
+    steps = max(round(along.time / step), 1)
+    plan = Plan(loop, TimeGrid(step, steps, log_every=steps))
     frame = _Frame(plan, along, _arrived(plan, compiled), compiled)
     try:
         with np.errstate(all="ignore"):
-            return _about(loop, frame, frame.steady(frame.settled(frame.start)))
+            return _about(plan, frame, frame.steady(frame.settled(frame.start)))
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise NotConvergedError(f"no steady motion was found: {error}; {WHAT_IT_TAKES}") from error
 
 
-def _about(loop: ClosedLoop, frame: _Frame, q: Vector) -> Linear:
+def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
     jacobian, reach = frame.jacobian(q)
     states = len(q)
     heights = (abs(jacobian[:states]) * _size(q)).max(axis=1)
@@ -113,7 +114,7 @@ def _about(loop: ClosedLoop, frame: _Frame, q: Vector) -> Linear:
     outputs = jacobian[states:, moving]
     return Linear(
         A=jacobian[np.ix_(moving, moving)],
-        B=_inputs(loop, states)[moving],
+        B=_inputs(plan, states)[moving],
         C=outputs[:2],
         B_command=frame.commanded(q)[moving],
         C_command=outputs[2:],
@@ -128,7 +129,7 @@ def _about(loop: ClosedLoop, frame: _Frame, q: Vector) -> Linear:
 
 def _arrived(plan: Plan, compiled: bool) -> Vector:
     """The loop's state at the end of a run. Raises NotConvergedError where it diverges."""
-    log = run(replace(plan, grid=replace(plan.grid, log_every=plan.grid.steps)), compiled=compiled)
+    log = run(plan, compiled=compiled)
     if log.status == "interrupted":
         raise KeyboardInterrupt
     if log.status != "finished":
@@ -137,9 +138,9 @@ def _arrived(plan: Plan, compiled: bool) -> Vector:
     return np.asarray(np.column_stack([log[name] for name in state])[-1])
 
 
-def _inputs(loop: ClosedLoop, states: int) -> Vector:
+def _inputs(plan: Plan, states: int) -> Vector:
     """Rates of the states by a surge force and by a yaw moment on the hull, shape (states, 2)."""
-    k, nothing, rates = bundle(loop.vessel.constants()), np.zeros(6), np.zeros((states, 2))
+    k, nothing, rates = bundle(plan.constants["vessel"]), np.zeros(6), np.zeros((states, 2))
     for column, tau in enumerate(np.eye(3)[[0, 2]]):
         rate = np.zeros(6)
         plant(nothing, tau, nothing, k, rate)

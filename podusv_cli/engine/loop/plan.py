@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
@@ -38,12 +38,24 @@ FORCES, SEA = LOADS[:3], LOADS[3:]
 AT_START = (0.0,)  # s
 
 
+# The component of each function that is no component's only one
+OWNERS = {
+    "locate": "path", "sample": "law", "after_saturation": "law", "correct": "estimator",
+    "follow": "estimator",
+}  # fmt: skip
+
+
 class Function(NamedTuple):
     """What the loop calls as one of its parts, and the names of the constants that it reads."""
 
     part: str  # in `signatures.SIGNATURES`
     kernel: Any
     constants: tuple[str, ...]
+
+    @property
+    def owner(self) -> str:
+        """Whose constants these are, as `Plan.constants` and `Vectors` call it."""
+        return OWNERS.get(self.part, self.part)
 
 
 def unwatched(plan: Plan) -> Observer:
@@ -150,37 +162,32 @@ class Plan:
     @cached_property
     def functions(self) -> tuple[Function, ...]:
         """What the loop calls, in the order in which it takes them."""
-        return tuple(Function(*each) for each in self._functions())
+        loop, names = self.loop, self.constants
+        law, path, seen, estimator = loop.controller, loop.path, loop.measurement, loop.estimator
+        rounded = self.recall(path.fillet_for_law) is not None
+        kernels = {
+            "path": path.evaluate, "locate": path.locate if path.follows else nothing,
+            "disturbance": loop.disturbance.kernel_with(loop.vessel),
+            "law": law_of_rounded(law.law) if rounded else law.law,
+            "sample": law.sample if law.takes_samples() else nothing,
+            "actuator": loop.actuator.drive_with(),
+            "after_saturation": law.after_saturation if law.wants_loads() else nothing,
+            "measurement": seen.sense if loop.measured else nothing,
+            "correct": estimator.correct if loop.measured else nothing,
+            "follow": estimator.follow if loop.measured else nothing,
+            "observer": self.observer.watch,
+        }  # fmt: skip
+        if rounded and law.takes_samples():
+            kernels["sample"] = sample_of_rounded(law.sample)
+        return tuple(  # what does nothing reads nothing: its code is one for all
+            Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
+            for part, inner in kernels.items()
+        )
 
     @property
     def structure(self) -> tuple[Layout, tuple[Function, ...]]:
         """What runs of one batch have in common; they differ in numbers only."""
         return self.layout, self.functions
-
-    def _functions(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-        loop, recall = self.loop, self.recall
-        law, path, sea = loop.controller, loop.path, loop.disturbance
-        names = {part: tuple(constants) for part, constants in self.constants.items()}
-        rounded = recall(path.fillet_for_law) is not None
-        take = sample_of_rounded(law.sample) if rounded and law.takes_samples() else law.sample
-        yield "path", path.evaluate, names["path"]
-        yield "locate", *_if(path.follows, lambda: path.locate, names["path"])
-        yield "disturbance", sea.kernel_with(loop.vessel), names["disturbance"]
-        yield "law", law_of_rounded(law.law) if rounded else law.law, names["law"]
-        yield "sample", *_if(law.takes_samples(), lambda: take, names["law"])
-        yield "actuator", loop.actuator.drive_with(), names["actuator"]
-        told = law.wants_loads()
-        yield "after_saturation", *_if(told, lambda: law.after_saturation, names["law"])
-        measurement, estimator = loop.measurement, loop.estimator
-        sense, correct, follow = (
-            (measurement.sense, estimator.correct, estimator.follow)
-            if loop.measured
-            else (nothing, nothing, nothing)
-        )
-        yield "measurement", sense, names["measurement"]
-        yield "correct", correct, names["estimator"]
-        yield "follow", follow, names["estimator"]
-        yield "observer", self.observer.watch, names["observer"]
 
     @cached_property
     @np.errstate(all="ignore")
@@ -297,11 +304,6 @@ def _names(signals: tuple[Signal, ...]) -> list[str]:
 def _offsets(parts: Mapping[str, list[str]]) -> dict[str, int]:
     """Where each part begins, and the `end` of all."""
     return dict(zip((*parts, "end"), accumulate(map(len, parts.values()), initial=0), strict=True))
-
-
-def _if(there: bool, kernel: Callable[[], Any], constants: tuple[str, ...]) -> tuple[Any, ...]:
-    """A part that some loops have. What does nothing reads nothing: its code is one for all."""
-    return (kernel(), constants) if there else (nothing, ())
 
 
 def _numbers(constants: Mapping[str, float]) -> Vector:

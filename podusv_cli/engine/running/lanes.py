@@ -30,31 +30,25 @@ MARCHING = -1.0  # stands for the instants that a lane has reached
 
 
 def alike(plan: Plan) -> dict[str, frozenset[str]]:
-    """By part the constants that all lanes have to share: choices, sizes and positions."""
-    loop, observer, law = plan.loop, plan.observer, plan.loop.controller
-    names = {part: names for part, _, names in plan.functions}
-    chosen = {
-        "path": loop.path.choices(), "locate": loop.path.choices(),
-        "disturbance": loop.disturbance.choices(), "actuator": loop.actuator.choices(),
-        "law": law.choices(), "sample": law.choices(),
-        "after_saturation": law.choices(),
-        "observer": frozenset(names["observer"]) - observer.differing,
-        "measurement": loop.measurement.choices(), "correct": loop.estimator.choices(),
-        "follow": loop.estimator.choices(),
+    """By component the constants that all lanes have to share: choices, sizes and positions."""
+    loop, observer = plan.loop, plan.observer
+    shared = {
+        "path": loop.path.choices(), "law": loop.controller.choices(),
+        "actuator": loop.actuator.choices(), "measurement": loop.measurement.choices(),
+        "estimator": loop.estimator.choices(),
+        "observer": plan.constants["observer"].keys() - observer.differing,
+        "disturbance": loop.disturbance.choices().union(
+            loop.disturbance.constant_of(i, name)
+            for i, part in enumerate(loop.disturbance.each())
+            for name in whole_numbers(part.kernel_with(loop.vessel))
+        ),
     }  # fmt: skip
-    whole = {part: whole_numbers(inner) for part, inner, _ in plan.functions}
-    whole["disturbance"] = frozenset(
-        loop.disturbance.constant_of(i, name)
-        for i, part in enumerate(loop.disturbance.each())
-        for name in whole_numbers(part.kernel_with(loop.vessel))
-    )
-    for one in (
-        ("path", "locate"),
-        ("law", "sample", "after_saturation"),
-        ("correct", "follow"),
-    ):  # of one component
-        whole |= dict.fromkeys(one, frozenset().union(*(whole[part] for part in one)))
-    return {part: (chosen[part] | whole[part]) & set(names[part]) for part in names}
+    for function in plan.functions:
+        if function.part != "disturbance":  # whose parts' constants have other names in the sum
+            shared[function.owner] |= whole_numbers(function.kernel)
+    return {
+        owner: frozenset(names & plan.constants[owner].keys()) for owner, names in shared.items()
+    }
 
 
 def marcher(
@@ -103,27 +97,20 @@ def _pieces(plan: Plan) -> list[Any]:
     from podusv_cli.engine.machine import compile
 
     shared = alike(plan)
-    parts = [compile.lane_adapter(*part, shared[part.part]) for part in plan.functions]
+    parts = [
+        compile.lane_adapter(*function, shared[function.owner].intersection(function.constants))
+        for function in plan.functions
+    ]
     march = compile.Piece(advance_lanes, signatures.ADVANCE_LANES, compiler=compile.LANES_BY)
     return [*parts, march]
 
 
 def places(plan: Plan) -> list[tuple[int, list[int]]]:
     """Where the numbers that are alike lie: positions of vectors in `Vectors`, and in these."""
-    loop, shared = plan.loop, alike(plan)
-    names = {part: names for part, _, names in plan.functions}
-    names["estimator"], shared["estimator"] = names["correct"], shared["correct"]
+    loop = plan.loop
     found = {
-        part: [i for i, n in enumerate(names[part]) if n in shared[part]]
-        for part in (
-            "path",
-            "disturbance",
-            "law",
-            "actuator",
-            "measurement",
-            "estimator",
-            "observer",
-        )
+        owner: [i for i, name in enumerate(plan.constants[owner]) if name in names]
+        for owner, names in alike(plan).items()
     }
     found |= {
         "disturbance_table": loop.disturbance.shared_places(),

@@ -16,7 +16,7 @@ from podusv_cli.core.kernel import (
     lanes_any,
     tail,
 )
-from podusv_cli.engine.step.layout import STOP, Function, Parts
+from podusv_cli.engine.step.layout import STOP, Parts, spread
 from podusv_cli.engine.step.rk4 import arrive, finite, named_layout, named_vectors, observed, step
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
@@ -63,23 +63,17 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
     return living
 
 
+@spread
 @kernel
 def advance_lanes(
-    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
-    actuator: Function, after: Function, measurement: Function, correct: Function,
-    follow: Function, observe: Function,
-    first: int, last: int, h: float, vectors: Any, layout: Any, size: int, under_way: Vector,
-    ends: Vector,
+    p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any, size: int,
+    under_way: Vector, ends: Vector,
 ) -> int:  # fmt: skip
     """`rk4.advance` for all lanes, without a log.
 
     A lane whose numbers are not finite goes on without an effect on the others. Returns the first
     instant that was not begun, or at which no lane was left, or `last`.
     """
-    p = Parts(
-        path, locate, disturbance, law, sample, actuator, after, measurement, correct, follow,
-        observe,
-    )  # fmt: skip
     c, n = named_vectors(vectors), named_layout(layout)
     for k in range(first, last):
         if under_way[STOP] != 0.0:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from podusv_cli.core.kernel import Vector, kernel
 
@@ -24,6 +24,16 @@ class Parts(NamedTuple):
     correct: Function
     follow: Function
     observe: Function
+
+
+def spread(march: Any) -> Any:
+    """A kernel whose first argument are the parts, as machine code takes it: part by part."""
+    names, parts = march.__code__.co_varnames[1 : march.__code__.co_argcount], Parts._fields
+    given = f"Parts({', '.join(parts)}), {', '.join(names)}"
+    text = f"def {march.__name__}({', '.join((*parts, *names))}):\n    return march({given})"
+    scope: dict[str, Any] = {"march": march, "Parts": Parts, "__name__": march.__module__}
+    exec(text, scope)  # noqa: S102
+    return kernel(scope[march.__name__])
 
 
 class Layout(NamedTuple):

@@ -27,6 +27,7 @@ from podusv_cli.engine.step.layout import (
     Parts,
     Vectors,
     shifted,
+    spread,
 )
 from podusv_cli.engine.step.relay import BEGAN, GIVEN, begin_step, pass_on
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
@@ -200,21 +201,13 @@ def instant(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> bo
     return True
 
 
+@spread
 @kernel
-def advance(
-    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
-    actuator: Function, after: Function, measurement: Function, correct: Function,
-    follow: Function, observe: Function,
-    first: int, last: int, h: float, vectors: Any, layout: Any,
-) -> int:  # fmt: skip
+def advance(p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any) -> int:
     """March over the instants first .. last - 1.
 
     Returns the first instant that is not finite, or that was not begun, or `last`.
     """
-    p = Parts(
-        path, locate, disturbance, law, sample, actuator, after, measurement, correct, follow,
-        observe,
-    )  # fmt: skip
     c, n = named_vectors(vectors), named_layout(layout)
     for k in range(first, last):
         if c.under_way[STOP] != 0.0 or not instant(k, first, h, p, c, n):
@@ -258,18 +251,12 @@ def evaluate_all(
             )  # fmt: skip
 
 
+@spread
 @kernel
 def rates_along(
-    path: Function, locate: Function, disturbance: Function, law: Function, sample: Function,
-    actuator: Function, after: Function, measurement: Function, correct: Function,
-    follow: Function, observe: Function,
-    count: int, logged: Vector, out: Vector, vectors: Any, layout: Any,
-) -> None:  # fmt: skip
+    p: Parts, count: int, logged: Vector, out: Vector, vectors: Any, layout: Any
+) -> None:
     """For each of `count` logged rows of t, s: the rates of s, then the row, into `out`."""
-    p = Parts(
-        path, locate, disturbance, law, sample, actuator, after, measurement, correct, follow,
-        observe,
-    )  # fmt: skip
     c, n = named_vectors(vectors), named_layout(layout)
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
