@@ -16,6 +16,7 @@ from podusv_cli.studies.making.words import WORDS, in_words
         ({"times": {"lognormal": {"sigma": 0.1}}},
          "the scenario's own value times a factor: lognormal with median 1, standard deviation of "
          "the logarithm 0.1"),
+        ({"log_uniform": (0.5, 2.0)}, "log-uniform from 0.5 to 2"),
         ({"triangular": (0.0, 1.0, 3.0)}, "triangular from 0 to 3, likeliest at 1"),
         ({"choice": ("line", 2)}, "one of line, 2, all equally likely"),
         ({"integers": (1, 6)}, "a whole number from 1 to 6, all equally likely"),

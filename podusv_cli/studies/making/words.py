@@ -32,6 +32,7 @@ def _cut(bounds: tuple[float, float] | None) -> str:
 
 WORDS: dict[str, Callable[[Any], str]] = {
     "uniform": lambda x: f"uniform from {x[0]:g} to {x[1]:g}",
+    "log_uniform": lambda x: f"log-uniform from {x[0]:g} to {x[1]:g}",
     "normal": lambda x: f"normal with mean {x.mean:g} and standard deviation {x.sigma:g}",
     "lognormal": lambda x: (
         f"lognormal with median {x.median:g}, standard deviation of the logarithm {x.sigma:g}"
