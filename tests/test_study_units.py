@@ -9,15 +9,23 @@ from test_study_store import finishing
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.counting.runs import Unit, UnitResult
+from podusv_cli.studies.making import runs_writer
 from podusv_cli.studies.making import store as stores
 from podusv_cli.studies.making.store import UNITS, decoded, encoded, read
 
 
 def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):
-    store = made(tmp_path / "study", draws=8)
+    made(tmp_path / "study", part=(1, 2), draws=8)
+    store = made(tmp_path / "study", part=(2, 2), draws=8)
     finishing(monkeypatch, lambda: (store.folder / UNITS / "late.unit").write_bytes(b"late"))
     store.write_runs()
     assert [path.name for path in (store.folder / UNITS).iterdir()] == ["late.unit"]
+
+
+def test_a_table_to_which_nothing_is_added_is_not_written_again(tmp_path, monkeypatch):
+    store = made(tmp_path / "study", draws=8)
+    monkeypatch.setattr(runs_writer, "write", None)
+    assert all(store.write_runs().tried(law).all() for law in store.about.laws)
 
 
 def test_a_unit_that_cannot_be_read_is_an_error_and_not_missing(tmp_path, monkeypatch):

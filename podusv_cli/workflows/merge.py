@@ -54,5 +54,4 @@ def _joined(
     tally = Tally.of(store.covered())
     if tally.made < tally.wanted:
         return Swept(out, tally, missing_runs=tuple(gaps(store)))
-    store.write_runs()
-    return answered(store, request)
+    return answered(store, store.write_runs(), request)

@@ -17,6 +17,7 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
+from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.making import record
 from podusv_cli.studies.making.check import sweep_faults, unjudged
 from podusv_cli.studies.making.dispatch import Engine, Gaps, Tally, Tell, dispatch
@@ -108,8 +109,8 @@ def _run(store: Store, made: Plan, request: Request, started: datetime, tell: Te
     if not whole:
         return swept
     with sole_writer(store.folder, TABLES, PATIENCE, request.warn):
-        store.write_runs()
-        return replace(answered(store, request, made), refused=swept.refused)
+        runs = store.write_runs()
+        return replace(answered(store, runs, request, made), refused=swept.refused)
 
 
 def _marched(
@@ -171,14 +172,14 @@ def default_folder(scenario: Scenario) -> Path:
     return RESULTS / f"{scenario.name}-sweep"
 
 
-def answered(store: Store, request: Request, made: Plan | None = None) -> Swept:
+def answered(store: Store, runs: Table, request: Request, made: Plan | None = None) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
     With the plan of the study, the logs that it is to keep are made, too.
     Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
     """
     with interrupts_deferred():
-        results = judged(store.about, store.runs())
+        results = judged(store.about, runs)
         outputs.write_tables(store.folder, results)
         extras, whole = Extras(), results.made == results.wanted
         if whole and made:
@@ -213,10 +214,10 @@ def report(study: Path, request: Request) -> Swept:
                 f"{study} has no runs yet: {plugins.continue_with('sweep run', study)}"
             )
         Session(study, request.argv, started, ()).end(0)
-        store.write_runs()
-        if not store.runs().common.any():
+        runs = store.write_runs()
+        if not runs.common.any():
             raise UsageError(
                 f"no draw in {study} has runs of all laws yet, so they cannot be compared; "
                 f"continue: {plugins.continue_with('sweep run', study)}"
             )
-        return answered(store, request)
+        return answered(store, runs, request)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,23 +32,21 @@ from podusv_cli.studies.making.draws import table
 BLOCK = 2**20  # bytes written and read at a time
 NUMBERS = "iuf"  # numpy's kinds of numbers
 HEAD = 1200  # bytes of what the file says of an array, roughly
-Results = Callable[[], Iterable[UnitResult]]  # all runs that there are, from the first again
+Causes = Mapping[tuple[int, int, int], str]  # by law, cell and draw
 
 
-def write(path: Path, study: StudyAbout, identity: str, results: Results) -> None:
-    """Write the table of a study, in place of an older one.
+def write(
+    path: Path, study: StudyAbout, identity: str, causes: Causes, results: Iterable[UnitResult]
+) -> None:
+    """Write the table of a study with the `results`, in place of an older one.
 
-    Raises StorageError; the older table is then still there.
+    `causes` are why runs did not finish. Raises StorageError; the older table is then still there.
     """
     part = path.with_name(temporary_name())
     try:
-        causes = {
-            (study.laws.index(r.unit.law), r.unit.cell, r.unit.first + i): cause
-            for r in results() for i, cause in enumerate(r.causes) if cause
-        }  # fmt: skip
         places = _lay_out(part, study, identity, dict(sorted(causes.items())))
         with storage_errors(f"cannot write {path}"):
-            _fill(part, study, places, results())
+            _fill(part, study, places, results)
             os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
@@ -77,9 +75,7 @@ class Extent:
         return np.asarray(numbers, self.kind).tobytes()
 
 
-def _lay_out(
-    part: Path, study: StudyAbout, identity: str, causes: Mapping[tuple[int, int, int], str]
-) -> dict[str, Extent]:
+def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> dict[str, Extent]:
     """Make the file with everything but long arrays; the places of these."""
     layout, places, wanted = LogLayout(), dict[str, Extent](), study.draws
     (sweep, stream), shape = record.drawing(study), (len(study.laws), len(study.cells), wanted)

@@ -41,6 +41,7 @@ UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
 UNFINISHED = (SCENARIO, UNITS, RUNS, FOLDER, "provenance.json")  # in any study's folder
 SEAL = "sha256"
+Run = tuple[int, int, int]  # the positions of its law, its cell and its draw
 
 
 class Store:
@@ -117,28 +118,42 @@ class Store:
     def _units(self) -> list[Path]:
         return sorted((self.folder / UNITS).glob("*.unit"))
 
-    def write_runs(self) -> None:
-        """Put every run into runs.h5, and remove its units once no run is missing.
+    def write_runs(self) -> runs_file.Table:
+        """Put every run into runs.h5, and remove its units once no run is missing; the runs.
 
-        A driver may make more units meanwhile, so the same ones are read each time. Raises
-        StorageError.
+        A driver may make more units meanwhile, which are left alone. Raises StorageError.
         """
-        paths = [path for path in self._units() if read(path, self.seal)]
-        runs_writer.write(self.folder / RUNS, self.about, self.seal, lambda: self._these(paths))
-        if all(self.runs().tried(law).all() for law in self.about.laws):
+        earlier, units, causes = [*self._earlier()], list[Path](), dict[Run, str]()
+        for path in self._units():
+            if result := read(path, self.seal):
+                units.append(path)
+                causes |= self._causes(result)
+        for table in earlier:
+            if not units and table.wanted == self.about.draws:
+                return table
+            causes |= table.causes
+        path = self.folder / RUNS
+        runs_writer.write(path, self.about, self.seal, causes, self._these(earlier, units))
+        runs = self.runs()
+        if all(runs.tried(law).all() for law in self.about.laws):
             with files.storage_errors(f"cannot remove the files in {self.folder / UNITS}"):
-                for path in paths:
+                for path in units:
                     path.unlink(missing_ok=True)
+        return runs
 
-    def _these(self, paths: Sequence[Path]) -> Iterator[UnitResult]:
+    def _causes(self, result: UnitResult) -> dict[Run, str]:
+        """Why runs of a unit did not finish."""
+        unit, law = result.unit, self.about.laws.index(result.unit.law)
+        told = zip(unit.draws, result.causes, strict=True)
+        return {(law, unit.cell, draw): cause for draw, cause in told if cause}
+
+    def _these(
+        self, earlier: Sequence[runs_file.Table], units: Sequence[Path]
+    ) -> Iterator[UnitResult]:
         """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
-        there = (result for earlier in self._earlier() for result in earlier.results())
-        for result in chain(there, filter(None, (read(path, self.seal) for path in paths))):
-            if not set(result.metrics) <= set(self.about.measured):
-                raise StorageError(
-                    f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the "
-                    "runs; restore the file"
-                )
+        there = (result for table in earlier for result in table.results())
+        for result in chain(there, filter(None, (read(path, self.seal) for path in units))):
+            self._check_metrics(set(result.metrics) <= set(self.about.measured))
             undefined = np.full(result.unit.count, np.nan)  # of laws that do not have a metric
             metrics = {name: result.metrics.get(name, undefined) for name in self.about.measured}
             yield replace(result, metrics=metrics)
@@ -157,7 +172,15 @@ class Store:
                 f"{error}; restore the file, or move it away and simulate its runs again with: "
                 f"{continue_with('sweep run', self.folder)}"
             ) from error
+        self._check_metrics(set(found.metrics) == set(self.about.measured))
         return found
+
+    def _check_metrics(self, fit: bool) -> None:
+        if not fit:
+            raise StorageError(
+                f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the runs; "
+                "restore the file"
+            )
 
     def _earlier(self) -> Iterator[runs_file.Table]:
         """runs.h5, if it is there. Raises StorageError where it is damaged or of another study."""

@@ -60,8 +60,7 @@ def validate(
     _clear(store)
     store.open(started)
     dispatch(store, made, tell, engine)
-    store.write_runs()
-    return store.runs()
+    return store.write_runs()
 
 
 def _clear(store: Store) -> None:
