@@ -103,6 +103,21 @@ def test_what_is_told_without_plug_ins_is_what_was_told_with_them(study, tmp_pat
     assert all(float(row["largest_east"]) > 0 for row in rows)
 
 
+def test_a_study_json_of_before_is_read_with_the_scenario_beside_it(study, planted, podusv):
+    told = ("summary.csv", "pairs.csv", "claims.json", "runs.h5")
+    before = {name: (study / name).read_bytes() for name in told}
+    record = json.loads((study / "study.json").read_text())
+    facts = record["metrics"]["largest_east"] | {"happens": False, "symbol": ""}
+    old = {key: record[key] for key in ("name", "draws", "laws", "cells", "identity", "history")}
+    old |= {"format": 1, "metrics_of_plugins": {"largest_east": facts}}
+    del facts["name"]
+    (study / "study.json").write_text(json.dumps(old))
+    assert podusv("sweep", "report", study, "--no-figures").code == 0
+    assert {name: (study / name).read_bytes() for name in told} == before
+    assert "largest |y|" in (study / "report.html").read_text()
+    assert not (planted / MARK).exists()
+
+
 NEEDS = {
     "draw": ("sweep", "draw", "--law", "pid", "--draw", "1", "--out", "one.yaml"),
     "run": ("sweep", "run", "--no-figures"),

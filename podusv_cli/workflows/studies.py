@@ -17,7 +17,7 @@ from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.studies.making import record
+from podusv_cli.studies.making import before, record
 from podusv_cli.studies.making.plan import KERNELS, Plan, differing, disagreements, plan
 from podusv_cli.studies.making.store import RUNS, SCENARIO, Store
 from podusv_cli.studies.telling import outputs
@@ -58,10 +58,12 @@ def check_study(folder: Path) -> None:
 def stored(study: Path) -> Store:
     """The store of a study's folder, for reading; its scenario and plug-ins are not looked at.
 
+    Only where an older podusv wrote study.json, its scenario is, and no plug-in.
+
     Raises UsageError where the folder is no study, StorageError where it is damaged.
     """
     check_study(study)
-    return Store(study, record.read(study))
+    return Store(study, before.about(study, lambda: kept_scenario(study).scenario))
 
 
 def planned(study: Path, *, trusted: bool) -> Plan:

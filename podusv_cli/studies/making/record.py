@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
-from podusv_cli.core.about import QuantityAbout, StudyAbout, StudyIdentity
+from podusv_cli.core.about import MetricAbout, QuantityAbout, StudyAbout, StudyIdentity
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.core.plugins import digest
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import FOLDER
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.storage import files, json_files
@@ -22,8 +25,17 @@ FORMAT = 2
 
 def about(plan: Plan) -> StudyAbout:
     """What a plan's study says about itself."""
-    scenario, sweep = plan.scenario, plan.sweep
-    seas = scenario.disturbances().values()
+    known = {n: m.about for n, m in plan.scenario.known_metrics().items() if m.accumulator}
+    cells = tuple(cell.label for cell in plan.cells)
+    return told(plan.scenario, plan.laws, cells, plan.identity, known, plan.metrics)
+
+
+def told(
+    scenario: Scenario, laws: tuple[str, ...], cells: tuple[str, ...],
+    identity: Mapping[str, Any], metrics: dict[str, MetricAbout], measured: tuple[str, ...],
+) -> StudyAbout:  # fmt: skip
+    """What the study of a scenario says about itself, with what follows from its cells and laws."""
+    sweep, seas = scenario.sweep or Sweep(), scenario.disturbances().values()
     return StudyAbout(
         name=scenario.name, description=scenario.description,
         duration=scenario.simulation.duration, steady_fraction=scenario.metrics.steady_fraction,
@@ -33,7 +45,7 @@ def about(plan: Plan) -> StudyAbout:
             "actuator": scenario.actuator.label,
         },
         plugins={n: one.sha256 for n, one in scenario.plugins.items() if n.endswith(".py")},
-        laws=plan.laws, cells=tuple(cell.label for cell in plan.cells),
+        laws=laws, cells=cells,
         grid={key: tuple(map(as_yaml, given)) for key, given in sweep.grid.items()},
         draws=sweep.draws, seed=sweep.seed, design=sweep.design, success=sweep.success,
         level=sweep.level, keep=sweep.keep, claims=sweep.claims,
@@ -41,8 +53,7 @@ def about(plan: Plan) -> StudyAbout:
             name: QuantityAbout(keys=one.targets(name), drawn=in_words(one), is_seed=one.seed)
             for name, one in sweep.vary.items()
         },
-        metrics={n: m.about for n, m in scenario.known_metrics().items() if m.accumulator},
-        measured=plan.metrics, identity=json_files.plain(plan.identity), history=(),
+        metrics=metrics, measured=measured, identity=json_files.plain(identity), history=(),
     )  # fmt: skip
 
 
@@ -58,11 +69,6 @@ def drawing(study: StudyIdentity) -> tuple[Sweep, str]:
 
 def read(folder: Path) -> StudyAbout:
     """What the study in a folder says about itself. Raises StorageError."""
-    if json_files.read(folder / STUDY).get("format") == 1:
-        raise StorageError(
-            f"cannot read {folder / STUDY}: an older podusv wrote it; podusv sweep run {folder} "
-            "writes it anew, and keeps all runs that are there"
-        )
     return json_files.read_as(folder / STUDY, StudyAbout)
 
 
