@@ -39,7 +39,7 @@ def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
     foreign = before.metrics_of_plugins.items()
     known |= {name: MetricAbout(name=name, **facts) for name, facts in foreign if name not in known}
     there = {*_measured(folder, digest(before.identity))}
-    return record.told(
+    return record.of_scenario(
         own, before.laws, before.cells, before.identity, known,
         tuple(name for name in known if name in there),
     ).model_copy(update={"draws": before.draws, "history": before.history})  # fmt: skip

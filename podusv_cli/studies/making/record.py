@@ -27,10 +27,10 @@ def about(plan: Plan) -> StudyAbout:
     """What a plan's study says about itself."""
     known = {n: m.about for n, m in plan.scenario.known_metrics().items() if m.accumulator}
     cells = tuple(cell.label for cell in plan.cells)
-    return told(plan.scenario, plan.laws, cells, plan.identity, known, plan.metrics)
+    return of_scenario(plan.scenario, plan.laws, cells, plan.identity, known, plan.metrics)
 
 
-def told(
+def of_scenario(
     scenario: Scenario, laws: tuple[str, ...], cells: tuple[str, ...],
     identity: Mapping[str, Any], metrics: dict[str, MetricAbout], measured: tuple[str, ...],
 ) -> StudyAbout:  # fmt: skip
