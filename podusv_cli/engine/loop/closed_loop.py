@@ -19,7 +19,7 @@ from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import signal
-from podusv_cli.core.component import describe
+from podusv_cli.core.component import Component, describe
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import LOOP, Signal
@@ -70,6 +70,15 @@ class ClosedLoop:
     start: tuple[float, float, float, float, float, float]
     measurement: Measurement = field(default_factory=Exact)
     estimator: Estimator = field(default_factory=NoEstimator)
+
+    @property
+    def parts(self) -> dict[str, Component]:
+        """Those that kernels belong to, as `Plan.constants` calls them."""
+        return {
+            "path": self.path, "disturbance": self.disturbance, "law": self.controller,
+            "actuator": self.actuator, "measurement": self.measurement,
+            "estimator": self.estimator,
+        }  # fmt: skip
 
     @property
     def measured(self) -> bool:

@@ -32,17 +32,13 @@ MARCHING = -1.0  # stands for the instants that a lane has reached
 def alike(plan: Plan) -> dict[str, frozenset[str]]:
     """By component the constants that all lanes have to share: choices, sizes and positions."""
     loop, observer = plan.loop, plan.observer
-    shared = {
-        "path": loop.path.choices(), "law": loop.controller.choices(),
-        "actuator": loop.actuator.choices(), "measurement": loop.measurement.choices(),
-        "estimator": loop.estimator.choices(),
-        "observer": plan.constants["observer"].keys() - observer.differing,
-        "disturbance": loop.disturbance.choices().union(
-            loop.disturbance.constant_of(i, name)
-            for i, part in enumerate(loop.disturbance.each())
-            for name in whole_numbers(part.kernel_with(loop.vessel))
-        ),
-    }  # fmt: skip
+    shared = {name: part.choices() for name, part in loop.parts.items()}
+    shared["observer"] = frozenset(plan.constants["observer"]) - observer.differing
+    shared["disturbance"] = shared["disturbance"].union(
+        loop.disturbance.constant_of(i, name)
+        for i, part in enumerate(loop.disturbance.each())
+        for name in whole_numbers(part.kernel_with(loop.vessel))
+    )
     for function in plan.functions:
         if function.part != "disturbance":  # whose parts' constants have other names in the sum
             shared[function.owner] |= whole_numbers(function.kernel)
