@@ -15,7 +15,7 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.paths.fillet import round_corner
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.paths.waypoints import Waypoints
-from podusv_cli.core.errors import LawError, NotConvergedError
+from podusv_cli.core.errors import NotConvergedError
 from podusv_cli.core.kernel import Vector, bundle, kernel
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.running.batch import simulate_many
@@ -35,7 +35,11 @@ def shown(path: Waypoints, t: float) -> Vector:
     """The target as the law sees it."""
     fillet, given = path.fillet_for_law(), np.zeros(6)
     assert fillet is not None
-    round_corner(t, bundle(fillet.constants(0)), fillet.rows(), path.targets([t])[0], given)
+    target = path.targets([t])[0]
+    round_corner(t, bundle(fillet.constants(0)), fillet.rows(), target, given)
+    both = np.zeros((2, 6))
+    path.evaluate_shown(t, bundle(path.constants()), path.table(), *both)
+    np.testing.assert_array_equal(both, [target, given])
     return given
 
 
@@ -147,14 +151,14 @@ def test_a_fillet_is_refused_where_it_has_no_corner_or_no_room() -> None:
     assert course("loop", 0.0).fillet_for_law() is None
 
 
-def test_a_law_s_own_constant_of_the_name_is_refused() -> None:
+def test_a_law_may_have_a_constant_of_the_name() -> None:
     class Named(Witness):
         kind: Literal["named"] = "named"  # type: ignore[assignment]
         fillet: float = 8.0
 
-    loop = replace(corrected(), controller=Named(), path=course("loop"))
-    with pytest.raises(LawError, match="another name"):
-        simulate(loop, TimeGrid(0.05, 10))
+    loop, grid = replace(corrected(), path=course("loop")), TimeGrid(0.05, 400)
+    one, other = (simulate(replace(loop, controller=law()), grid) for law in (Named, Witness))
+    np.testing.assert_array_equal(one["north"], other["north"])
 
 
 def test_steady_motion_is_looked_for_outside_the_fillets() -> None:

@@ -52,6 +52,8 @@ def rendered(name: str, about: Mapping[str, Any]) -> str:
 def told(law: ExportedLaw) -> dict[str, Any]:
     """What templates show of a law."""
     vectors, layout = law.vectors, law.layout
+    of_path = ("path", "path_table") if layout.shown else ()  # which shows the law another target
+    shown = {name: f"(double *){name}" for name in of_path}
     return {
         "label": law.loop.controller.label, "name": _comment(law.scenario.name),
         "version": __version__, "period": f"{law.period:.15g}", "signals": law.signals,
@@ -59,10 +61,11 @@ def told(law: ExportedLaw) -> dict[str, Any]:
         "step": STEP, "h": literal(law.grid.step), "every": layout.hold_every, "tau": layout.tau,
         "demand": layout.demand, "assumed": _assumed(law),
         "sizes": {name: len(getattr(vectors, name)) for name in ("stages", "held", "work")},
-        "vectors": [VECTORS.get(name, "&unused") for name in vectors._fields],
+        "vectors": [VECTORS.get(name, shown.get(name, "&unused")) for name in vectors._fields],
         "arrays": {
             "constants": _lines(vectors.law), "table": _lines(vectors.law_table),
             "start": _lines(vectors.s),
+            **{name: _lines(getattr(vectors, name)) for name in shown},
         },
     }  # fmt: skip
 

@@ -14,11 +14,12 @@ import numpy.typing as npt
 
 from podusv_cli.components.controllers.base import Slots
 from podusv_cli.components.paths.base import TARGET
+from podusv_cli.components.paths.fillet import round_corner
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE, Signal
-from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop
+from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop, nothing
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.compile import Piece, adapter, routine
@@ -95,10 +96,12 @@ class ExportedLaw:
         whole, signals = plan.layout, len(plan.loop.controller.signals)
         memory = whole.states - whole.memory
         first = len(TARGET) + 1
+        end = first + signals + len(DEMAND) + len(LOAD_NUMBERS)
         layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
             states=len(STATE) + memory, memory=len(STATE), place=len(STATE) + memory,
             signals=first, demand=first + signals, tau=first + signals + len(DEMAND),
-            columns=first + signals + len(DEMAND) + len(LOAD_NUMBERS), hold_every=whole.hold_every,
+            columns=end + len(plan.row["shown"]), shown=end if whole.shown else 0,
+            hold_every=whole.hold_every,
             sample_every=whole.sample_every, update_first=whole.update_first,
             wants_loads=whole.wants_loads,
         )  # fmt: skip
@@ -131,8 +134,12 @@ class ExportedLaw:
         return {**found, STEP: Piece(law_alone.demand, PROTOTYPE)}
 
     def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
-        yield from (e for e in self.plan.functions if e.part != "path")
-        yield "path", law_alone.target_is_there, ()
+        path, *others = self.plan.functions
+        yield from others
+        if self.layout.shown:
+            yield "path", round_corner, path.constants
+        else:  # the row has the target already
+            yield "path", nothing, ()
 
     @property
     def _given(self) -> tuple[Signal, ...]:
@@ -213,7 +220,7 @@ class ExportedLaw:
 
         def stepped(sample: int, inputs: Vector) -> list[float]:
             c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
-            c.row[n.tau :] = inputs[given:]
+            c.row[n.tau : n.tau + len(LOAD_NUMBERS)] = inputs[given:]
             step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)
             return [*c.row[n.demand : n.tau], *c.row[n.signals : n.demand], *c.s[n.memory :]]
 

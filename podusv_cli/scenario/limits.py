@@ -78,13 +78,14 @@ def estimate(scenario: Scenario, plan: Plan | None = None) -> Size:
     plan = plan or scenario.plan()
     grid = plan.grid
     monitored = len(monitor.signals(plan)) if scenario.log.monitor else 0
-    columns = len(plan.names) - len(TARGET[2:]) + monitored
+    hidden = len(TARGET[2:]) + len(plan.row["shown"])
+    columns = len(plan.names) - hidden + monitored
     content = grid.rows * columns * NUMBER
     cosines = sum(part.cosines() for part in scenario.disturbances().values())
     step = STEP + MEMORY * len(plan.states["law"]) + COSINE * cosines
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
-    unlogged = len(TARGET[2:]) + (len(monitor.UNLOGGED) if monitored else 0)
+    unlogged = hidden + (len(monitor.UNLOGGED) if monitored else 0)
     compress = scenario.log.compress
     scratch = content + grid.rows * unlogged * NUMBER if content > HELD and not compress else 0
     return Size(grid.steps, grid.rows, content, seconds, scratch, compress)

@@ -41,6 +41,9 @@ class Path(Component):
     followed reads the vessel's state x as the law is given it, and `place`, one number for each
     signal of `places`; `locate(t, x, s, place, k, table)` sets these at every instant, with the
     true state s.
+
+    Where the law is to see another target than the log has, `evaluate_shown` is called in place of
+    `evaluate`, with a further argument `shown`, which it fills as well.
     """
 
     noun: ClassVar[str] = "path"
@@ -48,6 +51,7 @@ class Path(Component):
     places: ClassVar[tuple[Signal, ...]] = ()
 
     evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
+    evaluate_shown: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate_shown"))
     locate: ClassVar[Callable[..., None]] = staticmethod(absent("locate"))
 
     def targets(self, times: Iterable[float]) -> Vector:

@@ -17,23 +17,23 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.interpolation import segment
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, kernel, tail
 
 
 @kernel
 def round_corner(t: float, k: Any, table: Vector, target: Vector, shown: Vector) -> None:
-    """shown = the target at t as the law sees it; `table` as in `Fillet.rows`."""
+    """shown = the target at t as the law sees it; the path's table ends in `Fillet.rows`."""
     for i in range(6):
         shown[i] = target[i]
-    count = int(k.fillet_corners)
+    count, corners = int(k.fillet_corners), tail(table, int(k.fillet_place))
     lap = t - k.fillet_period * math.floor(t / k.fillet_period)
-    i = segment(lap + 0.5 * k.fillet, count, table)
-    s = lap - table[i]
+    i = segment(lap + 0.5 * k.fillet, count, corners)
+    s = lap - corners[i]
     left = 0.5 * k.fillet - abs(s)
     if left > 0.0 and t > s:  # the first lap has no corner at its start
         side = -left if s >= 0.0 else left
         for axis in range(2):
-            rate = table[count + 2 * i + axis] / k.fillet
+            rate = corners[count + 2 * i + axis] / k.fillet
             shown[axis] += 0.5 * rate * left * left
             shown[2 + axis] += rate * side
             shown[4 + axis] += rate
@@ -65,7 +65,7 @@ class Fillet:
         return np.asarray(np.hypot(*self.jumps.T) / self.time)
 
     def constants(self, place: int) -> dict[str, float]:
-        """What the kernel reads from `k`, where `rows` begin at `place` of the law's table."""
+        """What the kernel reads from `k`, where `rows` begin at `place` of the path's table."""
         return {
             "fillet": self.time, "fillet_period": self.period,
             "fillet_corners": float(len(self.times)), "fillet_place": float(place),

@@ -9,14 +9,37 @@ import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.components.paths.base import Break, Path, Point
-from podusv_cli.components.paths.fillet import Fillet
+from podusv_cli.components.paths.fillet import Fillet, round_corner
 from podusv_cli.core.component import value
 from podusv_cli.core.interpolation import segment
 from podusv_cli.core.kernel import Vector, kernel
 
 ALIGNED = 1e-9  # of the speed; a smaller change of velocity is rounding
 FOREVER = 1e300  # s, the period of what never comes again
+WIDTH = 9  # numbers in the table for each knot
 LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
+
+
+@kernel
+def along(t: float, k: Any, table: Vector, target: Vector) -> None:
+    """The spline and its derivatives, by Horner's rule."""
+    count = int(k.count)
+    if k.after == LOOP:
+        t -= k.period * math.floor(t / k.period)
+    i = segment(t, count, table)
+    s = t - table[i]
+    for axis in range(2):
+        c = count + 8 * i + 4 * axis
+        target[axis] = ((table[c] * s + table[c + 1]) * s + table[c + 2]) * s + table[c + 3]
+        target[2 + axis] = (3.0 * table[c] * s + 2.0 * table[c + 1]) * s + table[c + 2]
+        target[4 + axis] = 6.0 * table[c] * s + 2.0 * table[c + 1]
+
+
+@kernel
+def along_shown(t: float, k: Any, table: Vector, target: Vector, shown: Vector) -> None:
+    """The same, and what the law is shown."""
+    along(t, k, table, target)
+    round_corner(t, k, table, target, shown)
 
 
 class Waypoints(Path):
@@ -132,11 +155,15 @@ class Waypoints(Path):
 
     def constants(self) -> dict[str, float]:
         """The speed, what comes after, the number of points, and the time that they take."""
-        knots = self._knots()
-        return super().constants() | {"count": float(len(knots)), "period": float(knots[-1])}
+        knots, fillet = self._knots(), self.fillet_for_law()
+        own = super().constants() | {"count": float(len(knots)), "period": float(knots[-1])}
+        return own | (fillet.constants(WIDTH * len(knots)) if fillet else {})
 
     def table(self) -> Vector:
-        """The knots, then eight coefficients a knot: cubic in x and in y, highest power first."""
+        """The knots, eight coefficients a knot: cubic in x and in y, highest power first; corners.
+
+        The corners are those that a law sees rounded, if any.
+        """
         knots, cubic = self._knots(), self._cubic()
         end = cubic(knots[-1])
         velocity = np.zeros(2) if self.after == "stop" else cubic(knots[-1], 1)
@@ -144,7 +171,8 @@ class Waypoints(Path):
         rows = np.vstack(
             [cubic.c.transpose(1, 2, 0).reshape(-1, 8), last[[0, 1, 2, 4, 0, 1, 3, 5]]]
         )
-        return np.concatenate([knots, rows.ravel()])
+        fillet = self.fillet_for_law()
+        return np.concatenate([knots, rows.ravel(), *([fillet.rows()] if fillet else [])])
 
     def _cubic(self) -> Any:
         """Piecewise cubic polynomials of the time through the points."""
@@ -158,17 +186,5 @@ class Waypoints(Path):
         ends = "periodic" if self.after == "loop" else "natural"
         return CubicSpline(knots, course, bc_type=ends)
 
-    @staticmethod
-    @kernel
-    def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:
-        """The spline and its derivatives, by Horner's rule."""
-        count = int(k.count)
-        if k.after == LOOP:
-            t -= k.period * math.floor(t / k.period)
-        i = segment(t, count, table)
-        s = t - table[i]
-        for axis in range(2):
-            c = count + 8 * i + 4 * axis
-            target[axis] = ((table[c] * s + table[c + 1]) * s + table[c + 2]) * s + table[c + 3]
-            target[2 + axis] = (3.0 * table[c] * s + 2.0 * table[c + 1]) * s + table[c + 2]
-            target[4 + axis] = 6.0 * table[c] * s + 2.0 * table[c + 1]
+    evaluate = staticmethod(along)
+    evaluate_shown = staticmethod(along_shown)

@@ -13,8 +13,6 @@ import numpy as np
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.disturbances.base import FLOW, WAVE_MOTION
 from podusv_cli.components.paths.base import TARGET
-from podusv_cli.core.component import describe
-from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.kernel import call as call_kernel
 from podusv_cli.core.recording import Allocate
@@ -29,12 +27,12 @@ from podusv_cli.engine.loop.closed_loop import (
     nothing,
 )
 from podusv_cli.engine.loop.recent import Recent
-from podusv_cli.engine.loop.rounded import law_of_rounded, sample_of_rounded
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
 from podusv_cli.engine.step.relay import relay
 
 FORCES, SEA = LOADS[:3], LOADS[3:]
+SHOWN = tuple(f"{name}, shown" for name in TARGET)  # which no log has
 AT_START = (0.0,)  # s
 
 
@@ -129,6 +127,7 @@ class Plan:
             "forces": [*FORCES], "sea": [*SEA, *_names(loop.disturbance.signals)],
             "actuator": _names(loop.actuator.signals_with),
             "measurement": _names(loop.measurement.signals),
+            "shown": [*SHOWN] if self.recall(loop.path.fillet_for_law) else [],
         }  # fmt: skip
 
     @cached_property
@@ -144,7 +143,8 @@ class Plan:
         s, row, flow = _offsets(self.states), _offsets(self.row), self._of_sea(FLOW[0])
         return Layout(
             states=s["end"], estimate=s["estimator"] if loop.measured else 0, place=s["path"],
-            memory=s["law"], signals=row["law"], demand=row["demand"], tau=row["forces"],
+            memory=s["law"], shown=row["shown"] if self.row["shown"] else 0,
+            signals=row["law"], demand=row["demand"], tau=row["forces"],
             b=row["sea"], flow=row["sea"] + flow if flow and loop.actuator.feels_motion else 0,
             flags=row["actuator"], sensed=row["measurement"], columns=row["end"],
             steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
@@ -164,11 +164,11 @@ class Plan:
         """What the loop calls, in the order in which it takes them."""
         loop, names = self.loop, self.constants
         law, path, seen, estimator = loop.controller, loop.path, loop.measurement, loop.estimator
-        rounded = self.recall(path.fillet_for_law) is not None
         kernels = {
-            "path": path.evaluate, "locate": path.locate if path.follows else nothing,
+            "path": path.evaluate_shown if self.row["shown"] else path.evaluate,
+            "locate": path.locate if path.follows else nothing,
             "disturbance": loop.disturbance.kernel_with(loop.vessel),
-            "law": law_of_rounded(law.law) if rounded else law.law,
+            "law": law.law,
             "sample": law.sample if law.takes_samples() else nothing,
             "actuator": loop.actuator.drive_with(),
             "after_saturation": law.after_saturation if law.wants_loads() else nothing,
@@ -177,8 +177,6 @@ class Plan:
             "follow": estimator.follow if loop.measured else nothing,
             "observer": self.observer.watch,
         }  # fmt: skip
-        if rounded and law.takes_samples():
-            kernels["sample"] = sample_of_rounded(law.sample)
         return tuple(  # what does nothing reads nothing: its code is one for all
             Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
             for part, inner in kernels.items()
@@ -215,19 +213,11 @@ class Plan:
 
     @property
     def law_constants(self) -> dict[str, float]:
-        """The law's constants, with those of the path's fillet where it has one."""
-        law = self.loop.controller
-        own: dict[str, float] = self.recall(law.constants_with, self.loop.nominal)
-        fillet = self.recall(self.loop.path.fillet_for_law)
-        if fillet is None:
-            return own
-        corners: dict[str, float] = fillet.constants(len(self.recall(law.table)))
-        if taken := sorted(own.keys() & corners):
-            raise LawError(
-                f"{describe(law)}: path.fillet needs the name {taken[0]!r}, which is a constant of "
-                "this law; give it another name"
-            )
-        return own | corners
+        """The law's constants."""
+        constants: dict[str, float] = self.recall(
+            self.loop.controller.constants_with, self.loop.nominal
+        )
+        return constants
 
     @property
     def path_table(self) -> Vector:
@@ -237,10 +227,9 @@ class Plan:
 
     @property
     def law_table(self) -> Vector:
-        """The law's table, and behind it the corners of the path's fillet."""
-        own: Vector = self.recall(self.loop.controller.table)
-        fillet = self.recall(self.loop.path.fillet_for_law)
-        return np.concatenate([own, fillet.rows()]) if fillet else own
+        """The law's table."""
+        table: Vector = self.recall(self.loop.controller.table)
+        return table
 
     @cached_property
     def first_target(self) -> Vector:

@@ -23,7 +23,7 @@ VECTOR = POINTER(NUMBER)
 # instant's position, its weight in an integral [s], and whether an evaluation is one more at its
 # instant or a stage within a step are numbers, all others vectors.
 SIGNATURES = {
-    "path": "t x place k table target",
+    "path": "t x place k table target shown",
     "locate": "t x s place k table",
     "disturbance": "t x k table b again stage",
     "law": "t x memory target k table tau rate signals work",

@@ -94,7 +94,8 @@ class Pieces:
     def _path(self, part: tuple[Any, ...], compiled: bool) -> Callable[[float], None]:
         """What writes the target at a time [s], as the loop calls it."""
         c, place = self.vectors, self.vectors.s[self._layout.place :]
-        vectors = (self._given, place, c.path, c.path_table, self._target)
+        shown = np.zeros(len(TARGET))
+        vectors = (self._given, place, c.path, c.path_table, self._target, shown)
         if not compiled:
             path = signatures.bind(*part)
             return lambda t: path(t, *vectors)

@@ -15,13 +15,6 @@ named_vectors, named_layout = unpacker(Vectors._fields), unpacker(Layout._fields
 
 
 @kernel
-def target_is_there(
-    t: float, x: Vector, place: Vector, k: Vector, table: Vector, target: Vector
-) -> None:
-    """Stands for the path: the row has the target already."""
-
-
-@kernel
 def demand(
     path: Function, law: Function, sample: Function, after: Function,
     k: int, h: float, vectors: Vector, layout: Vector,

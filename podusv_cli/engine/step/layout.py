@@ -43,7 +43,8 @@ class Layout(NamedTuple):
     estimate: int  # offset in s of the state that the law is given; 0: the true state
     place: int  # offset in s of where on its path the vessel is, see `paths.base`
     memory: int  # offset of the law's memory in s
-    signals: int  # offsets in the row
+    shown: int  # offsets in the row; of the target that the law is given, 0: the target itself
+    signals: int
     demand: int
     tau: int
     b: int

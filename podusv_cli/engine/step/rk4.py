@@ -3,7 +3,8 @@
 State s: the vessel's (x, y, psi, u, v, r), the actuator's states, the estimator's, the place on a
 path that is followed, the law's memory.
 Row: target, distance to it, law's signals, demand, tau, b and the disturbance's signals,
-actuator's signals, measured values; offsets are in `Layout`.
+actuator's signals, measured values, the target that the law is shown where that is another;
+offsets are in `Layout`.
 """
 
 from __future__ import annotations
@@ -86,10 +87,10 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
     row = c.row
     demand, tau, b = tail(row, n.demand), tail(row, n.tau), tail(row, n.b)
     memory, memory_rate = tail(s, n.memory), tail(ds, n.memory)
-    given = tail(s, n.estimate)  # the state that the law is given
+    given, aim = tail(s, n.estimate), tail(row, n.shown)  # state and target that the law is given
     k, table, work = c.law, c.law_table, c.work
     if not again or n.follows > 0:
-        p.path(t, given, tail(s, n.place), c.path, c.path_table, row)
+        p.path(t, given, tail(s, n.place), c.path, c.path_table, row, aim)
     if n.hold_every > 0 and n.update_first > 0:
         for i in range(n.states - n.memory):
             memory_rate[i] = 0.0
@@ -100,7 +101,7 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
             tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
         )  # fmt: skip
     else:
-        p.law(t, given, memory, row, k, table, demand, memory_rate, tail(row, n.signals), work)
+        p.law(t, given, memory, aim, k, table, demand, memory_rate, tail(row, n.signals), work)
     wanted = demand
     if n.relayed > 0:
         pass_on(demand, c.relay)

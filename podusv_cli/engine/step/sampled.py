@@ -57,21 +57,21 @@ def sample_and_hold(
 ) -> None:  # fmt: skip
     """What happens at instants only: the law's own samples, and the hold of sampled control."""
     given, row, held = tail(c.s, n.estimate), c.row, c.held
-    memory = tail(c.s, n.memory)
+    memory, aim = tail(c.s, n.memory), tail(row, n.shown)
     p, table = c.law, c.law_table
-    path(t, given, tail(c.s, n.place), c.path, c.path_table, row)
+    path(t, given, tail(c.s, n.place), c.path, c.path_table, row, aim)
     if n.sample_every > 0 and k % n.sample_every == 0:
-        sample(t, given, memory, row, p, table)
+        sample(t, given, memory, aim, p, table)
     if n.hold_every > 0 and k % n.hold_every == 0:
         held[0] = t
         for i in range(6):
             held[HELD_X + i] = given[i]
-            held[HELD_TARGET + i] = row[i]
+            held[HELD_TARGET + i] = aim[i]
         if n.update_first > 0 and k > 0:
             for _ in range(n.hold_every):  # the period that ends, with its loads
                 remember(t, 0.0, h, law, after, c, n)
         law(
-            t, given, memory, row, p, table, tail(row, n.demand), tail(c.stages, n.memory),
+            t, given, memory, aim, p, table, tail(row, n.demand), tail(c.stages, n.memory),
             tail(row, n.signals), c.work,
         )  # fmt: skip
 
