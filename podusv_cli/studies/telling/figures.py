@@ -28,7 +28,7 @@ from podusv_cli.studies.counting.expressions import FINISHED, parse_success, suc
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.telling.keep import Track
 from podusv_cli.studies.telling.results import Results
-from podusv_cli.studies.telling.summary import has, values_of
+from podusv_cli.studies.telling.summary import column_of
 
 MOST_CELLS = 6  # of which each has figures of its own
 POINTS = 400  # of a curve
@@ -77,8 +77,8 @@ def _met(results: Results, name: str, cell: int) -> dict[str, Vector]:
     """A metric of the draws that every law that has it was tried on, failures as infinity."""
     runs, about = results.runs, results.known[name]
     return {
-        law: values_of(runs, law, cell, about)[runs.done(law)[cell]]
-        for law in runs.laws if has(runs, law, cell, about)
+        law: values[runs.done(law)[cell]]
+        for law in runs.laws if (values := column_of(runs, law, cell, about)) is not None
     }  # fmt: skip
 
 

@@ -45,10 +45,10 @@ def pairs(
         {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
          **_pair(of_a[used], of_b[used], margin, level)}
         for name in _names(runs, metrics) for cell in range(len(runs.cells))
-        for (a, one), (b, other) in combinations(laws.items(), 2)
-        for of_a, of_b in [(values_of(runs, law, cell, metrics[name]) for law in (one, other))]
-        for used in [runs.done(one)[cell] & runs.done(other)[cell]]
-        if all(has(runs, law, cell, metrics[name]) for law in (one, other))
+        for read in [{a: column_of(runs, law, cell, metrics[name]) for a, law in laws.items()}]
+        for a, b in combinations(laws, 2)
+        for of_a, of_b in [(read[a], read[b])] if of_a is not None and of_b is not None
+        for used in [runs.done(laws[a])[cell] & runs.done(laws[b])[cell]]
     ]  # fmt: skip
     return pd.DataFrame(rows)
 
@@ -93,16 +93,15 @@ def _names(runs: StudyRuns, metrics: Known) -> list[str]:
     return [name for name in metrics if name in runs.metrics and not metrics[name].clocked]
 
 
-def values_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vector:
-    """A metric of every draw of a cell; +inf for a run that failed."""
-    return worst(about, runs.metric(law, about.name)[cell], ~runs.success(law)[cell])
+def column_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vector | None:
+    """A metric of every draw of a cell, +inf for a run that failed; None where the law has none.
 
-
-def has(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> bool:
-    """Whether the law has the metric: a run that succeeded has it, or there is no such run."""
-    succeeded = runs.done(law)[cell] & runs.success(law)[cell]
-    values = values_of(runs, law, cell, about)[succeeded]
-    return bool(runs.done(law)[cell].any() and (not len(values) or not np.isnan(values).all()))
+    It has the metric where a run that succeeded has it, or where there is no such run.
+    """
+    done, success = runs.done(law)[cell], runs.success(law)[cell]
+    values = worst(about, runs.metric(law, about.name)[cell], ~success)
+    known = values[done & success]
+    return values if done.any() and not (len(known) and np.isnan(known).all()) else None
 
 
 def _columns(
@@ -110,8 +109,8 @@ def _columns(
 ) -> Iterator[tuple[str, Vector]]:  # fmt: skip
     """Every metric that the law has, over the draws of a cell that it met."""
     for name in _names(runs, metrics):
-        if has(runs, law, cell, metrics[name]):
-            yield name, values_of(runs, law, cell, metrics[name])[runs.done(law)[cell]]
+        if (values := column_of(runs, law, cell, metrics[name])) is not None:
+            yield name, values[runs.done(law)[cell]]
 
 
 def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, Any]:
