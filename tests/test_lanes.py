@@ -30,8 +30,9 @@ from podusv_cli.core.registry import kinds
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.machine import compile, wide_numba
+from podusv_cli.engine.machine import compile
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
+from podusv_cli.engine.machine.wide import object_code
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.batch import Batch, simulate_many
 from podusv_cli.engine.running.lanes import why_alone
@@ -383,11 +384,11 @@ def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(
     def without_a_pass(*given: Any) -> Any:
         raise AttributeError("no attribute 'add_always_inliner_pass'")
 
-    monkeypatch.setattr(wide_numba.widening, "widened", without_a_pass)
+    monkeypatch.setattr(object_code.widening, "widened", without_a_pass)
     (piece,) = [
         p for p in lanes._pieces(Plan(loop("pid"), GRID)) if p.label.startswith("lanes_law")
     ]
-    code = wide_numba.object_code(piece.function, piece.prototype)
+    code = object_code.object_code(piece.function, piece.prototype)
     assert code.symbol == ""
     assert b"cannot be widened: AttributeError: no attribute 'add_always" in code.content
     assert code.content.endswith(f"llvmlite {version('llvmlite')}".encode())

@@ -19,7 +19,8 @@ from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import available_workers, run_all
 
-ALONE_BY, LANES_BY = "compile_numba", "wide_numba"  # what compiles kernels for a run, for lanes
+# What compiles kernels for a run, and for lanes
+ALONE_BY, LANES_BY = "compile_numba", "wide.object_code"
 SHARE = 40_000  # size of what a process of its own compiles at least: about 3 s
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "

@@ -28,7 +28,7 @@ import numpy as np
 from podusv_cli.engine.machine import code_folder
 
 # The files of podusv that turn kernels into machine code, from the package's folder.
-TRANSLATORS = ("core/kernel.py", "engine/machine/*.py")
+TRANSLATORS = ("core/kernel.py", "engine/machine/**/*.py")
 
 
 class Code(NamedTuple):

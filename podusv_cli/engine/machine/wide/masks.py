@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Any
 
-from podusv_cli.engine.machine.scalar_ir import Function, Instruction, NotForLanes
-from podusv_cli.engine.machine.wide_order import END, Level, Loop, Node, Order
+from podusv_cli.engine.machine.wide.order import END, Level, Loop, Node, Order
+from podusv_cli.engine.machine.wide.scalar_ir import Function, Instruction, NotForLanes
 
 EVERY = "every"  # the mask of all lanes
 # What a call gives that is the same in all lanes, whatever it is given.

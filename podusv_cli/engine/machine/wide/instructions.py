@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 
 from podusv_cli.core.kernel import LANES
-from podusv_cli.engine.machine.scalar_ir import Instruction, NotForLanes
-from podusv_cli.engine.machine.wide_masks import EVERY, LANES_MEMORY, PLAIN_MEMORY, Masks
-from podusv_cli.engine.machine.wide_values import MASK, Values, lanes
+from podusv_cli.engine.machine.wide.masks import EVERY, LANES_MEMORY, PLAIN_MEMORY, Masks
+from podusv_cli.engine.machine.wide.scalar_ir import Instruction, NotForLanes
+from podusv_cli.engine.machine.wide.values import MASK, Values, lanes
 
 NUMBER = 8  # bytes of what a vector has
 SIZES = {"double": NUMBER, "i64": NUMBER, "ptr": NUMBER, "float": 4, "i32": 4, "i16": 2, "i8": 1}

@@ -9,11 +9,11 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
-from podusv_cli.engine.machine.scalar_ir import EXCEPTION, RESULT, RETURN, prepared, read
-from podusv_cli.engine.machine.wide_instructions import Instructions, is_cheap
-from podusv_cli.engine.machine.wide_masks import PLAIN_MEMORY, Masks
-from podusv_cli.engine.machine.wide_order import END, Level, Loop, Node
-from podusv_cli.engine.machine.wide_values import ALL_FALSE, MASK
+from podusv_cli.engine.machine.wide.instructions import Instructions, is_cheap
+from podusv_cli.engine.machine.wide.masks import PLAIN_MEMORY, Masks
+from podusv_cli.engine.machine.wide.order import END, Level, Loop, Node
+from podusv_cli.engine.machine.wide.scalar_ir import EXCEPTION, RESULT, RETURN, prepared, read
+from podusv_cli.engine.machine.wide.values import ALL_FALSE, MASK
 
 NAME = "podusv_lanes"
 
@@ -21,7 +21,7 @@ NAME = "podusv_lanes"
 def widened(module: Any, name: str, memory: list[str], result: str, machine: Any) -> Any:
     """An optimised module with the function `name` of a module for lanes, called NAME.
 
-    `memory` tells for every argument what it points at (`wide_masks`); the function was compiled
+    `memory` tells for every argument what it points at (`masks`); the function was compiled
     by numba, which hands over two more in front of them: where the result of type `result` (""
     for none) is written, and where an exception. Raises NotForLanes.
     """

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 from podusv_cli.core.kernel import LANES
-from podusv_cli.engine.machine.scalar_ir import Instruction
-from podusv_cli.engine.machine.wide_masks import EVERY, NOTHING, Masks
+from podusv_cli.engine.machine.wide.masks import EVERY, NOTHING, Masks
+from podusv_cli.engine.machine.wide.scalar_ir import Instruction
 
 MASK = f"<{LANES} x i1>"
 ALL_TRUE, ALL_FALSE = "splat (i1 true)", "zeroinitializer"

@@ -12,7 +12,7 @@ from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from podusv_cli.engine.machine.scalar_ir import RETURN, Function, NotForLanes
+from podusv_cli.engine.machine.wide.scalar_ir import RETURN, Function, NotForLanes
 
 END = -2  # where a level ends: the next round of its loop, or the function's return
 

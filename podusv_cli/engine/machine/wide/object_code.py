@@ -23,11 +23,12 @@ from numba.extending import intrinsic
 
 from podusv_cli.core import kernel
 from podusv_cli.core.errors import in_a_line
-from podusv_cli.engine.machine import compile_numba, widening
+from podusv_cli.engine.machine import compile_numba
 from podusv_cli.engine.machine.object_cache import Code, target
-from podusv_cli.engine.machine.scalar_ir import NotForLanes
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
-from podusv_cli.engine.machine.wide_masks import LANES_MEMORY, PLAIN_MEMORY
+from podusv_cli.engine.machine.wide import widening
+from podusv_cli.engine.machine.wide.masks import LANES_MEMORY, PLAIN_MEMORY
+from podusv_cli.engine.machine.wide.scalar_ir import NotForLanes
 
 
 def object_code(function: Any, prototype: Any) -> Code:
