@@ -9,7 +9,7 @@ from itertools import islice
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.scenario.conflicts import Conflicts
+from podusv_cli.scenario.conflicts import Conflicts, clashes
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import monitor
@@ -115,7 +115,8 @@ def limits(
 
     def check_size(scenario: Scenario) -> list[tuple[str, str]]:
         too_large = _too_large(scenario, allow_large, read_back, insist)
-        return [] if scenario.conflicts() else list(islice(too_large, 1))
+        no_loop = scenario.conflicts() or clashes(scenario)
+        return [] if no_loop else list(islice(too_large, 1))
 
     return check_size
 
