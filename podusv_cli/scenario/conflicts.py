@@ -21,7 +21,12 @@ MOST_INSTANTS = 2**53  # that are distinct numbers
 
 
 def conflicts(scenario: Scenario) -> list[tuple[str, str]]:
-    """Key and message for every pair of values that contradict each other."""
+    """Key and message for every pair of values that contradict each other, and for `clashes`."""
+    return contradictions(scenario) or list(_signals(scenario))
+
+
+def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
+    """Key and message for every pair of values that contradict each other; plans no loop."""
     parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
     return parts or [*of_numbers(scenario), *_names(scenario), *scenario.metrics.conflicts()]
 
@@ -31,7 +36,7 @@ def clashes(scenario: Scenario) -> list[tuple[str, str]]:
 
     Nothing where values contradict each other, as no loop can be planned then.
     """
-    return [] if conflicts(scenario) else list(_signals(scenario))
+    return [] if contradictions(scenario) else list(_signals(scenario))
 
 
 def of_numbers(scenario: Scenario) -> Conflicts:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from podusv_cli.core.errors import SizingError
 from podusv_cli.core.phrases import did_you_mean, found, hint, unknown, without_case
+from podusv_cli.scenario.conflicts import contradictions
 from podusv_cli.scenario.keys import NAME, NUMBER, Key, either, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import stands_in
@@ -36,7 +37,7 @@ def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ())
     except SizingError as error:
         faults.append(Fault(follow(root, ("actuator",))[-1].mark, "actuator", str(error)))
         return None
-    for key, text in chain(scenario.conflicts(), *(look(scenario) for look in more)):
+    for key, text in chain(contradictions(scenario), *(look(scenario) for look in more)):
         steps = route(key) if isinstance(key, str) else key
         name = key if isinstance(key, str) else dotted(key)
         faults.append(Fault(follow(root, steps)[-1].mark, name, text))
