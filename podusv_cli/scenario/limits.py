@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from podusv_cli.components.paths.base import TARGET
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.scenario.conflicts import Conflicts, clashes
+from podusv_cli.scenario.conflicts import Conflicts
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import monitor
@@ -73,19 +73,18 @@ class Size:
 def estimate(scenario: Scenario, plan: Plan | None = None) -> Size:
     """The size of the run with `controller`, counted without allocating its arrays.
 
-    `plan` is that of the run where there is one already.
+    `plan` is that of the run where there is one already. Raises LawError as `plan.about`.
     """
     plan = plan or scenario.plan()
-    grid = plan.grid
+    grid, about = plan.grid, plan.about
     monitored = len(monitor.signals(plan)) if scenario.log.monitor else 0
-    hidden = len(TARGET[2:]) + len(plan.row["shown"])
-    columns = len(plan.names) - hidden + monitored
-    content = grid.rows * columns * NUMBER
+    logged = sum(name in about for name in plan.names)
+    content = grid.rows * (logged + monitored) * NUMBER
     cosines = sum(part.cosines() for part in scenario.disturbances().values())
     step = STEP + MEMORY * len(plan.states["law"]) + COSINE * cosines
     pace = 1.0 if scenario.simulation.compiled else PLAIN
     seconds = START + grid.steps * step * pace + content * BYTE
-    unlogged = hidden + (len(monitor.UNLOGGED) if monitored else 0)
+    unlogged = len(plan.names) - logged + (len(monitor.UNLOGGED) if monitored else 0)
     compress = scenario.log.compress
     scratch = content + grid.rows * unlogged * NUMBER if content > HELD and not compress else 0
     return Size(grid.steps, grid.rows, content, seconds, scratch, compress)
@@ -114,9 +113,12 @@ def limits(
     insist = f", or insist with {insist}" if insist else ""
 
     def check_size(scenario: Scenario) -> list[tuple[str, str]]:
-        too_large = _too_large(scenario, allow_large, read_back, insist)
-        no_loop = scenario.conflicts() or clashes(scenario)
-        return [] if no_loop else list(islice(too_large, 1))
+        if scenario.conflicts():
+            return []
+        try:
+            return list(islice(_too_large(scenario, allow_large, read_back, insist), 1))
+        except LawError:  # `clashes` says which signals
+            return []
 
     return check_size
 
