@@ -9,7 +9,7 @@ from itertools import islice
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.scenario.conflicts import Conflicts
+from podusv_cli.scenario.conflicts import Conflicts, contradictions
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import monitor
@@ -113,7 +113,7 @@ def limits(
     insist = f", or insist with {insist}" if insist else ""
 
     def check_size(scenario: Scenario) -> list[tuple[str, str]]:
-        if scenario.conflicts():
+        if contradictions(scenario):
             return []
         try:
             return list(islice(_too_large(scenario, allow_large, read_back, insist), 1))
