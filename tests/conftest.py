@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from command_samples import commanded, write
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from old_results import among_old_results
 from policy_samples import content, symmetric
 
@@ -69,7 +69,8 @@ PRINTED_START = (-10.0, -10.0, 0.0, 0.0, 0.0, 0.0)
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep what tests compile out of the user's cache; ask no speed of a property."""
-    settings.register_profile("podusv", deadline=None)
+    unhurried = [HealthCheck.too_slow]
+    settings.register_profile("podusv", deadline=None, suppress_health_check=unhurried)
     settings.load_profile("podusv")
     cache = getattr(config, "cache", None)  # absent under `-p no:cacheprovider`
     if cache is not None:
