@@ -31,9 +31,10 @@ JUDGES := fresh cybership2 otter
 LEFEBER := circle line port load damping
 FOSSEN := course cybership2 damping load limits beside
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
+DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN))
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod sea sweep tune bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help reproduce claim pod sea doubt sweep tune bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -79,6 +80,15 @@ sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/
 	@for name in $(SEAS); do $(STEP) compare sea $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
 	@echo "what was found: results/sea.md; every table and figure: results/.runs/sea/*/report.html"
+
+doubt: $(VENV)/run.done ## what the verdicts on three papers hang on, into results/doubt.md, about half an hour
+	@for name in $(DOUBTED); do \
+	    echo "  $$name" && mkdir -p results/.doubt/$${name%/*} && \
+	    $(BIN)/podusv doubt configs/$$name.yaml --out results/.doubt/$$name --force -q || exit 1; \
+	done
+	@$(BIN)/python examples/reproduce/doubts.py $(addprefix results/.doubt/,$(DOUBTED)) > results/.table && \
+	    mv results/.table results/doubt.md
+	@echo "what was found: results/doubt.md; every turn and figure: results/.doubt/*/*/report.html"
 
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \

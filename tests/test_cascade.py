@@ -162,7 +162,7 @@ def test_on_the_virtual_ship_the_demand_keeps_it_there_while_the_target_changes_
         assert abs(out[3]) > 1e-4
 
 
-ROWS = re.findall(r"^\| (L\d+) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
+ROWS = re.findall(r"^\| (L\d+\w?) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
 
 
 @pytest.mark.parametrize("name", ["circle", "line", "port", "load", "damping"])

@@ -86,6 +86,25 @@ def test_a_target_that_goes_on_after_its_last_point_is_told():
     assert "path-runs-on" not in codes(on, "simulation.duration=12")
 
 
+def test_a_start_opposite_to_the_path_is_told_and_the_last_digit_turns_it():
+    line = "path={kind: line, course: 0.4, speed: 0.5}"
+    ahead = 0.4 - math.pi
+    at = f"start={{x: 0.0, y: 0.0, psi: {ahead!r}}}"
+    assert "opposite-start" in codes(line, at)
+    assert "-2.74259" in finding("opposite-start", line, at).text
+    sides = [
+        np.sign(
+            log(line, "controller={kind: los_pid}", f"start={{x: 0.0, y: 0.0, psi: {psi!r}}}")["r"][
+                -1
+            ]
+        )
+        for psi in (ahead - 1e-9, ahead + 1e-9)
+    ]
+    assert sides[0] == -sides[1] != 0.0
+    assert "opposite-start" not in codes(line, f"start={{x: 0.0, y: 0.0, psi: {ahead + 1e-3!r}}}")
+    assert "opposite-start" not in codes(line, at, "start.r=0.1")
+
+
 def test_what_comes_after_the_run_is_not_told():
     assert "path-jump" not in codes(turning("literal"), "simulation.duration=10")
 

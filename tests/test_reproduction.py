@@ -389,3 +389,34 @@ def test_the_front_page_counts_the_verdicts_of_each_paper(paper):
         rf"^\|[^|]*results/{paper}\.md[^|]*\|[^|]*\| (\d+) \| (.*?) \|", front, re.M
     )
     assert row == (str(len(verdicts)), ", ".join(map(str, counts)))
+
+
+@pytest.mark.parametrize(
+    ("paper", "scenario"),
+    [("lefeber_2003", ""), ("fossen_2003", ""), ("README", "corrected_compare")],
+)
+def test_the_front_page_counts_what_is_robust(paper, scenario):
+    """As results/doubt.md has it, of which `make doubt` makes the rows."""
+    letter = {"lefeber_2003": "L", "fossen_2003": "F", "README": "C"}[paper]
+    found = re.findall(
+        rf"^\| {letter}\w+ \((\w+)\) \| [^|]+ \| ([^|]+) \|",
+        (ROOT / "results/doubt.md").read_text(),
+        re.M,
+    )
+    words = [word for where, word in found if not scenario or where == scenario]
+    (row,) = re.findall(
+        rf"^\|[^|]*results/{paper}\.md[^|]*(?:\|[^|]*){{4}}\| (\d+) of (\d+) \|",
+        (ROOT / "README.md").read_text(), re.M,
+    )  # fmt: skip
+    assert row == (str(words.count("robust")), str(len(words)))
+
+
+@pytest.mark.parametrize("paper", ["lefeber_2003", "fossen_2003"])
+def test_the_front_page_counts_the_papers_own_claims_apart(paper):
+    page = (ROOT / "results" / f"{paper}.md").read_text()
+    rows = re.findall(r"^\| [LF]\d+\w? \| (.+?) \| (.+?) \| .+ \|$", page, re.M)
+    own = [verdict for says, verdict in rows if not says.endswith("(ours)")]
+    counts = [own.count(word) for word in ("reproduced", "not reproduced", "cannot tell")]
+    told = f"{len(own)}: {', '.join(map(str, counts))}"
+    (row,) = re.findall(rf"^\|[^|]*results/{paper}\.md.*$", (ROOT / "README.md").read_text(), re.M)
+    assert row.split(" | ")[4] == told

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from podusv_cli.core.phrases import unknown
-from podusv_cli.doubt.choices import choices, places_of, public
+from podusv_cli.doubt.choices import by_key
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import Route, bracketed
 
@@ -20,7 +20,7 @@ def doubt_faults(scenario: Scenario) -> list[tuple[Route, str]]:
 
 def _printed(scenario: Scenario) -> Faults:
     assert scenario.doubt
-    known = _known(scenario)
+    known = set(by_key(scenario.singles()))
     sections = {key[:end] for key in known for end in range(len(key)) if key[end] in ".["}
     for place, key in enumerate(scenario.doubt.printed):
         if bracketed(key) not in known | sections:
@@ -29,14 +29,9 @@ def _printed(scenario: Scenario) -> Faults:
 
 def _vary(scenario: Scenario) -> Faults:
     assert scenario.doubt
-    singles, known = scenario.singles(), _known(scenario)
+    known = by_key(scenario.singles())
     for name, quantity in scenario.doubt.vary.items():
         for key in quantity.targets(name):
-            if not places_of(key, singles):
+            if bracketed(key) not in known:
                 text = unknown(f"key {key!r}", key, sorted(known), LISTED)
                 yield ("doubt", "vary", name), text
-
-
-def _known(scenario: Scenario) -> set[str]:
-    """The keys of all choices."""
-    return {public(place) for one in choices(scenario.singles()) for place in one.places}

@@ -183,13 +183,13 @@ def public(place: Place) -> str:
     return dotted(("controllers", label, *route[1:]) if route[0] == "controller" else route)
 
 
-def places_of(key: str, singles: Singles) -> list[Place]:
-    """Where a key of the comparison's scenario stands in the runs of its laws."""
-    key, known = bracketed(key), defaultdict[str, list[Place]](list)
+def by_key(singles: Singles) -> dict[str, list[Place]]:
+    """Where each key of the comparison's scenario stands in the runs of its laws."""
+    known = defaultdict[str, list[Place]](list)
     for label, scenario in singles.items():
         for route, _ in _leaves(scenario):
             known[public((label, route))].append((label, route))
-    return known[key]
+    return dict(known)
 
 
 def _is_printed(key: str, doubt: Doubt) -> bool:
@@ -248,14 +248,15 @@ def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:
 
 def _given(name: str, quantity: Quantity, singles: Singles) -> Choice:
     """The choice that `doubt.vary` has for a key; see `faults` for what cannot be one."""
-    places = [p for key in quantity.targets(name) for p in places_of(key, singles)]
-    base, key = _base(places, singles)
-    places = [*places, *_known(places, singles)]
+    known = by_key(singles)
+    own = [place for key in quantity.targets(name) for place in known[bracketed(key)]]
+    base, key = _base(own, singles)
+    moving = (*own, *_known(own, singles))
     if quantity.seed or quantity.distribution.choice:
         values = quantity.distribution.choice or _values(key, base.own)
-        return replace(base, places=tuple(places), values=values)
+        return replace(base, places=moving, values=values)
     scale = abs(base.own) or max(abs(quantity.value(base.own, 1.0)), 1.0)
-    return replace(base, places=tuple(places), range=Range(quantity, quantity, scale))
+    return replace(base, places=moving, range=Range(quantity, quantity, scale))
 
 
 def _known(places: Sequence[Place], singles: Singles) -> list[Place]:

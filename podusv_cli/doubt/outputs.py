@@ -65,7 +65,7 @@ def in_words(answer: Answer) -> str:
     """What the verdict hangs on: its word, and how near the nearest place is."""
     nearest = answer.turns[0].share if answer.turns else math.inf
     far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
-    idle = "" if answer.acted else ": nothing that was moved acts on it"
+    idle = "" if answer.acted or not answer.word else ": nothing that was moved acts on it"
     return f"{answer.word}{far}{idle}"
 
 

@@ -13,8 +13,9 @@ from podusv_cli.components.vessels.plant import sway_force
 from podusv_cli.core.finding import FindingKind, Sentences, before
 from podusv_cli.core.kernel import bundle
 from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import FASTEST, drift, median
+from podusv_cli.findings.reference import FASTEST, STANDING, drift, median
 
+OPPOSITE = 1e-6  # rad
 RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target
 BESIDE = 1e-9  # s; distance from a break at which the target is evaluated on either side
 STABLE = 2.785  # step over time constant up to which RK4 is stable
@@ -76,6 +77,25 @@ path_corner = _path_break("path-corner", "velocity", "set path.fillet, or round 
 path_bend = _path_break(
     "path-bend", "acceleration", "none needed: Assumption 3 holds; a smooth path avoids the step"
 )
+
+
+@before(
+    "opposite-start", about="start.psi", meaning="rounding decides to which side the vessel turns",
+    condition=f"the start's heading is opposite to the target's course to {OPPOSITE:g} rad",
+    remedy="start a thousandth of a radian to one side",
+)  # fmt: skip
+def opposite_start(case: Case) -> Sentences:
+    """Half a turn lies ahead, to either side alike, of a vessel that does not turn yet."""
+    start, law = case.scenario.start, case.scenario.controller
+    _, _, x_dot, y_dot, *_ = case.scenario.path.targets([0.0])[0].tolist()
+    off = start.psi - math.atan2(y_dot, x_dot)
+    half = abs(abs(math.remainder(off, 2.0 * math.pi)) - math.pi) < OPPOSITE
+    if half and not start.r and math.hypot(x_dot, y_dot) > STANDING and not law.trial():
+        yield (
+            f"{start.psi:.6g} rad is opposite to the target's course, so rounding decides to which "
+            "side the vessel turns, and what follows from that; start a thousandth of a radian to "
+            f"one side: {start.psi - 1e-3:.6g}"
+        )
 
 
 @before(

@@ -1,0 +1,123 @@
+"""Print results/doubt.md: what every verdict hangs on, most fragile first; made by `make doubt`.
+
+    python examples/reproduce/doubts.py FOLDER...
+
+A folder is the answer of `podusv doubt`, below results/.doubt/PAPER.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+WORDS = ("knife's edge", "fragile", "under conditions", "in combination only", "robust", "")
+SAID = {"": "cannot tell"}
+HEAD = """\
+# What our verdicts hang on
+
+Keep this: {kept} Made by `make doubt`; [docs/doubt.md](../docs/doubt.md) says what was moved, and \
+how. All of it is simulation.
+
+| paper | claims | {words} |
+|---|---|{rule}
+{papers}
+
+By a single value a verdict turns within 0.1 % of its scale (knife's edge), within 10 % (fragile), \
+further away or by another word (under conditions). In combination only: in some draws of all \
+numbers at once, and by no single value. What a paper prints stays: `doubt` in \
+`configs/*/base.yaml` and `configs/mu_2017/claims.yaml`.
+
+| claim | verdict | hangs on | in draws | nearest | of its scale |
+|---|---|---|---|---|---|
+"""
+KEPT = (
+    "of {all} verdicts {robust} are robust, {conditions} hold under conditions, {combined} turn in "
+    "combination only, {fragile} are fragile, {edge} stand on a knife's edge, and {unknown} cannot "
+    "tell."
+)
+
+
+def rows(folder: Path) -> Iterator[dict[str, Any]]:
+    """The claims of an answer, with the paper and the scenario that they are of."""
+    claims = {
+        one["claim"]: one for one in json.loads((folder / "doubt.json").read_text())["claims"]
+    }
+    with (folder / "doubt.csv").open(newline="") as file:
+        for row in csv.DictReader(file):
+            yield {
+                **row, "paper": folder.parent.name, "scenario": folder.name,
+                "own": claims[row["claim"]]["source"].startswith("ours"),
+                "turns": [turn for turn in claims[row["claim"]]["turns"] if not turn["task"]],
+            }  # fmt: skip
+
+
+def nearest(row: dict[str, Any]) -> tuple[str, str]:
+    """The value that turns the verdict, and its distance."""
+    if not row["turns"]:
+        return "", ""
+    turn = row["turns"][0]
+    other = turn["turns_at"]
+    if turn["share"] is None:
+        return f"`{turn['key']}: {other}`", ""
+    far = f"{100.0 * turn['share']:.2g} %"
+    if turn["share"] < 0.01:
+        return f"`{turn['key']}` {other - turn['own']:+.2g} {turn['unit']}".rstrip(), far
+    return f"`{turn['key']}` {other:.3g} {turn['unit']}".rstrip() + f" ({turn['own']:.3g})", far
+
+
+def line(row: dict[str, Any]) -> str:
+    """A row of the table."""
+    known = int(row["kept"]) + int(row["turned"])
+    draws = f"{row['kept']} of {known}" if known else ""
+    place, far = nearest(row)
+    verdict = row["verdict"]
+    if row["own"]:
+        verdict = {"reproduced": "holds", "not reproduced": "fails"}.get(verdict, verdict)
+    word = SAID.get(row["word"], row["word"])
+    return (
+        f"| {row['claim']} ({row['scenario']}) | {verdict} | {word} | {draws} | {place} | {far} |"
+    )
+
+
+def order(row: dict[str, Any]) -> tuple[int, float, str]:
+    """Most fragile first."""
+    share = float(row["nearest_share"] or "inf")
+    return WORDS.index(row["word"]), share, row["claim"]
+
+
+def counted(paper: str, found: Sequence[dict[str, Any]]) -> str:
+    """A paper's row of the first table."""
+    counts = Counter(row["word"] for row in found)
+    return f"| `{paper}` | {len(found)} | " + " | ".join(str(counts[word]) for word in WORDS) + " |"
+
+
+def main(*folders: str) -> None:
+    """The page."""
+    found = [row for folder in folders for row in rows(Path(folder))]
+    edge, fragile, conditions, combined, robust, unknown = (
+        sum(row["word"] == word for row in found) for word in WORDS
+    )
+    kept = KEPT.format(
+        all=len(found), robust=robust, conditions=conditions, combined=combined, fragile=fragile,
+        edge=edge, unknown=unknown,
+    )  # fmt: skip
+    papers = dict.fromkeys(row["paper"] for row in found)
+    text = HEAD.format(
+        kept=kept,
+        words=" | ".join(SAID.get(word, word) for word in WORDS),
+        rule="---|" * len(WORDS),
+        papers="\n".join(counted(p, [r for r in found if r["paper"] == p]) for p in papers),
+    )
+    told = sorted((row for row in found if row["word"]), key=order)
+    open_ = ", ".join(f"{row['claim']} ({row['scenario']})" for row in found if not row["word"])
+    end = f"\nNobody can tell, so that nothing can turn: {open_}.\n" if open_ else ""
+    sys.stdout.write(text + "\n".join(map(line, told)) + "\n" + end)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
