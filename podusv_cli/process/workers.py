@@ -1,4 +1,8 @@
-"""Jobs in processes of their own: a job that kills its process affects no other job."""
+"""Jobs in processes of their own: a job that kills its process affects no other job.
+
+So each process has a pipe of its own. The pools of concurrent.futures and pebble share one, and a
+process that is killed while it sends its result stops all others.
+"""
 
 from __future__ import annotations
 

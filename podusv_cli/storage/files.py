@@ -141,7 +141,7 @@ def disk_array(folder: Path, size: int) -> Vector:
     """An array of `size` numbers in a nameless file of the folder, for logs larger than memory.
 
     Its disk space is reserved at once, so that a full disk is a StorageError here and not a signal
-    (SIGBUS) when a number is stored.
+    (SIGBUS) when a number is stored; ZFS reserves nothing.
     """
     failure = f"cannot keep the log in {folder} ({8 * size} bytes)"
     with storage_errors(failure), tempfile.TemporaryFile(dir=folder) as file:
