@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.core.component import describe, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit, nearest_hint, whole_steps
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
-
-if TYPE_CHECKING:
-    from podusv_cli.scenario.model import Scenario
 
 Conflicts = Iterator[tuple[str, str]]  # key and message
 NO_ESTIMATOR = NoEstimator()

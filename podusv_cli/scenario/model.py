@@ -32,7 +32,6 @@ from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_with, observer
 from podusv_cli.metrics.windows import NAMED
-from podusv_cli.scenario.conflicts import conflicts
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.sections import (
     NAME,
@@ -244,7 +243,7 @@ class Scenario(Component):
         return Total(parts=parts) if isinstance(parts, tuple) else parts
 
     def time_grid(self) -> TimeGrid:
-        """The instants of the run; call `conflicts` first."""
+        """The instants of a scenario that `conflicts` finds no fault with."""
         step = self.simulation.step
         steps = whole_steps(self.simulation.duration, step) or 0
         # Beyond the last step only the first is logged; machine code knows no larger numbers.
@@ -298,10 +297,6 @@ class Scenario(Component):
             return numbers.get("path_done", 1.0) >= 1.0
         error = numbers.get("e_steady", math.nan)
         return bool(self.controller.trial()) or error <= self.metrics.settling_radius
-
-    def conflicts(self) -> list[tuple[str, str]]:
-        """Key and message for every pair of values that contradict each other."""
-        return conflicts(self)
 
     def disturbances(self) -> dict[str, Disturbance]:
         """The disturbance, or each of several, by its key."""

@@ -23,6 +23,7 @@ from podusv_cli.scenario.address import (
     is_whole,
     no_entry,
 )
+from podusv_cli.scenario.conflicts import conflicts
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
@@ -49,7 +50,7 @@ def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
         return []
     laws = list(_laws(scenario, sweep))
     # What contradicts itself without a draw does so with every one.
-    draws = () if scenario.conflicts() else _vary(singles(scenario), sweep)
+    draws = () if conflicts(scenario) else _vary(singles(scenario), sweep)
     return laws or [
         *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
         *_claims(scenario, sweep),
