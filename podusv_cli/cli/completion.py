@@ -174,14 +174,6 @@ def metrics(plugins: Plugins) -> Mapping[str, str]:
 
 
 @kept
-def listed(plugins: Plugins) -> Mapping[str, str]:
-    """Parts of `podusv list`."""
-    from podusv_cli.cli.list import parts
-
-    return dict.fromkeys((word for part in parts(plugins) for word in part.words), "")
-
-
-@kept
 def names(plugins: Plugins) -> Mapping[str, str]:
     """What `podusv explain` explains: keys, kinds, signals, presets, metrics, findings."""
     from podusv_cli.findings.finding import finding_kinds

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from podusv_cli.cli import completion
+from podusv_cli.cli.completion import kept
 from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_entry
 
@@ -33,12 +33,18 @@ THEN = {
 }  # by section
 
 
+@kept
+def listed(plugins: Known) -> Mapping[str, str]:
+    """Words for a part of the list."""
+    return dict.fromkeys((word for part in parts(plugins) for word in part.words), "")
+
+
 def list(
     part: Annotated[
         str,
         typer.Argument(
             help="One part only: vessels, paths, laws, metrics, figures, findings, ...",
-            autocompletion=completion.listed,
+            autocompletion=listed,
         ),
     ] = "",
     plugin: Plugins = None,
