@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from podusv_cli.core.phrases import as_yaml
 from podusv_cli.doubt.alone import Alone, Turn
 from podusv_cli.doubt.events import Event
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import Draws, Explained, counted, explained
 from podusv_cli.expressions.verdict import Verdict
+from podusv_cli.scenario.model import Scenario
 
 KNIFE, FRAGILE = 1e-3, 0.1  # of a choice's scale, within which a verdict turns
 LEVEL = 0.95  # of the bound on the share of draws that turn a verdict where none does
@@ -148,6 +150,15 @@ class Tried:
     worlds: Sequence[Judged]
 
 
+@dataclass(frozen=True)
+class Told:
+    """What figures and page are about: a scenario, the answers on its claims, what was tried."""
+
+    scenario: Scenario
+    answers: Sequence[Answer]
+    tried: Tried
+
+
 def answers(
     verdicts: Sequence[Verdict], tried: Tried, events: Mapping[str, Event | None] | None = None
 ) -> list[Answer]:
@@ -193,6 +204,17 @@ def _nearest(verdict: Verdict, base: Judged, worlds: Sequence[Judged]) -> tuple[
     own = base.numbers[verdict.name]
     number = min(spreads, key=lambda n: n.margin(own, spreads[n]))
     return number, spreads[number]
+
+
+def place(turn: Turn) -> str:
+    """Where a verdict turns: `start.psi +7e-06 rad`, or the word that turns it."""
+    choice, unit = turn.choice, f" {turn.choice.unit}" if turn.choice.unit else ""
+    if not choice.range:
+        return f"{choice.name}: {as_yaml(turn.value)} ({as_yaml(choice.own)})"
+    if turn.share < 0.01 or not choice.own:
+        return f"{choice.name} {turn.value - choice.own:+.2g}{unit}"
+    way = "from" if turn.value > choice.own else "down from"
+    return f"{choice.name} {way} {turn.value:.3g}{unit} ({choice.own:.3g})"
 
 
 def as_json(answer: Answer) -> dict[str, Any]:

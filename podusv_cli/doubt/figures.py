@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.doubt.alone import Alone, ends
-from podusv_cli.doubt.answer import Answer
-from podusv_cli.doubt.outputs import Told, place
+from podusv_cli.doubt.answer import Answer, Told, place
 from podusv_cli.doubt.together import counted
 from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.style import legend, new_figure

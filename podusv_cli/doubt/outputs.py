@@ -11,25 +11,15 @@ from typing import Any
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.core.recording import Status
-from podusv_cli.doubt.alone import Turn, ends
-from podusv_cli.doubt.answer import Answer, Tried, as_json
+from podusv_cli.doubt.alone import ends
+from podusv_cli.doubt.answer import Answer, Told, as_json, place
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat, value_text
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import csv_files, json_files
 from podusv_cli.storage.run_folder import RunWriter
 
 HEAD = ("claim", "verdict", "in draws", "turns at", "hangs on")
-
-
-@dataclass(frozen=True)
-class Told:
-    """What the page is about: a scenario, the answers on its claims, and all that was tried."""
-
-    scenario: Scenario
-    answers: Sequence[Answer]
-    tried: Tried
 
 
 @dataclass(frozen=True)
@@ -48,17 +38,6 @@ class Doubted:
             "claims": [as_json(one) for one in self.answers],
             "missing": [str(part) for part in self.missing],
         }  # fmt: skip
-
-
-def place(turn: Turn) -> str:
-    """Where a verdict turns: `start.psi +7e-06 rad`, or the word that turns it."""
-    choice, unit = turn.choice, f" {turn.choice.unit}" if turn.choice.unit else ""
-    if not choice.range:
-        return f"{choice.name}: {as_yaml(turn.value)} ({as_yaml(choice.own)})"
-    if turn.share < 0.01 or not choice.own:
-        return f"{choice.name} {turn.value - choice.own:+.2g}{unit}"
-    way = "from" if turn.value > choice.own else "down from"
-    return f"{choice.name} {way} {turn.value:.3g}{unit} ({choice.own:.3g})"
 
 
 def in_words(answer: Answer) -> str:

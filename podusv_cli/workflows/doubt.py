@@ -17,7 +17,7 @@ from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import Alone, explored
-from podusv_cli.doubt.answer import Tried, answers, labels_of
+from podusv_cli.doubt.answer import Told, Tried, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import HULL, Choice, Singles, choices
 from podusv_cli.doubt.events import nearest_event
@@ -104,7 +104,7 @@ def comparison(loaded: Loaded) -> Compared:
 
 def doubted(
     compared: Compared, scenario: Scenario, request: Request, progress: Progress | None
-) -> tuple[outputs.Told, Extras]:
+) -> tuple[Told, Extras]:
     """All that is tried, and what it says of every claim."""
     for one in compared.singles.values():
         case = Case(one)
@@ -123,7 +123,7 @@ def doubted(
         for one in compared.parsed
     ]
     events = {one.name: nearest_event(one, entries) for one in compared.parsed}
-    return outputs.Told(scenario, answers(verdicts, tried, events), tried), extras
+    return Told(scenario, answers(verdicts, tried, events), tried), extras
 
 
 def search(

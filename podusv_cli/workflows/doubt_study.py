@@ -13,7 +13,7 @@ import numpy as np
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import Alone, Trial
-from podusv_cli.doubt.answer import Tried, answers
+from podusv_cli.doubt.answer import Told, Tried, answers
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.of_study import overrides, study_choices
@@ -83,7 +83,7 @@ def doubt_study(
         tell("one at a time", done / len(found))
         alone.append(Alone(choice, tuple(_trials(studies, choice, loaded))))
     tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
-    told = outputs.Told(scenario, answers(verdicts, tried), tried)
+    told = Told(scenario, answers(verdicts, tried), tried)
     origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
     extras = Extras()
     with RunWriter(folder / "answer", force=True, named=True) as writer:
