@@ -15,7 +15,7 @@ from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import asked, check_law
-from podusv_cli.engine.running.watch import Ending, Word, watch
+from podusv_cli.engine.running.watch import Ending, MarchStatus, watch
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
@@ -25,7 +25,7 @@ from podusv_cli.process.interrupts import interrupts_deferred
 March = Callable[..., int]
 Marcher = Callable[[Vectors, Layout, float], March]  # of vectors, with a step [s]
 # What a log says of a run, by how its march ended.
-RECORDED: dict[Word, Status] = {
+RECORDED: dict[MarchStatus, Status] = {
     "finished": "finished", "interrupted": "interrupted",
     "diverged": "diverged", "crashed": "diverged", "hung": "diverged",
 }  # fmt: skip

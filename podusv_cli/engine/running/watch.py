@@ -28,14 +28,14 @@ PATIENCE = 10.0  # s of processor time that a step may take
 LAST_CHANCE = 1.0  # s for a march to end after its stop flag is set
 
 
-Word = Literal["finished", "diverged", "crashed", "hung", "interrupted"]
+MarchStatus = Literal["finished", "diverged", "crashed", "hung", "interrupted"]
 
 
 class Ending(NamedTuple):
     """How many instants are good, how the march ended, and the error that ended it, if any."""
 
     reached: int
-    status: Word
+    status: MarchStatus
     cause: str = ""
 
 
