@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import field_validator, model_validator
 
 from podusv_cli.components.controllers.base import Controller
-from podusv_cli.components.controllers.policy_weights import Network, network
+from podusv_cli.components.controllers.policy_weights import PolicyNetwork, network
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import arctangent, cos_sin, hyperbolic_tangent
 from podusv_cli.core.kernel import Vector, kernel, tail
@@ -58,7 +58,7 @@ def layer(inputs: int, outputs: int, given: Vector, weights: Vector, out: Vector
 
 
 @lru_cache(maxsize=4)  # the same weights are read a dozen times in a run
-def _network(content: str) -> Network:
+def _network(content: str) -> PolicyNetwork:
     return network(content, INPUTS, OUTPUTS, OBSERVED)
 
 
@@ -102,7 +102,7 @@ class Policy(Controller):
             )
         return self
 
-    def network(self) -> Network:
+    def network(self) -> PolicyNetwork:
         """The weights as the kernel takes them."""
         assert self.content is not None  # else there is no such law
         return _network(self.content)

@@ -24,7 +24,7 @@ KINDS: dict[str, np.dtype[Any]] = {"F32": np.dtype("<f4"), "F64": np.dtype("<f8"
 LAYER = re.compile(r"(?P<of>.+\.)?(?P<number>0|[1-9][0-9]{0,3})\.(weight|bias)")
 
 
-class Network(NamedTuple):
+class PolicyNetwork(NamedTuple):
     """Weights as a kernel takes them; narrower hidden layers are filled up with zeros."""
 
     hidden: int
@@ -79,7 +79,7 @@ def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
     return found
 
 
-def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> Network:
+def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> PolicyNetwork:
     """The network in base64 of a safetensors file; `names` are those of its inputs.
 
     Raises ValueError for what is no network from so many inputs to so many outputs.
@@ -97,7 +97,7 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
         np.concatenate([_filled(bias, (after,)), _filled(weight, (after, before)).T.ravel()])
         for (_, weight, bias), before, after in zip(layers, sizes, sizes[1:], strict=False)
     ]
-    return Network(len(layers) - 1, width, np.concatenate([*given, *filled]))
+    return PolicyNetwork(len(layers) - 1, width, np.concatenate([*given, *filled]))
 
 
 def _normal(found: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
