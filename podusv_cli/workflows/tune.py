@@ -26,7 +26,7 @@ from podusv_cli.studies.tuning.dispatch import dispatch
 from podusv_cli.studies.tuning.idle import find_idle
 from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
 from podusv_cli.studies.tuning.remarks import remarks
-from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.sampler import optuna
 from podusv_cli.studies.tuning.search import Search
 from podusv_cli.studies.tuning.space import with_gains
@@ -59,7 +59,7 @@ class Tuned:
     """A finished search and its folder."""
 
     folder: Path
-    results: Results
+    results: SearchResults
     missing: tuple[Failure, ...] = ()  # of figures and report
     refused: tuple[str, ...] = ()  # workers of a cluster that got no units, and why
 
@@ -122,7 +122,7 @@ def _loaded(config: Source, request: Request) -> tuple[Loaded, Path]:
 
 def _simulated(
     plan: TunePlan, folder: Path, request: Request, started: datetime, engine: Engine, tell: Tell
-) -> Results:
+) -> SearchResults:
     """Search and validate what is not there yet, and note the session."""
     session = Session(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
@@ -143,7 +143,7 @@ def _simulated(
         trials = {law: found for law, found in trials.items() if found}
         winners = {law: [best(one) for one in found] for law, found in trials.items()}
         stamp = started.isoformat(timespec="seconds")
-        return Results(
+        return SearchResults(
             plan, trials, winners, validate(plan, winners, folder, stamp, engine, validated)
         )
     except KeyboardInterrupt as stop:
@@ -195,7 +195,7 @@ def _leaders(searches: Sequence[Search]) -> str:
     return f"best on the training draws: {leaders}" if found else "no gains are tried yet"
 
 
-def _written(results: Results, folder: Path, request: Request) -> Tuned:
+def _written(results: SearchResults, folder: Path, request: Request) -> Tuned:
     """Write the scenario and the tables, then figures and the report."""
     with interrupts_deferred():
         files.write_bytes(folder / place.TUNED, place.tuned_yaml(results))

@@ -22,7 +22,7 @@ from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.telling.figures import ratios
-from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.space import Gain, units_of
 from podusv_cli.studies.tuning.trials import FINISHED
 
@@ -36,7 +36,7 @@ PRUNED: dict[str, Any] = {"s": 5.0, "linewidths": 0.35, "zorder": 2.0}  # or cut
 SMALL: dict[str, Any] = {"fontsize": 6.5}
 
 
-def sketches(results: Results) -> Iterator[Sketch]:
+def sketches(results: SearchResults) -> Iterator[Sketch]:
     """The figures that there are numbers for."""
 
     objective = results.plan.tune.objective
@@ -58,7 +58,7 @@ def sketches(results: Results) -> Iterator[Sketch]:
         yield from _of_searches(results, objective)
 
 
-def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
+def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
 
     yield Sketch(
         "history",
@@ -87,7 +87,7 @@ def _of_searches(results: Results, objective: str) -> Iterator[Sketch]:
         yield _slices(results, law, objective)
 
 
-def _slices(results: Results, law: str, objective: str) -> Sketch:
+def _slices(results: SearchResults, law: str, objective: str) -> Sketch:
     tried = pd.DataFrame(
         [
             {**trial.gains, "objective": trial.value, "repeat": repeat,

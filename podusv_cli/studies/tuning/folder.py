@@ -18,7 +18,7 @@ from podusv_cli.studies.making.plan import disagreements
 from podusv_cli.studies.making.store import SCENARIO
 from podusv_cli.studies.tuning import sampler, trials, validation
 from podusv_cli.studies.tuning.plan import TunePlan
-from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.results import SearchResults
 
 TUNE, TUNED = "tune.json", "tuned.yaml"
 UNFINISHED = (SCENARIO, TUNED, trials.FOLDER, validation.FOLDER, FOLDER, "provenance.json")
@@ -132,7 +132,7 @@ def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> 
             )
 
 
-def tuned_yaml(results: Results) -> bytes:
+def tuned_yaml(results: SearchResults) -> bytes:
     """The scenario with the gains that were found, for `compare` and `sweep`."""
     plan, scenario = results.plan, results.plan.scenario
     several = bool(scenario.controllers)
@@ -152,7 +152,7 @@ def tuned_yaml(results: Results) -> bytes:
     return f"# The gains that podusv tune found.\n{yaml_text(told)}".encode()
 
 
-def _told(results: Results) -> str:
+def _told(results: SearchResults) -> str:
     tune = results.plan.tune
     searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
     what = tune.objective

@@ -9,10 +9,10 @@ from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
 from podusv_cli.studies.telling.outputs import publish
 from podusv_cli.studies.telling.summary import as_csv
-from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.results import SearchResults
 
 
-def write_tables(folder: Path, results: Results) -> None:
+def write_tables(folder: Path, results: SearchResults) -> None:
     """Write all tables. Raises StorageError."""
     tables = {
         "laws": results.laws, "searches": results.searches, "limits": results.limits,
@@ -22,7 +22,7 @@ def write_tables(folder: Path, results: Results) -> None:
     files.write_all({folder / f"{name}.csv": as_csv(t).encode() for name, t in tables.items()})
 
 
-def write_report(folder: Path, results: Results, extras: Extras, *, figures: bool) -> None:
+def write_report(folder: Path, results: SearchResults, extras: Extras, *, figures: bool) -> None:
     """Draw the figures and write the report; what fails is noted. Raises StorageError."""
     from podusv_cli.studies.tuning import report
 

@@ -8,13 +8,13 @@ from typing import Any
 
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.tuning.plan import ENOUGH, is_few
-from podusv_cli.studies.tuning.results import MARGIN, Results
+from podusv_cli.studies.tuning.results import MARGIN, SearchResults
 from podusv_cli.studies.tuning.trials import FINISHED
 
 ENOUGH_SEARCHES = 6  # with three, of 14 equal laws some are told apart in 40 % of all tables
 
 
-def remarks(results: Results) -> list[str]:
+def remarks(results: SearchResults) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
         *_answer(results), *_unsettled(results), *_once(results), *_bounds(results),
@@ -23,7 +23,7 @@ def remarks(results: Results) -> list[str]:
     ]  # fmt: skip
 
 
-def _answer(results: Results) -> Iterator[str]:
+def _answer(results: SearchResults) -> Iterator[str]:
     """The two best laws by the median of their searches, and in the same draw."""
     ranked = results.laws[results.laws.rank_after.notna()]
     ordered = ranked.sort_values("repeats_median").law.tolist()
@@ -42,7 +42,7 @@ def _answer(results: Results) -> Iterator[str]:
             )
 
 
-def _unsettled(results: Results) -> Iterator[str]:
+def _unsettled(results: SearchResults) -> Iterator[str]:
     laws = results.laws[results.laws.rank_after.isna()].law
     if len(laws):
         yield (
@@ -51,7 +51,7 @@ def _unsettled(results: Results) -> Iterator[str]:
         )
 
 
-def _once(results: Results) -> Iterator[str]:
+def _once(results: SearchResults) -> Iterator[str]:
     repeats = results.plan.tune.repeats
     if repeats < ENOUGH_SEARCHES and len(results.plan.laws) > 1:
         yield (
@@ -69,19 +69,19 @@ def _verdict(row: dict[str, Any]) -> str:
     return "neither is better"
 
 
-def _kept(results: Results) -> Iterator[str]:
+def _kept(results: SearchResults) -> Iterator[str]:
     for law in results.plan.laws:
         if law not in results.winners:
             yield f"{law} has no gains, kept as it is"
 
 
-def _idle(results: Results) -> Iterator[str]:
+def _idle(results: SearchResults) -> Iterator[str]:
     for law, keys in results.plan.idle.items():
         if keys:
             yield f"{law}: not searched, as no run depends on it: {', '.join(keys)}"
 
 
-def _unsound(results: Results) -> Iterator[str]:
+def _unsound(results: SearchResults) -> Iterator[str]:
     for law in results.winners:
         trial = results.winner(law)
         broken = [
@@ -94,7 +94,7 @@ def _unsound(results: Results) -> Iterator[str]:
             yield f"{law}: every trial failed on most draws; its gains mean nothing"
 
 
-def _few(results: Results) -> Iterator[str]:
+def _few(results: SearchResults) -> Iterator[str]:
     told = []
     for law in results.winners:
         whole = min(sum(t.status == FINISHED for t in one) for one in results.trials[law])
@@ -108,7 +108,7 @@ def _few(results: Results) -> Iterator[str]:
         )
 
 
-def _overfitted(results: Results) -> Iterator[str]:
+def _overfitted(results: SearchResults) -> Iterator[str]:
     for law in results.winners:
         taken, *others = results.spread(law)
         if others and taken > (1.0 + MARGIN) * min(others):
@@ -119,7 +119,7 @@ def _overfitted(results: Results) -> Iterator[str]:
             )
 
 
-def _beyond(results: Results) -> Iterator[str]:
+def _beyond(results: SearchResults) -> Iterator[str]:
     """Inequalities that gains hold on the training draws, and not on the fresh ones."""
     table = results.limits
     after: Any = table[table["when"] == "after"].to_dict("records")
@@ -131,7 +131,7 @@ def _beyond(results: Results) -> Iterator[str]:
             )
 
 
-def _bounds(results: Results) -> Iterator[str]:
+def _bounds(results: SearchResults) -> Iterator[str]:
     rows = results.gains[results.gains["at"] != ""].to_dict("records")
     told = []
     for row in rows:

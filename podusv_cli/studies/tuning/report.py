@@ -15,14 +15,14 @@ from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.making.sessions import sessions
 from podusv_cli.studies.making.words import in_words
 from podusv_cli.studies.tuning.remarks import remarks
-from podusv_cli.studies.tuning.results import Results
+from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.space import units_of
 
 FEW = 15  # pairs that are shown at once
 
 
 def page(
-    folder: Path, results: Results, figures: Sequence[Picture], missing: Sequence[Failure]
+    folder: Path, results: SearchResults, figures: Sequence[Picture], missing: Sequence[Failure]
 ) -> str:
     """The whole report."""
     plan = results.plan
@@ -54,7 +54,7 @@ def page(
     )  # fmt: skip
 
 
-def _laws(results: Results) -> Iterator[dict[str, Any]]:
+def _laws(results: SearchResults) -> Iterator[dict[str, Any]]:
     """The rows of the answer, the best law after the search first."""
     keys = ["place_low", "place_high", "rank_after", "rank_before"]
     ordered: Any = results.laws.sort_values(keys).to_dict("records")
@@ -107,7 +107,7 @@ def place(row: Any) -> str:
     return f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
 
 
-def _pairs(results: Results) -> Iterator[dict[str, Any]]:
+def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
     """Every pair of laws with its numbers before and after."""
     table = results.pairs
     table = table[table.metric.isin(results.shown[:1])]
@@ -130,7 +130,7 @@ def _turned(before: Any, after: Any) -> str:
     return ""
 
 
-def _gains(results: Results) -> Iterator[dict[str, Any]]:
+def _gains(results: SearchResults) -> Iterator[dict[str, Any]]:
     units = {law: units_of(own) for law, own in results.plan.laws.items()}
     share = results.importance.set_index(["law", "gain"]) if len(results.importance) else None
     rows: Any = results.gains.to_dict("records")

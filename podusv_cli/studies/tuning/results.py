@@ -46,7 +46,7 @@ FEWEST = 24  # trials that importances are computed from
 
 
 @dataclass(frozen=True)
-class Results:
+class SearchResults:
     """A finished search: its trials by law, a list for each repeat, and the runs on fresh draws."""
 
     plan: TunePlan
