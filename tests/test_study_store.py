@@ -21,7 +21,7 @@ from podusv_cli.studies.making import unit as units
 from podusv_cli.studies.making.draws import drawn, draws
 from podusv_cli.studies.making.plan import watching
 from podusv_cli.studies.making.record import about
-from podusv_cli.studies.making.sessions import Session, sessions
+from podusv_cli.studies.making.sessions import SessionLog, sessions
 from podusv_cli.studies.making.store import RUNS, UNITS, Store
 from podusv_cli.studies.telling.results import judged
 from podusv_cli.workflows import studies, sweep
@@ -226,9 +226,9 @@ def test_times_of_all_sittings_are_added_up(tmp_path):
 
 def test_a_sitting_keeps_those_that_others_noted_meanwhile(tmp_path):
     now = datetime.now(UTC)
-    driver = Session(tmp_path, ["run"], now, ())
+    driver = SessionLog(tmp_path, ["run"], now, ())
     for _ in range(3):
-        Session(tmp_path, ["report"], now, ()).end(0)
+        SessionLog(tmp_path, ["report"], now, ()).end(0)
     driver.end(7)
     assert [one["runs"] for one in sessions(tmp_path)] == [7, 0, 0, 0]
 

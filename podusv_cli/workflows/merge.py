@@ -12,7 +12,7 @@ from podusv_cli.storage.writer import TABLES, sole_writer
 from podusv_cli.studies.making import record
 from podusv_cli.studies.making.dispatch import Tally
 from podusv_cli.studies.making.joining import gaps, join, mixture
-from podusv_cli.studies.making.sessions import Session
+from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.store import SCENARIO, Store
 from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.studies import stored
@@ -46,7 +46,7 @@ def _joined(
     """Write the runs of the others into a study, and judge it where it is whole."""
     out = store.folder
     store.open(started.isoformat(timespec="seconds"), texts)
-    session = Session(out, request.argv, started, (), [other.folder for other in others])
+    session = SessionLog(out, request.argv, started, (), [other.folder for other in others])
     join(store, others)
     session.end(0)
     if mixed := mixture(out):

@@ -25,7 +25,7 @@ from podusv_cli.studies.making.estimate import check_fits
 from podusv_cli.studies.making.invalid import check_draws
 from podusv_cli.studies.making.joining import mixture
 from podusv_cli.studies.making.plan import Plan, plan
-from podusv_cli.studies.making.sessions import Session
+from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.store import Store
 from podusv_cli.studies.telling import outputs
 from podusv_cli.studies.telling.keep import contradiction, found, unmade
@@ -117,7 +117,7 @@ def _marched(
     store: Store, made: Plan, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> tuple[Tally, bool]:
     """Simulate what is missing, and note the session; how far it is, and if it is whole."""
-    session = Session(store.folder, request.argv, started, made.scenario.plugged)
+    session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
     seen = Tally(0)
 
     def told(tally: Tally) -> None:
@@ -213,7 +213,7 @@ def report(study: Path, request: Request) -> Swept:
             raise UsageError(
                 f"{study} has no runs yet: {plugins.continue_with('sweep run', study)}"
             )
-        Session(study, request.argv, started, ()).end(0)
+        SessionLog(study, request.argv, started, ()).end(0)
         runs = store.write_runs()
         if not runs.common.any():
             raise UsageError(

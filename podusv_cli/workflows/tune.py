@@ -17,7 +17,7 @@ from podusv_cli.storage.writer import sole_writer
 from podusv_cli.studies.making.check import sweep_faults
 from podusv_cli.studies.making.dispatch import Engine, Tally
 from podusv_cli.studies.making.plan import digest
-from podusv_cli.studies.making.sessions import Session
+from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.unit import prepare
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import outputs
@@ -124,7 +124,7 @@ def _simulated(
     plan: TunePlan, folder: Path, request: Request, started: datetime, engine: Engine, tell: Tell
 ) -> SearchResults:
     """Search and validate what is not there yet, and note the session."""
-    session = Session(folder, request.argv, started, plan.scenario.plugged)
+    session = SessionLog(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
 
     def searched(tally: Tally, searches: Sequence[Search]) -> None:

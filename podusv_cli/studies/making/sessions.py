@@ -74,7 +74,7 @@ def timing(folder: Path) -> dict[str, Any]:
     return {"format": 1, "laws": laws, "sittings": [{k: one[k] for k in keys} for one in every]}
 
 
-class Session:
+class SessionLog:
     """One session, noted when it begins and again when its runs are over.
 
     A report may note its own session while runs still come.
