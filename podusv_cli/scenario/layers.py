@@ -43,7 +43,7 @@ def composed(
     return replace(whole, mark=Mark(source))
 
 
-def alone(
+def self_contained(
     text: str, source: str, overrides: Sequence[str], faults: list[Fault], most: int
 ) -> Node | None:
     """As `composed` for a text of at most `most` values that extends no file."""

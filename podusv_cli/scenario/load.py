@@ -17,7 +17,7 @@ from podusv_cli.scenario import plugins
 from podusv_cli.scenario.conflicts import clashes
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.kinds import kept
-from podusv_cli.scenario.layers import alone, composed
+from podusv_cli.scenario.layers import composed, self_contained
 from podusv_cli.scenario.messages import Check, check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.named_files import without_files
@@ -124,7 +124,7 @@ def load_stored(
     mapping at all; ScenarioError where it is one that this podusv does not know.
     """
     faults: list[Fault] = []
-    root = alone(text, source, overrides, faults, MOST_RESOLVED)
+    root = self_contained(text, source, overrides, faults, MOST_RESOLVED)
     _undamaged(faults, source)
     if root is None or faults:
         raise ScenarioError(_ordered(faults, source))

@@ -23,7 +23,7 @@ from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.run import DRAWN
 
 
-def alone(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
+def scenario_of_draw(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
     """The scenario of one run of a study, under a name of its own."""
     (numbers,) = draws(plan.sweep, draw, 1)
     one = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
@@ -61,7 +61,7 @@ def keep(
 
 
 def _task(folder: Path, plan: Plan, one: KeptRun, request: Request) -> Task:
-    scenario = alone(plan, one.law, one.cell, one.draw)
+    scenario = scenario_of_draw(plan, one.law, one.cell, one.draw)
     return Task(
         scenario, resolved_yaml(scenario), folder / LOGS / one.name,
         figures=DRAWN if request.figures else (), argv=request.argv, label=one.law,

@@ -21,7 +21,7 @@ from podusv_cli.studies.making import before, record
 from podusv_cli.studies.making.plan import KERNELS, Plan, differing, disagreements, plan
 from podusv_cli.studies.making.store import RUNS, SCENARIO, Store
 from podusv_cli.studies.telling import outputs
-from podusv_cli.workflows.keep import alone, seen_from
+from podusv_cli.workflows.keep import scenario_of_draw, seen_from
 from podusv_cli.workflows.many_runs import kept_scenario
 
 FORMATS = ("csv", "parquet")
@@ -111,7 +111,7 @@ def draw(
     if number >= made.sweep.draws:
         last = made.sweep.draws - 1
         raise UsageError(f"--draw {number}: there is no such draw; they are numbered 0 to {last}")
-    one = alone(made, law, cell, number)
+    one = scenario_of_draw(made, law, cell, number)
     path = out or Path(f"{one.name}.yaml")
     one = seen_from(path.parent, study, one)
     if path.exists():
