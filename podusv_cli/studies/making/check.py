@@ -194,13 +194,14 @@ def _tried(name: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Itera
         *([1] if quantity.seed else []),
     ]
     for one in laws.values():
+        own = _structure(one)
         told = [_refused(name, quantity, one, value) for value in drawn_values]
         if all(told) or (discrete and any(told)):
             yield next(filter(None, told)).removeprefix(f"sweep.vary.{name}: ")
         yield from (
             "changes how the loop is put together or sampled; list its values under grid"
             for value, refused in zip(drawn_values, told, strict=True)
-            if not refused and _rebuilt(one, drawn(one, {name: quantity}, {name: value}))
+            if not refused and _structure(drawn(one, {name: quantity}, {name: value})) != own
         )
 
 
@@ -212,10 +213,9 @@ def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> s
     return ""
 
 
-def _rebuilt(one: Scenario, other: Scenario) -> bool:
-    """Whether two runs differ in more than numbers."""
-    first, second = (Plan(s.closed_loop(), s.time_grid()).structure for s in (one, other))
-    return first != second
+def _structure(one: Scenario) -> Any:
+    """What runs have in common that differ in numbers only."""
+    return Plan(one.closed_loop(), one.time_grid()).structure
 
 
 def _twice(sweep: Sweep) -> Faults:
