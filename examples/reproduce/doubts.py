@@ -64,7 +64,7 @@ def nearest(row: dict[str, Any]) -> tuple[str, str]:
     other = turn["turns_at"]
     if turn["share"] is None:
         return f"`{turn['key']}: {other}`", ""
-    far = f"{100.0 * turn['share']:.2g} %"
+    far = f"{100.0 * turn['share']:.3g} %"
     if turn["share"] < 0.01:
         return f"`{turn['key']}` {other - turn['own']:+.2g} {turn['unit']}".rstrip(), far
     return f"`{turn['key']}` {other:.3g} {turn['unit']}".rstrip() + f" ({turn['own']:.3g})", far
