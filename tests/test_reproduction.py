@@ -232,6 +232,20 @@ def test_pid_without_windup() -> None:
         assert same(energy, found["energy"])
 
 
+def test_the_margins_of_the_networks_are_told_with_their_range() -> None:
+    table = pd.read_csv(PAPER / "networks.csv", index_col=["nodes", "sigma_u_or_gain"])
+    fixed, networks = table.loc[[0]], table.drop(0, level="nodes")
+    margins = networks.phase_margin_deg
+    equal = (fixed.gain * fixed.delay_margin_ms).median() / networks.gain
+    share = networks.delay_margin_ms / equal
+    page = " ".join((ROOT / "results/claim.md").read_text().split())
+    assert f"is {margins.min():.1f} to {margins.max():.1f} deg where fixed gains have 90" in page
+    assert f"{share.min():.2f} to {share.max():.2f} of that of the equal fixed gain" in page
+    front = (ROOT / "README.md").read_text()
+    assert f"(1/{90 / margins.min():.0f} to 1/{90 / margins.max():.2f} over leakages" in front
+    assert round(90 / margins[27, 0.1]) == 11
+
+
 def test_what_the_networks_learn() -> None:
     table = pd.read_csv(PAPER / "learnt.csv", index_col=[0, 1])
     for name, *numbers in rows("Parts switched off", which=2):

@@ -28,6 +28,7 @@ from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
+from podusv_cli.theory.loop_margins import loop_margins
 from podusv_cli.workflows.execute import Stopwatch, simulated
 
 Case, Value = TypeVar("Case"), TypeVar("Value")
@@ -266,7 +267,10 @@ def networks() -> pd.DataFrame:
 
 
 def acting_as(scenario: Scenario) -> dict[str, float]:
-    """The gain that a law's network acts as in surge, the settled rms of u_e, and their product."""
+    """The gain that a law's network acts as in surge, the settled rms of u_e, and their product.
+
+    With the margins of the surge loop.
+    """
     _, log = made(scenario)
     settled = slice(int(SETTLED * len(log["time"])), None)
     nu = np.stack([log[name][settled] for name in "uvr"], axis=1)
@@ -275,7 +279,12 @@ def acting_as(scenario: Scenario) -> dict[str, float]:
     phi2 = float(np.mean(np.sum(activation(law.network, nu) ** 2, axis=1)))
     gain = law.k_ue + (hull.m11**2 * phi2 / law.sigma_u if law.Gamma_u else 0.0)
     error = settled_rms(log["u_e"])
-    return {"phi2": phi2, "gain": gain, "rms_u_e": error, "product": gain * error}
+    numbers = {"phi2": phi2, "gain": gain, "rms_u_e": error, "product": gain * error}
+    surge = loop_margins(scenario.closed_loop(), scenario.time_grid()).loops["surge"]
+    return numbers | {
+        "phase_margin_deg": math.degrees(surge.phase_margin),
+        "delay_margin_ms": 1e3 * surge.delay_margin,
+    }
 
 
 def velocity_errors(scenario: Scenario) -> dict[str, float]:
