@@ -411,7 +411,8 @@ def test_the_event_nearest_to_a_window_is_named():
 @pytest.mark.parametrize(
     ("config", "claim", "word", "key"),
     [
-        ("lefeber_2003/line.yaml", "L6", "knife's edge", "start.psi"),
+        ("lefeber_2003/line.yaml", "L6", "robust", ""),
+        ("lefeber_2003/line.yaml", "L6b", "knife's edge", "start.psi"),
         ("lefeber_2003/line.yaml", "L7", "robust", ""),
         ("lefeber_2003/circle.yaml", "L3", "robust", ""),
         ("lefeber_2003/port.yaml", "L9", "robust", ""),

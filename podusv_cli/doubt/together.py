@@ -69,7 +69,7 @@ def explained(
     Of the draws in which the claim's answer is known. The band is that of the clearest of all
     choices after the turned draws are shuffled.
     """
-    rows = [i for i, one in enumerate(draws.choices) if acting[one.name]]
+    rows = [i for i, one in enumerate(draws.choices) if acting.get(one.name, False)]
     turned, shares = turned[known], draws.shares[known][:, rows]
     if not rows or not turned.any() or turned.all():
         return []

@@ -115,7 +115,8 @@ def doubted(
         entries = {label: _entry(label, one) for label, one in compared.singles.items()}
     judge, asked = judging(compared, entries), scenario.doubt or Doubt()
     tried = search(compared.singles, judge, asked, request.workers, progress)
-    extras = Extras(interrupted=len(tried.worlds) < asked.draws)
+    whole = len(choices(compared.singles, asked)), asked.draws
+    extras = Extras(interrupted=(len(tried.alone), len(tried.worlds)) != whole)
     verdicts = [
         RunsVerdict(
             one.name, one.claim, tried.base.answers[one.name], dict(tried.base.numbers[one.name])
