@@ -1,5 +1,6 @@
 """What verdicts hang on: turns that algebra knows, planted judges, the words, and the files."""
 
+import ast
 import csv
 import json
 import math
@@ -8,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_samples import PATIENCE, under_way
 from html_tree import tree
 
 import podusv
 from podusv_cli.comparison import claims
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.comparison.expressions import Evaluation
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP, explored
@@ -33,7 +36,7 @@ vessel: {preset: cybership2_linear}
 path: {kind: line, speed: 1.0}
 disturbance: {kind: none}
 actuator: {kind: ideal}
-start: {u: 0.5}
+start: {x: -5.0, u: 0.5}
 simulation: {step: 0.01, duration: 10.0}
 controllers:
   a: {kind: pid, K_Pu: 0.0, K_Iu: 0.0, K_Du: 0.0, K_Pr: 0.0, K_Ir: 0.0, K_Dr: 0.0}
@@ -210,7 +213,7 @@ sweep:
   vary: {vessel.m: {times: {uniform: [0.9, 1.1]}}}
   claims:
     near: {says: It stays near., expect: failures(a) <= 0.2}
-doubt: {printed: [controllers.a, control, path, simulation]}
+doubt: {printed: [controllers.a, control, path, simulation, vessel, nominal]}
 """
 
 
@@ -231,6 +234,58 @@ def test_a_study_hangs_on_what_it_does_not_draw(podusv):
     assert podusv("sweep", "run", "drawn.yaml", *words).code == 0
     apart, within = (Path(at, "claims.json") for at in ("apart", "out/studies/sweep.seed-1"))
     assert apart.read_bytes() == within.read_bytes()
+
+
+def test_the_scenario_itself_is_judged_as_a_comparison_judges_it(podusv):
+    """Also by a number that only a comparison has: operations of the law."""
+    claim = "claims:\n  count: {says: Few., expect: a.law_operations <= 1000}\n"
+    doubted(podusv, text=WRITTEN.replace("claims:\n", claim).replace("draws: 40", "draws: 2"))
+    found = json.loads(Path("out/doubt.json").read_text())["claims"]
+    assert podusv("compare", "adrift.yaml", "--no-figures", "--out", "c").code == 0
+    known = json.loads(Path("c/claims.json").read_text())["claims"]
+    answers = {c["claim"]: (c["verdict"], c["numbers"]) for c in known}
+    assert {c["claim"]: (c["verdict"], c["numbers"]) for c in found} == answers
+    assert answers["count"][0] == "reproduced"
+
+
+INTERRUPTED = """
+import os, signal
+from podusv_cli.cli import main
+from podusv_cli.workflows import doubt
+
+found, calls = doubt.explored, []
+
+def third(*given):
+    calls.append(given)
+    if len(calls) == 3:
+        os.killpg(os.getpgid(0), signal.SIGINT)
+    return found(*given)
+
+doubt.explored = third
+main()
+"""
+
+
+def test_an_interrupt_keeps_what_was_tried(podusv):
+    """While values are moved one at a time, so that no draw is made."""
+    Path("adrift.yaml").write_text(WRITTEN, "utf-8")
+    words = ("doubt", "adrift.yaml", "--out", "out", "--no-figures", "--workers", "1")
+    with under_way(*words, script=INTERRUPTED) as process:
+        _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "the table is about what was tried so far" in err
+    assert json.loads(Path("out/manifest.json").read_text())["status"] == "interrupted"
+    assert [row["kept"] for row in rows("doubt.csv")] == ["0", "0"]
+    assert not rows("draws.csv")
+
+
+def test_a_verdict_that_some_value_leaves_open_is_robust_where_it_can_tell(podusv):
+    """A run of 5 s has no window from 8 s to 10 s."""
+    text = WRITTEN.replace("expect: max(abs(a.v))", "expect: 'max(abs(a.v), 8, 10)")
+    text = text.replace("0.1, tolerance", "0.1', tolerance")
+    shorter = "doubt: {vary: {simulation.duration: {choice: [5.0]}}, "
+    doubted(podusv, text=text.replace("doubt: {", shorter))
+    assert rows("doubt.csv")[1]["word"] == "robust where it can tell"
 
 
 # ---- the search, by judges of a line of Python ----
@@ -356,13 +411,46 @@ def test_a_word_is_tried_in_all_its_forms():
 
 
 def test_the_numbers_of_a_claim_with_their_limits():
-    assert compared("max(a.x) <= 0.1 and -3 > a.e") == [("max(a.x)", "", 0.1), ("a.e", "", -3.0)]
-    assert compared("1 < a.e < b.e") == [("a.e", "", 1.0), ("a.e", "b.e", 1.0)]
+    assert compared("max(a.x) <= 0.1 and -3 > a.e") == [
+        ("max(a.x)", "", (0.1,)), ("a.e", "", (-3.0,)),
+    ]  # fmt: skip
+    assert compared("1 < a.e < b.e") == [("a.e", "", (1.0,)), ("a.e", "b.e", (1.0,))]
     (ratio,) = compared("not b.iae > 2 * a.iae")
-    assert ratio == ("b.iae", "2 * a.iae", 1.0)
+    assert ratio == ("b.iae", "2 * a.iae", (1.0,))
     assert ratio.of({"b.iae": 3.0, "2 * a.iae": 4.0}) == 0.75
     assert math.isnan(ratio.of({"b.iae": 3.0}))
     assert compared("finished(a)")[0].of({"finished(a)": 1.0}) == 1.0
+
+
+class Numbered:
+    """A run of one metric, as far as claims ask."""
+
+    until, every, ending = math.inf, 1, ""
+
+    def __init__(self, number):
+        self.number = number
+
+    def metric(self, name):
+        return self.number
+
+
+@pytest.mark.parametrize(
+    ("expect", "edges"),
+    [
+        ("a.iae <= 4", (4.4,)), ("4 <= a.iae", (4.0 / 1.1,)), ("a.iae >= 4", (3.6,)),
+        ("4 == a.iae", (4.0 / 0.9, 4.0 / 1.1)),
+        ("a.iae == 4", (3.6, 4.4)), ("a.iae == b.iae", (0.9, 1.1)), ("a.iae <= b.iae", (1.1,)),
+    ],
+)  # fmt: skip
+def test_a_number_turns_where_the_verdict_on_the_claim_does(expect, edges):
+    """As the claims' own judge has it, a little to both sides of each edge."""
+    (number,) = compared(expect, 0.1)
+    scale = 5.0 if number.right else 1.0
+    for edge in number.edges:
+        runs = [{"a": Numbered(scale * edge * f), "b": Numbered(5.0)} for f in (0.999, 1.001)]
+        answers = [Evaluation(one, 0.1).holds(ast.parse(expect, mode="eval").body) for one in runs]
+        assert sorted(answers) == [False, True], (edge, answers)
+    assert number.edges == pytest.approx(edges)
 
 
 def test_the_margin_is_counted_in_half_widths_of_the_draws():
@@ -372,6 +460,8 @@ def test_the_margin_is_counted_in_half_widths_of_the_draws():
     assert spread == pytest.approx((0.05, 0.5, 0.95))
     assert number.margin({"a.e": 0.2}, spread) == pytest.approx(0.3 / 0.45)
     assert number.margin({"a.e": 0.2}, (0.2, 0.2, 0.2)) == math.inf
+    (equal,) = compared("a.e == 0.5", 0.1)
+    assert equal.margin({"a.e": 0.5}, spread) == pytest.approx(0.05 / 0.45)
 
 
 def test_worlds_that_cannot_be_are_counted():

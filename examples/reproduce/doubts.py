@@ -15,12 +15,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-WORDS = ("knife's edge", "fragile", "under conditions", "in combination only", "robust", "")
+BUILT = "by construction"  # robust, as nothing that was moved acts on it
+WORDS = (
+    "knife's edge", "fragile", "under conditions", "in combination only",
+    "robust where it can tell", "robust", BUILT, "",
+)  # fmt: skip
 SAID = {"": "cannot tell"}
 HEAD = """\
 # What our verdicts hang on
 
-Keep this: {kept} Made by `make doubt`; [docs/doubt.md](../docs/doubt.md) says what was moved, and \
+Keep this: {kept} {others} of the robust ones are not if the task may \
+change: a hull with or without Coriolis terms, a hull that laws know wrongly, another path. \
+Made by `make doubt`; [docs/doubt.md](../docs/doubt.md) says what was moved, and \
 how. All of it is simulation.
 
 | paper | claims | {words} |
@@ -29,16 +35,17 @@ how. All of it is simulation.
 
 By a single value a verdict turns within 0.1 % of its scale (knife's edge), within 10 % (fragile), \
 further away or by another word (under conditions). In combination only: in some draws of all \
-numbers at once, and by no single value. What a paper prints stays: `doubt` in \
-`configs/*/base.yaml` and `configs/mu_2017/claims.yaml`.
+numbers at once, and by no single value. Robust where it can tell: some values or draws leave the \
+claim without an answer. By construction: nothing that was moved changes one of its numbers. What \
+a paper prints stays: `doubt` in `configs/*/base.yaml` and `configs/mu_2017/claims.yaml`.
 
-| claim | verdict | hangs on | in draws | nearest | of its scale |
-|---|---|---|---|---|---|
+| claim | verdict | hangs on | in draws | nearest | of its scale | if the task may change |
+|---|---|---|---|---|---|---|
 """
 KEPT = (
-    "of {all} verdicts {robust} are robust, {conditions} hold under conditions, {combined} turn in "
-    "combination only, {fragile} are fragile, {edge} stand on a knife's edge, and {unknown} cannot "
-    "tell."
+    "of {all} verdicts {robust} are robust and {dumb} more where they can tell, {built} hold by "
+    "construction, {conditions} under conditions, {combined} turn in combination only, {fragile} "
+    "are fragile, {edge} stand on a knife's edge, and {unknown} cannot tell."
 )
 
 
@@ -49,18 +56,21 @@ def rows(folder: Path) -> Iterator[dict[str, Any]]:
     }
     with (folder / "doubt.csv").open(newline="") as file:
         for row in csv.DictReader(file):
+            word = BUILT if row["word"] == "robust" and row["acted"] == "0" else row["word"]
+            turns = claims[row["claim"]]["turns"]
             yield {
-                **row, "paper": folder.parent.name, "scenario": folder.name,
+                **row, "word": word, "paper": folder.parent.name, "scenario": folder.name,
                 "own": claims[row["claim"]]["source"].startswith("ours"),
-                "turns": [turn for turn in claims[row["claim"]]["turns"] if not turn["task"]],
+                "turns": [turn for turn in turns if not turn["task"]],
+                "others": [turn for turn in turns if turn["task"]],
             }  # fmt: skip
 
 
-def nearest(row: dict[str, Any]) -> tuple[str, str]:
+def nearest(turns: Sequence[dict[str, Any]]) -> tuple[str, str]:
     """The value that turns the verdict, and its distance."""
-    if not row["turns"]:
+    if not turns:
         return "", ""
-    turn = row["turns"][0]
+    turn = turns[0]
     other = turn["turns_at"]
     if turn["share"] is None:
         return f"`{turn['key']}: {other}`", ""
@@ -72,15 +82,19 @@ def nearest(row: dict[str, Any]) -> tuple[str, str]:
 
 def line(row: dict[str, Any]) -> str:
     """A row of the table."""
-    known = int(row["kept"]) + int(row["turned"])
-    draws = f"{row['kept']} of {known}" if known else ""
-    place, far = nearest(row)
+    counts = [int(row[name]) for name in ("kept", "turned", "unknown", "failed")]
+    open_ = f", {row['unknown']} cannot tell" if int(row["unknown"]) else ""
+    draws = f"{row['kept']} of {sum(counts)}{open_}"
+    place, far = nearest(row["turns"])
+    other, by = row["word_for_neighbours"], " by " + nearest(row["others"])[0]
+    beside = f"{other}{by}" if other != row["word"] and row["others"] else ""
     verdict = row["verdict"]
     if row["own"]:
         verdict = {"reproduced": "holds", "not reproduced": "fails"}.get(verdict, verdict)
     word = SAID.get(row["word"], row["word"])
     return (
-        f"| {row['claim']} ({row['scenario']}) | {verdict} | {word} | {draws} | {place} | {far} |"
+        f"| {row['claim']} ({row['scenario']}) | {verdict} | {word} | {draws} | {place} "
+        f"| {far} | {beside} |"
     )
 
 
@@ -99,16 +113,19 @@ def counted(paper: str, found: Sequence[dict[str, Any]]) -> str:
 def main(*folders: str) -> None:
     """The page."""
     found = [row for folder in folders for row in rows(Path(folder))]
-    edge, fragile, conditions, combined, robust, unknown = (
+    edge, fragile, conditions, combined, dumb, robust, built, unknown = (
         sum(row["word"] == word for row in found) for word in WORDS
     )
     kept = KEPT.format(
         all=len(found), robust=robust, conditions=conditions, combined=combined, fragile=fragile,
-        edge=edge, unknown=unknown,
+        edge=edge, unknown=unknown, dumb=dumb, built=built,
     )  # fmt: skip
     papers = dict.fromkeys(row["paper"] for row in found)
+    solid = [row for row in found if row["word"] == "robust"]
+    others = sum(row["word_for_neighbours"] != "robust" for row in solid)
     text = HEAD.format(
         kept=kept,
+        others=others,
         words=" | ".join(SAID.get(word, word) for word in WORDS),
         rule="---|" * len(WORDS),
         papers="\n".join(counted(p, [r for r in found if r["paper"] == p]) for p in papers),

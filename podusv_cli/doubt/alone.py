@@ -62,6 +62,16 @@ class Alone:
     choice: Choice
     trials: tuple[Trial, ...]
 
+    @property
+    def possible(self) -> bool:
+        """Whether the scenario can take any of the values."""
+        return any(not trial.judged.failed for trial in self.trials)
+
+    def silences(self, claim: str) -> bool:
+        """Whether a value leaves a claim without an answer."""
+        judged = (trial.judged for trial in self.trials if not trial.judged.failed)
+        return any(one.answers.get(claim) is None for one in judged)
+
     def acts(self, claim: str, base: Judged) -> bool:
         """Whether any value changes a number of the claim."""
         return any(not t.judged.failed and not t.judged.same(claim, base) for t in self.trials)

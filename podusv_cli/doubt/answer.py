@@ -22,21 +22,25 @@ from podusv_cli.scenario.model import Scenario
 
 KNIFE, FRAGILE = 1e-3, 0.1  # of a choice's scale, within which a verdict turns
 LEVEL = 0.95  # of the bound on the share of draws that turn a verdict where none does
-WORDS = ("knife's edge", "fragile", "under conditions", "in combination only", "robust")
+WORDS = (
+    "knife's edge", "fragile", "under conditions", "in combination only",
+    "robust where it can tell", "robust",
+)  # fmt: skip
 
 
 Spread = tuple[float, float, float]  # 5, 50 and 95 %; NaN where no draw has the number
 
 
 class Compared(NamedTuple):
-    """A number of a claim, and what it is compared with: a limit, or another number.
+    """A number of a claim, and where a comparison of it turns.
 
-    Against another number it is the ratio of the two, with a limit of 1.
+    It is compared with a limit; against another number it is the ratio of the two. `edges` are the
+    limit, or 1, as far as the claim's tolerance moves it; an equality has two.
     """
 
     left: str
     right: str
-    limit: float
+    edges: tuple[float, ...]
 
     @property
     def text(self) -> str:
@@ -57,25 +61,39 @@ class Compared(NamedTuple):
         return float(low), float(middle), float(high)
 
     def margin(self, numbers: Mapping[str, float], spread: Spread) -> float:
-        """Its distance from the limit, in half-widths of the spread; infinite where that is 0."""
+        """Its distance from the nearest edge, in half-widths of the spread; infinite at 0."""
         low, _, high = spread
-        return abs(self.of(numbers) - self.limit) / (0.5 * (high - low)) if high > low else math.inf
+        away = min(abs(self.of(numbers) - edge) for edge in self.edges)
+        return away / (0.5 * (high - low)) if high > low else math.inf
 
 
-def compared(expect: str) -> list[Compared]:
+def compared(expect: str, tolerance: float = 0.0) -> list[Compared]:
     """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
     tree = ast.parse(expect, mode="eval").body
     found = []
     for node in (node for node in ast.walk(tree) if isinstance(node, ast.Compare)):
-        found += [_link(*pair) for pair in pairwise([node.left, *node.comparators])]
-    return found or [Compared(ast.unparse(tree), "", 0.5)]
+        sides = pairwise([node.left, *node.comparators])
+        found += [_link(*pair, sign, tolerance) for pair, sign in zip(sides, node.ops, strict=True)]
+    return found or [Compared(ast.unparse(tree), "", (0.5,))]
 
 
-def _link(left: ast.expr, right: ast.expr) -> Compared:
-    for number, limit in ((left, right), (right, left)):
-        with suppress(ValueError):  # not a plain number
-            return Compared(ast.unparse(number), "", float(ast.literal_eval(limit)))
-    return Compared(ast.unparse(left), ast.unparse(right), 1.0)
+# By how many tolerances the right side may be larger or smaller where a comparison turns.
+SIDES: dict[type[ast.cmpop], tuple[float, ...]] = {
+    ast.Eq: (-1.0, 1.0), ast.LtE: (1.0,), ast.GtE: (-1.0,),
+}  # fmt: skip
+
+
+def _link(left: ast.expr, right: ast.expr, sign: ast.cmpop, tolerance: float) -> Compared:
+    """The tolerance is that of the right side, as `docs/claims.md` has it."""
+    factors = tuple(1.0 + side * tolerance for side in SIDES.get(type(sign), (0.0,)))
+    with suppress(ValueError):  # not a plain number
+        limit = float(ast.literal_eval(right))
+        edges = (limit + (factor - 1.0) * abs(limit) for factor in factors)
+        return Compared(ast.unparse(left), "", tuple(edges))
+    with suppress(ValueError):
+        limit = float(ast.literal_eval(left))
+        return Compared(ast.unparse(right), "", tuple(limit / factor for factor in factors))
+    return Compared(ast.unparse(left), ast.unparse(right), factors)
 
 
 @dataclass(frozen=True)
@@ -97,6 +115,7 @@ class Answer:
     failed: int
     tried: int  # choices that were moved
     acted: int  # of which so many change a number of the claim
+    silent: int  # of which so many have a value at which nobody can tell
     numbers: Mapping[str, float]  # of the claim, by their text
     number: Compared  # which of its numbers is nearest to its limit
     spread: Spread  # of this number over the draws
@@ -136,7 +155,8 @@ def _word(answer: Answer, turns: Sequence[Turn], turned: int) -> str:
     if answer.verdict.answer is None:
         return ""
     nearest = min((turn.share for turn in turns), default=math.nan)
-    reached = (nearest <= KNIFE, nearest <= FRAGILE, bool(turns), turned > 0, True)
+    dumb = answer.silent + answer.unknown > 0
+    reached = (nearest <= KNIFE, nearest <= FRAGILE, bool(turns), turned > 0, dumb, True)
     return WORDS[reached.index(True)]
 
 
@@ -179,7 +199,7 @@ def _answer(verdict: Verdict, tried: Tried) -> Answer:
     labels = labels_of(verdict.claim)
     moved = [
         one for one in tried.alone
-        if one.choice.labels & labels and not one.choice.is_contrast(labels)
+        if one.possible and one.choice.labels & labels and not one.choice.is_contrast(labels)
     ]  # fmt: skip
     turns = sorted(
         (t for one in moved for t in one.turns(claim, base)), key=lambda turn: turn.share
@@ -193,14 +213,16 @@ def _answer(verdict: Verdict, tried: Tried) -> Answer:
         tuple(t for t in turns if t.choice.task),
         tuple(explained(tried.draws, turned, known, acting)),
         int((known & ~turned).sum()), int(turned.sum()), int((~known).sum()) - failed, failed,
-        len(moved), sum(acting[one.choice.name] for one in moved), base.numbers[claim],
+        len(moved), sum(acting[one.choice.name] for one in moved),
+        sum(one.silences(claim) for one in moved if not one.choice.task), base.numbers[claim],
         number, spread,
     )  # fmt: skip
 
 
 def _nearest(verdict: Verdict, base: Judged, worlds: Sequence[Judged]) -> tuple[Compared, Spread]:
     """The number of a claim that is nearest to its limit, in half-widths of its draws."""
-    spreads = {n: n.spread(verdict.name, worlds) for n in compared(verdict.claim.expect)}
+    numbers = compared(verdict.claim.expect, verdict.claim.tolerance)
+    spreads = {n: n.spread(verdict.name, worlds) for n in numbers}
     own = base.numbers[verdict.name]
     number = min(spreads, key=lambda n: n.margin(own, spreads[n]))
     return number, spreads[number]
@@ -223,13 +245,13 @@ def as_json(answer: Answer) -> dict[str, Any]:
         **answer.verdict.as_json(), "word": answer.word,
         "word_for_neighbours": answer.word_for_neighbours,
         "draws": {n: getattr(answer, n) for n in ("kept", "turned", "unknown", "failed")},
-        "choices": {"moved": answer.tried, "acted": answer.acted},
+        "choices": {"moved": answer.tried, "acted": answer.acted, "silent": answer.silent},
         "turns": [turn_as_json(turn) for turn in (*answer.turns, *answer.neighbours)],
         "explained": [
             {"key": e.choice.name, "part": e.part, "inside": e.inside, "outside": e.outside}
             for e in answer.explained
         ],
-        "number": answer.number.text, "limit": answer.number.limit, "spread": answer.spread,
+        "number": answer.number.text, "edges": list(answer.number.edges), "spread": answer.spread,
         "event": answer.event and answer.event._asdict(),
     }  # fmt: skip
 

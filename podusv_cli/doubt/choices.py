@@ -136,18 +136,27 @@ RANGES: dict[str, dict[str, Way]] = {
     "estimator": {"": _times(3.0, 1.25)},
     "controller": {"": _times(3.0, 1.25)},
 }  # fmt: skip
+
+
+def _whole(own: float) -> tuple[float, ...]:
+    """None and all of the Coriolis terms."""
+    return tuple(share for share in (0.0, 1.0) if share != own)
+
+
 # Keys that have values of their own to be tried, from the scenario's own.
 TRIED: dict[str, Callable[[Any], tuple[Any, ...]]] = {
     "simulation.step": lambda own: (own / 2.0,),
     "simulation.duration": lambda own: (own * 1.5,),  # a shorter run ends before windows of claims
     "control.period": lambda own: (own / 2.0, own * 2.0) if own else (),
-}
-WORDS = ("control.update",)  # beside those of the sections above
-# What another value of makes another task: where the target goes, and a hull that laws know wrongly
-TASK = ("path.", "nominal.")
+    "vessel.coriolis": _whole, "nominal.coriolis": _whole,
+}  # fmt: skip
+OTHERS = ("simulation.step", "simulation.duration", "control.period", "control.update")
+# What another value of makes another task: where the target goes, a hull that laws know wrongly,
+# and whether the hull has Coriolis terms
+TASK = ("path.", "nominal.", "vessel.coriolis")
 WAYS_OF_LAW = ("path.switch", "path.fillet")  # but these, which are part of a law's way
-# Fields that are no part of the motion, and which terms the equations have, 0 or 1
-FIXED = ("kind", "preset", "source", "validity", "length", "beam", "envelope", "coriolis")
+# Fields that are no part of the motion
+FIXED = ("kind", "preset", "source", "validity", "length", "beam", "envelope")
 
 
 def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
@@ -201,7 +210,7 @@ def _leaves(scenario: Scenario) -> Iterator[tuple[Route, Any]]:
     """Every number and word that may move, with its place."""
     for section in RANGES:
         yield from _within(getattr(scenario, section), (section,))
-    for key in (*TRIED, *WORDS):
+    for key in OTHERS:
         section, name = key.split(".")
         yield (section, name), getattr(getattr(scenario, section), name)
 
@@ -228,12 +237,15 @@ def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
     base, key = _base(places, singles)
     tried = TRIED.get(base.name, lambda own: _values(key, own))(base.own)
     way = RANGES.get(str(places[0][1][0]), {})
+    known = (*places, *_known(places, singles))
     if tried:
-        yield replace(base, values=tried)
-    elif isinstance(base.own, float) and (moves := way.get(base.unit, way.get(""))):
-        known = (*places, *_known(places, singles))
-        if found := moves(base.own, singles[places[0][0]], key):
-            yield replace(base, places=known, range=found)
+        yield replace(base, places=known, values=tried)
+    elif (
+        isinstance(base.own, float)
+        and (moves := way.get(base.unit, way.get("")))
+        and (found := moves(base.own, singles[places[0][0]], key))
+    ):
+        yield replace(base, places=known, range=found)
 
 
 def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:

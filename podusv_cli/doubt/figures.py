@@ -70,7 +70,8 @@ def specification(told: Told, answer: Answer, acting: Sequence[Alone]) -> Figure
     own = number.of(answer.numbers)
     if math.isfinite(own):
         top.axhline(own, color="black", lw=0.8, ls=":", label="the scenario's own")
-    top.axhline(number.limit, color="black", lw=0.8, label="limit")
+    for place_, edge in enumerate(number.edges):
+        top.axhline(edge, color="black", lw=0.8, label=None if place_ else "limit")
     top.set_ylabel(textwrap.fill(escaping.figure(number.text), WIDE), fontsize=6)
     names = [escaping.figure(tried.draws.choices[column].name) for column in lanes]
     below.set_yticks([lane + 0.5 for lane in range(len(lanes))], names, fontsize=5.5)

@@ -45,7 +45,9 @@ def in_words(answer: Answer) -> str:
     nearest = answer.turns[0].share if answer.turns else math.inf
     far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
     idle = "" if answer.acted or not answer.word else ": nothing that was moved acts on it"
-    return f"{answer.word}{far}{idle}"
+    other = answer.word_for_neighbours
+    beside = f"; {other} if the task may change" if other != answer.word else ""
+    return f"{answer.word}{far}{idle}{beside}"
 
 
 def _share(share: float) -> str:
@@ -54,7 +56,8 @@ def _share(share: float) -> str:
 
 def row(answer: Answer) -> list[str]:
     """A claim's row of the table."""
-    kept = f"{answer.kept} of {answer.draws}" if answer.draws else "-"
+    open_ = f", {answer.unknown} cannot tell" if answer.unknown and answer.word else ""
+    kept = f"{answer.kept} of {answer.draws}{open_}" if answer.draws else "-"
     others = f" and {len(answer.turns) - 1} more" if len(answer.turns) > 1 else ""
     turns = f"{place(answer.turns[0])}{others}" if answer.turns else "-"
     return [answer.verdict.name, answer.verdict.in_words, kept, turns, in_words(answer)]
@@ -85,14 +88,14 @@ def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
     """A head, and a row a claim."""
     yield (
         "claim", "verdict", "word", "word_for_neighbours", "kept", "turned", "unknown", "failed",
-        "moved", "acted", "nearest", "turns_at", "nearest_share",
+        "moved", "acted", "silent", "nearest", "turns_at", "nearest_share",
     )  # fmt: skip
     for one in answers:
         first = one.turns[0] if one.turns else None
         nearest = (first.choice.name, first.value, first.share) if first else ("", "", "")
         yield (
             one.verdict.name, one.verdict.verdict, one.word, one.word_for_neighbours, one.kept,
-            one.turned, one.unknown, one.failed, one.tried, one.acted, *nearest,
+            one.turned, one.unknown, one.failed, one.tried, one.acted, one.silent, *nearest,
         )  # fmt: skip
 
 

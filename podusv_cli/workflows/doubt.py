@@ -24,6 +24,7 @@ from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.together import Draws, drawn
 from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Job, run_shares
@@ -112,7 +113,9 @@ def doubted(
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
-        entries = {label: _entry(label, one) for label, one in compared.singles.items()}
+        entries = {
+            label: _entry(label, one, compared.parsed) for label, one in compared.singles.items()
+        }
     judge, asked = judging(compared, entries), scenario.doubt or Doubt()
     tried = search(compared.singles, judge, asked, request.workers, progress)
     whole = len(choices(compared.singles, asked)), asked.draws
@@ -173,7 +176,10 @@ def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
     def judge(world: World) -> Judged:
         labels = dict.fromkeys(label for label, _ in world)
         try:
-            moved = {label: _entry(label, _changed(compared, label, world)) for label in labels}
+            moved = {
+                label: _entry(label, _changed(compared, label, world), compared.parsed)
+                for label in labels
+            }
         except PodusvError as error:
             return Judged({}, {}, str(error))
         every = {**entries, **moved}
@@ -204,13 +210,14 @@ class InMemory(Run):
         return self.kept
 
 
-def _entry(label: str, scenario: Scenario) -> Entry:
+def _entry(label: str, scenario: Scenario, parsed: Sequence[ParsedClaim]) -> Entry:
+    """A run in memory, with what a comparison adds to it that these claims name."""
     case = Case(scenario)
     recording = simulated(case, Stopwatch())
     if recording.status == "interrupted":
         raise KeyboardInterrupt
     whole, _ = monitored(case, recording)
-    numbers = summary(case, recording, Extras())
-    return Entry(
-        label, InMemory(Path(), recording.status, dict(numbers), {}, "", kept=whole), scenario
-    )
+    numbers: dict[str, float | None] = {**summary(case, recording, Extras())}
+    if len(recording["time"]) and any(law_operations.name in one.claim.expect for one in parsed):
+        numbers |= operations(case.plan, recording)
+    return Entry(label, InMemory(Path(), recording.status, numbers, {}, "", kept=whole), scenario)

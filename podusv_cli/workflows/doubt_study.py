@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.core.phrases import as_yaml
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import Alone, Trial
 from podusv_cli.doubt.answer import Told, Tried, answers
@@ -18,7 +19,8 @@ from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.of_study import overrides, study_choices
 from podusv_cli.doubt.together import Draws
-from podusv_cli.process.extras import Extras
+from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter
@@ -79,16 +81,32 @@ def doubt_study(
     if base.failed:
         raise PodusvError(base.failed)
     alone = []
-    for done, choice in enumerate(found):
-        tell("one at a time", done / len(found))
-        alone.append(Alone(choice, tuple(_trials(studies, choice, loaded))))
+    try:
+        for done, choice in enumerate(found):
+            tell("one at a time", done / len(found))
+            alone.append(Alone(choice, tuple(_trials(studies, choice, loaded))))
+    except KeyboardInterrupt as stop:
+        again = plugins.continue_with(f"doubt {config} --out", folder)
+        raise KeyboardInterrupt(
+            f"interrupted; the studies that are made are kept, continue with: {again}"
+        ) from stop
     tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
     told = Told(scenario, answers(verdicts, tried), tried)
     origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
     extras = Extras()
+    extras.missing += _failed(alone)
     with RunWriter(folder / "answer", force=True, named=True) as writer:
         outputs.write(writer, told, loaded.text, origin, extras, figures=False)
-        return outputs.Doubted(writer.finish("finished"), told.answers, "finished")
+        at, missing = writer.finish("finished"), tuple(extras.missing)
+        return outputs.Doubted(at, told.answers, "finished", missing)
+
+
+def _failed(alone: Sequence[Alone]) -> Iterator[Failure]:
+    """The values with which there is no study, and why."""
+    for one in alone:
+        for trial in one.trials:
+            if trial.judged.failed:
+                yield Failure(f"{one.choice.name}: {as_yaml(trial.value)}", trial.judged.failed)
 
 
 def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[Trial]:
