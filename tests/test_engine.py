@@ -36,6 +36,7 @@ from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.watch import Work
 from podusv_cli.engine.step.grid import TimeGrid
 
 
@@ -268,6 +269,16 @@ def test_progress_grows_to_one_and_the_log_takes_no_notice():
     assert same(run(loop, 60.0, progress=fractions.append), run(loop, 60.0))
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
+
+
+def test_work_that_is_over_before_anybody_looks_reports_its_end():
+    class AtOnce(Work):
+        def start(self):
+            self._run()
+
+    heard = []
+    AtOnce(lambda: 7).finish(heard.append)
+    assert heard == [7]
 
 
 def test_no_steps_is_the_start_alone():

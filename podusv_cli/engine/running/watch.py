@@ -77,10 +77,12 @@ class Work:
         return not self.over and used - self._last_change[1] > PATIENCE
 
     def finish(self, progress: Callable[[int], None] | None = None) -> None:
-        """Start, and wait until it is over or hangs."""
+        """Start, and wait until it is over or hangs; `progress` hears of the end, however near."""
         self.start()
-        while not (self.over or self.hangs()):
+        ended = False
+        while not ended:
             self.wait()
+            ended = self.over or self.hangs()
             if progress:
                 progress(self.reached)
 
