@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.cases import LAWS, Case, grid, metrics_observer
+from benchmarks.cases import LAWS, Case, grid, run_probe
 from benchmarks.timing import in_turns, quartiles, ratio, timed
 from benchmarks.variants import variants
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
@@ -26,9 +26,9 @@ RUNS = {31_000: 8, 1_000: 64}  # side by side, by number of steps
 MANY = {True: 512, False: 64}  # runs on all cores, side by side and one by one
 
 
-def _one_by_one(loops: list[ClosedLoop], over: TimeGrid, observer: Observer) -> None:
+def _one_by_one(loops: list[ClosedLoop], over: TimeGrid, probe: Probe) -> None:
     for loop in loops:
-        simulate(loop, over, observer=observer)
+        simulate(loop, over, probe=probe)
 
 
 def batch_costs(rounds: int = 7) -> dict[str, Any]:
@@ -46,9 +46,9 @@ def _costs(steps: int, rounds: int) -> dict[str, Any]:
     over = grid(steps, log_every=steps + 1)
     scales = {"disturbance.scale": np.linspace(0.5, 1.5, count)}
     loops = variants(CASE.loop(), scales)
-    watching = metrics_observer(loops[0], over)
-    many = partial(simulate_many, loops, over, observer=watching, side_by_side=False)
-    singly = partial(_one_by_one, loops, over, watching)
+    probe = run_probe(loops[0], over)
+    many = partial(simulate_many, loops, over, probe=probe, side_by_side=False)
+    singly = partial(_one_by_one, loops, over, probe)
     timers = {
         "alone": timed(singly, 1),
         "batch": timed(many, 1),
@@ -75,7 +75,7 @@ def side_by_side_laws(rounds: int = 7) -> dict[str, dict[str, Any]]:
 def _abreast(case: Case, steps: int, rounds: int) -> dict[str, Any]:
     over, count = grid(steps, log_every=steps + 1), RUNS[steps]
     loops = variants(case.loop(), {"disturbance.scale": np.linspace(0.5, 1.5, count)})
-    many = partial(simulate_many, loops, over, observer=metrics_observer(loops[0], over), workers=1)
+    many = partial(simulate_many, loops, over, probe=run_probe(loops[0], over), workers=1)
     timers = {
         name: timed(partial(many, side_by_side=abreast), 1, process_time)
         for name, abreast in (("side by side", True), ("one by one", False))
@@ -100,9 +100,9 @@ def _hours(case: Case, rounds: int) -> dict[str, list[float]]:
     for abreast, count in MANY.items():
         starts = {f"start.{axis}": draws.uniform(-10.0, 10.0, count) for axis in "xy"}
         loops = variants(case.loop(), starts)
-        watching = metrics_observer(loops[0], over)
+        probe = run_probe(loops[0], over)
         timers["side by side" if abreast else "one by one"] = timed(
-            partial(simulate_many, loops, over, observer=watching, side_by_side=abreast), 1
+            partial(simulate_many, loops, over, probe=probe, side_by_side=abreast), 1
         )
     times = in_turns(timers, rounds)
     counts = dict(zip(timers, MANY.values(), strict=True))

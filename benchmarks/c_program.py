@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.cases import NETWORKS, Case, grid, metrics_observer
+from benchmarks.cases import NETWORKS, Case, grid, run_probe
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.running.simulate import simulate
@@ -64,14 +64,14 @@ def run(program: Path, case: Case, *, repeats: int = 1, steps: int | None = None
 def podusv_outcome(case: Case, steps: int | None = None) -> Outcome:
     """The same numbers from podusv."""
     loop, over = case.loop(), grid(steps)
-    watching = metrics_observer(loop, over)
-    recording = simulate(loop, over, observer=watching)
+    probe = run_probe(loop, over)
+    recording = simulate(loop, over, probe=probe)
     if recording.status != "finished" or recording.seen is None:
         raise ValueError(f"{case.label}: {recording.message or recording.status}")
     slots = [part.name for part, _ in loop.controller.slots()]
     slots = [name for name in slots if not name.startswith("psi_d")]
     state = np.concatenate([np.ravel(recording[name][-1]) for name in (*STATE, *slots)])
-    return Outcome(watching.summary(recording.seen)["iae"], state)
+    return Outcome(probe.summary(recording.seen)["iae"], state)
 
 
 def difference(a: Outcome, b: Outcome) -> float:

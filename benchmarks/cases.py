@@ -13,7 +13,7 @@ from podusv_cli.core.registry import kinds
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics.table import Metrics, observer
+from podusv_cli.metrics.table import Metrics, metrics_probe
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 
@@ -82,10 +82,10 @@ def grid(steps: int | None = None, log_every: int = 1) -> TimeGrid:
     return TimeGrid(whole.step, whole.steps if steps is None else steps, log_every)
 
 
-def metrics_observer(loop: ClosedLoop, over: TimeGrid) -> Metrics:
-    """The observer of `podusv run`, which gathers all metrics."""
+def run_probe(loop: ClosedLoop, over: TimeGrid) -> Metrics:
+    """The probe of `podusv run`, which gathers all metrics."""
     settings = _scenario().metrics
-    return observer(
+    return metrics_probe(
         Plan(loop, over),
         steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
     )  # fmt: skip

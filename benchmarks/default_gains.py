@@ -135,11 +135,11 @@ def of_the_model_ship(part: Component) -> Any:
 
 def outcome(scenario: Scenario) -> tuple[bool, float]:
     """Whether the run fails, and its error, rms over the length of the hull."""
-    watch, length = scenario.observer(), scenario.vessel.length
-    done = simulate_many([scenario.closed_loop()], scenario.time_grid(), observer=watch, workers=1)
+    probe, length = scenario.probe(), scenario.vessel.length
+    done = simulate_many([scenario.closed_loop()], scenario.time_grid(), probe=probe, workers=1)
     if done.status[0] != "finished":
         return True, float("inf")
-    found = {name: float(numbers[0]) for name, numbers in watch.summaries(done.seen).items()}
+    found = {name: float(numbers[0]) for name, numbers in probe.summaries(done.seen).items()}
     if scenario.path.follows:
         error = found["e_ct_rms"]
         return found["path_done"] < 1.0 or not error <= length, error / length

@@ -10,7 +10,7 @@ from time import process_time
 from typing import Any
 
 from benchmarks.c_program import agreement, timer
-from benchmarks.cases import CASES, ROOT, SCENARIO, Case, grid, metrics_observer, rivals
+from benchmarks.cases import CASES, ROOT, SCENARIO, Case, grid, rivals, run_probe
 from benchmarks.timing import Timer, in_turns, quartiles, ratio, timed
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.network import Network
@@ -33,11 +33,11 @@ USUAL = Case("adaptive_neural", "27 grid")
 def engine_timers(case: Case) -> dict[str, Timer]:
     """Timers of one whole `simulate`, every step logged, without and with the metrics [CPU s]."""
     loop, over = case.loop(), grid()
-    watching = metrics_observer(loop, over)
+    probe = run_probe(loop, over)
     return {
         "podusv": timed(partial(simulate, loop, over), clock=process_time),
         "podusv with metrics": timed(
-            partial(simulate, loop, over, observer=watching), clock=process_time
+            partial(simulate, loop, over, probe=probe), clock=process_time
         ),
     }
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.c_program import TOLERANCE, compiler
-from benchmarks.cases import Case, grid, metrics_observer
+from benchmarks.cases import Case, grid, run_probe
 from benchmarks.timing import in_turns, quartiles, ratio, timed
 from benchmarks.variants import variants
 from podusv_cli.core.kernel import LANES, Vector
@@ -49,11 +49,11 @@ def podusv() -> tuple[Callable[[], Any], Vector]:
     """A function that makes the same runs with all metrics, and their integrals of the distance."""
     over = grid(STEPS, log_every=STEPS + 1)
     loops = variants(CASE.loop(), {"disturbance.scale": SCALES})
-    watching = metrics_observer(loops[0], over)
+    probe = run_probe(loops[0], over)
     many = partial(
-        simulate_many, loops, over, observer=watching, workers=1, side_by_side=True
+        simulate_many, loops, over, probe=probe, workers=1, side_by_side=True
     )  # fmt: skip
-    return many, watching.summaries(many().seen)["iae"]
+    return many, probe.summaries(many().seen)["iae"]
 
 
 def side_by_side_costs(rounds: int = 7) -> dict[str, Any]:

@@ -47,7 +47,7 @@ from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import metrics_with, observer
+from podusv_cli.metrics.table import metrics_probe, metrics_with
 from podusv_cli.scenario.load import load_text
 from podusv_cli.testing_seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
 from podusv_cli.theory import derived
@@ -170,14 +170,14 @@ def gathered_number(metric: Metric, compiled: bool) -> float:
     """The metric of a short run."""
     loop, grid = loop_with(Pid()), TimeGrid(STEP, STEPS)
     alone = Plugin(metric.name, f"{id(metric)}", offers=(("metrics", metric),))
-    seeing = observer(
+    probe = metrics_probe(
         Plan(loop, grid), steady_fraction=0.2, settling_radius=1.0, known=metrics_with((alone,))
     )
-    run = simulate(loop, grid, observer=seeing, compiled=compiled)
+    run = simulate(loop, grid, probe=probe, compiled=compiled)
     assert run.seen is not None
     if metric.of_log:
         return float(metric.of_log(run))
-    return seeing.summary(run.seen)[metric.name]
+    return probe.summary(run.seen)[metric.name]
 
 
 def draws_any_number_of_runs(sheet: Sheet) -> None:

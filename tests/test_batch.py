@@ -30,7 +30,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch import Batch, Lazily, simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics.table import observer
+from podusv_cli.metrics.table import metrics_probe
 
 GRID = TimeGrid(0.01, 2000)
 SETTINGS = {"steady_fraction": 0.5, "settling_radius": 12.0}
@@ -65,16 +65,16 @@ def spread_out(**parts: Any) -> list[ClosedLoop]:
 @pytest.mark.parametrize("law", [AdaptiveNeural(rate="difference"), DynamicSurface()])
 def test_every_run_has_the_bits_and_metrics_of_a_run_alone(law: Any, workers: int) -> None:
     loops = spread_out(controller=law)
-    watching = observer(Plan(loops[0], GRID), **SETTINGS)
-    batch = simulate_many(loops, GRID, observer=watching, workers=workers)
-    metrics = watching.summaries(batch.seen)
+    probe = metrics_probe(Plan(loops[0], GRID), **SETTINGS)
+    batch = simulate_many(loops, GRID, probe=probe, workers=workers)
+    metrics = probe.summaries(batch.seen)
     for i, loop in enumerate(loops):
-        alone = simulate(loop, GRID, observer=observer(Plan(loop, GRID), **SETTINGS))
+        alone = simulate(loop, GRID, probe=metrics_probe(Plan(loop, GRID), **SETTINGS))
         assert (batch.status[i], batch.reached[i]) == (alone.status, GRID.steps + 1)
         np.testing.assert_array_equal(batch.state[i], [alone[name][-1] for name in STATE])
         np.testing.assert_array_equal(batch.seen[i], alone.seen)
         assert alone.seen is not None
-        expected = watching.summary(alone.seen)
+        expected = probe.summary(alone.seen)
         np.testing.assert_array_equal([metrics[name][i] for name in expected], [*expected.values()])
     assert len(set(metrics["iae"])) == COUNT  # the runs do differ
 
@@ -98,15 +98,15 @@ class Lost(Constant):
 
 def test_a_run_that_diverges_stops_no_other() -> None:
     loops = variants(adrift(controller=Lost()), {"controller.until": [30.0, 4.999, 30.0, 2.499]})
-    watching = observer(Plan(loops[0], GRID), **SETTINGS)
-    batch = simulate_many(loops, GRID, observer=watching)
+    probe = metrics_probe(Plan(loops[0], GRID), **SETTINGS)
+    batch = simulate_many(loops, GRID, probe=probe)
     assert batch.status.tolist() == ["finished", "diverged", "finished", "diverged"]
     assert batch.reached.tolist() == [2001, 500, 2001, 250]
     broke = "at t = {} s: u is not finite"
     assert batch.cause.tolist() == ["", broke.format(5), "", broke.format(2.5)]
     np.testing.assert_array_equal(np.isfinite(batch.state).all(axis=1), batch.reached == 2001)
     for loop, row in zip(loops, batch.seen, strict=True):
-        np.testing.assert_array_equal(row, simulate(loop, GRID, observer=watching).seen)
+        np.testing.assert_array_equal(row, simulate(loop, GRID, probe=probe).seen)
 
 
 def test_a_march_lets_go_of_the_interpreters_lock() -> None:
@@ -121,18 +121,18 @@ def interrupted(loops: list[ClosedLoop], grid: TimeGrid) -> Batch:
         if fraction >= 2 / len(loops):
             raise KeyboardInterrupt
 
-    watching = observer(Plan(loops[0], grid), **SETTINGS)
-    return simulate_many(loops, grid, observer=watching, workers=1, progress=press)
+    probe = metrics_probe(Plan(loops[0], grid), **SETTINGS)
+    return simulate_many(loops, grid, probe=probe, workers=1, progress=press)
 
 
 def test_an_interrupt_keeps_the_runs_that_are_done() -> None:
     loops, others = [corrected()] * 40, set(threading.enumerate())
-    watching = observer(Plan(loops[0], TimeGrid(0.01, 100_000)), **SETTINGS)
+    probe = metrics_probe(Plan(loops[0], TimeGrid(0.01, 100_000)), **SETTINGS)
     batch = interrupted(loops, TimeGrid(0.01, 100_000))
     done = batch.status == "finished"
     assert 2 <= done.sum() < 40
     assert set(batch.status) == {"finished", "interrupted"}
-    iae = watching.summaries(batch.seen)["iae"]
+    iae = probe.summaries(batch.seen)["iae"]
     assert len(set(iae[done])) == 1
     never = batch.reached == 0
     assert never.any()
@@ -165,7 +165,9 @@ def test_a_loop_of_another_structure_is_invalid(other: ClosedLoop) -> None:
 def test_no_runs_are_an_empty_batch() -> None:
     batch = simulate_many([], GRID)
     assert (len(batch.status), batch.seen.shape) == (0, (0, 1))
-    assert observer(Plan(corrected(), GRID), **SETTINGS).summaries(batch.seen)["iae"].shape == (0,)
+    assert metrics_probe(Plan(corrected(), GRID), **SETTINGS).summaries(batch.seen)[
+        "iae"
+    ].shape == (0,)
 
 
 class Faulty(Lost):
@@ -195,10 +197,10 @@ def test_no_run_that_fails_changes_a_bit_of_the_others() -> None:
         return one
 
     grid, fractions = TimeGrid(0.01, 20), list[float]()
-    watching = observer(Plan(sound[0], grid), **SETTINGS)
-    whole = simulate_many(sound, grid, observer=watching, workers=1)
+    probe = metrics_probe(Plan(sound[0], grid), **SETTINGS)
+    whole = simulate_many(sound, grid, probe=probe, workers=1)
     mixed = simulate_many(
-        Lazily(100, make), grid, observer=watching, workers=3, progress=fractions.append
+        Lazily(100, make), grid, probe=probe, workers=3, progress=fractions.append
     )
     others = [i for i in range(100) if i not in ends]
     assert {i: mixed.status[i] for i in ends} == ends

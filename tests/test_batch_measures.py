@@ -23,7 +23,7 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
-from podusv_cli.metrics.table import METRICS, observer
+from podusv_cli.metrics.table import METRICS, metrics_probe
 from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
@@ -73,10 +73,10 @@ def changed(scenario: Scenario, key: str, old: float) -> Scenario | None:
 
 def alone(scenario: Scenario) -> dict[str, float]:
     """The metrics of one run."""
-    watching = scenario.observer()
-    run = simulate(scenario.closed_loop(), scenario.time_grid(), observer=watching)
+    probe = scenario.probe()
+    run = simulate(scenario.closed_loop(), scenario.time_grid(), probe=probe)
     assert run.seen is not None
-    return watching.summary(run.seen)
+    return probe.summary(run.seen)
 
 
 @pytest.mark.parametrize(
@@ -153,17 +153,17 @@ def test_a_metric_of_a_plugin_has_the_constants_of_each_run() -> None:
     loops, grid = two_speeds(), TASK.time_grid()
     known = speed_excess(lambda layout: 1)
     settings = {"steady_fraction": 0.2, "settling_radius": 1.0, "known": known}
-    watching = observer(Plan(loops[0], grid), **settings)
-    batch = simulate_many(loops, grid, observer=watching)
+    probe = metrics_probe(Plan(loops[0], grid), **settings)
+    batch = simulate_many(loops, grid, probe=probe)
     u = batch.state[:, 3]
-    np.testing.assert_array_equal(watching.summaries(batch.seen)["excess"], u - [0.5, 0.75])
+    np.testing.assert_array_equal(probe.summaries(batch.seen)["excess"], u - [0.5, 0.75])
 
 
 def test_a_metric_whose_size_depends_on_a_drawn_number_refuses_the_run() -> None:
     loops, grid = two_speeds(), TASK.time_grid()
     known = speed_excess(lambda layout: 1 if layout.loop.path.speed < 0.6 else 2)
     settings = {"steady_fraction": 0.2, "settling_radius": 1.0, "known": known}
-    batch = simulate_many(loops, grid, observer=observer(Plan(loops[0], grid), **settings))
+    batch = simulate_many(loops, grid, probe=metrics_probe(Plan(loops[0], grid), **settings))
     assert batch.status.tolist() == ["finished", "invalid"]
     expected = "metric excess: its accumulator gathers 2 numbers in this run and 1 in others"
     assert batch.cause[1].startswith(expected)

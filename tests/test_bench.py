@@ -201,7 +201,7 @@ def test_a_law_that_fails_is_a_row_and_costs_no_other(bench):
     assert found["wild"].cause.startswith("diverged at t = ")
     assert ";" not in found["wild"].cause
     assert "m off over the steady window" in found["far"].cause
-    alone = laws["good"].observer()
+    alone = laws["good"].probe()
     assert set(found["good"].metrics) == set(alone.summary(np.zeros(alone.size)))
     assert found["good"].track[0].tolist() == [-10.0, -10.0, 0.0, 0.0]
 

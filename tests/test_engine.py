@@ -33,7 +33,7 @@ from podusv_cli.components.disturbances.total import Total
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.steps import whole_steps
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.running.watch import Work
@@ -53,7 +53,7 @@ def _integrate(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
     seen[2] += 1.0
 
 
-WATCH = Observer(_integrate, 3)
+WATCH = Probe(_integrate, 3)
 
 
 def test_the_same_loop_gives_the_same_bits_whatever_the_blocks():
@@ -157,8 +157,8 @@ def test_the_plant_is_the_vessel_whatever_the_law_is_told():
 
 @pytest.mark.parametrize("log_every", [7, 10, 64])
 def test_thinning_the_log_drops_rows_and_changes_nothing(log_every):
-    full = run(corrected(), 3.0, observer=WATCH)
-    thin = run(corrected(), 3.0, observer=WATCH, log_every=log_every)
+    full = run(corrected(), 3.0, probe=WATCH)
+    thin = run(corrected(), 3.0, probe=WATCH, log_every=log_every)
     assert len(thin["time"]) == 300 // log_every + 1
     for name in full.signals:
         np.testing.assert_array_equal(thin[name], full[name][::log_every])
@@ -167,7 +167,7 @@ def test_thinning_the_log_drops_rows_and_changes_nothing(log_every):
 
 
 def test_an_observer_sees_every_instant_with_trapezoidal_weights():
-    out = run(corrected(), 3.0, observer=WATCH, log_every=100)
+    out = run(corrected(), 3.0, probe=WATCH, log_every=100)
     full = run(corrected(), 3.0)
     assert out.seen is not None
     integral = np.trapezoid(full["x"], full["time"])

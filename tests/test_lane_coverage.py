@@ -18,7 +18,7 @@ from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.paths.base import Path
 from podusv_cli.core.component import Component
 from podusv_cli.core.registry import kinds
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.lanes import why_alone
 from podusv_cli.engine.step.grid import TimeGrid
@@ -61,7 +61,7 @@ def test_every_law_marches_side_by_side(law: str) -> None:
     base = replace(loop("pid"), controller=made(LAWS[law]))
     together, alone = both(scattered(base, 7), GRID)
     same(together, alone)
-    assert why_alone(Plan.watched(base, GRID, Observer())) == ""
+    assert why_alone(Plan.with_probe(base, GRID, Probe())) == ""
     assert {"finished", "diverged"} <= set(alone.status)
 
 
@@ -74,7 +74,7 @@ def test_every_path_disturbance_and_actuator_can_march_side_by_side(part: str) -
     }  # fmt: skip
     for name, kind in kinds(f"podusv_cli.components.{part}s", rooms[part]).items():
         one = replace(base, **{part: made(kind)})
-        assert (name, why_alone(Plan.watched(one, GRID, Observer()))) == (name, "")
+        assert (name, why_alone(Plan.with_probe(one, GRID, Probe()))) == (name, "")
 
 
 def test_numbers_of_paths_and_currents_differ_from_run_to_run() -> None:
@@ -102,5 +102,5 @@ def test_a_sea_with_all_that_belongs_to_it_marches_side_by_side(name: str) -> No
     base = scenario.closed_loop()
     together, alone = both(spread(base), replace(scenario.time_grid(), steps=200))
     same(together, alone)
-    assert why_alone(Plan.watched(base, GRID, Observer())) == ""
+    assert why_alone(Plan.with_probe(base, GRID, Probe())) == ""
     assert {"finished", "diverged"} <= set(alone.status)

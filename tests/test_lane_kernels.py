@@ -60,7 +60,7 @@ def newton(a: float, out: Vector) -> None:
 
 @kernel
 def loops(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """An observer with all of them, and a loop whose count is another one in every lane."""
+    """A probe with all of them, and a loop whose count is another one in every lane."""
     seen[0] = first_above(s[0], SIZE, row)
     halvings(10.0 * s[1], tail(seen, 1))
     if s[2] > 0.0:
@@ -71,7 +71,7 @@ def loops(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 
 @kernel
 def places(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """An observer that reads and writes at places of its own in every lane."""
+    """A probe that reads and writes at places of its own in every lane."""
     i = segment(s[0], SIZE, row)
     later = tail(row, i)
     seen[0] = later[0] if i > 2 else later[1] + row[min(i + 1, SIZE - 1)]
@@ -178,10 +178,8 @@ KERNELS = (loops, places, returns, only_where_needed, whole)
 @pytest.mark.parametrize("watch", KERNELS)
 def test_every_lane_has_the_numbers_that_it_has_alone(watch: Any) -> None:
     """NaN and the signs of zeros included."""
-    alone = compile.entry("observer", watch, ("nothing",))
-    side_by_side = compile.routine(
-        compile.lane_adapter("observer", watch, ("nothing",), frozenset())
-    )
+    alone = compile.entry("probe", watch, ("nothing",))
+    side_by_side = compile.routine(compile.lane_adapter("probe", watch, ("nothing",), frozenset()))
     draws, nothing = np.random.default_rng(8), np.zeros((1, LANES))
     for turn in range(10):
         s, seen = draws.normal(0.0, 1.5, (3, LANES)), draws.normal(0.0, 1.0, (9, LANES))
@@ -204,4 +202,4 @@ def test_a_number_of_one_run_is_not_taken_for_all_of_them() -> None:
     for _ in range(2):
         compile.routine.cache_clear()
         with pytest.raises(TypeError, match=r"test_lane_kernels.py, line \d+: shared is for"):
-            compile.routine(compile.lane_adapter("observer", first_run, ("nothing",), frozenset()))
+            compile.routine(compile.lane_adapter("probe", first_run, ("nothing",), frozenset()))

@@ -49,10 +49,10 @@ def outcome(seed: int) -> str:
     """What becomes of the random kernel of this seed side by side."""
     watch = watching(seed)
     try:
-        alone = compile.entry("observer", watch, NAMES)
+        alone = compile.entry("probe", watch, NAMES)
     except LawError:
         return "no kernel"
-    side_by_side = compile.routine(compile.lane_adapter("observer", watch, NAMES, ALIKE))
+    side_by_side = compile.routine(compile.lane_adapter("probe", watch, NAMES, ALIKE))
     return "equal" if all(agrees(alone, side_by_side, turn) for turn in range(8)) else "differs"
 
 

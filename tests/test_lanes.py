@@ -28,7 +28,7 @@ from podusv_cli.components.measurements.sensors import MEASURED, Sensor, Sensors
 from podusv_cli.core.kernel import LANES, Vector, kernel, shared
 from podusv_cli.core.registry import kinds
 from podusv_cli.core.signal import Signal
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import compile
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
@@ -38,7 +38,7 @@ from podusv_cli.engine.running.batch import Batch, simulate_many
 from podusv_cli.engine.running.lanes import why_alone
 from podusv_cli.engine.running.watch import Work
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics.table import observer
+from podusv_cli.metrics.table import metrics_probe
 from podusv_cli.scenario.load import load
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -84,9 +84,9 @@ def scattered(base: ClosedLoop, seed: int) -> list[ClosedLoop]:
 
 def both(loops: list[ClosedLoop], grid: TimeGrid = GRID) -> tuple[Batch, Batch]:
     """The batch side by side and run by run."""
-    watching = observer(Plan(loops[0], grid), steady_fraction=0.2, settling_radius=1.0)
-    alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
-    return simulate_many(loops, grid, observer=watching, side_by_side=True), alone
+    probe = metrics_probe(Plan(loops[0], grid), steady_fraction=0.2, settling_radius=1.0)
+    alone = simulate_many(loops, grid, probe=probe, side_by_side=False)
+    return simulate_many(loops, grid, probe=probe, side_by_side=True), alone
 
 
 def same(one: Batch, other: Batch) -> None:
@@ -110,8 +110,8 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone(
 ) -> None:
     """Also those that diverge, at different instants."""
     base = replace(loop(law), actuator=actuator)
-    watching = observer(Plan(base, GRID), steady_fraction=0.2, settling_radius=1.0)
-    assert why_alone(Plan.watched(base, GRID, watching)) == ""
+    probe = metrics_probe(Plan(base, GRID), steady_fraction=0.2, settling_radius=1.0)
+    assert why_alone(Plan.with_probe(base, GRID, probe)) == ""
     together, alone = both(scattered(base, 7))
     same(together, alone)
     assert {"finished", "diverged"} <= set(alone.status)
@@ -174,7 +174,7 @@ def test_runs_of_other_delays_march_beside_their_like(part: str, others: list[An
         replace(one, **{part: others[i % len(others)]}) for i, one in enumerate(scattered_loops)
     ]
     together, alone = both(loops, replace(GRID, steps=60))
-    assert why_alone(Plan.watched(loops[0], GRID, Observer())) == ""
+    assert why_alone(Plan.with_probe(loops[0], GRID, Probe())) == ""
     assert "invalid" not in alone.status
     same(together, alone)
 
@@ -207,11 +207,11 @@ def fourth_measured(t: float, weight: float, s: Vector, row: Vector, k: Any, see
     seen[0] += weight * row[int(k.place) + 3]
 
 
-class OfMeasured(Observer):
+class OfMeasured(Probe):
     """Knows where the row has the measured numbers."""
 
     def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
-        return {"place": float(Plan.watched(loop, GRID, Observer()).layout.sensed)}
+        return {"place": float(Plan.with_probe(loop, GRID, Probe()).layout.sensed)}
 
 
 def test_runs_of_other_quantities_measured_march_beside_their_like() -> None:
@@ -220,11 +220,10 @@ def test_runs_of_other_quantities_measured_march_beside_their_like() -> None:
         replace(one, measurement=AllBut(lacking=3.0 + i % 2), estimator=PassiveObserver())
         for i, one in enumerate(scattered(loop("pid"), 5) + scattered(loop("pid"), 6))
     ]
-    watching, grid = OfMeasured(fourth_measured), replace(GRID, steps=60)
-    assert why_alone(Plan.watched(loops[0], grid, watching)) == ""
+    probe, grid = OfMeasured(fourth_measured), replace(GRID, steps=60)
+    assert why_alone(Plan.with_probe(loops[0], grid, probe)) == ""
     together, alone = (
-        simulate_many(loops, grid, observer=watching, side_by_side=chosen)
-        for chosen in (True, False)
+        simulate_many(loops, grid, probe=probe, side_by_side=chosen) for chosen in (True, False)
     )
     assert "invalid" not in alone.status, alone.cause
     same(together, alone)
@@ -232,18 +231,18 @@ def test_runs_of_other_quantities_measured_march_beside_their_like() -> None:
 
 @kernel
 def of_the_first(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """An observer that takes the first run's number for everybody's."""
+    """A probe that takes the first run's number for everybody's."""
     seen[0] += shared(s[0])
 
 
 def test_what_cannot_march_side_by_side_marches_alone_and_says_why() -> None:
     """What is shared is known of podusv's own kernels only."""
-    base, watching = loop("pid"), Observer(of_the_first)
-    assert "test_lanes.py, line" in why_alone(Plan.watched(base, GRID, watching))
-    assert "shared is for podusv's own kernels" in why_alone(Plan.watched(base, GRID, watching))
+    base, probe = loop("pid"), Probe(of_the_first)
+    assert "test_lanes.py, line" in why_alone(Plan.with_probe(base, GRID, probe))
+    assert "shared is for podusv's own kernels" in why_alone(Plan.with_probe(base, GRID, probe))
     loops, grid = scattered(base, 1), TimeGrid(0.01, 20)
-    alone = simulate_many(loops, grid, observer=watching, side_by_side=False)
-    same(simulate_many(loops, grid, observer=watching, side_by_side=True), alone)
+    alone = simulate_many(loops, grid, probe=probe, side_by_side=False)
+    same(simulate_many(loops, grid, probe=probe, side_by_side=True), alone)
 
 
 @kernel
@@ -267,7 +266,7 @@ def signed(x: float, limit: float, out: Vector) -> float:
 
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
-    """An observer that branches on the runs' numbers, and on one that they share."""
+    """A probe that branches on the runs' numbers, and on one that they share."""
     if s[1] > 0.0:
         seen[1] += 1.0
         if 0.0 < s[0] <= 2.0 * k.limit or t > 5.0:
@@ -282,7 +281,7 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 def test_every_lane_goes_its_own_way_through_branches(t: float) -> None:
     """As the kernel does in plain Python, number by number."""
     side_by_side = compile.routine(
-        compile.lane_adapter("observer", watch, ("limit",), frozenset({"limit"}))
+        compile.lane_adapter("probe", watch, ("limit",), frozenset({"limit"}))
     )
     draws = np.random.default_rng(4)
     for _ in range(20):
@@ -312,7 +311,7 @@ def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> Non
     """An author begins with a law that does."""
     assert podusv("new", "law", "our_own").code == 0
     written = load(Path("our_own.yaml")).scenario.singles()["our_own"]
-    assert why_alone(Plan.watched(written.closed_loop(), GRID, Observer())) == ""
+    assert why_alone(Plan.with_probe(written.closed_loop(), GRID, Probe())) == ""
 
 
 WHILE = """        rest = signals[0]
@@ -343,7 +342,7 @@ def test_a_law_with_a_while_marches_side_by_side(podusv: Any) -> None:
     loops = variants(base, {"start.y": np.linspace(-30.0, 50.0, COUNT)})
     together, alone = both(loops, TimeGrid(0.01, 50))
     same(together, alone)
-    assert why_alone(Plan.watched(base, GRID, Observer())) == ""
+    assert why_alone(Plan.with_probe(base, GRID, Probe())) == ""
 
 
 def test_an_interrupt_keeps_all_runs_that_marched_side_by_side() -> None:

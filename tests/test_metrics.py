@@ -34,7 +34,7 @@ from podusv_cli.metrics.distance import OF_OPTIMUM
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
-from podusv_cli.metrics.table import METRICS, metrics_with, observer
+from podusv_cli.metrics.table import METRICS, metrics_probe, metrics_with
 from podusv_cli.metrics.windows import CROSSED, NAMED, SETTLING, find, settle, settled_from
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.counting.expressions import parse_success
@@ -44,9 +44,9 @@ def gathered(
     loop, *, steps=4000, log_every=1, radius=2.0, steady_fraction=0.25, compiled=True, **options
 ):
     grid = TimeGrid(0.01, steps, log_every)
-    seeing = observer(Plan(loop, grid), steady_fraction=steady_fraction, settling_radius=radius)
-    recording = simulate(loop, grid, observer=seeing, compiled=compiled, **options)
-    return recording, seeing.summary(recording.seen)
+    probe = metrics_probe(Plan(loop, grid), steady_fraction=steady_fraction, settling_radius=radius)
+    recording = simulate(loop, grid, probe=probe, compiled=compiled, **options)
+    return recording, probe.summary(recording.seen)
 
 
 @pytest.fixture(scope="module")
@@ -345,14 +345,14 @@ def windowed(*, compiled=True, steps=4000, windows=WINDOWS, until=math.inf):
     """Log and metrics of a run of 40 s that is told of these windows."""
     loop, grid = corrected(actuator=Saturated()), TimeGrid(0.01, steps)
     known = metrics_with((), (windows, RADII))
-    seeing = observer(Plan(loop, grid), steady_fraction=0.2, settling_radius=1.0, known=known)
+    probe = metrics_probe(Plan(loop, grid), steady_fraction=0.2, settling_radius=1.0, known=known)
 
     def progress(done):
         if done >= until:
             raise KeyboardInterrupt
 
-    run = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
-    return run, seeing.summary(run.seen)
+    run = simulate(loop, grid, probe=probe, compiled=compiled, progress=progress)
+    return run, probe.summary(run.seen)
 
 
 @pytest.fixture(scope="module")
@@ -420,7 +420,7 @@ def test_metrics_of_windows_stand_beside_the_other_errors_and_only_where_they_ar
     assert not [name for name in METRICS if "bend" in name]
     plain = load_text(SCENARIO, "plain.yaml").scenario
     assert list(plain.known_metrics()) == [name for name in METRICS if NAMED not in name]
-    got = plain.observer()
+    got = plain.probe()
     assert not [n for n in got.summary(np.full(got.size, np.nan)) if n.startswith("error_")]
 
 

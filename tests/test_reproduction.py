@@ -83,7 +83,7 @@ def rerun(scenario):
     """A run without a folder, as a comparison sees it; nothing is timed."""
     plan = scenario.plan()
     recording = simulation.run(plan)
-    numbers = plan.observer.summary(recording.seen) | operations(plan, recording)
+    numbers = plan.probe.summary(recording.seen) | operations(plan, recording)
     run = SimpleNamespace(recording=recording, metrics=numbers)
     return Entry("", run, scenario)
 

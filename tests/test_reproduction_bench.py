@@ -442,11 +442,11 @@ def test_no_published_study_draws_what_a_metric_is_measured_by(config):
     made = plan(load(config))
     for law in made.laws:
         single = made.single(law, 0)
-        watching = single.observer()
-        same = watching.constants_for(single.closed_loop())
+        probe = single.probe()
+        same = probe.constants_for(single.closed_loop())
         for draw in draws(made.sweep, 0, 5):
             loop = drawn(single, made.sweep.vary, draw).closed_loop()
-            assert watching.constants_for(loop) == same
+            assert probe.constants_for(loop) == same
 
 
 def test_the_table_of_cybership_ii_is_that_of_the_study():

@@ -247,11 +247,11 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone():
     done = simulate_many(
         [one.closed_loop() for one in others],
         grid,
-        observer=others[0].observer(),
+        probe=others[0].probe(),
         side_by_side=True,
     )
     for place, one in enumerate(others):
-        alone = simulate_many([one.closed_loop()], grid, observer=one.observer())
+        alone = simulate_many([one.closed_loop()], grid, probe=one.probe())
         assert np.array_equal(done.seen[place], alone.seen[0], equal_nan=True)
 
 
@@ -294,9 +294,9 @@ def test_a_batch_from_python_follows_what_its_runs_are_told():
     table = package.simulate_many(base, {"nominal.X_uu": [-300.0, -80.0]})
     for row, number in enumerate((-300.0, -80.0)):
         one = loaded("simulation.duration=3.0", f"nominal.X_uu={number}").scenario
-        watch = one.observer()
-        alone = watch.summaries(
-            simulate_many([one.closed_loop()], one.time_grid(), observer=watch).seen
+        probe = one.probe()
+        alone = probe.summaries(
+            simulate_many([one.closed_loop()], one.time_grid(), probe=probe).seen
         )
         assert table.loc[row, "energy"] == alone["energy"][0]
 
@@ -329,9 +329,9 @@ def test_an_exported_law_has_the_numbers():
 def test_a_boat_with_two_fixed_thrusters_follows_its_legs_in_its_first_run(kind):
     """180 kg; with the model ship's numbers two of the laws do not come to the end."""
     scenario = loaded(f"controller={{kind: {kind}}}").scenario
-    watch = scenario.observer()
-    seen = simulate_many([scenario.closed_loop()], scenario.time_grid(), observer=watch).seen
-    found = watch.summaries(seen)
+    probe = scenario.probe()
+    seen = simulate_many([scenario.closed_loop()], scenario.time_grid(), probe=probe).seen
+    found = probe.summaries(seen)
     assert found["path_done"][0] == 1.0
     assert found["e_ct_rms"][0] < scenario.vessel.length / 3.0
 
@@ -343,7 +343,7 @@ def test_a_trial_of_the_boat_comes_to_its_end_without_a_number():
     own, length = scenario.controller, scenario.vessel.length
     assert own.thrust == pytest.approx(2.0 * 2.0 * 200.0 / 8.0, rel=5e-3)
     assert own.lever == pytest.approx(0.5 * length / 1.255, rel=5e-3)
-    watch = scenario.observer()
-    seen = simulate_many([scenario.closed_loop()], scenario.time_grid(), observer=watch).seen
-    assert np.isfinite(watch.summaries(seen)["overshoot_2"][0])
+    probe = scenario.probe()
+    seen = simulate_many([scenario.closed_loop()], scenario.time_grid(), probe=probe).seen
+    assert np.isfinite(probe.summaries(seen)["overshoot_2"][0])
     assert loaded(*trial, "controller.kind=stopping").scenario.controller.astern == 100.0

@@ -19,7 +19,6 @@ from podusv_cli.studies.making import dispatch as marching
 from podusv_cli.studies.making import runs_writer
 from podusv_cli.studies.making import unit as units
 from podusv_cli.studies.making.draws import drawn, draws
-from podusv_cli.studies.making.plan import watching
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.sessions import SessionLog, sessions
 from podusv_cli.studies.making.store import RUNS, UNITS, Store
@@ -41,9 +40,9 @@ def test_a_run_of_the_table_is_the_run_that_simulate_makes(whole):
     for law, number in (("pid", 0), ("li", 39)):
         (draw,) = draws(plan.sweep, number, 1)
         one = drawn(plan.single(law, 0), plan.sweep.vary, draw)
-        seeing = watching(one)
-        log = simulate(one.closed_loop(), one.time_grid(), observer=seeing)
-        alone = seeing.summary(log.seen)
+        probe = one.probe()
+        log = simulate(one.closed_loop(), one.time_grid(), probe=probe)
+        alone = probe.summary(log.seen)
         for name in runs.metrics:
             assert np.array_equal(runs.metric(law, name)[0, number], alone[name], equal_nan=True)
     for name, values in runs.drawn.items():

@@ -77,7 +77,7 @@ def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     recording = simulated(case, Stopwatch())
     seen = recording.seen
     assert seen is not None  # it was observed
-    return case.plan.observer.summary(seen), recording
+    return case.plan.probe.summary(seen), recording
 
 
 def errors(scenario: Scenario) -> dict[str, float]:

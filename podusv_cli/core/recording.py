@@ -32,7 +32,7 @@ class Recording:
     """Signals by name, each of shape (rows,) or (rows, ...), with `time` [s] along the rows.
 
     `fixed` holds arrays that do not run over time, such as network centres, and `about` says what
-    every array is. `seen` is what the observer gathered at every step, thinned log or not.
+    every array is. `seen` is what the probe gathered at every step, thinned log or not.
     `message` says how a run ended that did not finish.
     """
 

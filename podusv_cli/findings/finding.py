@@ -98,7 +98,7 @@ class Case:
 
     @cached_property
     def plan(self) -> Plan:
-        """The run's loop on its grid, with the observer of all metrics."""
+        """The run's loop on its grid, with the probe of all metrics."""
         return self.scenario.plan()
 
     @cached_property

@@ -178,15 +178,15 @@ def simulate_many(
     scenario, given = _single(loaded(source)), columns(parameters)
     if workers < 0:
         raise ParameterError(f"workers = {workers}: must be 0 (one a core) or more")
-    plan, watching = scenario.plan(), scenario.observer()
+    plan, probe = scenario.plan(), scenario.probe()
     loops = [one.closed_loop() for one in scenarios(scenario, given)]
     check_law(plan)
     check_words(scenario, loops, given)
     done = batch.simulate_many(
-        loops, plan.grid, observer=watching, workers=workers, side_by_side=side_by_side
+        loops, plan.grid, probe=probe, workers=workers, side_by_side=side_by_side
     )
     ends = {"status": done.status, "cause": done.cause}
-    return pd.DataFrame({**given, **ends, **watching.summaries(done.seen)})
+    return pd.DataFrame({**given, **ends, **probe.summaries(done.seen)})
 
 
 def verify(

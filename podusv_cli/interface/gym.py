@@ -252,9 +252,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self.single_observation_space = task.observation_space()
         self.action_space = batch_space(self.single_action_space, count)
         self.observation_space = batch_space(self.single_observation_space, count)
-        self._metrics, grid = task.scenario.observer(), task.scenario.time_grid()
+        self._metrics, grid = task.scenario.probe(), task.scenario.time_grid()
         grid = replace(grid, log_every=grid.steps + 1)
-        plan = Plan.watched(task.scenario.closed_loop(), grid, self._metrics)
+        plan = Plan.with_probe(task.scenario.closed_loop(), grid, self._metrics)
         if why := why_alone(plan):
             raise UsageError(
                 f"podusv.gym: these runs cannot march side by side ({why}); take Gymnasium's "

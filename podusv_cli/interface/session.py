@@ -114,8 +114,8 @@ class Session:
                 f"than {MOST:,} demands of {period:g} s; ask for at most {longest:g} s, or for a "
                 "longer period"
             )
-        self._metrics = scenario.observer(grid)
-        plan = Plan.watched(scenario.closed_loop(), grid, self._metrics)
+        self._metrics = scenario.probe(grid)
+        plan = Plan.with_probe(scenario.closed_loop(), grid, self._metrics)
         self._pieces = Pieces(plan, march, compiled=scenario.simulation.compiled)
         self._demand = self._pieces.vectors.law_table[DEMAND]
 

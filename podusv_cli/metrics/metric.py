@@ -66,8 +66,8 @@ def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
 class Accumulator:
     """Numbers gathered at every step, logged or not, from which metrics are computed.
 
-    The kernel `watch(t, weight, s, row, k, seen)` is called like an observer's, see
-    `Observer`. Its `seen` are `size` numbers, 0 at first; with size 0 it is left out. It reads
+    The kernel `watch(t, weight, s, row, k, seen)` is called like a probe's, see
+    `Probe`. Its `seen` are `size` numbers, 0 at first; with size 0 it is left out. It reads
     `constants` from `k`; a name used by several accumulators must have one value. Every run
     of a batch has constants of its own, and the same size. Runs march side by side only with runs
     of equal constants, but for those named in `differing`.

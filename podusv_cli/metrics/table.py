@@ -13,7 +13,7 @@ from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, kernel, specialise, tail, taking
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.engine.loop.closed_loop import ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, close_integrals
 from podusv_cli.metrics.windows import NONE, Radii, Windows, named
@@ -74,8 +74,8 @@ def _watch(parts: Parts) -> Callable[..., None]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Metrics(Observer):
-    """An observer for `engine.running.simulate` that gathers the numbers of all metrics."""
+class Metrics(Probe):
+    """A probe for `engine.running.simulate` that gathers the numbers of all metrics."""
 
     parts: Parts
     step: float  # s
@@ -85,7 +85,7 @@ class Metrics(Observer):
     def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
         """The constants of all accumulators in a run of this loop.
 
-        Raises LawError where one of them gathers another number of numbers than in the observer's
+        Raises LawError where one of them gathers another number of numbers than in the probe's
         own loop, or has another value than another one for a constant of the same name.
         """
         layout, sizes = replace(self.layout, loop=loop), dict(self.parts)
@@ -150,11 +150,11 @@ class Metrics(Observer):
         return {name: np.array([metrics[name] for metrics in each]) for name in names}
 
 
-def observer(
+def metrics_probe(
     plan: Plan, *, steady_fraction: float, settling_radius: float,
     known: Mapping[str, Metric] = METRICS,
 ) -> Metrics:  # fmt: skip
-    """The observer of those of the known metrics that this loop has.
+    """The probe of those of the known metrics that this loop has.
 
     It serves all loops of the same structure: each has constants of its own. Raises LawError for a
     metric whose accumulator does not answer.

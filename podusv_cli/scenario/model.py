@@ -30,7 +30,7 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.metrics.table import Metrics, metrics_with, observer
+from podusv_cli.metrics.table import Metrics, metrics_probe, metrics_with
 from podusv_cli.metrics.windows import NAMED
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.sections import (
@@ -252,17 +252,17 @@ class Scenario(Component):
         return TimeGrid(step, steps, every, held, first)
 
     def plan(self, grid: TimeGrid | None = None) -> Plan:
-        """The loop on its grid, or another one, with the observer of all metrics."""
+        """The loop on its grid, or another one, with the probe of all metrics."""
         return Plan(self.closed_loop(), grid or self.time_grid(), self.metrics_of)
 
     def metrics_of(self, plan: Plan) -> Metrics:
         """What gathers the numbers of all metrics in such a run."""
-        return observer(
+        return metrics_probe(
             plan, known=self.known_metrics(), steady_fraction=self.metrics.steady_fraction,
             settling_radius=self.metrics.settling_radius,
         )  # fmt: skip
 
-    def observer(self, grid: TimeGrid | None = None) -> Metrics:
+    def probe(self, grid: TimeGrid | None = None) -> Metrics:
         """What gathers the numbers of all metrics, over another grid than the run's where given."""
         return self.metrics_of(Plan(self.closed_loop(), grid or self.time_grid()))
 

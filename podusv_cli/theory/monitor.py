@@ -132,9 +132,9 @@ def monitored(
                 if name not in traces:
                     traces[name] = allocate(count)
                 traces[name][rows] = part
-        observed = _Observer(loop, law, recording, traces, ideal, b, not plan.sampled)
+        bounded = _Bounds(loop, law, recording, traces, ideal, b, not plan.sampled)
         starts = (0.0, grid.last_part(steady_fraction))
-        windows = dict(zip(WINDOWS, map(observed.window, starts), strict=True))
+        windows = dict(zip(WINDOWS, map(bounded.window, starts), strict=True))
     logged = [signal.name for signal in signals(plan)]
     extended = replace(
         recording,
@@ -193,7 +193,7 @@ def _traces(
 
 
 @dataclass(frozen=True)
-class _Observer:
+class _Bounds:
     """Computes the bounds of a part of a run from its largest values."""
 
     loop: ClosedLoop

@@ -43,12 +43,12 @@ def refined(scenario: Scenario, halvings: int) -> TimeGrid:
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
     """Run a scenario of one law with its step halved `halvings` times."""
     loop, grid = scenario.closed_loop(), refined(scenario, halvings)
-    seeing = scenario.observer(grid)
+    probe = scenario.probe(grid)
     compiled = scenario.simulation.compiled
-    out = simulate(loop, grid, observer=seeing, compiled=compiled, progress=progress)
+    out = simulate(loop, grid, probe=probe, compiled=compiled, progress=progress)
     if out.status == "interrupted":
         raise KeyboardInterrupt
     whole = out.status == "finished" and out.seen is not None
-    metrics = seeing.summary(out.seen) if whole and out.seen is not None else {}
+    metrics = probe.summary(out.seen) if whole and out.seen is not None else {}
     position = np.array([out["x"][-1], out["y"][-1]]) if whole else np.full(2, np.nan)
     return Level(grid.step, out.status, out.message, metrics, position)

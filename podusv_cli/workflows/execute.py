@@ -218,7 +218,7 @@ def simulated(
     case: Case, watch: Stopwatch, progress: Progress | None = None,
     allocate: Allocate = np.empty, compiling: Progress | None = None,
 ) -> Recording:  # fmt: skip
-    """Simulate a scenario, observed for its metrics; `allocate` as `simulate` has it."""
+    """Simulate a scenario, with the probe of its metrics; `allocate` as `simulate` has it."""
     with watch.part("compile"), interrupts_enabled():
         warm_up(case, compiling)
     compiled = case.scenario.simulation.compiled
@@ -235,9 +235,9 @@ def check_figures(scenario: Scenario) -> None:
 
 
 def summary(case: Case, recording: Recording, extras: Extras) -> dict[str, float]:
-    """The metrics of a run that was observed; those that raise are missing among the extras."""
+    """The metrics of a run that the probe saw; those that raise are missing among the extras."""
     seen = recording.seen
-    numbers = case.plan.observer.summary(seen, extras.note) if seen is not None else {}
+    numbers = case.plan.probe.summary(seen, extras.note) if seen is not None else {}
     for name, metric in case.scenario.known_metrics().items():
         if metric.of_log and len(recording["time"]):
             try:

@@ -124,7 +124,7 @@ def _guesses(scenario: Scenario) -> dict[str, Motion]:
 def _run(scenario: Scenario) -> Recording:
     scenario.ready()
     log = simulate(
-        scenario.closed_loop(), scenario.time_grid(), observer=scenario.observer(),
+        scenario.closed_loop(), scenario.time_grid(), probe=scenario.probe(),
         compiled=scenario.simulation.compiled,
     )  # fmt: skip
     if log.status == "interrupted":

@@ -25,7 +25,7 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.metrics.table import observer
+from podusv_cli.metrics.table import metrics_probe
 from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.files import fingerprint
@@ -90,8 +90,8 @@ def repeatable(folder: Path) -> dict[str, Any]:
 def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
     """The loop's recording from machine code and from plain Python."""
     grid = TimeGrid(0.002, 150, hold_every=hold_every)
-    seeing = observer(Plan(loop, grid), steady_fraction=0.25, settling_radius=2.0)
-    one, other = (simulate(loop, grid, observer=seeing, compiled=c) for c in (True, False))
+    probe = metrics_probe(Plan(loop, grid), steady_fraction=0.25, settling_radius=2.0)
+    one, other = (simulate(loop, grid, probe=probe, compiled=c) for c in (True, False))
     return one, other
 
 

@@ -35,7 +35,7 @@ def nothing() -> None:
 
 
 @dataclass(frozen=True)
-class Observer:
+class Probe:
     """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant of a run.
 
     It gathers `size` numbers. Runs that march side by side have equal constants but for those named

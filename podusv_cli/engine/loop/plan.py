@@ -23,7 +23,7 @@ from podusv_cli.engine.loop.closed_loop import (
     LOADS,
     STATE,
     ClosedLoop,
-    Observer,
+    Probe,
     nothing,
 )
 from podusv_cli.engine.loop.recent import Recent
@@ -56,27 +56,27 @@ class Function(NamedTuple):
         return OWNERS.get(self.part, self.part)
 
 
-def unwatched(plan: Plan) -> Observer:
+def no_probe(plan: Plan) -> Probe:
     """Nobody sees the run."""
-    return Observer()
+    return Probe()
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
     """A loop, a grid, and all that follows from both; made once, and handed down.
 
-    `probe` gives the observer of the run. `recall` asks components, and remembers their answers.
+    `probe_for` gives the probe of the run. `recall` asks components, and remembers their answers.
     """
 
     loop: ClosedLoop
     grid: TimeGrid
-    probe: Callable[[Plan], Observer] = unwatched
+    probe_for: Callable[[Plan], Probe] = no_probe
     recall: Recent = field(default_factory=Recent)
 
     @classmethod
-    def watched(cls, loop: ClosedLoop, grid: TimeGrid, observer: Observer) -> Plan:
-        """With an observer that is there already."""
-        return cls(loop, grid, lambda plan: observer)
+    def with_probe(cls, loop: ClosedLoop, grid: TimeGrid, probe: Probe) -> Plan:
+        """With a probe that is there already."""
+        return cls(loop, grid, lambda plan: probe)
 
     def like(self, loop: ClosedLoop) -> Plan:
         """The plan of a loop that differs in numbers only; parts of both are asked once.
@@ -84,7 +84,7 @@ class Plan:
         Raises ValueError for a loop of another structure, LawError for parts that do not fit.
         """
         loop.check_fit(self.grid.step)
-        plan = replace(self, loop=loop, probe=lambda plan: self.observer)
+        plan = replace(self, loop=loop, probe_for=lambda plan: self.probe)
         if plan.structure != self.structure:
             raise ValueError(
                 f"it has another structure than the batch: {_kinds(loop)} with {plan.layout}, "
@@ -94,9 +94,9 @@ class Plan:
         return plan
 
     @cached_property
-    def observer(self) -> Observer:
+    def probe(self) -> Probe:
         """What sees every instant."""
-        return self.probe(self)
+        return self.probe_for(self)
 
     @cached_property
     def about(self) -> dict[str, Signal]:
@@ -175,7 +175,7 @@ class Plan:
             "measurement": seen.sense if loop.measured else nothing,
             "correct": estimator.correct if loop.measured else nothing,
             "follow": estimator.follow if loop.measured else nothing,
-            "observer": self.observer.watch,
+            "probe": self.probe.watch,
         }  # fmt: skip
         return tuple(  # what does nothing reads nothing: its code is one for all
             Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
@@ -200,7 +200,7 @@ class Plan:
             "measurement": recall(loop.measurement.constants_with, step, motion),
             "estimator": recall(loop.estimator.constants_with, loop.nominal),
             "vessel": recall(loop.vessel.constants),
-            "observer": recall(self.observer.constants_for, loop),
+            "probe": recall(self.probe.constants_for, loop),
         }  # fmt: skip
 
     @property
@@ -276,7 +276,7 @@ class Plan:
             sensed=loop.measurement.first(start, grid.step),
             relay=relay(loop.actuator.delay(), grid),
             held=np.zeros(HELD_SIGNALS + len(law.signals)), work=np.zeros(law.workspace()),
-            seen=np.zeros(self.observer.size), under_way=np.zeros(2),
+            seen=np.zeros(self.probe.size), under_way=np.zeros(2),
             log=allocate(rows * layout.width),
         )  # fmt: skip
 

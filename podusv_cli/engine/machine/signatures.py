@@ -33,7 +33,7 @@ SIGNATURES = {
     "measurement": "t instant x b k table seen",
     "correct": "t seen state k table",
     "follow": "t seen tau state k table rate",
-    "observer": "t weight s row k seen",
+    "probe": "t weight s row k seen",
 }
 PROTOTYPES: dict[str, Any] = {
     part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments.split()))

@@ -98,7 +98,7 @@ class Abreast:
         return self._view
 
     def seen(self) -> Vector:
-        """What observers gather of runs that end at the next instant, or have ended before."""
+        """What the probes gather of runs that end at the next instant, or have ended before."""
         with self._unchanged:
             if self.reached <= self.grid.steps:
                 self._march(self.reached, self.reached + 1, self.reached)

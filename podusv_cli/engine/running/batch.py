@@ -2,7 +2,7 @@
 
 The compiled march releases the interpreter's lock, so threads are enough. A thread marches over
 several runs side by side (`lanes`), or over one with the compiled code of `simulate`. No log is
-kept; a run's observer gathers what is wanted of it.
+kept; a run's probe gathers what is wanted of it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.batch_threads import BatchRun, Group, alone, together
 from podusv_cli.engine.running.lanes import FEWEST, Sorter
@@ -77,7 +77,7 @@ class Batch:
     cause: npt.NDArray[np.object_]  # (N,), str
     reached: npt.NDArray[np.int64]  # (N,), good instants; steps + 1 for a finished run
     state: Vector  # (N, 6), the vessel's state where the march ended
-    seen: Vector  # (N, observer.size)
+    seen: Vector  # (N, probe.size)
 
     def note(self, run: BatchRun, ending: Ending) -> None:
         """Enter how a run ended."""
@@ -96,7 +96,7 @@ def simulate_many(
     loops: Loops,
     grid: TimeGrid,
     *,
-    observer: Observer | None = None,
+    probe: Probe | None = None,
     workers: int = 0,
     progress: Callable[[float], None] | None = None,
     like: ClosedLoop | None = None,
@@ -112,12 +112,12 @@ def simulate_many(
     compiled already or the batch is worth it. It changes no bit. Raises LawError where a kernel
     cannot be compiled.
     """
-    observer = observer or Observer()
+    probe = probe or Probe()
     grid = replace(grid, log_every=grid.steps + 1)  # one row, for the first instant
-    batch = _blank(len(loops), observer)
+    batch = _blank(len(loops), probe)
     with interrupts_deferred():
-        plan = Plan.watched(like, grid, observer) if like else None
-        runs = _Runs(loops, grid, batch, observer, plan, progress, side_by_side)
+        plan = Plan.with_probe(like, grid, probe) if like else None
+        runs = _Runs(loops, grid, batch, probe, plan, progress, side_by_side)
         runs.march(workers or available_workers())
     return batch
 
@@ -130,10 +130,10 @@ class _Runs:
     """The runs of a batch while they are made."""
 
     def __init__(
-        self, loops: Loops, grid: TimeGrid, batch: Batch, observer: Observer,
+        self, loops: Loops, grid: TimeGrid, batch: Batch, probe: Probe,
         like: Plan | None, progress: Callable[[float], None] | None, lanes: bool | None,
     ) -> None:  # fmt: skip
-        self._loops, self._grid, self._batch, self._observer = loops, grid, batch, observer
+        self._loops, self._grid, self._batch, self._probe = loops, grid, batch, probe
         self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)
         self._lanes = Sorter(len(loops) * (grid.steps + 1), lanes)
@@ -209,7 +209,7 @@ class _Runs:
         """The plan of a run."""
         try:
             loop = self._loops[position]
-            return (self._plan or Plan.watched(loop, self._grid, self._observer)).like(loop)
+            return (self._plan or Plan.with_probe(loop, self._grid, self._probe)).like(loop)
         except (PodusvError, ValueError) as error:
             raise InvalidLoop(str(error)) from error
 
@@ -261,9 +261,9 @@ class _Runs:
                 self._batch.note(run, ending)
 
 
-def _blank(count: int, observer: Observer) -> Batch:
+def _blank(count: int, probe: Probe) -> Batch:
     return Batch(
         status=np.full(count, "interrupted"), cause=np.full(count, "", object),
         reached=np.zeros(count, np.int64), state=np.full((count, len(STATE)), np.nan),
-        seen=np.full((count, observer.size), np.nan),
+        seen=np.full((count, probe.size), np.nan),
     )  # fmt: skip

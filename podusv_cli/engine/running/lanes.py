@@ -31,9 +31,9 @@ MARCHING = -1.0  # stands for the instants that a lane has reached
 
 def alike(plan: Plan) -> dict[str, frozenset[str]]:
     """By component the constants that all lanes have to share: choices, sizes and positions."""
-    loop, observer = plan.loop, plan.observer
+    loop, probe = plan.loop, plan.probe
     shared = {name: part.choices() for name, part in loop.parts.items()}
-    shared["observer"] = frozenset(plan.constants["observer"]) - observer.differing
+    shared["probe"] = frozenset(plan.constants["probe"]) - probe.differing
     shared["disturbance"] = shared["disturbance"].union(
         loop.disturbance.constant_of(i, name)
         for i, part in enumerate(loop.disturbance.each())

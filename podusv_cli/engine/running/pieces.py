@@ -67,7 +67,7 @@ class Pieces:
         return self.reached == instant
 
     def seen(self) -> Vector:
-        """What observers gather of the run that ends at the next instant, as it is steered now."""
+        """What the probe gathers of the run that ends at the next instant, as it is steered now."""
         if not 0 < self.reached <= self.grid.steps:
             return self.vectors.seen.copy()
         with self._unchanged:

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Allocate, Recording, Status
-from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Observer
+from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -35,13 +35,13 @@ def simulate(
     loop: ClosedLoop,
     grid: TimeGrid,
     *,
-    observer: Observer | None = None,
+    probe: Probe | None = None,
     compiled: bool = True,
     progress: Callable[[float], None] | None = None,
     allocate: Allocate = np.empty,
 ) -> Recording:
     """Plan the closed loop and integrate it over the grid; see `run`."""
-    plan = Plan.watched(loop, grid, observer or Observer())
+    plan = Plan.with_probe(loop, grid, probe or Probe())
     return run(plan, compiled=compiled, progress=progress, allocate=allocate)
 
 

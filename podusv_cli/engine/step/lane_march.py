@@ -17,7 +17,7 @@ from podusv_cli.core.kernel import (
     tail,
 )
 from podusv_cli.engine.step.layout import STOP, Parts, spread
-from podusv_cli.engine.step.rk4 import arrive, finite, named_layout, named_vectors, observed, step
+from podusv_cli.engine.step.rk4 import arrive, finite, named_layout, named_vectors, show_probe, step
 
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
 
@@ -40,7 +40,7 @@ def follow_lane(lane: int, other: int, count: int, vector: Any) -> None:
 
 @kernel
 def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, ends: Vector) -> int:
-    """Keep state, row and observer's numbers of lanes that end here; how many lanes go on.
+    """Keep state, row and probe's numbers of lanes that end here; how many lanes go on.
 
     A lane that has ended goes on with the state of one that has not, and without an effect on it: a
     loop of a law need not end for numbers that are not finite.
@@ -83,7 +83,7 @@ def advance_lanes(
         lost = not (finite(n.states, c.s) and finite(n.columns, c.row))
         if lanes_any(lost) and end_lanes(k, lost, c, n, size, under_way, ends) == 0:
             return k
-        observed(k, h, p, c, n)
+        show_probe(k, h, p, c, n)
         if k < n.steps:
             step(k * h, h, p, c, n)
     return last

@@ -23,7 +23,7 @@ class Parts(NamedTuple):
     measurement: Function
     correct: Function
     follow: Function
-    observe: Function
+    probe: Function
 
 
 def spread(march: Any) -> Any:
@@ -88,7 +88,7 @@ class Vectors(NamedTuple):
     estimator: Vector
     estimator_table: Vector
     vessel: Vector
-    observer: Vector
+    probe: Vector
     s: Vector
     row: Vector
     stages: Vector  # four rates and one intermediate state
@@ -96,7 +96,7 @@ class Vectors(NamedTuple):
     relay: Vector  # demands on their way to the actuator, see `engine.step.relay`
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
-    seen: Vector  # the observer's
+    seen: Vector  # what the probe gathers
     under_way: Vector  # the instant that is under way; then 1 if the march has to stop
     log: Vector  # rows of t, s, row
 

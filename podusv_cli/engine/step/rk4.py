@@ -183,20 +183,20 @@ def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> Non
 
 
 @kernel
-def observed(k: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
-    """Show instant k to the observer, with its weight in an integral."""
+def show_probe(k: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
+    """Show instant k to the probe, with its weight in an integral."""
     weight = 0.5 * h if k == 0 or k == n.steps else h
-    p.observe(k * h, weight, c.s, c.row, c.observer, c.seen)
+    p.probe(k * h, weight, c.s, c.row, c.probe, c.seen)
 
 
 @kernel
 def instant(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> bool:
-    """Evaluate, observe and log instant k; whether all its numbers are finite."""
+    """Evaluate, probe and log instant k; whether all its numbers are finite."""
     c.under_way[0] = k
     arrive(k, first, h, p, c, n)
     if not (finite(n.states, c.s) and finite(n.columns, c.row)):
         return False
-    observed(k, h, p, c, n)
+    show_probe(k, h, p, c, n)
     if k % n.log_every == 0:
         write_row(k, k * h, c, n)
     return True

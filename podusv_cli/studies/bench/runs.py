@@ -63,13 +63,13 @@ def crashed(case: Case, law: str, cause: str) -> BenchRun:
 
 
 def _run(case: Case, law: str, scenario: Scenario) -> BenchRun:
-    seeing, grid = scenario.observer(), _thinned(scenario).time_grid()
+    probe, grid = scenario.probe(), _thinned(scenario).time_grid()
     recording = simulate(
-        scenario.closed_loop(), grid, observer=seeing, compiled=scenario.simulation.compiled
+        scenario.closed_loop(), grid, probe=probe, compiled=scenario.simulation.compiled
     )
     if recording.status == "interrupted":
         raise KeyboardInterrupt
-    numbers = seeing.summary(recording.seen) if recording.seen is not None else {}
+    numbers = probe.summary(recording.seen) if recording.seen is not None else {}
     track = np.stack([recording[name] for name in ("x", "y", "x_d", "y_d")], axis=1)
     settled = numbers.get("e_steady", math.nan)
     if recording.status != "finished" or scenario.at_target(numbers):

@@ -16,7 +16,6 @@ from podusv_cli.core.about import Keep
 from podusv_cli.core.errors import UsageError
 from podusv_cli.engine.machine.object_cache import ingredients
 from podusv_cli.engine.step import rk4 as closed_loop
-from podusv_cli.metrics.table import Metrics
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
@@ -73,8 +72,9 @@ class Plan:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
-        loops = [watching(self.single(law, cell.index)) for law in self.laws for cell in self.cells]
-        names = {name for one in loops for name in one.summary(np.full(one.size, np.nan))}
+        probes = [self.single(law, cell.index).probe() for law in self.laws for cell in self.cells]
+        blank = [probe.summary(np.full(probe.size, np.nan)) for probe in probes]
+        names = {name for numbers in blank for name in numbers}
         return tuple(name for name in self.scenario.known_metrics() if name in names)
 
     def single(self, law: str, cell: int) -> Scenario:
@@ -133,11 +133,6 @@ def kernels(scenario: Scenario) -> str:
         for text in ingredients(kernel, {}):
             found.update(text.encode() + b"\0")
     return found.hexdigest()[:16]
-
-
-def watching(scenario: Scenario) -> Metrics:
-    """The observer of a law's metrics."""
-    return scenario.observer()
 
 
 def digest(identity: Mapping[str, Any]) -> str:

@@ -13,7 +13,7 @@ from podusv_cli.engine.running.simulate import ready
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
 from podusv_cli.studies.making.draws import drawn, draws
-from podusv_cli.studies.making.plan import Plan, watching
+from podusv_cli.studies.making.plan import Plan
 
 
 def prepare(
@@ -43,7 +43,7 @@ def make(
     Raises KeyboardInterrupt, and then nothing is kept.
     """
     scenario = plan.single(unit.law, unit.cell)
-    grid, seeing = grid or scenario.time_grid(), watching(scenario)
+    grid, probe = grid or scenario.time_grid(), scenario.probe()
     numbers, vary = list(draws(plan.sweep, unit.first, unit.count, plan.stream)), plan.sweep.vary
 
     def loop(position: int) -> ClosedLoop:
@@ -52,7 +52,7 @@ def make(
     done = simulate_many(
         Lazily(unit.count, loop),
         grid,
-        observer=seeing,
+        probe=probe,
         workers=1,
         progress=progress,
         like=scenario.closed_loop(),
@@ -60,7 +60,7 @@ def make(
     if "interrupted" in done.status:
         raise KeyboardInterrupt
     return UnitResult(
-        unit, seeing.summaries(done.seen),
+        unit, probe.summaries(done.seen),
         np.array([STATUSES.index(word) for word in done.status], np.uint8),
         np.maximum(done.reached - 1, 0) * grid.step, tuple(map(str, done.cause)),
     )  # fmt: skip
