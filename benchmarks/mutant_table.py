@@ -300,7 +300,8 @@ TABLE: dict[str, list[Row]] = {
 "engine": [
     ("rows = -(-self.reached // self.grid.log_every)", "rows = self.reached // self.grid.log_every",
      "test_a_place_has_the_last_row_that_was_logged"),
-    ('"relay": [COUNT],', '"relay": [],', "test_runs_of_other_delays_march_beside_their_like"),
+    ('"delay_line": [COUNT],', '"delay_line": [],',
+     "test_runs_of_other_delays_march_beside_their_like"),
     ('"sensed": list(range(KNOWN, OWN)) if loop.measured else []', '"sensed": []',
      "test_runs_of_other_quantities_measured_march_beside_their_like"),
     ('"disturbance_table": loop.disturbance.shared_places()', '"disturbance_table": []',
@@ -340,7 +341,7 @@ TABLE: dict[str, list[Row]] = {
      "test_every_lane_has_the_numbers_that_it_has_alone"),
     ("if waits or any(self.edge(*way) != entered for way in leaving):", "if False:",
      "test_every_lane_has_the_numbers_that_it_has_alone"),
-    ("relay[NEXT] = STAGES * k % int(count)", "relay[NEXT] = k % int(count)",
+    ("line[NEXT] = STAGES * k % int(count)", "line[NEXT] = k % int(count)",
      "test_a_delay_is_integrated_with_fourth_order"),
     ("if _seal(path, rest) == digest:", "if digest:",
      "test_a_piece_that_is_damaged_or_anothers_is_made_anew"),
@@ -383,7 +384,7 @@ TABLE: dict[str, list[Row]] = {
      "test_surge_is_wanted_as_far_as_the_bow_points_there_and_N_m_turns_it"),
 ],
 "actuators": [
-    ("return self.cuts and not self.is_relayed", "return self.cuts",
+    ("return self.cuts and not self.by_delay_line", "return self.cuts",
      "test_an_fmu_begins_where_the_run_does_and_asks_for_loads_that_it_cannot_know"),
     ("max(demand[0], -k.surge_limit)", "max(demand[0], 0.0)",
      "test_limits_hold_on_each_axis_by_itself"),

@@ -71,7 +71,7 @@ def problem(scenario: Scenario, minimised: Minimised) -> Problem:
             "actuators that deliver the demand up to constant limits: ideal, saturated",
         ),
     }
-    if loop.actuator.is_relayed:
+    if loop.actuator.by_delay_line:
         raise UsageError(
             f"{scenario.name}: actuator has a command or a failure; podusv optimum knows actuators "
             "without them: leave actuator.command and actuator.failure out"

@@ -92,14 +92,14 @@ class Actuator(Component):
         return (*GIVEN, *self.signals) if self.command else self.signals
 
     @property
-    def is_relayed(self) -> bool:
-        """Whether it has a command path or a failure."""
+    def by_delay_line(self) -> bool:
+        """Whether demands reach it by the delay line: with a command path or a failure."""
         return bool(self.command or self.failure)
 
     @property
     def only_cuts(self) -> bool:
         """Whether the loads are always the demand of the same instant, cut at `limits()`."""
-        return self.cuts and not self.is_relayed
+        return self.cuts and not self.by_delay_line
 
     def delay(self) -> float:
         """How long the law's demand takes to the actuator [s]."""

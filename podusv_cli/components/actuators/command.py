@@ -1,8 +1,8 @@
 """What any actuator may have around it: a command path with delay and dead zone, and a failure.
 
-From the law to the hull: the demand is delayed (by the engine, `engine.step.relay`), rounded to its
-resolution, goes through the dead zone, and is what the actuator is given. Where the actuator has
-failed, a part of its loads is left.
+From the law to the hull: the demand is delayed (by the engine, `engine.step.delay_line`), rounded
+to its resolution, goes through the dead zone, and is what the actuator is given. Where the actuator
+has failed, a part of its loads is left.
 """
 
 from __future__ import annotations

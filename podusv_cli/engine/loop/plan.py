@@ -27,9 +27,9 @@ from podusv_cli.engine.loop.closed_loop import (
     nothing,
 )
 from podusv_cli.engine.loop.recent import Recent
+from podusv_cli.engine.step.delay_line import delay_line
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
-from podusv_cli.engine.step.relay import relay
 
 FORCES, SEA = LOADS[:3], LOADS[3:]
 SHOWN = tuple(f"{name}, shown" for name in TARGET)  # which no log has
@@ -151,7 +151,8 @@ class Plan:
             sample_every=_sample_steps(loop.controller, grid),
             measured=int(loop.measured), update_first=int(grid.update_first),
             follows=int(loop.path.follows), load_of_time=int(loop.disturbance.of_time),
-            wants_loads=int(loop.controller.wants_loads()), relayed=int(loop.actuator.is_relayed),
+            wants_loads=int(loop.controller.wants_loads()),
+            by_delay_line=int(loop.actuator.by_delay_line),
         )  # fmt: skip
 
     def _of_sea(self, one: Signal) -> int:
@@ -274,7 +275,7 @@ class Plan:
             ),
             row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
             sensed=loop.measurement.first(start, grid.step),
-            relay=relay(loop.actuator.delay(), grid),
+            delay_line=delay_line(loop.actuator.delay(), grid),
             held=np.zeros(HELD_SIGNALS + len(law.signals)), work=np.zeros(law.workspace()),
             seen=np.zeros(self.probe.size), under_way=np.zeros(2),
             log=allocate(rows * layout.width),

@@ -19,9 +19,9 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.step.delay_line import COUNT
 from podusv_cli.engine.step.lane_march import REACHED, advance_lanes
 from podusv_cli.engine.step.layout import STEPS, Layout, Vectors
-from podusv_cli.engine.step.relay import COUNT
 
 NUMBER = 8  # bytes
 FEWEST = 3  # runs; fewer take no longer alone
@@ -112,7 +112,7 @@ def places(plan: Plan) -> list[tuple[int, list[int]]]:
         "disturbance_table": loop.disturbance.shared_places(),
         "measurement_table": loop.measurement.shared_places(),
         "sensed": list(range(KNOWN, OWN)) if loop.measured else [],
-        "relay": [COUNT],
+        "delay_line": [COUNT],
     }
     return [(Vectors._fields.index(vector), inside) for vector, inside in found.items()]
 

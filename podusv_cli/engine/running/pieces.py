@@ -17,7 +17,7 @@ from podusv_cli.engine.running.simulate import Marcher, recorded
 from podusv_cli.engine.running.watch import Ending
 
 # The vectors that a march writes to, beside the log.
-CHANGING = ("s", "row", "stages", "sensed", "relay", "held", "work", "seen", "under_way")
+CHANGING = ("s", "row", "stages", "sensed", "delay_line", "held", "work", "seen", "under_way")
 
 
 class Mark(NamedTuple):

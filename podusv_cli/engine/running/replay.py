@@ -15,8 +15,8 @@ from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.step import rk4
+from podusv_cli.engine.step.delay_line import COUNT, DEMANDS
 from podusv_cli.engine.step.layout import Layout, Vectors
-from podusv_cli.engine.step.relay import COUNT, DEMANDS
 
 
 def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
@@ -79,15 +79,15 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     of (tau_u [N], tau_r [N m]) that reach the actuator in place of the law's demands.
     """
     layout, vectors = plan.layout._replace(hold_every=0, measured=0), plan.vectors()
-    vectors.relay[COUNT] = 0.0
+    vectors.delay_line[COUNT] = 0.0
     run = _rates_runner(plan, compiled)
 
     def at(rows: Vector, given: Vector | None = None) -> Vector:
         out, there, sizes = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
         if given is not None:  # as if they had been on their way to the actuator
-            relay = np.concatenate([np.zeros(DEMANDS), given.ravel()])
-            relay[COUNT] = len(rows)
-            there, sizes = vectors._replace(relay=relay), layout._replace(relayed=1)
+            line = np.concatenate([np.zeros(DEMANDS), given.ravel()])
+            line[COUNT] = len(rows)
+            there, sizes = vectors._replace(delay_line=line), layout._replace(by_delay_line=1)
         run(len(rows), rows.ravel(), out.reshape(-1), there, sizes)
         return out
 

@@ -61,7 +61,7 @@ class Layout(NamedTuple):
     follows: int  # 1: the path depends on where the vessel is, not on the time
     load_of_time: int  # 1: the disturbance depends on time alone
     wants_loads: int  # 1: the law is told which loads really act
-    relayed: int  # 1: the actuator has a command path or a failure
+    by_delay_line: int  # 1: demands reach the actuator by the delay line
 
     @property
     def width(self) -> int:
@@ -93,7 +93,7 @@ class Vectors(NamedTuple):
     row: Vector
     stages: Vector  # four rates and one intermediate state
     sensed: Vector  # what was measured, see `measurements.base`
-    relay: Vector  # demands on their way to the actuator, see `engine.step.relay`
+    delay_line: Vector  # demands on their way to the actuator
     held: Vector  # t, x, target of the last sample; demand and signals that nobody reads
     work: Vector
     seen: Vector  # what the probe gathers

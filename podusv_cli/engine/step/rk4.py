@@ -16,6 +16,7 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, shared, tail, unpacker
+from podusv_cli.engine.step.delay_line import BEGAN, GIVEN, begin_step, pass_on
 from podusv_cli.engine.step.layout import (
     DISTANCE,
     HELD_DEMAND,
@@ -30,7 +31,6 @@ from podusv_cli.engine.step.layout import (
     shifted,
     spread,
 )
-from podusv_cli.engine.step.relay import BEGAN, GIVEN, begin_step, pass_on
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
 
 LARGEST = 1e300
@@ -103,9 +103,9 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
     else:
         p.law(t, given, memory, aim, k, table, demand, memory_rate, tail(row, n.signals), work)
     wanted = demand
-    if n.relayed > 0:
-        pass_on(demand, c.relay)
-        wanted = tail(c.relay, GIVEN)
+    if n.by_delay_line > 0:
+        pass_on(demand, c.delay_line)
+        wanted = tail(c.delay_line, GIVEN)
     drive(t, s, ds, wanted, p, c, n)
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
         p.after(t, memory, demand, tau, k, table, memory_rate)
@@ -169,8 +169,8 @@ def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> Non
     """Measure, sample and evaluate instant k."""
     t = k * h
     again = k > first and t == (k - 1) * h + h  # where the last stage of the step before was
-    if n.relayed > 0:
-        begin_step(k, t, c.relay)
+    if n.by_delay_line > 0:
+        begin_step(k, t, c.delay_line)
     load(t, c.s, p, c, n, again, False)
     if n.measured > 0:
         perceive(k, t, p.measurement, p.correct, c, n)
@@ -262,8 +262,8 @@ def rates_along(
     for i in range(count):
         here = tail(logged, i * (1 + n.states))
         there = tail(out, i * (n.states + n.columns))
-        if n.relayed > 0:
-            c.relay[BEGAN] = here[0]
+        if n.by_delay_line > 0:
+            c.delay_line[BEGAN] = here[0]
         load(here[0], tail(here, 1), p, c, n, False, False)
         rates(here[0], tail(here, 1), there, p, c, n, False)
         measure(tail(here, 1), c.row)

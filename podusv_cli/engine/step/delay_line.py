@@ -1,4 +1,4 @@
-"""The way of the law's demand to an actuator that has a command path, or that fails.
+"""The delay line: the way of a demand to an actuator that has a command path, or that fails.
 
 A delay of m steps gives a stage of the RK4 step the demand that the law formed at the same stage m
 steps before. That is RK4 for the delay differential equation as one large ordinary one (the method
@@ -15,12 +15,12 @@ from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.step.grid import TimeGrid
 
 STAGES = 4  # of a step of RK4
-# In the vector `relay`: the place of the next demand, how many are under way, what the actuator is
-# given (tau_u [N], tau_r [N m], when the step began [s]), then the demands under way.
+# In the vector: the place of the next demand, how many are under way, what the actuator is given
+# (tau_u [N], tau_r [N m], when the step began [s]), then the demands under way.
 NEXT, COUNT, GIVEN, BEGAN, DEMANDS = 0, 1, 2, 4, 5
 
 
-def relay(delay: float, grid: TimeGrid) -> Vector:
+def delay_line(delay: float, grid: TimeGrid) -> Vector:
     """The vector at the start of a run: zero demands are under way.
 
     Raises ValueError for a delay [s] that is no whole number of steps.
@@ -38,21 +38,21 @@ def relay(delay: float, grid: TimeGrid) -> Vector:
 
 
 @kernel
-def begin_step(k: int, t: float, relay: Vector) -> None:
+def begin_step(k: int, t: float, line: Vector) -> None:
     """Note that step k begins at time t."""
-    relay[BEGAN] = t
-    count = shared(relay[COUNT])
+    line[BEGAN] = t
+    count = shared(line[COUNT])
     if count > 0.0:
-        relay[NEXT] = STAGES * k % int(count)
+        line[NEXT] = STAGES * k % int(count)
 
 
 @kernel
-def pass_on(demand: Vector, relay: Vector) -> None:
+def pass_on(demand: Vector, line: Vector) -> None:
     """Take this stage's demand, and give the actuator that of the same stage a delay before."""
-    relay[GIVEN], relay[GIVEN + 1] = demand[0], demand[1]
-    if shared(relay[COUNT]) > 0.0:
-        at = int(shared(relay[NEXT]))
-        place = tail(relay, DEMANDS + 2 * at)
-        relay[GIVEN], relay[GIVEN + 1] = place[0], place[1]
+    line[GIVEN], line[GIVEN + 1] = demand[0], demand[1]
+    if shared(line[COUNT]) > 0.0:
+        at = int(shared(line[NEXT]))
+        place = tail(line, DEMANDS + 2 * at)
+        line[GIVEN], line[GIVEN + 1] = place[0], place[1]
         place[0], place[1] = demand[0], demand[1]
-        relay[NEXT] = at + 1
+        line[NEXT] = at + 1
