@@ -8,6 +8,7 @@ for, since matplotlib is slow to import.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 from podusv_cli.components.actuators.base import Actuator
@@ -21,7 +22,7 @@ from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.finding import after, before
+from podusv_cli.core.finding import warn_after_run, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.kinematics import direction, wrap
 from podusv_cli.core.recording import Recording
@@ -32,18 +33,23 @@ FIGURES = {
     "figure": "sheet", "signals_over_time": "panels",
     "Shown": "shown", "axis_label": "style", "legend": "style", "new_figure": "style",
 }  # fmt: skip
+RENAMED = {"before": "warn_before_run", "after": "warn_after_run"}
 
 __all__ = [
     "FRESH", "MEASURED", "VALUE", "Accumulator", "Actuator", "Approach", "Axis", "Controller",
     "Disturbance", "Estimator", "Loop", "Measurement", "Metric", "Most", "Path", "Recording",
-    "Signal", "Slots", "Vector", "Vessel", "add", "after", "before", "cos_sin", "direction",
-    "gathered", "kernel", "ratio", "tail", "value", "wrap",
+    "Signal", "Slots", "Vector", "Vessel", "add", "cos_sin", "direction", "gathered",
+    "kernel", "ratio", "tail", "value", "warn_after_run", "warn_before_run", "wrap",
 ]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
     from importlib import import_module
 
+    if name in RENAMED:
+        text = f"podusv_cli.plugin.{name} is called {RENAMED[name]} now"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return globals()[RENAMED[name]]
     if name not in FIGURES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"podusv_cli.figures.{FIGURES[name]}"), name)

@@ -131,16 +131,16 @@ from podusv_cli.plugin import figure, signals_over_time
 cross = figure("cross", caption="cross-track error", signals=("e_ct",))(signals_over_time("e_ct"))
 """,
     "findings/lazy.py": """
-from podusv_cli.plugin import after, before
+from podusv_cli.plugin import warn_after_run, warn_before_run
 
 
-@before("lazy-law", about="controller", meaning="the gain is small")
+@warn_before_run("lazy-law", about="controller", meaning="the gain is small")
 def lazy(case):
     if getattr(case.scenario.controller, "gain", 9.0) < 2.0:
         yield "the gain is small"
 
 
-@after("far-off", about="path", meaning="the cross-track error is large")
+@warn_after_run("far-off", about="path", meaning="the cross-track error is large")
 def far_off(scenario, log):
     if "e_ct" in log and abs(log["e_ct"]).max() > 0.5:
         yield f"e_ct reaches {abs(log['e_ct']).max():.2g} {log.about['e_ct'].unit}"

@@ -17,6 +17,7 @@ from plugin_samples import LAW, SCENARIO, TWO, put
 from test_cli_words import offered_for
 
 import podusv as podusv_python
+from podusv_cli import plugin
 from podusv_cli.core.plugins import from_file
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.scenario.model import Scenario, scenario_class
@@ -52,6 +53,18 @@ def test_each_of_two_equal_files_is_named_where_it_lies(podusv):
     for folder in ("one", "two"):
         (plugin,) = load(f"{folder}/a.yaml").scenario.plugged
         assert plugin.path == str(Path(folder, "laws/my_law.py").resolve())
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_an_old_name_of_a_decorator_works_and_says_the_new_one(when):
+    new = f"warn_{when}_run"
+    with pytest.warns(
+        DeprecationWarning, match=rf"^podusv_cli\.plugin\.{when} is called {new} now$"
+    ):
+        old = getattr(plugin, when)
+    assert old is getattr(plugin, new)
+    assert old("a", about="path", meaning="m")(iter).when == when
+    assert when not in plugin.__all__
 
 
 def test_a_file_is_named_on_the_command_line_too(podusv):
@@ -268,7 +281,7 @@ def test_a_file_may_stand_alone_or_twice(podusv):
 
 MORE = """
 from podusv_cli.core.derived import difference
-from podusv_cli.core.finding import after
+from podusv_cli.core.finding import warn_after_run
 from podusv_cli.figures.panels import signals_over_time
 from podusv_cli.figures.sheet import figure
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
@@ -287,7 +300,7 @@ gap = difference(GAP, "e_ct", "z_e")
 gaps = figure("gaps", caption="The gap over time", signals=("gap",))(signals_over_time("gap"))
 
 
-@after("wide-gap", about="controller", meaning="the gap is wide")
+@warn_after_run("wide-gap", about="controller", meaning="the gap is wide")
 def wide_gap(scenario, log):
     yield "the gap is wide"
 """

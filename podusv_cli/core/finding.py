@@ -1,7 +1,8 @@
 """Findings: warnings about a scenario before a run, or about the run afterwards.
 
-Each kind of finding is one function, decorated with `before` or `after`, in a module of `findings`
-or in the file of the component that it is about. It yields one sentence per finding.
+Each kind of finding is one function, decorated with `warn_before_run` or `warn_after_run`, in a
+module of `findings` or in the file of the component that it is about. It yields one sentence per
+finding.
 """
 
 from __future__ import annotations
@@ -111,7 +112,7 @@ def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
     return kind_of
 
 
-before, after = _decorator("before"), _decorator("after")
+warn_before_run, warn_after_run = _decorator("before"), _decorator("after")
 
 
 def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:

@@ -8,7 +8,7 @@ import numpy as np
 
 from podusv_cli.components.paths.base import Path
 from podusv_cli.core.errors import SizingError
-from podusv_cli.core.finding import Sentences, after, before
+from podusv_cli.core.finding import Sentences, warn_after_run, warn_before_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import Case
@@ -24,7 +24,7 @@ def _lengths(path: Path) -> Vector:
     return np.asarray(np.hypot(*np.diff(np.array(path.waypoints()), axis=0).T))
 
 
-@before(
+@warn_before_run(
     "short-leg", about="path.points", meaning="a leg is over before the vessel can be on it",
     condition=f"a leg is shorter than {ROOM:g} acceptance radii",
     remedy="take a smaller acceptance radius, or fewer waypoints",
@@ -43,7 +43,7 @@ def short_leg(case: Case) -> Sentences:
         )
 
 
-@after(
+@warn_after_run(
     "never-arrives", about="path", meaning="legs are left at the end",
     condition="the last waypoint is not reached by the end of the run",
     remedy="simulate longer, take a larger acceptance radius, or path.switch: passed",

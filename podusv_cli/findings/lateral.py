@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_steering import VelocitySteering
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
-from podusv_cli.core.finding import Sentences, before
+from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import STANDING, sway_share
 from podusv_cli.theory.lateral import (
@@ -43,7 +43,7 @@ LOOPS: dict[type[Any], tuple[Growth, str]] = {
 }
 
 
-@before(
+@warn_before_run(
     "sway-answers-yaw", about="controller", meaning="sway answers yaw more than the law bears",
     condition="on a straight line at the target's speed, told exactly, the law's linear loop has a "
     "root in the right half plane",

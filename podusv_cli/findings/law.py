@@ -10,7 +10,7 @@ import numpy as np
 from podusv_cli.components.actuators.base import SATURATION
 from podusv_cli.components.controllers.velocity_loop import Cause, Loop
 from podusv_cli.core.errors import LawError, NotConvergedError
-from podusv_cli.core.finding import FindingKind, Sentences, before
+from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.stability import (
     bursts,
@@ -74,7 +74,7 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
 
 def _stiff(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
-    return before(
+    return warn_before_run(
         f"stiff-{cause}", about="simulation.step", meaning=f"{what} too fast for RK4's step",
         condition=f"RK4 makes {loop} grow", remedy=f"take a shorter step, or smaller {gains}",
     )(partial(_too_fast, cause=cause))  # fmt: skip
@@ -82,7 +82,7 @@ def _stiff(cause: Cause) -> FindingKind:
 
 def _sampled(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
-    return before(
+    return warn_before_run(
         f"sampled-{cause}", about="control.period", meaning=f"{what} too fast for the period",
         condition=f"{loop} grows over one period",
         remedy=f"take a shorter period, or smaller {gains}",
@@ -103,7 +103,7 @@ def _margin(case: Case) -> float:
     return found.delay_margin
 
 
-@before(
+@warn_before_run(
     "delayed-loop", about="actuator.command", meaning="a velocity loop too fast for the delay",
     condition="the delay exceeds the delay margin of both demands (podusv margins); without a "
     "steady motion, a velocity loop that is stable without the delay grows with it",
@@ -134,7 +134,7 @@ def delayed_loop(case: Case) -> Sentences:
                 )
 
 
-@before(
+@warn_before_run(
     "stiff-start", about="simulation.step", meaning="start error makes the bound too stiff",
     condition="RK4 makes the error, marched from t = 0 with its bound, grow",
     remedy="take a shorter step, a smaller bound gain, or a start nearer to the target's velocity",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.core.finding import Mask, Sentences, after
+from podusv_cli.core.finding import Mask, Sentences, warn_after_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.spectrum import periodogram
@@ -18,7 +18,7 @@ FORCED = 0.1  # of the accelerations; loads of that size may drive them
 SPREAD = 2  # harmonics to either side of a line that Hann's window and a broken period reach
 
 
-@after(
+@warn_after_run(
     "limit-cycle", about="controller", meaning="the vessel swings about its target for ever",
     condition=f"{PERIODS} periods or more of a swing above {VISIBLE:.0%} of a hull length in the "
     "steady window, which neither dies away nor follows a load or the target",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.core.finding import Sentences, after, rows_where, times_of
+from podusv_cli.core.finding import Sentences, rows_where, times_of, warn_after_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.findings.sea import SENSORS
@@ -21,7 +21,7 @@ DOUBTFUL, TIMID, CHANCE = 2.0, 0.1, 1e-3  # NIS, and its probability; podusv's c
 REVERSALS = 3  # of a zig-zag with two overshoots
 
 
-@after(
+@warn_after_run(
     "saturated", about="actuator",
     meaning=f"the actuator limits the law for over {LONG:.0%} of the run",
     condition=f"limited during more than {LONG:.0%} of the run",
@@ -64,7 +64,7 @@ def _switching(scenario: Scenario) -> list[str]:
     ]
 
 
-@after(
+@warn_after_run(
     "outside-envelope", about="vessel", meaning="the hull leaves what its numbers hold for",
     condition=f"for over {LONG:.0%} of the run the speed, the drift angle or the yaw rate through "
     "the water exceeds vessel.envelope",
@@ -97,7 +97,7 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
     return u, v, log["r"]
 
 
-@after(
+@warn_after_run(
     "inconsistent-filter", about="estimator",
     meaning="innovations are not as large as the filter believes",
     condition="over the steady window the mean squared innovation over its variance (NIS) of a "
@@ -135,7 +135,7 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
             )
 
 
-@after(
+@warn_after_run(
     "moves-away", about="controller", meaning="the vessel ends further away than it started",
     condition="the mean distance over the steady window exceeds that at the start by a hull length",
     remedy="check signs and units of the law and of the nominal vessel, or take larger gains",
@@ -156,7 +156,7 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
         )
 
 
-@after(
+@warn_after_run(
     "never-settles", about="controller", meaning="the vessel is not at its target at the end",
     condition="the mean of |z_e - standoff| over the steady window exceeds metrics.settling_radius",
     remedy="simulate longer where it still comes nearer; else larger gains or integral action",
@@ -218,7 +218,7 @@ def _way(part: dict[str, Vector], turned: float) -> str | None:
 UNFINISHED = {"zig-zag": _reversals, "turning circle": _turn, "stopping": _way}
 
 
-@after(
+@warn_after_run(
     "trial-unfinished", about="controller", meaning="the trial has not led to all of its numbers",
     condition="a zig-zag reverses fewer than three times, a circle turns by less than 180 deg, or "
     "a hull with thrust astern still goes ahead at the end",

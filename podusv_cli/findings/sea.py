@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.core.finding import At, Sentences, warn_before_run
 from podusv_cli.core.signal import STATE
 from podusv_cli.core.steps import misfit
 from podusv_cli.findings.finding import Case
@@ -20,7 +20,7 @@ SENSORS = {  # by name, which numbers of the state each measures
 FAR = 2.0  # factor between what an estimator assumes and what a sensor does
 
 
-@before(
+@warn_before_run(
     "late-load", about="disturbance", meaning="a load sets in after the run",
     condition="the time of a step is not before the end of the run",
     remedy="take an earlier time, or simulate longer",
@@ -37,7 +37,7 @@ def late_load(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "load-between-steps", about="disturbance", meaning="a load jumps between two steps",
     condition="the time of a step without a ramp is no whole number of simulation.step",
     remedy="take a whole number of steps, or a ramp",
@@ -50,7 +50,7 @@ def load_between_steps(case: Case) -> Sentences:
             yield At(f"{key}.time", f"{told}; the method is of first order at such a jump")
 
 
-@before(
+@warn_before_run(
     "late-outage", about="measurement", meaning="an outage begins after the run",
     condition="an outage does not begin before the end of the run",
     remedy="let the outage begin earlier, or simulate longer",
@@ -65,7 +65,7 @@ def late_outage(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "dead-zone", about="actuator.command", meaning="the dead zone swallows all that can be given",
     condition="the dead zone is not smaller than the actuator's limit",
     remedy="take a smaller dead zone",
@@ -86,7 +86,7 @@ def dead_zone(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "estimator-noise", about="estimator",
     meaning="the filter assumes another noise than sensors have",
     condition=f"a sigma differs by more than a factor of {FAR:g} from its sensor's noise",
@@ -111,7 +111,7 @@ def estimator_noise(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "estimator-delay", about="estimator", meaning="the filter assumes another age of positions",
     condition="the filter's delay differs from that of the position's sensor",
     remedy="give the estimator the sensor's delay",
@@ -128,7 +128,7 @@ def estimator_delay(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "steep-waves", about="disturbance", meaning="waves steeper than waves can stand",
     condition="Hs exceeds a seventh of the length of waves of the peak's period",
     remedy="take lower or longer waves; at model scale, times go by the root of the scale",
@@ -146,7 +146,7 @@ def steep_waves(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "few-components", about="disturbance", meaning="a sea of too few cosines for its run",
     condition="the components, weighted by the square of their energy, are further apart than "
     f"1/duration, in a run that needs {LONG} of them or more",
@@ -166,7 +166,7 @@ def few_components(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "same-waves", about="disturbance", meaning="two seas of a list have the same phases",
     condition="two entries of a kind that sums cosines have the same seed",
     remedy="give each entry a seed of its own",
@@ -185,7 +185,7 @@ def same_waves(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "model-gusts", about="disturbance", meaning="a spectrum of the open sea on a model",
     condition=f"a spectrum of gusts, or Torsethaugen's, and a vessel shorter than {MODEL:g} m",
     remedy="take another spectrum or none, or simulate at full scale",

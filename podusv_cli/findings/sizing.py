@@ -8,7 +8,7 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.facts import Facts
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import SizingError
-from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.core.finding import At, Sentences, warn_before_run
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import median
 
@@ -51,7 +51,7 @@ def _why(name: str, number: float, found: float, facts: Facts) -> str:
     return small if number < low * found else large if number > high * found else ""
 
 
-@before(
+@warn_before_run(
     "gains-for-another-hull", about="controller", meaning="a gain belongs to another hull",
     condition=f"U outside {USUAL['U'][0]:g} to {USUAL['U'][1]:g} times (a small one only below "
     f"{AMPLE:g} times the path's speed), N_m outside {USUAL['N_m'][0]:g} to {USUAL['N_m'][1]:g} "
@@ -73,7 +73,7 @@ def gains_for_another_hull(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "slow-steering", about="controller", meaning="the hull is faster than the law steers it",
     condition=f"the gain of the heading times the length, over the path's speed, is below {AGILE}",
     remedy="slow the target down, shorten the actuator's lag or the period, or take a larger gain",

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.components.controllers.base import Approach
 from podusv_cli.components.vessels.plant import sway_force
-from podusv_cli.core.finding import FindingKind, Sentences, before
+from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
 from podusv_cli.core.kernel import bundle
 from podusv_cli.findings.finding import Case
 from podusv_cli.findings.reference import FASTEST, STANDING, drift, median
@@ -66,7 +66,7 @@ def path_breaks(case: Case, what: str) -> Sentences:
 
 
 def _path_break(code: str, what: str, remedy: str) -> FindingKind:
-    return before(
+    return warn_before_run(
         code, about="path", meaning=f"the target's {what} jumps",
         condition=f"the {what} differs before and after a break of the path", remedy=remedy,
     )(partial(path_breaks, what=what))  # fmt: skip
@@ -79,7 +79,7 @@ path_bend = _path_break(
 )
 
 
-@before(
+@warn_before_run(
     "opposite-start", about="start.psi", meaning="rounding decides to which side the vessel turns",
     condition=f"the start's heading is opposite to the target's course to {OPPOSITE:g} rad",
     remedy="start a thousandth of a radian to one side",
@@ -98,7 +98,7 @@ def opposite_start(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "path-runs-on", about="path", meaning="the target goes straight on after the last waypoint",
     condition="the run lasts longer than the way through the points",
     remedy="set path.after to stop or loop, or simulate no longer",
@@ -113,7 +113,7 @@ def path_runs_on(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "sway-drift", about="path", meaning="the sway load drifts the hull faster than the target",
     condition="no heading balances sway damping and mean load at the target's speed",
     remedy="check the sway damping, the load and the speed",
@@ -134,7 +134,7 @@ def sway_drift(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "sway-unstable", about="controller.k_ze", meaning="pointing at the target makes sway grow",
     condition=f"m11 k_ze exceeds the sway damping, and sway grows beyond {RUNAWAY:g} target speed",
     remedy="take a smaller k_ze, or a hull with more sway damping",
@@ -196,7 +196,7 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
     return damping, float(growths[held.index(True)]) if any(held) else FASTEST
 
 
-@before(
+@warn_before_run(
     "thrust-short", about="actuator", meaning="keeping up takes more than the actuator gives",
     condition=f"less than {DELIVERED:.1%} of the force or moment along the path is delivered",
     remedy="raise the actuator's limit, or slow the target down",
@@ -234,7 +234,7 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "slow-law", about="controller.U", meaning="the law's largest speed is below the target's",
     condition="U is below the median speed of the target along the path",
     remedy="take a larger U, or slow the target down",
@@ -250,7 +250,7 @@ def slow_law(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "moment-short", about="controller.N_m", meaning="the law counts on more moment than there is",
     condition=f"less than {ROUNDED:.0%} of N_m is delivered to a hull at rest",
     remedy="give the law the moment that the actuator has",
@@ -267,7 +267,7 @@ def moment_short(case: Case) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "stiff-actuator", about="simulation.step", meaning="a pod's lag too short for RK4's step",
     condition=f"the step exceeds {STABLE:g} times the shortest lag",
     remedy="take a shorter step, or a longer lag",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.core.finding import At, Sentences, warn_before_run
 from podusv_cli.findings.finding import Case
 
 WATER = 1000.0  # kg/m3
@@ -43,7 +43,7 @@ RANGES = (
 )
 
 
-@before(
+@warn_before_run(
     "other-unit", about="vessel", meaning="a value fits the others in another unit only",
     condition=RANGES, remedy="give the value in podusv's unit",
 )  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import unit_of
-from podusv_cli.core.finding import At, Sentences, before
+from podusv_cli.core.finding import At, Sentences, warn_before_run
 from podusv_cli.findings.finding import Case
 
 DAMPING = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # a positive linear one is refused by the model
@@ -15,7 +15,7 @@ ADDED_MASS = {"X_udot": "m11", "Y_vdot": "m22", "N_rdot": "m33"}  # and the iner
 TURN = 2.0 * math.pi
 
 
-@before(
+@warn_before_run(
     "damping-sign", about="vessel", meaning="nonlinear damping drives the motion",
     condition="X_uu, X_uuu, Y_vv or N_rr is positive",
     remedy="make the coefficient negative, as damping is published",
@@ -30,7 +30,7 @@ def damping_sign(case: Case) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "added-mass-sign", about="vessel", meaning="added mass makes the hull lighter",
     condition="X_udot, Y_vdot or N_rdot is positive",
     remedy="make the coefficient negative; papers that print positive added masses add them",
@@ -61,7 +61,7 @@ def _positive(case: Case, names: Iterable[str]) -> Iterator[tuple[str, Vessel, s
                 yield f"{section}.{name}", vessel, name, text
 
 
-@before(
+@warn_before_run(
     "large-angle", about="start.psi", meaning="an angle is beyond a whole turn",
     condition="an angle of start, path or disturbance beyond 2 pi",
     remedy="give the angle in radians",

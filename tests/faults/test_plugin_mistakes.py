@@ -85,7 +85,7 @@ def test_a_mistake_in_a_path_is_not_blamed_on_the_law(podusv, name):
 
 
 MORE = """
-from podusv_cli.core.finding import after, before
+from podusv_cli.core.finding import warn_after_run, warn_before_run
 from podusv_cli.figures.sheet import figure
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 
@@ -114,9 +114,9 @@ OTHERS = {
     "word": ("m = made('a b')", 2, "the name of a metric is at most 64 letters, digits and '_'"),
     "metric": ("m = made('iae')", 2, "my_law.py: podusv_cli.metrics.distance has the name 'iae'"),
     "figure": ("f = figure('pods', caption='', signals=('x',))(failing)", 2, "has the name 'pods'"),
-    "before": ("f = before('a', about='path', meaning='m')(failing)", 0, "not be looked for: Z"),
-    "after": ("f = after('a', about='path', meaning='m')(failing)", 0, "not be looked for: Z"),
-    "about": ("f = after('a', about='pth', meaning='m')(failing)", 2, "did you mean 'path'"),
+    "before": ("f = warn_before_run('a', about='path', meaning='m')(failing)", 0, "looked for: Z"),
+    "after": ("f = warn_after_run('a', about='path', meaning='m')(failing)", 0, "looked for: Z"),
+    "about": ("f = warn_after_run('a', about='pth', meaning='m')(failing)", 2, "mean 'path'"),
 }
 
 

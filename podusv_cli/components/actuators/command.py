@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any
 
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.finding import Sentences, before
+from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
 from podusv_cli.core.signal import Signal
 
@@ -132,7 +132,7 @@ def failing(drive: Drive, lose: Drive) -> Drive:
     return made
 
 
-@before(
+@warn_before_run(
     "late-failure", about="actuator.failure", meaning="the failure never happens",
     condition="the failure's time is not before the end of the run",
     remedy="let the failure happen earlier, or simulate longer",
@@ -147,7 +147,7 @@ def late_failure(case: Any) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "late-command", about="actuator.command", meaning="no command reaches the actuator",
     condition="the delay is not shorter than the run",
     remedy="take a shorter delay, or simulate longer",

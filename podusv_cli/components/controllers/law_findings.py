@@ -15,7 +15,7 @@ from podusv_cli.components.controllers.network import NODE_DISTANCE, nearest, no
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.components.controllers.tracking import TrackingController
-from podusv_cli.core.finding import Sentences, after, before, rows_where, times_of
+from podusv_cli.core.finding import Sentences, rows_where, times_of, warn_after_run, warn_before_run
 from podusv_cli.core.recording import Recording
 
 KICK = 1.0  # rad/s; beyond what a hull turns at
@@ -27,7 +27,7 @@ LAST = 0.1  # of the run, over which a bound is watched
 GROWN = 0.01  # by which it may grow there
 
 
-@before(
+@warn_before_run(
     "coupling-saddle", about="controller.coupling", meaning="the printed sign makes a saddle",
     condition="k_ze k_ue < 1 or k_psie k_re < 1 with the printed sign",
     remedy="take coupling: corrected, or larger gains", law=PolarBackstepping,
@@ -53,7 +53,7 @@ def coupling_saddle(case: Any) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "network-range", about="controller.network", meaning="no node near the speeds needed",
     condition=f"a steady (u, v, r) along the path is more than {FAR:g} widths from every node",
     remedy="move low and high, or widen spread", law=PolarBackstepping,
@@ -75,7 +75,7 @@ def network_range(case: Any) -> Sentences:
         )
 
 
-@after(
+@warn_after_run(
     "off-network", about="controller.network", meaning="no node within two widths",
     condition=f"no node within {FAR:g} widths of (u, v, r)",
     remedy="move low and high, or widen spread", law=PolarBackstepping,
@@ -92,7 +92,7 @@ def off_network(scenario: Any, log: Recording) -> Sentences:
         )
 
 
-@after(
+@warn_after_run(
     "bound-growing", about="controller", meaning="an estimated bound still grew at the end",
     condition=f"growth above {GROWN:.0%} over the last {LAST:.0%} of the run, to a new maximum",
     remedy="simulate longer, or take more leakage", law=PolarBackstepping,
@@ -114,7 +114,7 @@ def bound_growing(scenario: Any, log: Recording) -> Sentences:
             )
 
 
-@before(
+@warn_before_run(
     "start-astern", about="start", meaning="the start lies outside the folding range",
     condition="the target is more than a right angle off the bow, and fold is not joint",
     remedy="turn start.psi, or take fold: joint", law=TrackingController,
@@ -133,7 +133,7 @@ def start_astern(case: Any) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "start-kick", about="controller.first_difference", meaning="the first difference is a kick",
     condition=f"|psi_d(0)|/difference_step above {KICK:g} rad/s",
     remedy="take first_difference: from_start", law=TrackingController,
@@ -152,7 +152,7 @@ def start_kick(case: Any) -> Sentences:
         )
 
 
-@after(
+@warn_after_run(
     "near-target", about="controller.standoff", meaning="z_e came close to its singularity",
     condition=f"z_e below {NEAR:g} hull lengths, and hold_below is smaller than that",
     remedy="take a standoff, or hold_below", law=TrackingController, needs=("z_e",),
@@ -177,7 +177,7 @@ def near_target(scenario: Any, log: Recording) -> Sentences:
         )
 
 
-@after(
+@warn_after_run(
     "crosswise", about="controller", meaning="cos psi_e came close to zero",
     condition=f"|cos psi_e| below {CROSSWISE:g}",
     remedy="start with a heading nearer to the line of sight", law=TrackingController,
@@ -194,7 +194,7 @@ def crosswise(scenario: Any, log: Recording) -> Sentences:
         )
 
 
-@before(
+@warn_before_run(
     "relay-gains", about="controller", meaning="PID's gains swing the actuator between its limits",
     condition=f"(K_P + K_D/T_d)/inertia times the loop's delay and its period exceeds {RELAY:g}",
     remedy="take smaller gains; PID's defaults are the paper's, for a model ship without delays",
