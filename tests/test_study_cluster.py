@@ -53,10 +53,10 @@ def stub(names="ab", **others):
 
 
 def marched(folder, client, tell=lambda tally: None, **changes):
-    plan, engine = small(**changes), cluster(client)
+    plan, executor = small(**changes), cluster(client)
     store = Store(folder, about(plan))
     store.open("now")
-    return store, engine, dispatch(store, plan, tell, engine)
+    return store, executor, dispatch(store, plan, tell, executor)
 
 
 def statuses(store):
@@ -101,18 +101,18 @@ def test_a_cluster_without_workers_is_refused():
 
 
 def test_which_worker_made_which_draws_is_told(tmp_path):
-    _, engine, (_, whole) = marched(tmp_path / "study", stub("ab"))
+    _, executor, (_, whole) = marched(tmp_path / "study", stub("ab"))
     assert whole
-    told = {one["worker"]: one["units"] for one in engine.told()["workers"]}
+    told = {one["worker"]: one["units"] for one in executor.provenance()["workers"]}
     assert told["a"] == ["pid[0] draws 0 to 39"]
     assert told["b"] == ["li[0] draws 0 to 39"]
 
 
 def test_a_foreign_worker_that_joins_later_gets_no_units(tmp_path):
     client = stub("ab", join={"tcp://c:1": OTHER_NUMPY})
-    store, engine, (_, whole) = marched(tmp_path / "study", client)
+    store, executor, (_, whole) = marched(tmp_path / "study", client)
     assert whole
-    refused = engine.told()["refused"]
+    refused = executor.provenance()["refused"]
     assert list(refused) == ["tcp://c:1"]
     assert (
         "got no units, because it computes with something else: numpy is 1.9"

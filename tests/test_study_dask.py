@@ -43,9 +43,9 @@ def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
     recipe = StudyText(TEXT)
     with (
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
-        connected(local.scheduler_address, recipe, store.seal) as engine,
+        connected(local.scheduler_address, recipe, store.seal) as executor,
     ):
-        _, finished = dispatch(store, small(), tell, engine)
+        _, finished = dispatch(store, small(), tell, executor)
     assert finished
     assert killed
     store.write_runs()

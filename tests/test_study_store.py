@@ -179,8 +179,8 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     store.open("now")
     clock = iter(range(10**6))
     monkeypatch.setattr(marching.time, "monotonic", lambda: float(next(clock)))
-    engine = marching.Processes(1)
-    tally, whole = marching.dispatch(store, small(), lambda tally: None, engine, seconds=2.0)
+    executor = marching.Processes(1)
+    tally, whole = marching.dispatch(store, small(), lambda tally: None, executor, seconds=2.0)
     assert not whole
     assert 0 < tally.made < tally.wanted
     assert sum(int(mask.sum()) for mask in store.covered().values()) == tally.made

@@ -1,4 +1,4 @@
-"""What `podusv sweep run` and `podusv tune` share: options, scenario, engine, session, ending."""
+"""What `podusv sweep run` and `podusv tune` share: options, scenario, executor, session, ending."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from podusv_cli.scenario.load import LOOKED_AT, Loaded, Plugged, load, load_stor
 from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, manifest
-from podusv_cli.studies.making.cluster import engine
-from podusv_cli.studies.making.dispatch import Engine, Shard
+from podusv_cli.studies.making.cluster import executor
+from podusv_cli.studies.making.dispatch import Executor, Shard
 from podusv_cli.studies.making.remote import StudyText
 from podusv_cli.studies.making.store import SCENARIO
 
@@ -111,17 +111,17 @@ def one_by_one(law: str, why: str) -> str:
     return f"{law}: runs march one by one: {why}"
 
 
-def engine_for(
+def executor_for(
     request: Request, folder: Path, scenario: Scenario, seal: str
-) -> AbstractContextManager[Engine]:
+) -> AbstractContextManager[Executor]:
     """Where the units of a folder are made, whose study has this seal."""
     recipe = StudyText(files.read_text(folder / SCENARIO), tuple(scenario.plugin_files().items()))
-    return engine(request.scheduler, request.workers, recipe, seal)
+    return executor(request.scheduler, request.workers, recipe, seal)
 
 
-def refused(engine: Engine) -> tuple[str, ...]:
+def refused(executor: Executor) -> tuple[str, ...]:
     """Why workers of a cluster got no units."""
-    return tuple(engine.told().get("refused", {}).values())
+    return tuple(executor.provenance().get("refused", {}).values())
 
 
 def interrupted(kept: str, command: str, folder: Path) -> KeyboardInterrupt:

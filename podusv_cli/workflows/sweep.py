@@ -20,7 +20,7 @@ from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
 from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.making import record
 from podusv_cli.studies.making.check import sweep_faults, unjudged
-from podusv_cli.studies.making.dispatch import Engine, Gaps, Tally, Tell, dispatch
+from podusv_cli.studies.making.dispatch import Executor, Gaps, Tally, Tell, dispatch
 from podusv_cli.studies.making.estimate import check_fits
 from podusv_cli.studies.making.invalid import check_draws
 from podusv_cli.studies.making.joining import mixture
@@ -36,7 +36,7 @@ from podusv_cli.workflows.many_runs import (
     Request,
     Source,
     compiling,
-    engine_for,
+    executor_for,
     finish,
     folder_of,
     interrupted,
@@ -100,9 +100,9 @@ def run(config: Source, request: Request, tell: Tell) -> Swept:
 
 def _run(store: Store, made: Plan, request: Request, started: datetime, tell: Tell) -> Swept:
     """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
-    with engine_for(request, store.folder, made.scenario, store.seal) as engine:
-        tally, whole = _marched(store, made, request, started, engine, tell)
-    swept = Swept(store.folder, tally, refused=refused(engine))
+    with executor_for(request, store.folder, made.scenario, store.seal) as executor:
+        tally, whole = _marched(store, made, request, started, executor, tell)
+    swept = Swept(store.folder, tally, refused=refused(executor))
     if whole and request.shard != WHOLE:
         whole = _is_whole(store)
         swept = replace(swept, part_is_whole=not whole)
@@ -114,7 +114,7 @@ def _run(store: Store, made: Plan, request: Request, started: datetime, tell: Te
 
 
 def _marched(
-    store: Store, made: Plan, request: Request, started: datetime, engine: Engine, tell: Tell
+    store: Store, made: Plan, request: Request, started: datetime, executor: Executor, tell: Tell
 ) -> tuple[Tally, bool]:
     """Simulate what is missing, and note the session; how far it is, and if it is whole."""
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
@@ -127,7 +127,7 @@ def _marched(
 
     try:
         return dispatch(
-            store, made, told, engine, seconds=request.seconds, part=request.shard,
+            store, made, told, executor, seconds=request.seconds, part=request.shard,
             begin=partial(_announce, store.folder, made, request),
         )  # fmt: skip
     except KeyboardInterrupt as stop:
@@ -135,7 +135,9 @@ def _marched(
         raise interrupted(kept, "sweep run", store.folder) from stop
     finally:
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
-        session.end(seen.made - seen.before, {**timed, "ended": seen.ended, **engine.told()})
+        session.end(
+            seen.made - seen.before, {**timed, "ended": seen.ended, **executor.provenance()}
+        )
 
 
 def _announce(

@@ -15,7 +15,7 @@ from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files
 from podusv_cli.storage.writer import sole_writer
 from podusv_cli.studies.making.check import sweep_faults
-from podusv_cli.studies.making.dispatch import Engine, Tally
+from podusv_cli.studies.making.dispatch import Executor, Tally
 from podusv_cli.studies.making.plan import digest
 from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.unit import prepare
@@ -36,7 +36,7 @@ from podusv_cli.workflows.many_runs import (
     Request,
     Source,
     compiling,
-    engine_for,
+    executor_for,
     finish,
     folder_of,
     interrupted,
@@ -106,9 +106,9 @@ def _tuned(
         place.clear(folder)
     place.write(folder, plan, told, stamp, texts)
     request.begin(f"{plan.size}; in {folder}")
-    with engine_for(request, folder, plan.scenario, digest(plan.base.identity)) as engine:
-        results = _simulated(plan, folder, request, started, engine, tell)
-    return replace(_written(results, folder, request), refused=refused(engine))
+    with executor_for(request, folder, plan.scenario, digest(plan.base.identity)) as executor:
+        results = _simulated(plan, folder, request, started, executor, tell)
+    return replace(_written(results, folder, request), refused=refused(executor))
 
 
 def _loaded(config: Source, request: Request) -> tuple[Loaded, Path]:
@@ -121,8 +121,9 @@ def _loaded(config: Source, request: Request) -> tuple[Loaded, Path]:
 
 
 def _simulated(
-    plan: TunePlan, folder: Path, request: Request, started: datetime, engine: Engine, tell: Tell
-) -> SearchResults:
+    plan: TunePlan, folder: Path, request: Request, started: datetime, executor: Executor,
+    tell: Tell,
+) -> SearchResults:  # fmt: skip
     """Search and validate what is not there yet, and note the session."""
     session = SessionLog(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
@@ -138,18 +139,18 @@ def _simulated(
     try:
         searches = _searches(plan, folder)
         _prepare(plan, request)
-        dispatch(searches, engine, searched)
+        dispatch(searches, executor, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
         trials = {law: found for law, found in trials.items() if found}
         winners = {law: [best(one) for one in found] for law, found in trials.items()}
         stamp = started.isoformat(timespec="seconds")
         return SearchResults(
-            plan, trials, winners, validate(plan, winners, folder, stamp, engine, validated)
+            plan, trials, winners, validate(plan, winners, folder, stamp, executor, validated)
         )
     except KeyboardInterrupt as stop:
         raise interrupted("all batches that were finished", "tune", folder) from stop
     finally:
-        session.end(sum(made.values()), engine.told())
+        session.end(sum(made.values()), executor.provenance())
 
 
 def _prepare(plan: TunePlan, request: Request) -> None:

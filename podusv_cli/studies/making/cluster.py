@@ -19,7 +19,7 @@ from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enable
 from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making import remote
-from podusv_cli.studies.making.dispatch import Done, Engine, Processes, Units
+from podusv_cli.studies.making.dispatch import Done, Executor, Processes, Units
 from podusv_cli.studies.making.plan import Variant, digest
 from podusv_cli.studies.making.remote import Reply, Report, StudyText
 
@@ -44,9 +44,9 @@ class Task:
     alone: bool = False
 
 
-def engine(
+def executor(
     scheduler: str, workers: int, study: StudyText, identity: str
-) -> AbstractContextManager[Engine]:
+) -> AbstractContextManager[Executor]:
     """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
     if not scheduler:
         return nullcontext(Processes(workers))
@@ -82,7 +82,7 @@ def _client(address: str) -> Any:
 
 
 class Cluster:
-    """Makes units on the workers of a cluster; an engine of `march`."""
+    """Makes units on the workers of a cluster; an `Executor`."""
 
     def __init__(self, client: Any, study: StudyText, ours: Report) -> None:
         """Take a client of Dask, the study, and what every worker has to report."""
@@ -123,7 +123,7 @@ class Cluster:
             raise UsageError(f"worker {worker} computes with something else: {wrong}")
 
     def __call__(self, units: Units, done: Done) -> bool:
-        """As `march.Engine` says. Raises StorageError where the scheduler is lost."""
+        """As `Executor` says. Raises StorageError where the scheduler is lost."""
         with interrupts_deferred():
             try:
                 while self._fill(units):
@@ -242,7 +242,7 @@ class Cluster:
         """The threads of all workers that there are now."""
         return max(1, sum(self._threads.values()))
 
-    def told(self) -> dict[str, Any]:
+    def provenance(self) -> dict[str, Any]:
         """Which worker made how many runs, of the study which ones, and who was refused."""
         workers = [
             {

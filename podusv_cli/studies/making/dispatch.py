@@ -24,7 +24,7 @@ from podusv_cli.studies.making.unit import crashed, make, prepare
 FIRST = 8  # draws of a unit before it is known how long a run takes
 AIM = 4.0  # s of computing that a unit is to take
 MOST = 4096  # draws of a unit
-# Causes are part of runs.h5, which has the same bytes whichever engine made it.
+# Causes are part of runs.h5, which has the same bytes whichever executor made it.
 ENDED = "it ended its process, each time that it was made; provenance.json tells how"
 EARLY = 3.0  # s in which a rate says little, as no unit or few are made
 
@@ -75,7 +75,7 @@ Units = Iterator[tuple[int, Plan, Unit]]
 Done = Callable[[int, Outcome], None]
 
 
-class Engine(Protocol):
+class Executor(Protocol):
     """Where units are made."""
 
     def __call__(self, units: Units, done: Done) -> bool:
@@ -89,7 +89,7 @@ class Engine(Protocol):
     def workers(self) -> int:
         """How many units are made at a time."""
 
-    def told(self) -> dict[str, Any]:
+    def provenance(self) -> dict[str, Any]:
         """What a study's provenance has to say about the workers."""
 
 
@@ -100,7 +100,7 @@ class Processes:
     count: int = 0  # one a core
 
     def __call__(self, units: Units, done: Done) -> bool:
-        """As Engine says."""
+        """As `Executor` says."""
         # `map` asks again after the last unit, as units may be halved; a generator would not.
         return run_each(map(self._job, units), done, workers=self.workers)
 
@@ -113,7 +113,7 @@ class Processes:
         number, plan, unit = numbered
         return number, partial(timed, plan, unit)
 
-    def told(self) -> dict[str, Any]:
+    def provenance(self) -> dict[str, Any]:
         """Nothing: the workers are those of the machine."""
         return {}
 
@@ -206,7 +206,7 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def dispatch(
-    store: Store, plan: Plan, tell: Tell, engine: Engine, *, seconds: float = math.inf,
+    store: Store, plan: Plan, tell: Tell, executor: Executor, *, seconds: float = math.inf,
     part: Shard = (1, 1),
     begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
 ) -> tuple[Tally, bool]:  # fmt: skip
@@ -223,7 +223,7 @@ def dispatch(
     reasons = {law: prepare(plan, law, cell) for law, cell in missing}
     begin(missing, {law: why for law, why in reasons.items() if why})
     driver.tally.began = time.monotonic()  # compiling and timing are over
-    finished = engine(driver, driver.done)
+    finished = executor(driver, driver.done)
     if driver.failure:
         raise PodusvError(driver.failure.failure)
     if not finished:

@@ -12,7 +12,7 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.counting.runs import Unit, UnitResult
 from podusv_cli.studies.making import plan as study
-from podusv_cli.studies.making.dispatch import Engine, Tally
+from podusv_cli.studies.making.dispatch import Executor, Tally
 from podusv_cli.studies.making.unit import crashed
 from podusv_cli.studies.tuning.search import Search
 
@@ -69,14 +69,14 @@ class Driver:
         self._waiting.extend((search, asked) for asked in units)
 
 
-def dispatch(searches: Sequence[Search], engine: Engine, tell: Tell) -> Tally:
+def dispatch(searches: Sequence[Search], executor: Executor, tell: Tell) -> Tally:
     """Bring all searches to the end of their budget.
 
     Every batch is on the disk before the next of its search is asked for. Raises PodusvError where
     a unit cannot be made at all, KeyboardInterrupt after an interrupt; finished batches are kept.
     """
     driver = Driver(searches, tell)
-    finished = engine(driver, driver.done)
+    finished = executor(driver, driver.done)
     if driver.failure:
         raise PodusvError(driver.failure)
     if not finished:

@@ -11,7 +11,7 @@ from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.making import record
-from podusv_cli.studies.making.dispatch import Engine, Tally, dispatch
+from podusv_cli.studies.making.dispatch import Executor, Tally, dispatch
 from podusv_cli.studies.making.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning.plan import VALIDATE, Named, TunePlan
 from podusv_cli.studies.tuning.trials import Trial, best
@@ -48,7 +48,7 @@ def contestants(plan: TunePlan, winners: Winners) -> dict[str, Named]:
 
 
 def validate(
-    plan: TunePlan, winners: Winners, folder: Path, started: str, engine: Engine,
+    plan: TunePlan, winners: Winners, folder: Path, started: str, executor: Executor,
     tell: Callable[[Tally], None],
 ) -> Table:  # fmt: skip
     """Simulate what is missing of the validation; its runs.
@@ -59,7 +59,7 @@ def validate(
     store = Store(folder / FOLDER, record.about(made))
     _clear(store)
     store.open(started)
-    dispatch(store, made, tell, engine)
+    dispatch(store, made, tell, executor)
     return store.write_runs()
 
 
