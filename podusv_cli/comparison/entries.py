@@ -15,7 +15,7 @@ from podusv_cli.findings.proof import input_rank
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage.run_folder import Run
+from podusv_cli.storage.run_folder import FinishedRun
 from podusv_cli.theory import derived
 
 UNKNOWN = "a metric of a plug-in that is not here; its unit is in the run's metrics.csv"
@@ -39,7 +39,7 @@ class Entry:
     """
 
     label: str
-    run: Run
+    run: FinishedRun
     scenario: Scenario
     cost: Mapping[str, float] = field(default_factory=dict)
 

@@ -15,7 +15,7 @@ from podusv_cli.pages.page import flat
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Fault, plain
 from podusv_cli.storage import log_reader, manifest
-from podusv_cli.storage.run_folder import LOG, Run
+from podusv_cli.storage.run_folder import LOG, FinishedRun
 
 Change = tuple[Any, Any]
 Numbers = tuple[float | None, float | None]
@@ -76,7 +76,7 @@ def relative(one: float | None, other: float | None) -> float | None:
     return (other - one) / abs(one) if one else 0.0
 
 
-def difference(one: Run, other: Run) -> RunDifference:
+def difference(one: FinishedRun, other: FinishedRun) -> RunDifference:
     """Compare two opened run folders. Raises StorageError."""
     entries = [manifest.read(run.folder).files[LOG] for run in (one, other)]
     texts = [log_reader.resolved_yaml(run.folder / LOG) for run in (one, other)]
@@ -92,7 +92,7 @@ def difference(one: Run, other: Run) -> RunDifference:
     )
 
 
-def _number(run: Run, name: str) -> float | None:
+def _number(run: FinishedRun, name: str) -> float | None:
     number = run.metrics.get(name)
     return number if number is None or math.isfinite(number) else None
 

@@ -23,8 +23,7 @@ from podusv_cli.studies.telling.outputs import as_frame
 from podusv_cli.studies.telling.results import Results, judged
 from podusv_cli.workflows import studies as folders
 from podusv_cli.workflows import sweep as sweeping
-from podusv_cli.workflows.many_runs import Request
-from podusv_cli.workflows.many_runs import Source as Config
+from podusv_cli.workflows.many_runs import Config, Request
 
 if TYPE_CHECKING:
     import xarray

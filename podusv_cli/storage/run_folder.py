@@ -184,8 +184,8 @@ def check_free_space(final: Path, needed: float, remedy: str) -> None:
 
 
 @dataclass(frozen=True)
-class Run:
-    """A finished run folder. `metrics` has None where a number was not finite."""
+class FinishedRun:
+    """A run as its finished folder has it. `metrics` has None where a number was not finite."""
 
     folder: Path
     status: Status
@@ -202,7 +202,7 @@ class Run:
         return log_reader.read_log(self.folder / LOG)
 
 
-def open_run(folder: Path) -> Run:
+def open_run(folder: Path) -> FinishedRun:
     """Open a run folder whose files are unchanged since it was finished.
 
     Raises StorageError naming the first fault.
@@ -211,7 +211,7 @@ def open_run(folder: Path) -> Run:
     missing = [name for name in NEEDED if name not in found.files]
     if missing:
         raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")
-    return Run(
+    return FinishedRun(
         folder=folder,
         status=found.status,
         metrics=_metrics(folder / "metrics.json"),

@@ -9,7 +9,7 @@ from typing import Any
 
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.storage import manifest
-from podusv_cli.storage.run_folder import Run
+from podusv_cli.storage.run_folder import FinishedRun
 from podusv_cli.workflows.members import from_folder
 
 
@@ -56,10 +56,10 @@ def diff(one: Path, other: Path) -> Differences:
     )
 
 
-def _runs(path: Path) -> list[Run]:
+def _runs(path: Path) -> list[FinishedRun]:
     manifest.demand(path)
     return [member.run for member in from_folder(path) if member.run]
 
 
-def _pair(one: Run, other: Run) -> tuple[Path, Path, RunDifference]:
+def _pair(one: FinishedRun, other: FinishedRun) -> tuple[Path, Path, RunDifference]:
     return one.folder, other.folder, difference(one, other)

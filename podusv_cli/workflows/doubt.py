@@ -35,7 +35,7 @@ from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import find, placed
 from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import Run, RunWriter, default_folder
+from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder
 from podusv_cli.workflows.doubt_study import doubt_study
 from podusv_cli.workflows.execute import Stopwatch, examined, monitored, simulated, summary, warm_up
 from podusv_cli.workflows.run import RESULTS, Request, opened
@@ -199,7 +199,7 @@ def _changed(compared: Compared, label: str, world: World) -> Scenario:
 
 
 @dataclass(frozen=True)
-class InMemory(Run):
+class InMemory(FinishedRun):
     """A run that lies in no folder."""
 
     kept: Recording = field(kw_only=True)

@@ -29,7 +29,7 @@ WHOLE: Shard = (1, 1)  # the only shard
 Tell = Callable[..., None]
 # A scenario's file, the folder of what is to be continued, or a scenario from Python: that is
 # loaded with these checks.
-Source = Path | Callable[[Sequence[Check]], Loaded]
+Config = Path | Callable[[Sequence[Check]], Loaded]
 
 
 def silent(*text: str) -> None:
@@ -57,7 +57,7 @@ class Request:
 
 
 def loaded_for(
-    key: str, advice: str, config: Source, request: Request, faults: Sequence[Check]
+    key: str, advice: str, config: Config, request: Request, faults: Sequence[Check]
 ) -> Loaded:
     """The scenario with this key, of a file or of a folder that is to be continued.
 
@@ -82,7 +82,7 @@ def loaded_for(
     return loaded
 
 
-def folder_of(config: Source) -> Path | None:
+def folder_of(config: Config) -> Path | None:
     """The folder that is to be continued, None for a new study or search."""
     return config if isinstance(config, Path) and config.is_dir() else None
 

@@ -20,7 +20,7 @@ from podusv_cli.scenario.messages import Check
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
-from podusv_cli.storage.run_folder import LOG, LOGS, STUDY, THEORY, Run, open_run
+from podusv_cli.storage.run_folder import LOG, LOGS, STUDY, THEORY, FinishedRun, open_run
 
 # Signals that every log has, as figures and comparisons need them.
 NEEDED = (
@@ -47,7 +47,7 @@ class Member:
     label: str
     scenario: Scenario
     text: str = ""  # the scenario's file
-    run: Run | None = None
+    run: FinishedRun | None = None
     noticed: Sequence[Finding] = ()  # before the run
 
 

@@ -19,7 +19,7 @@ from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.limits import estimate, limits, needed
 from podusv_cli.scenario.plugins import loaded
 from podusv_cli.storage import manifest, provenance, run_folder
-from podusv_cli.storage.run_folder import Run
+from podusv_cli.storage.run_folder import FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
@@ -137,7 +137,7 @@ def _several(members: Sequence[Member], request: Request, progress: Progress | N
         return done
 
 
-def _runs(members: Sequence[Member]) -> list[Run]:
+def _runs(members: Sequence[Member]) -> list[FinishedRun]:
     return [member.run for member in members if member.run]
 
 
@@ -156,7 +156,7 @@ def _passing(request: Request) -> Iterator[Path]:
         staging.discard()
 
 
-def _repeated(original: Run, done: Finished) -> Repeated:
+def _repeated(original: FinishedRun, done: Finished) -> Repeated:
     """A run that was made once more, held against the original."""
     found = difference(original, run_folder.open_run(done.folder))
     return Repeated(

@@ -33,8 +33,8 @@ from podusv_cli.studies.telling.results import Results, judged
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
     WHOLE,
+    Config,
     Request,
-    Source,
     compiling,
     executor_for,
     finish,
@@ -78,7 +78,7 @@ class Swept:
         }  # fmt: skip
 
 
-def run(config: Source, request: Request, tell: Tell) -> Swept:
+def run(config: Config, request: Request, tell: Tell) -> Swept:
     """Simulate what is missing of a study, and judge it once all of it is there.
 
     `config` is a scenario or the folder of a study. Raises ScenarioError, UsageError where the
@@ -158,7 +158,7 @@ def _is_whole(store: Store) -> bool:
     return tally.made == tally.wanted
 
 
-def _planned(config: Source, request: Request) -> tuple[Plan, Path, dict[str, str]]:
+def _planned(config: Config, request: Request) -> tuple[Plan, Path, dict[str, str]]:
     """A new study, or one that is to be continued: plan, folder, scenario and plug-ins."""
     if there := folder_of(config):
         check_study(there)

@@ -33,8 +33,8 @@ from podusv_cli.studies.tuning.space import with_gains
 from podusv_cli.studies.tuning.trials import best
 from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.many_runs import (
+    Config,
     Request,
-    Source,
     compiling,
     executor_for,
     finish,
@@ -75,7 +75,7 @@ class Tuned:
         }  # fmt: skip
 
 
-def tune(config: Source, request: Request, tell: Tell) -> Tuned:
+def tune(config: Config, request: Request, tell: Tell) -> Tuned:
     """Search gains for every law with equal budgets, and report them on fresh draws.
 
     `config` is a scenario or the folder of a search. Raises ScenarioError, UsageError where the
@@ -111,7 +111,7 @@ def _tuned(
     return replace(_written(results, folder, request), refused=refused(executor))
 
 
-def _loaded(config: Source, request: Request) -> tuple[Loaded, Path]:
+def _loaded(config: Config, request: Request) -> tuple[Loaded, Path]:
     """The scenario, and the folder of the search."""
     if there := folder_of(config):
         place.check(there)

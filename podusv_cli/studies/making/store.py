@@ -41,7 +41,7 @@ UNITS, RUNS = "units", "runs.h5"
 SCENARIO = "scenario.yaml"  # whole: it refers to no other file but plug-ins beside it
 UNFINISHED = (SCENARIO, UNITS, RUNS, FOLDER, "provenance.json")  # in any study's folder
 SEAL = "sha256"
-Run = tuple[int, int, int]  # the positions of its law, its cell and its draw
+RunKey = tuple[int, int, int]  # the positions of its law, its cell and its draw
 
 
 class Store:
@@ -123,7 +123,7 @@ class Store:
 
         A driver may make more units meanwhile, which are left alone. Raises StorageError.
         """
-        earlier, units, causes = [*self._earlier()], list[Path](), dict[Run, str]()
+        earlier, units, causes = [*self._earlier()], list[Path](), dict[RunKey, str]()
         for path in self._units():
             if result := read(path, self.seal):
                 units.append(path)
@@ -141,7 +141,7 @@ class Store:
                     path.unlink(missing_ok=True)
         return runs
 
-    def _causes(self, result: UnitResult) -> dict[Run, str]:
+    def _causes(self, result: UnitResult) -> dict[RunKey, str]:
         """Why runs of a unit did not finish."""
         unit, law = result.unit, self.about.laws.index(result.unit.law)
         told = zip(unit.draws, result.causes, strict=True)
