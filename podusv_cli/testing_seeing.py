@@ -37,7 +37,7 @@ def guarded(numbers: Vector) -> Vector:
     return np.concatenate([numbers, np.full(MARGIN, BEYOND)])
 
 
-def kept(vector: Vector) -> bool:
+def intact(vector: Vector) -> bool:
     """Whether what is behind the numbers is as it was."""
     return bool((vector[-MARGIN:] == BEYOND).all())
 
@@ -66,7 +66,7 @@ def watched(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> 
             table=table,
             seen=seen,
         )
-        assert kept(seen), f"at instant {instant} it writes behind `seen`"
+        assert intact(seen), f"at instant {instant} it writes behind `seen`"
         assert (x == pose_at(instant * STEP)).all(), "it changes the true state"
         assert not given.any(), "it changes the disturbance"
         rows.append(seen[:-MARGIN].copy())
@@ -106,7 +106,7 @@ def errs_alike_in_a_longer_run(sensors: Measurement) -> None:
     np.testing.assert_array_equal(first, longer, "a run of twice the length")
 
 
-class Asked:
+class EstimatorUnderTest:
     """An estimator's kernels with vectors of the declared sizes, from the state x."""
 
     def __init__(self, estimator: Estimator, x: Vector) -> None:
@@ -136,8 +136,8 @@ class Asked:
         for one, before, what in zip((seen, tau), given, ("seen", "tau"), strict=True):
             np.testing.assert_array_equal(one, before, f"it changes {what}")
         np.testing.assert_array_equal(self.state, corrected, "`follow` changes the state")
-        assert kept(self.state), "`correct` writes behind the state"
-        assert kept(self.rate), "`follow` writes behind the rate"
+        assert intact(self.state), "`correct` writes behind the state"
+        assert intact(self.rate), "`follow` writes behind the rate"
         written = self.rate[:-MARGIN]
         assert np.isfinite(written).all(), "a rate is left unwritten, or is no finite number"
         self.state[:-MARGIN] += STEP * written
@@ -161,17 +161,17 @@ def starts_at_the_truth(estimator: Estimator) -> None:
 
 def waits_for_a_delivery(estimator: Estimator) -> None:
     """`correct` leaves the state where nothing was delivered."""
-    asked, seen = Asked(estimator, pose_at(0.0)), delivery(pose_at(9.0), ALL, 0.0)
-    before = asked.state.copy()
-    call(estimator.correct, t=1.0, seen=seen, state=asked.state, k=asked.k, table=asked.table)
-    np.testing.assert_array_equal(asked.state, before, "nothing was delivered")
+    tested, seen = EstimatorUnderTest(estimator, pose_at(0.0)), delivery(pose_at(9.0), ALL, 0.0)
+    before = tested.state.copy()
+    call(estimator.correct, t=1.0, seen=seen, state=tested.state, k=tested.k, table=tested.table)
+    np.testing.assert_array_equal(tested.state, before, "nothing was delivered")
 
 
 def comes_to_what_is_measured(estimator: Estimator) -> None:
     """At rest beside the place where it starts, with all measured or no more than it needs."""
     for known in (ALL, estimator.needs()):
         away = np.array([0.4, -0.3, 0.2, 0.0, 0.0, 0.0])
-        found = settled(Asked(estimator, np.zeros(SIX)), away, known)
+        found = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), away, known)
         left = np.abs(found - away)
         assert (left[:3] <= NEAR * np.abs(away[:3])).all(), f"pose off by {left[:3]}"
         assert (left[3:] <= NEAR).all(), f"at rest with velocities {found[3:]}"
@@ -180,18 +180,18 @@ def comes_to_what_is_measured(estimator: Estimator) -> None:
 def takes_headings_by_the_nearest_turn(estimator: Estimator) -> None:
     """A measured heading that is a whole turn away is no error."""
     turned = np.array([0.0, 0.0, 2.0 * math.pi, 0.0, 0.0, 0.0])
-    found = settled(Asked(estimator, np.zeros(SIX)), turned, ALL)
+    found = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), turned, ALL)
     off = math.remainder(found[2], 2.0 * math.pi)
     assert abs(off) < NEAR, f"heading off by {off:.3g} rad"
     assert abs(found[5]) < NEAR, f"it yaws with {found[5]:.3g} rad/s"
 
 
-def settled(asked: Asked, place: Vector, known: tuple[bool, ...]) -> Vector:
+def settled(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) -> Vector:
     """The estimate after `PATIENCE` with x = `place` measured at 10 Hz."""
     new, old = (delivery(place, known, fresh) for fresh in (1.0, 0.0))
     tau, steps = np.zeros(3), round(PATIENCE / STEP)
     for i in range(steps):
-        found = asked.step(i * STEP, old if i % 10 else new, tau)
+        found = tested.step(i * STEP, old if i % 10 else new, tau)
     return found
 
 

@@ -245,7 +245,7 @@ def test_what_is_missing_is_compiled_before_it_is_asked_for(cache, monkeypatch, 
     assert fractions[0] == 0.0
     assert fractions[-1] == pytest.approx(1.0)
     assert fractions == sorted(fractions)
-    assert [object_cache.is_kept(piece.name) for piece in pieces] == [False, True, True]
+    assert [object_cache.is_cached(piece.name) for piece in pieces] == [False, True, True]
     monkeypatch.setattr(compile.Piece, "compile", lambda piece: pytest.fail("compiled again"))
     assert [compile.compiled(piece)(2.5) for piece in pieces[1:]] == [ready(2.5), doubled(2.5)]
     fractions.clear()
@@ -262,7 +262,7 @@ def test_a_worker_of_a_pool_which_may_start_no_process_compiles_by_itself(cache,
     monkeypatch.setattr(compile, "SHARE", 1)
     with multiprocessing.get_context("fork").Pool(1) as pool:
         pool.apply(_prepare_two)
-    assert object_cache.is_kept(compile.Piece(doubled, ONE_TO_ONE).name)
+    assert object_cache.is_cached(compile.Piece(doubled, ONE_TO_ONE).name)
 
 
 def test_a_full_disk_costs_time_only(cache, monkeypatch):

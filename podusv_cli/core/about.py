@@ -89,7 +89,7 @@ class _Plain(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)
 
 
-class Asked(_Plain):
+class SweepCall(_Plain):
     """How many draws one `podusv sweep run` asked for, and when it began."""
 
     draws: PositiveInt
@@ -109,7 +109,7 @@ class StudyIdentity(_Plain):
 
     draws: PositiveInt
     identity: dict[str, Any]
-    history: tuple[Asked, ...]
+    history: tuple[SweepCall, ...]
 
 
 class StudyAbout(StudyIdentity):

@@ -122,7 +122,7 @@ def lane_numbers(vector: Vector) -> Vector:
 
 
 @kernel
-def filled(whole: int, count: int) -> int:
+def padded_rounds(whole: int, count: int) -> int:
     """How many rounds a loop over `count` numbers takes that are filled up to `whole` registers.
 
     All of them where a register holds several rounds; where it holds several runs, `count`.

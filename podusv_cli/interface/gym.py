@@ -17,7 +17,7 @@ from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.abreast import Abreast
 from podusv_cli.engine.running.batch_threads import BatchRun
-from podusv_cli.engine.running.lanes import Sorter, why_alone
+from podusv_cli.engine.running.lanes import LaneSorter, why_alone
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.interface.session import DEMAND, Session, marcher_of, waiting
@@ -260,7 +260,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
                 f"podusv.gym: these runs cannot march side by side ({why}); take Gymnasium's "
                 "SyncVectorEnv of podusv.gym.Env"
             )
-        self._plan, self._sorter = plan, Sorter(0, True)
+        self._plan, self._sorter = plan, LaneSorter(0, True)
         self._sorter.choose(plan)
         self._marches: list[Abreast] = []
         self._views = np.zeros((INPUTS, count))

@@ -14,8 +14,8 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.pieces import Mark, Pieces
 from podusv_cli.engine.running.simulate import Marcher, marcher
+from podusv_cli.engine.running.stepped import Mark, SteppedMarch
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.functions import open_run, request
 from podusv_cli.interface.results import Run
@@ -116,8 +116,8 @@ class Session:
             )
         self._metrics = scenario.probe(grid)
         plan = Plan.with_probe(scenario.closed_loop(), grid, self._metrics)
-        self._pieces = Pieces(plan, march, compiled=scenario.simulation.compiled)
-        self._demand = self._pieces.vectors.law_table[DEMAND]
+        self._march = SteppedMarch(plan, march, compiled=scenario.simulation.compiled)
+        self._demand = self._march.vectors.law_table[DEMAND]
 
     @property
     def status(self) -> Status:
@@ -133,12 +133,12 @@ class Session:
         known, word = self._metrics.known, str(name)
         if word not in known:
             raise UsageError(f"session: {unknown(f'metric {name!r}', word, known, 'podusv list')}")
-        return float(self._metrics.one(word, self._pieces.seen()[:, np.newaxis])[0])
+        return float(self._metrics.one(word, self._march.seen()[:, np.newaxis])[0])
 
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""
-        pieces = self._pieces
-        return Observation(pieces.time, pieces.state(), pieces.target(), self._status)
+        march = self._march
+        return Observation(march.time, march.state(), march.target(), self._status)
 
     @explained
     def step(self, demand: Sequence[float] | Vector) -> Observation:
@@ -148,20 +148,20 @@ class Session:
         over; the session stays where it is.
         """
         tau_u, tau_r = self._checked(demand)
-        grid, pieces = self._pieces.grid, self._pieces
+        grid, march = self._march.grid, self._march
         self._demand[0], self._demand[1] = tau_u, tau_r
         self._demands.append((tau_u, tau_r))
         reach = len(self._demands) * self._every
         last = reach >= grid.steps
         with np.errstate(all="ignore"):
-            fine = pieces.to(grid.steps + 1 if last else reach)
+            fine = march.to(grid.steps + 1 if last else reach)
         self._status = ("finished" if last else "running") if fine else "diverged"
         return self.observe()
 
     def _checked(self, demand: Sequence[float] | Vector) -> tuple[float, float]:
         if self._status != "running":
             raise UsageError(
-                f"session: the run has {self._status} at t = {self._pieces.time:g} s and takes no "
+                f"session: the run has {self._status} at t = {self._march.time:g} s and takes no "
                 "more demands; close it, or go back with restore"
             )
         try:
@@ -170,14 +170,14 @@ class Session:
             tau_u = tau_r = math.nan
         if not (math.isfinite(tau_u) and math.isfinite(tau_r)):
             raise UsageError(
-                f"session, t = {self._pieces.time:g} s: the demand is {demand!r}; give two finite "
+                f"session, t = {self._march.time:g} s: the demand is {demand!r}; give two finite "
                 "numbers, tau_u [N] and tau_r [N m]"
             )
         return tau_u, tau_r
 
     def state(self) -> Bookmark:
         """The place in the run, for `restore`."""
-        return Bookmark(self, self._pieces.mark(), tuple(self._demands), self._status)
+        return Bookmark(self, self._march.mark(), tuple(self._demands), self._status)
 
     @explained
     def restore(self, place: Bookmark) -> Observation:
@@ -192,14 +192,14 @@ class Session:
                 "session: restore goes back to a place in the same session; this place is in "
                 "another one, so restore it there"
             )
-        self._pieces.back(place.mark)
+        self._march.back(place.mark)
         self._demands, self._status = [*place.demands], place.status
         return self.observe()
 
     @property
     def log(self) -> dict[str, Vector]:
         """Every signal that is logged so far, by name; a copy, which `restore` does not change."""
-        return {name: one.copy() for name, one in self._pieces.recording().signals.items()}
+        return {name: one.copy() for name, one in self._march.recording().signals.items()}
 
     @explained
     def close(

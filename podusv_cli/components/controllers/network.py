@@ -13,7 +13,7 @@ from pydantic import model_validator
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.derived import Derived, norm
 from podusv_cli.core.elementary import exponential
-from podusv_cli.core.kernel import Vector, filled, kernel, tail, whole_lanes
+from podusv_cli.core.kernel import Vector, kernel, padded_rounds, tail, whole_lanes
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 
@@ -153,7 +153,7 @@ def _evaluate(x: Vector, count: int, needed: int, table: Vector, out: Vector) ->
     u, v, r = x[3], x[4], x[5]
     c_u, c_v, c_r = table, tail(table, count), tail(table, 2 * count)
     e_u, e_v, e_r = tail(table, 3 * count), tail(table, 4 * count), tail(table, 5 * count)
-    for i in range(filled(count, needed)):
+    for i in range(padded_rounds(count, needed)):
         du, dv, dr = u - c_u[i], v - c_v[i], r - c_r[i]
         out[i] = exponential(-e_u[i] * du * du - e_v[i] * dv * dv - e_r[i] * dr * dr)
 

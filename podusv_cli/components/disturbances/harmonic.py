@@ -12,7 +12,7 @@ from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.kernel import LANES, Vector, filled, kernel, scratch, whole_lanes
+from podusv_cli.core.kernel import LANES, Vector, kernel, padded_rounds, scratch, whole_lanes
 
 WAVES = 6  # a sine and a cosine on every axis
 
@@ -64,7 +64,7 @@ class Harmonic(Component):
 def harmonic(t: float, k: Any, table: Vector, b: Vector) -> None:
     """Equation (52), scaled."""
     waves, count = scratch(LANES), int(k.waves)
-    for i in range(filled(count, WAVES)):
+    for i in range(padded_rounds(count, WAVES)):
         cosine, sine = cos_sin(table[i] * t)
         waves[i] = table[count + i] * cosine + table[2 * count + i] * sine
     b[0] = k.scale * (k.b_u_mean + waves[0] + waves[3])

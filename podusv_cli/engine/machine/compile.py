@@ -65,7 +65,7 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
     `tell` is called with the fraction that is compiled, if there is anything to compile. A piece
     that cannot be compiled is left to `compiled`, which says why. Raises KeyboardInterrupt.
     """
-    missing = [piece for piece in pieces if not object_cache.is_kept(piece.name)]
+    missing = [piece for piece in pieces if not object_cache.is_cached(piece.name)]
     if not (missing and object_cache.keeps()):
         return
     sizes = {piece: piece.size for piece in missing}
@@ -97,7 +97,7 @@ def _keep(pieces: Sequence[Piece], tell: Callable[[float], None]) -> None:
     done = 0
     for piece in pieces:
         with suppress(TypeError):
-            object_cache.kept(piece.name, piece.compile)
+            object_cache.cached(piece.name, piece.compile)
         done += piece.size
         tell(float(done))
 

@@ -43,13 +43,13 @@ class Code(NamedTuple):
 
 def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
     """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
-    code = kept(name, translate)
+    code = cached(name, translate)
     if not code.symbol:
         raise TypeError(code.content.decode())
     return _loaded(prototype, code)
 
 
-def kept(name: str, translate: Callable[[], Code]) -> Code:
+def cached(name: str, translate: Callable[[], Code]) -> Code:
     """The code of this name: found on disk, or translated and kept there."""
     path = _path(name)
     code = _read(path) if path else None
@@ -61,7 +61,7 @@ def kept(name: str, translate: Callable[[], Code]) -> Code:
     return code
 
 
-def is_kept(name: str) -> bool:
+def is_cached(name: str) -> bool:
     """Whether a piece of this name is on the disk."""
     path = _path(name)
     return bool(path and path.exists())

@@ -13,9 +13,9 @@ from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch_threads import BatchRun
-from podusv_cli.engine.running.lanes import MARCHING, Lanes, alike, room
-from podusv_cli.engine.running.pieces import CHANGING, Unchanged
+from podusv_cli.engine.running.lanes import MARCHING, Lanes, room, shared_constants
 from podusv_cli.engine.running.simulate import March
+from podusv_cli.engine.running.stepped import CHANGING, Unchanged
 from podusv_cli.engine.step.lane_march import REACHED
 from podusv_cli.engine.step.layout import Vectors
 
@@ -60,7 +60,7 @@ class Abreast:
         view = room(size * LANES)
         given = c.s[layout.estimate * LANES :]
         _, path, names = plan.functions[0]
-        shared = alike(plan)["path"]
+        shared = shared_constants(plan)["path"]
         vectors = {"x": given, "place": c.s[layout.place * LANES :], "k": c.path,
                    "table": c.path_table, "target": target}  # fmt: skip
         self._aim = in_lanes("path", path, names, shared, vectors)

@@ -20,8 +20,13 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.batch_threads import BatchRun, Group, alone, together
-from podusv_cli.engine.running.lanes import FEWEST, Sorter
+from podusv_cli.engine.running.batch_threads import (
+    BatchRun,
+    MarchThread,
+    march_alone,
+    march_together,
+)
+from podusv_cli.engine.running.lanes import FEWEST, LaneSorter
 from podusv_cli.engine.running.simulate import Marcher, marcher, why
 from podusv_cli.engine.running.watch import Bell, Ending
 from podusv_cli.engine.step.grid import TimeGrid
@@ -136,9 +141,9 @@ class _Runs:
         self._loops, self._grid, self._batch, self._probe = loops, grid, batch, probe
         self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)
-        self._lanes = Sorter(len(loops) * (grid.steps + 1), lanes)
-        self._ready: list[Group] = []
-        self._busy: list[Group] = []
+        self._lanes = LaneSorter(len(loops) * (grid.steps + 1), lanes)
+        self._ready: list[MarchThread] = []
+        self._busy: list[MarchThread] = []
         self._over, self._settled = 0, False
 
     def march(self, workers: int) -> None:
@@ -169,9 +174,9 @@ class _Runs:
     def _together(self, runs: list[BatchRun]) -> None:
         """Have runs march side by side, or one by one where that takes no longer."""
         if len(runs) >= FEWEST and self._lanes.advance:
-            self._ready.append(together(runs, self._lanes.advance, self._bell))
+            self._ready.append(march_together(runs, self._lanes.advance, self._bell))
         else:
-            self._ready += (alone(run, self._march, self._bell) for run in runs)
+            self._ready += (march_alone(run, self._march, self._bell) for run in runs)
 
     @cached_property
     def _march(self) -> Marcher:
@@ -234,12 +239,12 @@ class _Runs:
             self._busy.remove(thread)
             self._enter(thread)
 
-    def _enter(self, thread: Group) -> None:
+    def _enter(self, thread: MarchThread) -> None:
         """Enter how the runs of a thread ended; which of several hangs, shows each alone."""
         if thread.work.result is None and len(thread.runs) > 1:
             thread.work.stop()
             again = (BatchRun.of(run.position, run.plan) for run in thread.runs)
-            self._ready += (alone(run, self._march, self._bell) for run in again)
+            self._ready += (march_alone(run, self._march, self._bell) for run in again)
             return
         for run, ending in zip(thread.runs, thread.endings(False), strict=True):
             self._batch.note(run, ending)

@@ -33,7 +33,7 @@ class BatchRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class MarchThread:
     """Runs that a thread marches over; `endings` tells how each of them ended.
 
     It is told whether the thread was stopped.
@@ -44,7 +44,7 @@ class Group:
     endings: Callable[[bool], list[Ending]]
 
 
-def alone(run: BatchRun, march: Marcher, bell: Bell) -> Group:
+def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
     """The thread of one run."""
     grid, last = run.plan.grid, run.plan.grid.steps + 1
     function = partial(march(run.vectors, run.plan.layout, grid.step), 0, last)
@@ -55,15 +55,17 @@ def alone(run: BatchRun, march: Marcher, bell: Bell) -> Group:
             return [Ending(work.reached, "interrupted")]
         return [work.ending(last)]
 
-    return Group([run], work, endings)
+    return MarchThread([run], work, endings)
 
 
-def together(runs: list[BatchRun], advance: Callable[[Lanes, float], March], bell: Bell) -> Group:
+def march_together(
+    runs: list[BatchRun], advance: Callable[[Lanes, float], March], bell: Bell
+) -> MarchThread:
     """The thread of runs side by side."""
     grid, last = runs[0].plan.grid, runs[0].plan.grid.steps + 1
     lanes = Lanes.of([run.vectors for run in runs], runs[0].plan.layout)
     work = Work(partial(advance(lanes, grid.step), 0, last), lanes.under_way, bell)
-    return Group(runs, work, lambda stopped: lanes.endings(work.reached, last))
+    return MarchThread(runs, work, lambda stopped: lanes.endings(work.reached, last))
 
 
 def _apart(vectors: Vectors) -> Vectors:

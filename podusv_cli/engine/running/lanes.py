@@ -29,7 +29,7 @@ WORTH = 20_000_000  # instants of a batch, from which on compiling takes less th
 MARCHING = -1.0  # stands for the instants that a lane has reached
 
 
-def alike(plan: Plan) -> dict[str, frozenset[str]]:
+def shared_constants(plan: Plan) -> dict[str, frozenset[str]]:
     """By component the constants that all lanes have to share: choices, sizes and positions."""
     loop, probe = plan.loop, plan.probe
     shared = {name: part.choices() for name, part in loop.parts.items()}
@@ -85,14 +85,14 @@ def is_compiled(plan: Plan) -> bool:
     """Whether the march of runs like this loop is on the disk, or in memory."""
     from podusv_cli.engine.machine import object_cache
 
-    return all(object_cache.is_kept(piece.name) for piece in _pieces(plan))
+    return all(object_cache.is_cached(piece.name) for piece in _pieces(plan))
 
 
 def _pieces(plan: Plan) -> list[Any]:
     """What is compiled for lanes: the parts, with what is alike in them, and the march."""
     from podusv_cli.engine.machine import compile
 
-    shared = alike(plan)
+    shared = shared_constants(plan)
     parts = [
         compile.lane_adapter(*function, shared[function.owner].intersection(function.constants))
         for function in plan.functions
@@ -106,7 +106,7 @@ def places(plan: Plan) -> list[tuple[int, list[int]]]:
     loop = plan.loop
     found = {
         owner: [i for i, name in enumerate(plan.constants[owner]) if name in names]
-        for owner, names in alike(plan).items()
+        for owner, names in shared_constants(plan).items()
     }
     found |= {
         "disturbance_table": loop.disturbance.shared_places(),
@@ -172,7 +172,7 @@ class Lanes:
         return Ending(reached, "finished" if reached == last else "interrupted")
 
 
-class Sorter:
+class LaneSorter:
     """Sorts the runs of a batch by what they have to have in common to march side by side."""
 
     def __init__(self, instants: int, wanted: bool | None) -> None:

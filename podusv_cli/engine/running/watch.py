@@ -22,7 +22,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.step.layout import STOP
 from podusv_cli.process.interrupts import interrupts_enabled
 
-Bell = SimpleQueue[None]
+Bell = SimpleQueue[None]  # rung by every thread that ends; a batch waits for it
 GLANCE = 0.05  # s between two looks at a march
 PATIENCE = 10.0  # s of processor time that a step may take
 LAST_CHANCE = 1.0  # s for a march to end after its stop flag is set

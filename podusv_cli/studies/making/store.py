@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.core.about import Asked, StudyAbout
+from podusv_cli.core.about import StudyAbout, SweepCall
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.scenario.plugins import FOLDER, continue_with
 from podusv_cli.storage import files, manifest
@@ -58,7 +58,7 @@ class Store:
         written. Raises UsageError where it holds another study, naming what is different, and
         StorageError.
         """
-        history: tuple[Asked, ...] = ()
+        history: tuple[SweepCall, ...] = ()
         known = (self.folder / STUDY).exists()
         if known:
             there = record.begun(self.folder)
@@ -71,8 +71,8 @@ class Store:
                 )
         elif not files.is_empty(self.folder):
             raise UsageError(f"{self.folder} is no study and not empty; name another with --out")
-        asked = Asked(draws=self.about.draws, started=started)
-        self.about = self.about.model_copy(update={"history": (*history, asked)})
+        call = SweepCall(draws=self.about.draws, started=started)
+        self.about = self.about.model_copy(update={"history": (*history, call)})
         # With more draws in study.json than in the scenario, the study could not be continued. And
         # without study.json, a folder that is not empty is no study.
         if known:

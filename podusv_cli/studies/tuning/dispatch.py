@@ -17,7 +17,7 @@ from podusv_cli.studies.making.unit import crashed
 from podusv_cli.studies.tuning.search import Search
 
 Tell = Callable[[Tally, Sequence[Search]], None]
-Asked = tuple[int, study.Plan, Unit]  # a trial's place in its batch, and what to simulate
+TrialUnit = tuple[int, study.Plan, Unit]  # a trial's place in its batch, and what to simulate
 
 
 class Driver:
@@ -26,8 +26,8 @@ class Driver:
     def __init__(self, searches: Sequence[Search], tell: Tell) -> None:
         """Every search is asked for its first units."""
         self._searches, self._tell = searches, tell
-        self._waiting = deque[tuple[Search, Asked]]()
-        self._busy: dict[int, tuple[Search, Asked]] = {}
+        self._waiting = deque[tuple[Search, TrialUnit]]()
+        self._busy: dict[int, tuple[Search, TrialUnit]] = {}
         self._number = 0
         self.failure = ""
         for search in searches:
@@ -44,10 +44,10 @@ class Driver:
         """The next unit, with its number and its study."""
         if self.failure or not self._waiting:
             raise StopIteration
-        search, asked = self._waiting.popleft()
+        search, trial_unit = self._waiting.popleft()
         self._number += 1
-        self._busy[self._number] = search, asked
-        return self._number, asked[1], asked[2]
+        self._busy[self._number] = search, trial_unit
+        return self._number, trial_unit[1], trial_unit[2]
 
     def done(self, number: int, outcome: Outcome) -> None:
         """Give a search the result of a unit; runs of a process that ended are crashed."""
@@ -65,8 +65,8 @@ class Driver:
         self.tally.failed += sum(map(bool, result.causes))
         self._tell(self.tally, self._searches)
 
-    def _add(self, search: Search, units: Sequence[Asked]) -> None:
-        self._waiting.extend((search, asked) for asked in units)
+    def _add(self, search: Search, units: Sequence[TrialUnit]) -> None:
+        self._waiting.extend((search, trial_unit) for trial_unit in units)
 
 
 def dispatch(searches: Sequence[Search], executor: Executor, tell: Tell) -> Tally:

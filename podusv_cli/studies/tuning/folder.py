@@ -36,7 +36,7 @@ def check(folder: Path) -> None:
         )
 
 
-class Asked(BaseModel):
+class TuneCall(BaseModel):
     """What one `podusv tune` asked for."""
 
     model_config = ConfigDict(strict=True, frozen=True)
@@ -52,7 +52,7 @@ class Record(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True)
     identity: dict[str, Any]
     idle: dict[str, list[str]]
-    history: list[Asked]
+    history: list[TuneCall]
 
 
 def known(folder: Path, plan: TunePlan) -> Record | None:

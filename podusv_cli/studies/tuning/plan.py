@@ -29,7 +29,7 @@ TRAIN, VALIDATE = "tune", "tune validation"  # streams of draws, beside a sweep'
 # Settings that change no trial: more of them continues a search.
 OPEN = ("budget", "validate", "repeats")
 ENOUGH = 10  # whole trials for each gain; with fewer, repeats end in different places
-Named = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
+Contestant = tuple[str, Mapping[str, Any]]  # a law of the scenario, and its numbers that are others
 
 
 def is_few(trials: int, gains: int) -> bool:
@@ -128,7 +128,7 @@ class TunePlan:
         """The scenario's own study, which all others are variants of."""
         return study.Plan(self.scenario, (Cell(0, (), self.scenario),))
 
-    def variant(self, laws: Mapping[str, Named], stream: str, draws: int) -> study.Plan:
+    def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> study.Plan:
         """The study of laws by their new names, on draws of a stream."""
         told = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
         return self.base.varied(study.Variant(stream, draws, told))

@@ -13,7 +13,7 @@ from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.making import record
 from podusv_cli.studies.making.dispatch import Executor, Tally, dispatch
 from podusv_cli.studies.making.store import RUNS, UNITS, Store
-from podusv_cli.studies.tuning.plan import VALIDATE, Named, TunePlan
+from podusv_cli.studies.tuning.plan import VALIDATE, Contestant, TunePlan
 from podusv_cli.studies.tuning.trials import Trial, best
 
 FOLDER = "validation"
@@ -35,9 +35,9 @@ def chosen(winners: Sequence[Trial]) -> int:
     return best([replace(trial, number=place) for place, trial in enumerate(winners)]).number
 
 
-def contestants(plan: TunePlan, winners: Winners) -> dict[str, Named]:
+def contestants(plan: TunePlan, winners: Winners) -> dict[str, Contestant]:
     """All laws that meet the fresh draws, by name: before, after, and those of other repeats."""
-    found: dict[str, Named] = {}
+    found: dict[str, Contestant] = {}
     for law in plan.laws:
         found[law] = law, {}
         if law in winners:

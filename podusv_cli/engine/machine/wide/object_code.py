@@ -120,12 +120,12 @@ TRUE, NUMBERS = _mark("lane_true", types.boolean), _mark("lane_numbers")
 
 @intrinsic
 def _filled(typing: Any, whole: Any, count: Any) -> Any:
-    """`kernel.filled`: a register holds several lanes, and no rounds."""
+    """`kernel.padded_rounds`: a register holds several lanes, and no rounds."""
     return types.int64(types.int64, types.int64), lambda c, b, s, arguments: arguments[1]
 
 
 PRIMITIVES = compile_numba.PRIMITIVES | {
-    kernel.filled: _filled,
+    kernel.padded_rounds: _filled,
     kernel.shared: intrinsic(lambda typing, number: SHARED([number])),
     kernel.lanes_any: intrinsic(lambda typing, mask: ANY([mask])),
     kernel.lane_true: intrinsic(lambda typing, mask, lane: TRUE([mask, lane])),

@@ -1,4 +1,4 @@
-"""A march in pieces: it stops where it is asked to, and goes on from there with the same bits."""
+"""A march by steps: it stops where it is asked to, and goes on from there with the same bits."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Unchanged:
             vector[:] = numbers
 
 
-class Pieces:
+class SteppedMarch:
     """The march of a plan, some instants at a time."""
 
     def __init__(self, plan: Plan, march: Marcher, *, compiled: bool = True) -> None:
