@@ -90,7 +90,8 @@ def _a_step(runs: dict[str, tuple[ClosedLoop, TimeGrid]], rounds: int) -> dict[s
 
 def log_megabytes() -> float:
     """Size of the log of a whole run, in memory [MB]."""
-    return estimate(load(SCENARIO).scenario).content / 1e6
+    scenario = load(SCENARIO).scenario
+    return estimate(scenario, scenario.plan()).content / 1e6
 
 
 def actuators(rounds: int = ROUNDS) -> dict[str, list[float]]:

@@ -41,7 +41,7 @@ def finding(code: str, *overrides: str) -> Finding:
 @lru_cache(maxsize=3)  # a recording takes up to 40 MB, which every process started after it copies
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
-    case = Case(scene(*overrides).alone())
+    case = Case.of(scene(*overrides).alone())
     recording = execute.simulated(case, execute.Stopwatch())
     return recording, execute.summary(case, recording, Extras())
 

@@ -12,7 +12,7 @@ from command_samples import ROOT
 from plugin_samples import LAW
 
 from podusv_cli.core.errors import ScenarioError, UsageError
-from podusv_cli.scenario.conflicts import conflicts
+from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.bench.cases import AXES, Case, Selection, cases, shipped_bench
 from podusv_cli.studies.bench.optima import Least, wanted
@@ -276,7 +276,7 @@ def test_every_file_of_the_shipped_bench_makes_a_case_that_is_valid():
     assert {case.task for case in made} == set(names["tasks"])
     for case in made:
         for law in case.laws.values():
-            assert not conflicts(law)
+            assert not [*contradictions(law), *clashes(law, law.plans())]
             assert law.metrics.settling_radius == 0.5 * law.vessel.length
 
 

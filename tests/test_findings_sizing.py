@@ -176,7 +176,7 @@ def test_an_unusual_value_is_not(overrides):
 
 @pytest.mark.parametrize("name", VESSELS)
 def test_no_vessel_that_podusv_brings_along_is_in_another_unit(name):
-    assert not list(other_unit.search(Case(boat(f"vessel={{preset: {name}}}"))))
+    assert not list(other_unit.search(Case.of(boat(f"vessel={{preset: {name}}}"))))
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: f"{path.parent.name}/{path.stem}")
@@ -185,7 +185,7 @@ def test_no_scenario_that_podusv_brings_along_is_of_another_hull_or_unit(path):
         scenario = load(path).scenario
     except ScenarioError:  # a layer for others to extend
         return
-    cases = [Case(one) for one in scenario.singles().values()]
+    cases = [Case.of(one) for one in scenario.singles().values()]
     assert not [
         text
         for one in cases

@@ -165,7 +165,7 @@ def astern(distance: float) -> str:
 @pytest.mark.parametrize("k_ze", [0.06, 0.1, 0.2])
 def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within(k_ze):
     law = (*CALM, f"controller.k_ze={k_ze}")
-    case = Case(scene(*law))
+    case = Case.of(scene(*law))
     distance = sliding_distance(case, case.scenario.controller.approach(), 0.8896)
     assert distance == pytest.approx(
         (0.5 * 8.0 + 25.8 * k_ze * 0.5) / (25.8 * k_ze - 0.8896)  # m22 - m11 = 8 kg
@@ -180,7 +180,7 @@ def test_a_hull_slides_from_beyond_the_distance_that_is_told_and_not_from_within
 @pytest.mark.parametrize("standoff", [0.0, 0.5, 2.0])
 def test_the_distance_is_where_the_plants_sway_starts_to_grow(standoff):
     """Eigenvalues of the hull that points at the target, by differences of the plant's kernel."""
-    case = Case(scene(*CALM, f"controller.standoff={standoff}"))
+    case = Case.of(scene(*CALM, f"controller.standoff={standoff}"))
     k, U, h = bundle(VESSELS["paper"].constants()), 0.5, 1e-6
 
     def rates(theta: float, v: float, D: float) -> Vector:
@@ -242,7 +242,7 @@ def test_an_actuator_too_weak_is_told_and_falls_behind(short, enough):
 
 
 def test_the_thrust_needed_is_what_the_law_ends_up_asking_for():
-    needed = Case(scene(LONG)).reference.demand[:, 0]
+    needed = Case.of(scene(LONG)).reference.demand[:, 0]
     asked = late("tau_u_cmd", LONG)
     assert needed.max() == pytest.approx(asked.max(), rel=0.1)
     assert needed.min() == pytest.approx(asked.min(), abs=0.15)
@@ -322,7 +322,7 @@ STILL = ("disturbance={kind: none}", "simulation.duration=60")
 
 @pytest.mark.parametrize("name", ["X_uu", "X_uuu", "Y_vv", "N_rr"])
 def test_damping_that_drives_is_told_at_its_key_once(name):
-    case = Case(scene(f"vessel.{name}=1.32"))
+    case = Case.of(scene(f"vessel.{name}=1.32"))
     (told,) = damping_sign.findings(case.scenario.controller, case)
     assert (told.code, told.where) == ("damping-sign", f"vessel.{name}")
     assert "-1.32?" in told.text

@@ -138,7 +138,7 @@ from podusv_cli.findings.finding import Case
 from podusv_cli.workflows.execute import Task, execute, warm_up
 text, limit, held, kind = sys.argv[1], *map(int, sys.argv[2:4]), sys.argv[4]
 scenario = load_text(text, "a.yaml").scenario
-warm_up(Case(scenario))
+warm_up(Case.of(scenario))
 if kind == "RLIMIT_DATA":  # what a short run imports and allocates is not the log's
     short = text.replace("duration: 2500.0", "duration: 1.0")
     execute(Task(load_text(short, "a.yaml").scenario, short, Path("short"), force=True))

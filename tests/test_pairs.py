@@ -78,7 +78,7 @@ def signals(run: Run) -> Mapping[str, Any]:
 
 def marched(scenario: Scenario) -> Mapping[str, Any]:
     """What a run logs, without what is made of its log."""
-    return simulated(Case(scenario), Stopwatch()).signals
+    return simulated(Case.of(scenario), Stopwatch()).signals
 
 
 @pair

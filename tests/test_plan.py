@@ -1,52 +1,88 @@
-"""A run is planned once: what follows from its loop is asked once, and handed down."""
+"""A loop is planned once: what follows from it is asked once, and handed down from its loading."""
 
 from __future__ import annotations
 
 from collections import Counter
 from functools import wraps
+from pathlib import Path
 
 import pytest
 
+from podusv_cli.cli.validate import validate
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.workflows.run import Request, run_loaded
+from podusv_cli.workflows import run
+from podusv_cli.workflows.compare import compare
 
-ONCE = dict.fromkeys(
-    ("plan", "closed_loop", "metrics_of", "about", "drive_with", "path", "measurement"), 1
-)
+ROOT = Path(__file__).parent.parent / "configs"
+SHORT = ["simulation.duration=2"]
+MADE = ((Scenario, "plan"), (Scenario, "closed_loop"), (Plan, "__init__"), (ClosedLoop, "about"))
+ASKED = dict.fromkeys(("metrics_of", "drive_with", "path", "measurement"), 1)
+
+
+@pytest.fixture
+def counting(monkeypatch):
+    """Have calls of a class's method counted under a name."""
+    counts = Counter()
+
+    def count(owner, method, name):
+        real = getattr(owner, method)
+
+        @wraps(real)
+        def counted(*given, **named):
+            counts[name] += 1
+            return real(*given, **named)
+
+        monkeypatch.setattr(owner, method, counted)
+
+    def start(*more):
+        for owner, method in MADE:
+            count(owner, method, method)
+        for owner, method, name in more:
+            count(owner, method, name)
+        return counts
+
+    return start
 
 
 @pytest.mark.parametrize(
-    ("config", "controller", "of_law"),
+    ("config", "controller", "of_law", "loops"),
     [
-        ("podusv:fossen_2003/cybership2.yaml", "paper", 1),
-        ("podusv:own_vessel.yaml", "", 3),  # two of them by the law itself, for its memory
-        ("podusv:mu_2017/corrected.yaml", "", 3),  # which has the stability monitor
+        ("fossen_2003/cybership2.yaml", "paper", 1, 4),  # whose laws are all checked
+        ("own_vessel.yaml", "", 3, 1),  # two of them by the law itself, for its memory
+        ("mu_2017/corrected.yaml", "", 3, 1),  # which has the stability monitor
     ],
 )
-def test_a_run_plans_once(config, controller, of_law, tmp_path, monkeypatch):
-    """From a scenario that is loaded to its folder: warnings, march, metrics, monitor, cost."""
-    loaded, counts = load(config, ["simulation.duration=2"]), Counter()
-    scenario = loaded.scenario.singles()[controller] if controller else loaded.scenario
+def test_a_run_plans_each_loop_once(config, controller, of_law, loops, tmp_path, counting):
+    """From the file to the folder: checks, size, warnings, march, metrics, monitor, cost."""
+    loaded = load(ROOT / config).scenario
+    scenario = loaded.singles()[controller] if controller else loaded
+    counts = counting(
+        (Scenario, "metrics_of", "metrics_of"),
+        (type(scenario.actuator), "drive_with", "drive_with"),
+        *((type(getattr(scenario, at)), "constants_with", at) for at in ("path", "measurement")),
+        (type(scenario.controller), "constants_with", "law"),
+    )
+    given = {"out": tmp_path / "run", "figures": False, "overrides": SHORT}
+    run.run(ROOT / config, run.Request(controller=controller, **given))
+    assert counts == {**dict.fromkeys((name for _, name in MADE), loops), **ASKED, "law": of_law}
 
-    def count(owner, name, as_name):
-        method = getattr(owner, name)
 
-        @wraps(method)
-        def counted(*given, **named):
-            counts[as_name] += 1
-            return method(*given, **named)
+def test_a_comparison_plans_the_loop_of_each_law_once(tmp_path, counting):
+    """In the process that loads it; each run is handed its plan."""
+    counts = counting()
+    config = ROOT / "fossen_2003/cybership2.yaml"
+    done = compare([config], run.Request(out=tmp_path / "all", figures=False, overrides=SHORT))
+    assert len(done.result.entries) == 4
+    assert counts == dict.fromkeys((name for _, name in MADE), 4)
 
-        monkeypatch.setattr(owner, name, counted)
 
-    for owner, name in (
-        (Scenario, "plan"), (Scenario, "closed_loop"), (Scenario, "metrics_of"),
-        (ClosedLoop, "about"), (type(scenario.actuator), "drive_with"),
-    ):  # fmt: skip
-        count(owner, name, name)
-    for part in ("path", "measurement"):
-        count(type(getattr(scenario, part)), "constants_with", part)
-    count(type(scenario.controller), "constants_with", "law")
-    run_loaded(loaded, Request(out=tmp_path / "run", figures=False, controller=controller))
-    assert counts == {**ONCE, "law": of_law}
+@pytest.mark.parametrize(
+    ("config", "loops"), [("own_vessel.yaml", 1), ("fossen_2003/cybership2.yaml", 4)]
+)
+def test_validate_plans_each_loop_once(config, loops, counting):
+    counts = counting()
+    validate(ROOT / config, SHORT)
+    assert counts == dict.fromkeys((name for _, name in MADE), loops)

@@ -166,10 +166,10 @@ def test_every_run_of_a_comparison_is_repeated(compared, tmp_path, podusv):
 def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(compared, podusv, monkeypatch):
     real = compare.execute
 
-    def execute(task: Any, progress: Any = None) -> Any:
+    def execute(task: Any, progress: Any = None, **case: Any) -> Any:
         if task.scenario.controller.K_Pu == 500.0:
             raise RuntimeError("planted")
-        return real(task, progress)
+        return real(task, progress, **case)
 
     monkeypatch.setattr(compare, "execute", execute)
     said = podusv("rerun", compared)

@@ -10,8 +10,7 @@ from scenario_samples import SOUND, loaded, told
 
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.errors import ScenarioError
-from podusv_cli.scenario.load import load, load_text, values
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.load import Loaded, load, load_text, values
 
 *OTHERS, LAST = kinds("controllers")
 A_LAW = f"{', '.join(OTHERS)} or {LAST}"
@@ -78,8 +77,8 @@ def test_faults_of_claims_are_told_at_their_name():
 def test_further_checks_are_told_at_the_place_of_the_key():
     claims = "claims:\n  C1: {says: s, source: p, expect: e}\n"
 
-    def look(scenario: Scenario) -> list[tuple[str, str]]:
-        return [(f"claims.{name}.expect", "no such run") for name in scenario.claims]
+    def look(loaded: Loaded) -> list[tuple[str, str]]:
+        return [(f"claims.{name}.expect", "no such run") for name in loaded.scenario.claims]
 
     with pytest.raises(ScenarioError) as raised:
         load_text(SOUND + claims, "a.yaml", checks=[look])

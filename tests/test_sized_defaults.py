@@ -194,8 +194,9 @@ def test_a_hull_that_gives_no_number_is_told_at_its_place():
 
 def each(vary: str, *overrides: str) -> list:
     """The scenarios of the draws of a study, and the study's own."""
-    own = loaded(*overrides, text=CATAMARAN + STUDY % vary).scenario
-    assert not sweep_faults(own)
+    given = loaded(*overrides, text=CATAMARAN + STUDY % vary)
+    assert not sweep_faults(given)
+    own = given.scenario
     return [own, *(drawn(own.alone(), own.sweep.vary, one) for one in draws(own.sweep, 0, 4))]
 
 

@@ -35,7 +35,7 @@ def done(name, *sets, hull=MODEL):
     """Scenario, recording and metrics of a shipped trial."""
     text = f"extends: podusv:trials/{name}.yaml\nname: trial\n{hull}"
     scenario = load_text(text, "trial.yaml", sets).scenario.alone()
-    case = Case(scenario)
+    case = Case.of(scenario)
     recording = simulated(case, Stopwatch())
     return scenario, recording, summary(case, recording, Extras())
 

@@ -11,7 +11,6 @@ from podusv_cli.cli.terminal import echo
 
 if TYPE_CHECKING:
     from podusv_cli.scenario.load import Loaded
-    from podusv_cli.scenario.model import Scenario
     from podusv_cli.scenario.sweep import Sweep
     from podusv_cli.scenario.yaml_tree import Route
 
@@ -50,26 +49,26 @@ def validate(
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
-    cases = {label: Case(single) for label, single in scenario.singles().items()}
+    cases = {label: Case(one, loaded.plans[label]) for label, one in scenario.singles().items()}
     findings = merged({label: examined(case) for label, case in cases.items()})
     for case in cases.values():
         warm_up(case)
     loaded.told(echo)
     echo(f"{config}: ok ({scenario.name}, {laws}, {steps} steps)")
-    echo(f"a run takes {largest(scenario)}", *study, *findings)
+    echo(f"a run takes {largest(loaded)}", *study, *findings)
     if verbose:
         if scenario.sweep:
-            _tell_marches(scenario)
+            _tell_marches(loaded)
         _explain(loaded)
 
 
-def _tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+def _tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     """What is wrong with a search; its modules are slow to import, and few scenarios have one."""
-    if scenario.tune is None:
+    if loaded.scenario.tune is None:
         return []
     from podusv_cli.studies.tuning.check import tune_faults
 
-    return tune_faults(scenario)
+    return tune_faults(loaded)
 
 
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
@@ -95,12 +94,12 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
     return ["as a study, by podusv sweep:", *lines, "as a search, by podusv tune:", *search]
 
 
-def _tell_marches(scenario: Scenario) -> None:
+def _tell_marches(loaded: Loaded) -> None:
     """Which laws' runs march side by side, and why the others do not."""
     from podusv_cli.engine.running.lanes import why_alone
 
-    for law, single in scenario.singles().items():
-        why = why_alone(single.plan())
+    for law, plan in loaded.plans.items():
+        why = why_alone(plan)
         echo(f"{law}: runs march {f'one by one: {why}' if why else 'side by side'}")
 
 

@@ -87,8 +87,8 @@ def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
     scenario, claims, faults = loaded.scenario, [], []
     signals = {signal.name: signal for signal in explain.signals(scenario.plugged)}
     metrics = scenario.known_metrics()
-    for single in scenario.singles().values():
-        signals |= single.about()
+    for plan in loaded.plans.values():
+        signals |= scenario.about(plan)
     for name, claim in scenario.claims.items():
         trees: dict[str, ast.expr] = {}
         for field, text in (("expect", claim.expect), ("given", claim.given)):

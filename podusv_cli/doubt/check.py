@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from podusv_cli.core.phrases import unknown
 from podusv_cli.doubt.choices import by_key
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import Route, bracketed
 
@@ -13,8 +14,9 @@ Faults = Iterator[tuple[Route, str]]
 LISTED = "podusv explain"
 
 
-def doubt_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+def doubt_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     """Steps of the key and message for everything that is wrong; nothing without the section."""
+    scenario = loaded.scenario
     return [] if scenario.doubt is None else [*_printed(scenario), *_vary(scenario)]
 
 

@@ -19,6 +19,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 
 # A kind of finding may be in the file of the component that it is about.
@@ -44,12 +45,12 @@ def finding_kinds(plugins: Plugins = ()) -> dict[str, FindingKind]:
     return {kind.name: kind for kind in ordered}
 
 
-def unknown_codes(scenario: Scenario) -> list[tuple[str, str]]:
+def unknown_codes(loaded: Loaded) -> list[tuple[str, str]]:
     """Key and sentence for every unknown code in `silence`; a check for `load`."""
-    codes = tuple(finding_kinds(scenario.plugged))
+    codes = tuple(finding_kinds(loaded.scenario.plugged))
     return [
         (f"silence[{place}]", unknown(f"finding {code!r}", code, codes, "podusv list"))
-        for place, code in enumerate(scenario.silence)
+        for place, code in enumerate(loaded.scenario.silence)
         if code not in codes
     ]
 
@@ -59,7 +60,7 @@ def preflight(scenario: Scenario) -> list[Finding]:
 
     With `controllers` these are the findings for each law, merged.
     """
-    return merged({name: Case(one).findings() for name, one in scenario.singles().items()})
+    return merged({name: Case.of(one).findings() for name, one in scenario.singles().items()})
 
 
 def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
@@ -88,18 +89,22 @@ def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Case:
-    """A scenario with one law, its plan, and what several findings need of it, computed once."""
+    """A scenario with one law, its plan, and what several findings need of it, computed once.
+
+    The plan is the run's loop on its grid, with the probe of all metrics.
+    """
 
     scenario: Scenario
+    plan: Plan
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Case:
+        """Of a scenario that nobody has planned yet."""
+        return cls(scenario, scenario.plan())
 
     def findings(self) -> list[Finding]:
         """The findings about it before it runs, but those that it silences."""
         return _findings("before", self.scenario, self)
-
-    @cached_property
-    def plan(self) -> Plan:
-        """The run's loop on its grid, with the probe of all metrics."""
-        return self.scenario.plan()
 
     @cached_property
     def reference(self) -> Reference:

@@ -53,7 +53,9 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     >>> float(run.metrics["iae"].round()), run["z_e"].shape
     (71.0, (3001,))
     """
-    case, extras = Case(_single(loaded(source, changes))), Extras()
+    given = loaded(source, changes)
+    scenario, extras = _single(given), Extras()
+    case = Case(scenario, given.plan(scenario))
     recording = simulated(case, Stopwatch())
     whole, _ = monitored(case, recording)
     found = [*case.findings(), *postflight(case.scenario, whole)]

@@ -17,9 +17,8 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario import model, plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load_text, yaml_text
+from podusv_cli.scenario.load import Check, Loaded, load_text, yaml_text
 from podusv_cli.scenario.load import load as load_file
-from podusv_cli.scenario.messages import Check
 
 Changes = Mapping[str, Any]
 Source = str | os.PathLike[str] | Mapping[str, Any] | model.Scenario

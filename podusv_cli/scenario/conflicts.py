@@ -9,6 +9,7 @@ from podusv_cli.core.component import describe, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit, nearest_hint, whole_steps
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
 
@@ -17,23 +18,19 @@ NO_ESTIMATOR = NoEstimator()
 MOST_INSTANTS = 2**53  # that are distinct numbers
 
 
-def conflicts(scenario: Scenario) -> list[tuple[str, str]]:
-    """Key and message for every pair of values that contradict each other, and for `clashes`."""
-    return contradictions(scenario) or list(_signals(scenario))
-
-
 def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other; plans no loop."""
     parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
     return parts or [*of_numbers(scenario), *_names(scenario), *scenario.metrics.conflicts()]
 
 
-def clashes(scenario: Scenario) -> list[tuple[str, str]]:
-    """Laws of which two signals of a run would have one name; nobody asks it of a finished run.
-
-    Nothing where values contradict each other, as no loop can be planned then.
-    """
-    return [] if contradictions(scenario) else list(_signals(scenario))
+def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
+    """Laws of which two signals of a run would have one name; nobody asks it of a finished run."""
+    for label, plan in plans.items():
+        try:
+            scenario.about(plan)
+        except LawError as error:
+            yield f"controllers.{label}" if scenario.controllers else "controller", str(error)
 
 
 def of_numbers(scenario: Scenario) -> Conflicts:
@@ -124,15 +121,6 @@ def _seeing(scenario: Scenario) -> Conflicts:
         yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
     if told := scenario.estimator.lacking(scenario.measurement.measured()):
         yield "estimator", told
-
-
-def _signals(scenario: Scenario) -> Conflicts:
-    several = {f"controllers.{label}": law for label, law in scenario.controllers.items()}
-    for key, law in (several or {"controller": scenario.controller}).items():
-        try:
-            scenario.model_copy(update={"controller": law}).about()
-        except LawError as error:
-            yield key, str(error)
 
 
 def _names(scenario: Scenario) -> Conflicts:

@@ -9,8 +9,8 @@ from itertools import islice
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.scenario.conflicts import Conflicts, contradictions
-from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.conflicts import Conflicts
+from podusv_cli.scenario.load import Check, Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import monitor
 
@@ -70,12 +70,11 @@ class Size:
         return f"about {time_in_words(self.seconds)}, {memory} of memory and {disk} of disk"
 
 
-def estimate(scenario: Scenario, plan: Plan | None = None) -> Size:
-    """The size of the run with `controller`, counted without allocating its arrays.
+def estimate(scenario: Scenario, plan: Plan) -> Size:
+    """The size of a scenario's run with this plan, counted without allocating its arrays.
 
-    `plan` is that of the run where there is one already. Raises LawError as `plan.about`.
+    Raises LawError as `plan.about`.
     """
-    plan = plan or scenario.plan()
     grid, about = plan.grid, plan.about
     monitored = len(monitor.signals(plan)) if scenario.log.monitor else 0
     logged = sum(name in about for name in plan.names)
@@ -96,9 +95,10 @@ def needed(sizes: Sequence[Size], at_once: int) -> float:
     return sum(size.least for size in sizes) + sum(scratch)
 
 
-def largest(scenario: Scenario) -> Size:
+def largest(loaded: Loaded) -> Size:
     """The size of the run with the largest log."""
-    return max(map(estimate, scenario.singles().values()), key=lambda size: size.content)
+    sizes = [estimate(loaded.scenario, plan) for plan in loaded.plans.values()]
+    return max(sizes, key=lambda size: size.content)
 
 
 def limits(
@@ -112,19 +112,19 @@ def limits(
 
     insist = f", or insist with {insist}" if insist else ""
 
-    def check_size(scenario: Scenario) -> list[tuple[str, str]]:
-        if contradictions(scenario):
-            return []
+    def check_size(loaded: Loaded) -> list[tuple[str, str]]:
         try:
-            return list(islice(_too_large(scenario, allow_large, read_back, insist), 1))
+            return list(islice(_too_large(loaded, allow_large, read_back, insist), 1))
         except LawError:  # `clashes` says which signals
             return []
 
     return check_size
 
 
-def _too_large(scenario: Scenario, allow_large: bool, read_back: bool, insist: str) -> Conflicts:
-    size = largest(scenario)
+def _too_large(loaded: Loaded, allow_large: bool, read_back: bool, insist: str) -> Conflicts:
+    if not loaded.plans:  # values contradict each other
+        return
+    scenario, size = loaded.scenario, largest(loaded)
     if scenario.log.every > size.steps:
         only = f"the run has {size.steps} steps, so that its first instant alone would be logged"
         yield "log.every", f"{only}; must be at most {size.steps}"

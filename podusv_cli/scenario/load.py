@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import chain
+from operator import attrgetter
 from typing import Any
 
 import yaml
@@ -13,12 +15,13 @@ import yaml
 from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.conflicts import clashes
+from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.kinds import kept
 from podusv_cli.scenario.layers import composed, self_contained
-from podusv_cli.scenario.messages import Check, check
+from podusv_cli.scenario.messages import check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.named_files import without_files
 from podusv_cli.scenario.presets import complete, stands_in, with_contents
@@ -30,8 +33,10 @@ from podusv_cli.scenario.yaml_tree import (
     Route,
     dotted,
     find,
+    follow,
     merge,
     plain,
+    route,
     without_misfits,
 )
 
@@ -48,19 +53,57 @@ LOOKED_AT: Plugged = partial(plugins.recorded, ())
 
 @dataclass(frozen=True)
 class Loaded:
-    """A scenario and the origins of its values.
+    """A scenario, the plan of each of its runs, and the origins of its values.
 
-    `origins` maps every dotted key to "configs/a.yaml:12:5", "--set a.b=v", "vessel file
-    paper.yaml", `BY_RULE` or "default"; `text` is the scenario file as given. `root` is the tree of
-    which the scenario is made, without what is filled in. `dropped` are sentences about values that
-    were given to a section before it was given another kind, which does not take them.
+    `text` is the scenario file as given. `root` is the tree of which the scenario is made, `filled`
+    is this with presets, files and what stands for other values. `dropped` are sentences about
+    values that were given to a section before it was given another kind, which does not take them.
     """
 
     scenario: Scenario
-    origins: Mapping[str, str]
+    filled: Node
     text: str
     root: Node
     dropped: tuple[str, ...] = ()
+
+    @cached_property
+    def origins(self) -> dict[str, str]:
+        """Of every dotted key: "configs/a.yaml:12:5", "--set a.b=v", "default", `BY_RULE`, ..."""
+        origins = {}
+        for at, _ in _leaves(_data(self.scenario), ()):
+            node = find(self.filled, at)
+            origins[dotted(at)] = str(node.mark) if node else "default"
+        return origins | {dotted(steps): BY_RULE for steps in self.scenario.keys_by_rule()}
+
+    @cached_property
+    def contradictions(self) -> list[tuple[str, str]]:
+        """Key and message for every pair of values that contradict each other."""
+        return contradictions(self.scenario)
+
+    @cached_property
+    def plans(self) -> dict[str, Plan]:
+        """The plan of each law's run, by label; none can be made of values that contradict."""
+        return {} if self.contradictions else self.scenario.plans()
+
+    def plan(self, single: Scenario) -> Plan:
+        """That of one run; its law may be a `controller` that is none of several `controllers`."""
+        alike = (plan for plan in self.plans.values() if plan.loop.controller == single.controller)
+        return next(alike, None) or single.plan()
+
+    @cached_property
+    def clashes(self) -> list[tuple[str, str]]:
+        """Key and message for every law of which two signals would have one name."""
+        return list(clashes(self.scenario, self.plans))
+
+    def checked(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
+        """This. Raises ScenarioError with the faults and with all that the checks find."""
+        for key, text in chain(self.contradictions, *(look(self) for look in checks)):
+            steps = route(key) if isinstance(key, str) else key
+            mark = follow(self.filled, steps)[-1].mark
+            faults.append(Fault(mark, key if isinstance(key, str) else dotted(key), text))
+        if faults:
+            raise ScenarioError(_ordered(faults, self.root.mark.source))
+        return self
 
     def told(self, warn: Callable[[str], object]) -> Loaded:
         """This, after a warning of all that was dropped."""
@@ -73,8 +116,14 @@ class Loaded:
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
         root = kept(root, keys_of(type(self.scenario)), [])
-        source = self.root.mark.source
-        return _checked(root, self.scenario.plugged, source, faults, (clashes, *checks))[0]
+        scenario, filled = _made(root, self.scenario.plugged, faults)
+        changed = replace(self, scenario=scenario, filled=filled, root=root)
+        return changed.checked(faults, (CLASHES, *checks)).scenario
+
+
+# What is wrong with what is loaded: key and message. A key as its steps where names have dots.
+Check = Callable[[Loaded], Sequence[tuple[str | Route, str]]]
+CLASHES: Check = attrgetter("clashes")
 
 
 def load(
@@ -109,8 +158,9 @@ def load_text(
     if root is None:
         raise ScenarioError(_ordered(faults, source))
     root, known, dropped = _known(root, plugged, files, source, faults)
-    scenario, origins = _checked(root, known, source, faults, (clashes, *checks))
-    return Loaded(scenario, origins, text, root, dropped)
+    scenario, filled = _made(root, known, faults)
+    loaded = Loaded(scenario, filled, text, root, dropped)
+    return loaded.checked(faults, (CLASHES, *checks))
 
 
 def load_stored(
@@ -131,8 +181,8 @@ def load_stored(
     root, known, dropped = _known(root, plugged, files, source, faults)
     with_contents(root, keys_of(scenario_class(known)), faults, without_files)
     _undamaged(faults, source)
-    scenario, origins = _checked(root, known, source, faults, checks)
-    return Loaded(scenario, origins, text, root, dropped)
+    scenario, filled = _made(root, known, faults)
+    return Loaded(scenario, filled, text, root, dropped).checked(faults, checks)
 
 
 def _undamaged(faults: list[Fault], source: str) -> None:
@@ -155,22 +205,17 @@ def _known(
     return kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
 
 
-def _checked(
-    root: Node, known: Plugins, source: str, faults: list[Fault], checks: Sequence[Check]
-) -> tuple[Scenario, dict[str, str]]:
-    """The scenario of a tree, and the origins of its values."""
-    top = keys_of(scenario_class(known))
+def _made(root: Node, known: Plugins, faults: list[Fault]) -> tuple[Scenario, Node]:
+    """The scenario of a tree, and the tree with what is filled in."""
+    top, source = keys_of(scenario_class(known)), root.mark.source
     root = complete(root, top, faults)
-    scenario = check(root, top, faults, checks)
-    if scenario is None or faults:
+    scenario = check(root, top, faults)
+    if scenario is None:
         raise ScenarioError(_ordered(faults, source))
-    nodes = {route: find(root, route) for route, _ in _leaves(_data(scenario), ())}
-    origins = {dotted(at): str(node.mark) if node else "default" for at, node in nodes.items()}
-    origins |= {dotted(steps): BY_RULE for steps in scenario.keys_by_rule()}
     if stands_in(root):  # the very same law says so, see `Scenario.open_choice`
         first = next(iter(scenario.controllers.values()))
         scenario = scenario.model_copy(update={"controller": first})
-    return scenario, origins
+    return scenario, root
 
 
 def _ordered(faults: list[Fault], first: str) -> list[Fault]:

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import chain
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import ValidationError
 
 from podusv_cli.core.errors import SizingError
 from podusv_cli.core.phrases import did_you_mean, found, hint, unknown, without_case
-from podusv_cli.scenario.conflicts import contradictions
 from podusv_cli.scenario.keys import NAME, NUMBER, Key, either, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import stands_in
-from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain, route
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain
 
 MOST_PLACES = 4  # of a key, in a message
 
-# Key and message; a key as its steps where names of a mapping contain dots.
-Check = Callable[[Scenario], Sequence[tuple[str | Route, str]]]
 
-
-def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ()) -> Scenario | None:
+def check(root: Node, top: Key, faults: list[Fault]) -> Scenario | None:
     """The scenario of a complete tree, or None with every fault appended to `faults`.
 
     `top` are the scenario's keys.
@@ -33,15 +28,10 @@ def check(root: Node, top: Key, faults: list[Fault], more: Sequence[Check] = ())
         faults.extend(dict.fromkeys(_faults(root, top, error)))
         return None
     try:
-        scenario = given.in_numbers()
+        return given.in_numbers()
     except SizingError as error:
         faults.append(Fault(follow(root, ("actuator",))[-1].mark, "actuator", str(error)))
         return None
-    for key, text in chain(contradictions(scenario), *(look(scenario) for look in more)):
-        steps = route(key) if isinstance(key, str) else key
-        name = key if isinstance(key, str) else dotted(key)
-        faults.append(Fault(follow(root, steps)[-1].mark, name, text))
-    return scenario
 
 
 def with_defaults(key: Key | None, data: Any) -> Any:

@@ -255,6 +255,10 @@ class Scenario(Component):
         """The loop on its grid, or another one, with the probe of all metrics."""
         return Plan(self.closed_loop(), grid or self.time_grid(), self.metrics_of)
 
+    def plans(self) -> dict[str, Plan]:
+        """The plan of each run of a comparison, by label."""
+        return {label: single.plan() for label, single in self.singles().items()}
+
     def metrics_of(self, plan: Plan) -> Metrics:
         """What gathers the numbers of all metrics in such a run."""
         return metrics_probe(
@@ -312,9 +316,8 @@ class Scenario(Component):
             return several
         return {"controller": self.controller} | several
 
-    def about(self) -> dict[str, Signal]:
-        """Every signal of the run's log by name. Raises LawError where two have one name."""
-        plan = self.plan()
+    def about(self, plan: Plan) -> dict[str, Signal]:
+        """Every signal in the log of this run by name. Raises LawError where two have one name."""
         return monitor.about(plan) if self.log.monitor else plan.about
 
 

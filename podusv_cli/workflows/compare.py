@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
@@ -29,7 +29,7 @@ from podusv_cli.metrics.table import CLOCKED
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
-from podusv_cli.scenario.limits import estimate, needed
+from podusv_cli.scenario.limits import Size, estimate, needed
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
@@ -190,33 +190,40 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
-    sizes = [estimate(member.scenario) for member in members if member.run is None]
-    space = needed(sizes, request.workers or available_workers())
+    space = needed(sizes(members), request.workers or available_workers())
     return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
+
+
+def sizes(members: Sequence[Member]) -> list[Size]:
+    """The sizes of the runs that are to be made."""
+    return [estimate(one.case.scenario, one.case.plan) for one in members if one.case]
 
 
 def make_runs(
     members: Sequence[Member], folder: Path, request: Request, progress: Progress | None = None
 ) -> dict[str, Outcome]:
     """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
-    wanted = [member for member in members if member.run is None]
+    wanted = [(member, member.case) for member in members if member.case]
     with interrupts_enabled():
-        for member in wanted:
-            warm_up(Case(member.scenario), request.compiling)
+        for _, case in wanted:
+            warm_up(case, request.compiling)
     tasks = [
         Task(
             member.scenario, member.text, folder / member.label,
             argv=request.argv, label=member.label, noticed=member.noticed,
         )
-        for member in wanted
+        for member, _ in wanted
     ]  # fmt: skip
 
     def advance(position: int, fraction: float) -> None:
         if progress:
-            progress(wanted[position].label, fraction)
+            progress(tasks[position].label, fraction)
 
-    outcomes = run_all([partial(execute, task) for task in tasks], advance, request.workers)
-    return {member.label: outcome for member, outcome in zip(wanted, outcomes, strict=True)}
+    jobs = [
+        partial(execute, task, case=case) for task, (_, case) in zip(tasks, wanted, strict=True)
+    ]
+    outcomes = run_all(jobs, advance, request.workers)
+    return {task.label: outcome for task, outcome in zip(tasks, outcomes, strict=True)}
 
 
 def collect(
@@ -238,7 +245,8 @@ def collect(
     for label, done in finished.items():
         extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
     entries = [Entry(m.label, runs[m.label], m.scenario) for m in members if m.label in runs]
-    entries = related(_with_costs(entries, finished, extras), extras)
+    cases = {m.label: m.case for m in members if m.case and m.label in finished}
+    entries = related(_with_costs(entries, cases, extras), extras)
     entries = with_margins(entries, finished, parsed, extras)
     sources: dict[str, Source] = {m.label: Absent(m.scenario, endings[m.label]) for m in members}
     sources |= {entry.label: entry for entry in entries}
@@ -261,7 +269,7 @@ def collect(
     )
 
 
-def _with_costs(entries: Sequence[Entry], made: Collection[str], extras: Extras) -> list[Entry]:
+def _with_costs(entries: Sequence[Entry], made: Mapping[str, Case], extras: Extras) -> list[Entry]:
     """The entries; those `made` now with the laws' cost measured here and now, side by side.
 
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
@@ -271,7 +279,7 @@ def _with_costs(entries: Sequence[Entry], made: Collection[str], extras: Extras)
         e for e in entries
         if e.label in made and e.scenario.simulation.compiled and len(e.recording["time"])
     ]  # fmt: skip
-    loops = [(entry.scenario.plan(), entry.recording) for entry in timed]
+    loops = [(made[entry.label].plan, entry.recording) for entry in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
     return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]

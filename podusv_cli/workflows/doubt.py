@@ -108,7 +108,7 @@ def doubted(
 ) -> tuple[Told, Extras]:
     """All that is tried, and what it says of every claim."""
     for one in compared.singles.values():
-        case = Case(one)
+        case = Case.of(one)
         examined(case)
         with interrupts_enabled():
             warm_up(case, request.compiling)
@@ -212,7 +212,7 @@ class InMemory(FinishedRun):
 
 def _entry(label: str, scenario: Scenario, parsed: Sequence[ParsedClaim]) -> Entry:
     """A run in memory, with what a comparison adds to it that these claims name."""
-    case = Case(scenario)
+    case = Case.of(scenario)
     recording = simulated(case, Stopwatch())
     if recording.status == "interrupted":
         raise KeyboardInterrupt

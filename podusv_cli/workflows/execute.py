@@ -126,7 +126,7 @@ def execute(
     after the simulation costs the figures or the law's cost, nothing else; what fails after it is
     left out, and missing.json says why. Raises StorageError.
     """
-    started, watch, case = datetime.now(UTC), watch or Stopwatch(), case or Case(task.scenario)
+    started, watch, case = datetime.now(UTC), watch or Stopwatch(), case or Case.of(task.scenario)
     size = estimate(case.scenario, case.plan)
     with (
         interrupts_deferred(),

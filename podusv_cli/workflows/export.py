@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
@@ -57,7 +57,7 @@ def export(config: Path, request: Request) -> Path:
     loaded = load(config, request.overrides, checks, request.plugins, plugged).told(request.say)
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
-    if too_large(law.scenario):
+    if too_large(replace(loaded, scenario=law.scenario)):
         raise UsageError(
             f"{scenario.name}: the run that an exported law is checked against logs every step, "
             f"too many of them in {scenario.simulation.duration:g} s; simulate less, as --set "
@@ -67,7 +67,7 @@ def export(config: Path, request: Request) -> Path:
         if names := ", ".join(others(loaded, request.controller)):
             request.say(f"exporting `controller`; --controller chooses among {names}")
         request.say("simulating the run that the law is checked against")
-        run = simulated(Case(law.scenario), Stopwatch())
+        run = simulated(Case(law.scenario, law.plan), Stopwatch())
         if run.status == "interrupted":
             raise KeyboardInterrupt
         seen = law.samples(run)

@@ -76,9 +76,10 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
+    cases = [Case(single, loaded.plans[label]) for label, single in singles.items()]
     members = [
-        Member(label, single, loaded.text, noticed=examined(Case(single)))
-        for label, single in zip(labels, singles.values(), strict=True)
+        Member(label, single, loaded.text, case=case, noticed=examined(case))
+        for label, single, case in zip(labels, singles.values(), cases, strict=True)
     ]
     return Item(scenario.name, members, list(singles), parse_claims(loaded))
 

@@ -51,7 +51,7 @@ def keep(
     tasks = [_task(folder, plan, one, request) for one in missing]
     with interrupts_enabled():
         for law, cell in dict.fromkeys((one.law, one.cell) for one in missing):
-            warm_up(Case(plan.single(law, cell)))
+            warm_up(Case.of(plan.single(law, cell)))
     outcomes = run_all([partial(execute, task) for task in tasks], workers=request.workers)
     for one, outcome in zip(missing, outcomes, strict=True):
         if outcome.failure:

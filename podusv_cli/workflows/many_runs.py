@@ -16,8 +16,7 @@ from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import LOOKED_AT, Loaded, Plugged, load, load_stored, tree_yaml
-from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.load import LOOKED_AT, Check, Loaded, Plugged, load, load_stored, tree_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, manifest
 from podusv_cli.studies.making.cluster import executor

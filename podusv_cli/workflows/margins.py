@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import LawError, NotConvergedError, UsageError
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
@@ -65,12 +66,13 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
     duration, label = loaded.scenario.simulation.duration, request.controller
     if at is not None and at > duration:
         raise UsageError(f"--at {at:g}: the run ends at {duration:g} s; give an earlier time")
-    singles = {label: single(loaded, label)} if label else loaded.scenario.singles()
+    plans = {label: loaded.plan(single(loaded, label))} if label else loaded.plans
+    find = partial(_found, plans, at, compiled=loaded.scenario.simulation.compiled)
     if request.out is None:
-        return _found(singles, at)
+        return find()
     _check_formats(request.formats)
     with RunWriter(request.out, force=request.force) as writer:
-        found = _found(singles, at)
+        found = find()
         with interrupts_deferred():
             plugins = loaded.scenario.plugged
             origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
@@ -79,15 +81,12 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
             return replace(found, folder=writer.finish("finished"))
 
 
-def _found(singles: Mapping[str, Scenario], at: float | None) -> Found:
+def _found(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> Found:
     laws: dict[str, LoopMargins] = {}
     failed: dict[str, LawError | NotConvergedError] = {}
-    for label, scenario in singles.items():
+    for label, plan in plans.items():
         try:
-            laws[label] = loop_margins(
-                scenario.closed_loop(), scenario.time_grid(), at,
-                compiled=scenario.simulation.compiled,
-            )  # fmt: skip
+            laws[label] = loop_margins(plan.loop, plan.grid, at, compiled=compiled)
         except (LawError, NotConvergedError) as error:
             failed[label] = error
     if not laws:

@@ -15,8 +15,8 @@ from podusv_cli.comparison.outputs import RESERVED, TABLE
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Recording
-from podusv_cli.scenario.load import LOOKED_AT, Plugged, load_stored
-from podusv_cli.scenario.messages import Check
+from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.load import LOOKED_AT, Check, Plugged, load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
@@ -42,12 +42,13 @@ LARGEST = 1e300  # beyond it the engine calls a run diverged and logs no row
 
 @dataclass(frozen=True)
 class Member:
-    """One run of several: a scenario, and its finished `run` where there is one."""
+    """One run of several: a scenario, and its finished `run` or the `case` of one to be made."""
 
     label: str
     scenario: Scenario
     text: str = ""  # the scenario's file
     run: FinishedRun | None = None
+    case: Case | None = None
     noticed: Sequence[Finding] = ()  # before the run
 
 

@@ -89,7 +89,8 @@ def optimum_of(
     wanted = problem(scenario, minimised)
     check_figures(scenario)
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
-    with RunWriter(target, force=request.force, needed=estimate(scenario).needed):
+    size = estimate(scenario, loaded.plan(scenario))
+    with RunWriter(target, force=request.force, needed=size.needed):
         pass  # a place that cannot be written to is told before anything is computed
     guesses = _guesses(scenario)
     stages, motion = collocation.searched(wanted, guesses, step, progress)

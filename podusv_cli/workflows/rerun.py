@@ -14,14 +14,15 @@ from typing import Any
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
+from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
-from podusv_cli.scenario.limits import estimate, limits, needed
+from podusv_cli.scenario.limits import limits, needed
 from podusv_cli.scenario.plugins import loaded
 from podusv_cli.storage import manifest, provenance, run_folder
 from podusv_cli.storage.run_folder import FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
-from podusv_cli.workflows.compare import make_runs
+from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
 from podusv_cli.workflows.members import Member, from_folder
 from podusv_cli.workflows.run import Request
@@ -117,12 +118,12 @@ def _one(member: Member, request: Request, progress: Progress | None) -> Repetit
 def _several(members: Sequence[Member], request: Request, progress: Progress | None) -> Repetition:
     started, originals = datetime.now(UTC), _runs(members)
     again = [
-        replace(member, run=None, text=original.resolved_yaml)
+        replace(member, run=None, case=Case.of(member.scenario), text=original.resolved_yaml)
         for member, original in zip(members, originals, strict=True)
     ]
     with _passing(request) as place:
         target = request.out or place / "again"
-        room = needed([estimate(member.scenario) for member in members], available_workers())
+        room = needed(sizes(again), available_workers())
         with run_folder.RunWriter(target, force=request.force, needed=room) as writer:
             outcomes = make_runs(again, writer.folder, request, progress)
             missing = unwritten(outcomes.values())

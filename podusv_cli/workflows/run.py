@@ -10,8 +10,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.phrases import unknown
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, resolved_yaml
-from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.load import Check, Loaded, load, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage.run_folder import default_folder
@@ -68,7 +67,7 @@ def run_loaded(
     watch = watch or Stopwatch()
     with watch.part("load"):
         scenario = single(loaded, request.controller)
-        case = Case(scenario)
+        case = Case(scenario, loaded.plan(scenario))
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
         noticed = examined(case)

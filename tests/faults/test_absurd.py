@@ -191,10 +191,10 @@ control: {{period: {shape["period"]}}}
 log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
 """
     scenario = loaded(text).scenario
-    case = Case(scenario)
+    case = Case.of(scenario)
     recording = execute.simulated(case, execute.Stopwatch())
     recording, _ = execute.monitored(case, recording)
-    expected = estimate(scenario)
+    expected = estimate(scenario, case.plan)
     assert expected.steps == 10
     assert expected.rows == len(recording["time"])
     assert expected.content == sum(array.nbytes for array in recording.signals.values())
@@ -229,8 +229,9 @@ def test_a_disk_that_may_do_is_tried(podusv, crowded):
     """How small a log gets when it is compressed, nobody knows before."""
     write("a.yaml", f"{LAW}log: {{compress: true}}\n".replace("1.0}", "0.1, compiled: false}"))
     scenario = load("a.yaml").scenario
-    crowded(estimate(scenario).needed)
-    assert estimate(scenario).needed < estimate(scenario).disk
+    size = estimate(scenario, scenario.plan())
+    crowded(size.needed)
+    assert size.needed < size.disk
     assert podusv("run", "a.yaml", "-q", "--no-figures", "--out", "x").code == 0
     with h5py.File("x/log.h5") as log:
         assert log["x"].compression == "gzip"

@@ -137,7 +137,7 @@ def test_no_number_ends_in_a_traceback(tmp_path, monkeypatch):
     every = list(tries())
     chosen = [DIVERGING, *random.Random(1).sample(every, min(MOST, len(every)))]
     for config in sorted({one.config for one in chosen}):
-        warm_up(Case(load(ROOT / config).scenario.alone()))  # here, and not in every process
+        warm_up(Case.of(load(ROOT / config).scenario.alone()))  # here, and not in every process
     commands = [words(number, one) for number, one in enumerate(chosen)]
     fork = get_context("fork")
     with ProcessPoolExecutor(available_workers(), mp_context=fork, initializer=careless) as pool:

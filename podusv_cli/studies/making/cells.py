@@ -11,8 +11,7 @@ from typing import Any
 
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.phrases import as_yaml
-from podusv_cli.scenario.load import Loaded
-from podusv_cli.scenario.messages import Check
+from podusv_cli.scenario.load import Check, Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, placed, plain, route
 
@@ -68,7 +67,7 @@ def _label(values: tuple[tuple[str, Any], ...]) -> str:
 def _within(check: Check, label: str) -> Check:
     """The check, naming the cell in what it says."""
     cell = f" (in the cell {label})" if label else ""
-    return lambda scenario: [(key, f"{text}{cell}") for key, text in check(scenario)]
+    return lambda loaded: [(key, f"{text}{cell}") for key, text in check(loaded)]
 
 
 def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:

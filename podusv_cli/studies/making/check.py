@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from podusv_cli.core.component import Component
 from podusv_cli.core.phrases import did_you_mean, found, unknown
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
-from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.engine.loop.plan import Plan, no_probe
 from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.address import (
@@ -23,8 +24,7 @@ from podusv_cli.scenario.address import (
     is_whole,
     no_entry,
 )
-from podusv_cli.scenario.conflicts import conflicts
-from podusv_cli.scenario.load import values
+from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
@@ -43,14 +43,15 @@ FREE_NAME = "; a quantity with a name of your own needs `keys`, as in keys: [ves
 Faults = Iterator[tuple[Route, str]]
 
 
-def sweep_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     """Steps of the key and message for everything that is wrong; nothing without a sweep."""
-    sweep = scenario.sweep
+    scenario, sweep = loaded.scenario, loaded.scenario.sweep
     if sweep is None:
         return []
     laws = list(_laws(scenario, sweep))
     # What contradicts itself without a draw does so with every one.
-    draws = () if conflicts(scenario) else _vary(singles(scenario), sweep)
+    whole = not (loaded.contradictions or loaded.clashes)
+    draws = _vary(singles(scenario), loaded.plans, sweep) if whole else ()
     return laws or [
         *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
         *_claims(scenario, sweep),
@@ -89,14 +90,15 @@ def _metric_names(scenario: Scenario) -> Faults:
             yield ("plugins",), f"metric {name}: the table of runs has another column of this name"
 
 
-def _vary(laws: Mapping[str, Scenario], sweep: Sweep) -> Faults:
+def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep) -> Faults:
+    own = {law: replace(plans[law], probe_for=no_probe).structure for law in laws}
     taken = {*AXES, *ENDING, *(name for one in laws.values() for name in gathered_metrics(one))}
     for name, quantity in sweep.vary.items():
         if wrong := _wrong_name(name, quantity, taken):
             yield ("sweep", "vary", name), wrong
             continue
         texts = [text for key in quantity.targets(name) for text in _key(key, quantity, laws)]
-        texts = texts or list(_tried(name, quantity, laws))
+        texts = texts or list(_tried(name, quantity, laws, own))
         yield from ((("sweep", "vary", name), text) for text in dict.fromkeys(texts))
 
 
@@ -185,23 +187,27 @@ def _real(quantity: Quantity) -> str:
     return next((way for way in quantity.distribution.given if way in REAL), "")
 
 
-def _tried(name: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator[str]:
-    """What is wrong with some of the values that a quantity has: all, where there are few."""
+def _tried(
+    name: str, quantity: Quantity, laws: Mapping[str, Scenario], own: Mapping[str, Any]
+) -> Iterator[str]:
+    """What is wrong with some of the values that a quantity has: all, where there are few.
+
+    `own` is what the runs of a law have in common.
+    """
     discrete = quantity.distribution.choice or ()
     drawn_values = [
         *discrete[:MOST_TRIED],
         *([] if discrete or quantity.seed else quantity.distribution.at(TRIED).tolist()),
         *([1] if quantity.seed else []),
     ]
-    for one in laws.values():
-        own = _structure(one)
+    for law, one in laws.items():
         told = [_refused(name, quantity, one, value) for value in drawn_values]
         if all(told) or (discrete and any(told)):
             yield next(filter(None, told)).removeprefix(f"sweep.vary.{name}: ")
         yield from (
             "changes how the loop is put together or sampled; list its values under grid"
             for value, refused in zip(drawn_values, told, strict=True)
-            if not refused and _structure(drawn(one, {name: quantity}, {name: value})) != own
+            if not refused and _structure(drawn(one, {name: quantity}, {name: value})) != own[law]
         )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from podusv_cli.expressions.reading import ExpressionError
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.scenario.yaml_tree import Route
@@ -15,9 +16,9 @@ from podusv_cli.studies.tuning.space import space_faults
 Faults = Iterator[tuple[Route, str]]
 
 
-def tune_faults(scenario: Scenario) -> list[tuple[Route, str]]:
+def tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     """Steps of the key and message for everything that is wrong; nothing without `tune`."""
-    tune = scenario.tune
+    scenario, tune = loaded.scenario, loaded.scenario.tune
     if tune is None:
         return []
     return [
