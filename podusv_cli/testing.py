@@ -49,6 +49,7 @@ from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_probe, metrics_with
 from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.model import BASES
 from podusv_cli.testing_seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
 from podusv_cli.theory import derived
 
@@ -62,11 +63,7 @@ disturbance: {kind: none}
 actuator: {kind: ideal}
 controller: {kind: pid}
 """
-ROOMS: dict[str, tuple[str, type[Component]]] = {
-    "controllers": ("controller", Controller), "paths": ("path", AnyPath),
-    "disturbances": ("disturbance", Disturbance), "actuators": ("actuator", Actuator),
-    "measurements": ("measurement", Measurement), "estimators": ("estimator", Estimator),
-}  # fmt: skip
+ROOMS = {f"{section}s": (section, base) for section, base in BASES.items()}
 
 
 def contract(file: Path, fields: Mapping[str, Mapping[str, Any]] | None = None) -> list[Any]:

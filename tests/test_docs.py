@@ -20,8 +20,8 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.address import PER_RUN
 from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.model import PER_RUN
 
 PAGES = [
     path.relative_to(ROOT).as_posix()

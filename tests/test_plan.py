@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 from podusv_cli.cli.validate import validate
+from podusv_cli.core.plugins import ROOMS
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.engine.step.layout import Parts, Vectors
 from podusv_cli.scenario.load import load
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.model import BASES, Scenario
 from podusv_cli.workflows import run
 from podusv_cli.workflows.compare import compare
 
@@ -86,3 +88,16 @@ def test_validate_plans_each_loop_once(config, loops, counting):
     counts = counting()
     validate(ROOT / config, SHORT)
     assert counts == dict.fromkeys((name for _, name in MADE), loops)
+
+
+def test_every_kind_of_part_is_known_to_loop_plan_and_plugins():
+    """What docs/architecture.md says that a new kind of part touches."""
+    plan = load(ROOT / "own_vessel.yaml").scenario.plan()
+    sections = {name.replace("law", "controller"): part for name, part in plan.loop.parts.items()}
+    assert {name: getattr(plan.loop, name) for name in BASES} == sections
+    assert {f"{section}s" for section in BASES} <= set(ROOMS)
+    assert tuple(function.part for function in plan.functions) == Parts._fields
+    for name in plan.loop.parts:
+        assert name in plan.constants
+        assert {name, f"{name}_table"} <= set(Vectors._fields)
+        assert name in {function.owner for function in plan.functions}

@@ -74,7 +74,7 @@ def parts(plugins: Known) -> Iterator[Part]:
     """All parts, in the order of the list."""
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import first_sentence, kinds
-    from podusv_cli.scenario.plugins import BASES
+    from podusv_cli.scenario.model import BASES
     from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
     for section, summaries in kinds(plugins).items():

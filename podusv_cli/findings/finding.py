@@ -20,11 +20,10 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.scenario.load import Loaded
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.model import BASES, Scenario
 
 # A kind of finding may be in the file of the component that it is about.
-PARTS = ("paths", "disturbances", "actuators", "measurements", "estimators", "controllers")
-PACKAGES = ("findings", *(f"components.{part}" for part in PARTS))
+PACKAGES = ("findings", *(f"components.{section}s" for section in BASES))
 
 
 @cache

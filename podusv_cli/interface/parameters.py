@@ -14,7 +14,6 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.interface.border import ParameterError
 from podusv_cli.scenario.address import (
-    PER_RUN,
     Number,
     ValueRefused,
     content,
@@ -25,7 +24,7 @@ from podusv_cli.scenario.address import (
     with_values,
 )
 from podusv_cli.scenario.load import values
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.model import PER_RUN, Scenario
 from podusv_cli.scenario.yaml_tree import Route, bracketed, route
 
 Columns = dict[str, list[Any]]  # by key, with one value a run

@@ -17,14 +17,8 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import hint
 from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import Key, keys_of
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.model import PER_RUN, Scenario
 from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
-
-# The sections in which runs of one compiled loop may differ.
-PER_RUN = (
-    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
-    "controller",
-)  # fmt: skip
 
 
 class Number(NamedTuple):

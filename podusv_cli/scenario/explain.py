@@ -14,7 +14,7 @@ from podusv_cli.core.phrases import as_yaml, did_you_mean
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.keys import NAME, NO_DEFAULT, NUMBER, Key, either, keys_of
-from podusv_cli.scenario.model import Scenario, scenario_class
+from podusv_cli.scenario.model import BASES, Scenario, scenario_class
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route, with_dotted_key
 
@@ -156,8 +156,7 @@ def _with_contents(keys: list[Key]) -> list[Row]:
 @cache
 def signals(plugins: Plugins = ()) -> tuple[Signal, ...]:
     """Every signal that a run of podusv can log or give; a name may have several meanings."""
-    parts = ("controllers", "paths", "disturbances", "actuators", "measurements", "estimators")
-    packages = ("core", *(f"components.{part}" for part in parts), "theory")
+    packages = ("core", *(f"components.{section}s" for section in BASES), "theory")
     rooms = (f"podusv_cli.{package}" for package in packages)
     return tuple(registry.signals(*rooms, plugins=plugins))
 

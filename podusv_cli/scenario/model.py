@@ -69,7 +69,13 @@ Summands = Annotated[
     Annotated[Part, Tag("one")] | Annotated[tuple[Part, ...], Field(strict=False), Tag("several")],
     Discriminator(lambda given: "several" if isinstance(given, (list, tuple)) else "one"),
 ]
-PARTS = ("path", "disturbance", "actuator", "measurement", "estimator", "controller")
+# The sections whose kinds are components, found in the room and in plug-ins called `<section>s`.
+BASES: dict[str, type[Component]] = {
+    "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
+    "estimator": Estimator, "controller": Controller,
+}  # fmt: skip
+# The sections in which runs of one compiled loop may differ.
+PER_RUN = ("vessel", "nominal", "start", *BASES)
 DISTURBANCE = "what the sea does; those of a list add up"
 
 
@@ -166,7 +172,7 @@ class Scenario(Component):
     @property
     def recorded(self) -> tuple[str, ...]:
         """The sections that are only values of a finished run."""
-        parts = {name: getattr(self, name) for name in PARTS}
+        parts = {name: getattr(self, name) for name in BASES}
         several = {
             name: part if isinstance(part, tuple) else (part,) for name, part in parts.items()
         }
@@ -332,16 +338,14 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
 
 @cache
 def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
-    law: Any = any_of("podusv_cli.components.controllers", Controller, plugins)
-    sea: Any = any_of("podusv_cli.components.disturbances", Disturbance, plugins)
-    annotations: dict[str, Any] = {
-        "path": any_of("podusv_cli.components.paths", Path, plugins),
+    kinds: dict[str, Any] = {
+        name: any_of(f"podusv_cli.components.{name}s", base, plugins)
+        for name, base in BASES.items()
+    }
+    sea: Any = kinds["disturbance"]
+    annotations = kinds | {
         "disturbance": Summands[sea],  # type: ignore[misc]
-        "measurement": any_of("podusv_cli.components.measurements", Measurement, plugins),
-        "estimator": any_of("podusv_cli.components.estimators", Estimator, plugins),
-        "actuator": any_of("podusv_cli.components.actuators", Actuator, plugins),
-        "controller": law,
-        "controllers": GenericAlias(dict, (str, law)),
+        "controllers": GenericAlias(dict, (str, kinds["controller"])),
     }
     fields: dict[str, Any] = {
         name: (annotation, Scenario.model_fields[name]) for name, annotation in annotations.items()

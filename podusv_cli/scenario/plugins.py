@@ -11,19 +11,13 @@ from typing import Any, Literal
 
 from pydantic import create_model
 
-from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.components.controllers.base import Controller
-from podusv_cli.components.disturbances.base import Disturbance
-from podusv_cli.components.estimators.base import Estimator
-from podusv_cli.components.measurements.base import Measurement
-from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import VESSELS
-from podusv_cli.core.component import Component, Recorded, value
+from podusv_cli.core.component import Recorded, value
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.phrases import did_you_mean, found, quoted
 from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
 from podusv_cli.scenario.keys import keys_of
-from podusv_cli.scenario.model import Scenario, scenario_class
+from podusv_cli.scenario.model import BASES, Scenario, scenario_class
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import read_text
@@ -32,10 +26,6 @@ from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
 FINISHED = ("manifest.json", "study.json", "tune.json")  # folders of podusv have one of these
-BASES: dict[str, type[Component]] = {
-    "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
-    "estimator": Estimator, "controller": Controller,
-}  # fmt: skip
 
 
 def with_given(root: Node, files: Sequence[str | Plugin]) -> Node:

@@ -6,11 +6,11 @@ from typing import Any
 
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.kernel import Vector, kernel, taking
-from podusv_cli.engine.machine.signatures import SIGNATURES
+from podusv_cli.engine.step.layout import SIGNATURES
 
 BEGIN, END = 0.4999, 0.5001
 MANY = 100_000_000
-plain = taking(Pid.law, SIGNATURES["law"].split())
+plain = taking(Pid.law, SIGNATURES["law"])
 
 
 @kernel

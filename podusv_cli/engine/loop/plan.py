@@ -29,7 +29,7 @@ from podusv_cli.engine.loop.closed_loop import (
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.step.delay_line import delay_line
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Vectors
+from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Parts, Vectors
 
 FORCES, SEA = LOADS[:3], LOADS[3:]
 SHOWN = tuple(f"{name}, shown" for name in TARGET)  # which no log has
@@ -46,7 +46,7 @@ OWNERS = {
 class Function(NamedTuple):
     """What the loop calls as one of its parts, and the names of the constants that it reads."""
 
-    part: str  # in `signatures.SIGNATURES`
+    part: str  # a field of `Parts`
     kernel: Any
     constants: tuple[str, ...]
 
@@ -180,7 +180,7 @@ class Plan:
         }  # fmt: skip
         return tuple(  # what does nothing reads nothing: its code is one for all
             Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
-            for part, inner in kernels.items()
+            for part, inner in zip(Parts._fields, Parts(**kernels), strict=True)
         )
 
     @property

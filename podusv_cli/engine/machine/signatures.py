@@ -1,4 +1,4 @@
-"""The few signatures that the loop calls through.
+"""What the loop calls, as machine code takes it.
 
 A component's kernel takes those arguments that it names, its constants as a named tuple `k`; the
 loop hands over all of them, and `k` as a bare vector. `bind` makes the adapter between the two.
@@ -15,28 +15,12 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.kernel import LANES, Vector, taking, unpacker
+from podusv_cli.engine.step.layout import NUMBERS, SIGNATURES
 
 NUMBER, WHOLE = c_double, c_int64
-NUMBERS = ("t", "instant", "weight", "again", "stage")
 VECTOR = POINTER(NUMBER)
-# The arguments of every part, in the order in which the loop takes the parts. The time t, an
-# instant's position, its weight in an integral [s], and whether an evaluation is one more at its
-# instant or a stage within a step are numbers, all others vectors.
-SIGNATURES = {
-    "path": "t x place k table target shown",
-    "locate": "t x s place k table",
-    "disturbance": "t x k table b again stage",
-    "law": "t x memory target k table tau rate signals work",
-    "sample": "t x memory target k table",
-    "actuator": "t x state demand k table tau rate signals",
-    "after_saturation": "t memory demand tau k table rate",
-    "measurement": "t instant x b k table seen",
-    "correct": "t seen state k table",
-    "follow": "t seen tau state k table rate",
-    "probe": "t weight s row k seen",
-}
 PROTOTYPES: dict[str, Any] = {
-    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments.split()))
+    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else VECTOR for a in arguments))
     for part, arguments in SIGNATURES.items()
 }
 ADVANCE = CFUNCTYPE(
@@ -48,7 +32,7 @@ RATES_ALONG = CFUNCTYPE(
 # The same where every number of a vector is one number a lane.
 LANE_VECTOR = POINTER(NUMBER * LANES)
 LANE_PROTOTYPES: dict[str, Any] = {
-    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else LANE_VECTOR for a in arguments.split()))
+    part: CFUNCTYPE(None, *(NUMBER if a in NUMBERS else LANE_VECTOR for a in arguments))
     for part, arguments in SIGNATURES.items()
 }
 ADVANCE_LANES = CFUNCTYPE(
@@ -64,7 +48,7 @@ def bind(part: str, inner: Any, names: tuple[str, ...], alike: Set[str] = frozen
     Those in `alike` are the same in all runs that march side by side. Raises LawError for a kernel
     that names an argument which the part does not have.
     """
-    return taking(inner, SIGNATURES[part].split(), unpacker(names, alike))
+    return taking(inner, SIGNATURES[part], unpacker(names, alike))
 
 
 def pointer(vector: Vector) -> Any:

@@ -17,7 +17,7 @@ from podusv_cli.engine.running.lanes import MARCHING, Lanes, room, shared_consta
 from podusv_cli.engine.running.simulate import March
 from podusv_cli.engine.running.stepped import CHANGING, Unchanged
 from podusv_cli.engine.step.lane_march import REACHED
-from podusv_cli.engine.step.layout import Vectors
+from podusv_cli.engine.step.layout import SIGNATURES, Vectors
 
 NOTHING: frozenset[str] = frozenset()
 
@@ -33,7 +33,7 @@ def in_lanes(
     from podusv_cli.engine.machine import compile  # only what marches side by side needs it
 
     routine = compile.routine(compile.lane_adapter(part, kernel, names, frozenset(shared)))
-    given = [vectors.get(name, room(LANES)) for name in signatures.SIGNATURES[part].split()[1:]]
+    given = [vectors.get(name, room(LANES)) for name in SIGNATURES[part][1:]]
     pointers = [vector.ctypes.data_as(signatures.LANE_VECTOR) for vector in given]
     return lambda t: routine(t, *pointers)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from podusv_cli.core.kernel import Vector, kernel
 
@@ -11,19 +11,31 @@ Function = Callable[..., None]
 
 
 class Parts(NamedTuple):
-    """The functions that the loop calls, in the order of `signatures.SIGNATURES`."""
+    """The functions that the loop calls, each with its arguments.
 
-    path: Function
-    locate: Function
-    disturbance: Function
-    law: Function
-    sample: Function
-    actuator: Function
-    after: Function
-    measurement: Function
-    correct: Function
-    follow: Function
-    probe: Function
+    The time t, an instant's position, its weight in an integral [s], and whether an evaluation is
+    one more at its instant or a stage within a step are numbers, all others vectors.
+    """
+
+    path: Annotated[Function, "t x place k table target shown"]
+    locate: Annotated[Function, "t x s place k table"]
+    disturbance: Annotated[Function, "t x k table b again stage"]
+    law: Annotated[Function, "t x memory target k table tau rate signals work"]
+    sample: Annotated[Function, "t x memory target k table"]
+    actuator: Annotated[Function, "t x state demand k table tau rate signals"]
+    after_saturation: Annotated[Function, "t memory demand tau k table rate"]
+    measurement: Annotated[Function, "t instant x b k table seen"]
+    correct: Annotated[Function, "t seen state k table"]
+    follow: Annotated[Function, "t seen tau state k table rate"]
+    probe: Annotated[Function, "t weight s row k seen"]
+
+
+NUMBERS = ("t", "instant", "weight", "again", "stage")
+# The names of the arguments of every function, in the order in which the loop takes them.
+SIGNATURES: dict[str, tuple[str, ...]] = {
+    part: tuple(hint.__metadata__[0].split())
+    for part, hint in get_type_hints(Parts, include_extras=True).items()
+}
 
 
 def spread(march: Any) -> Any:

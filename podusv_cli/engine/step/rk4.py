@@ -108,7 +108,7 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
         wanted = tail(c.delay_line, GIVEN)
     drive(t, s, ds, wanted, p, c, n)
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
-        p.after(t, memory, demand, tau, k, table, memory_rate)
+        p.after_saturation(t, memory, demand, tau, k, table, memory_rate)
     if n.measured > 0:
         p.follow(
             t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate)
@@ -177,7 +177,7 @@ def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> Non
     if n.follows > 0:
         p.locate(t, tail(c.s, n.estimate), c.s, tail(c.s, n.place), c.path, c.path_table)
     if n.sample_every > 0 or n.hold_every > 0:
-        sample_and_hold(k, t, h, p.path, p.law, p.sample, p.after, c, n)
+        sample_and_hold(k, t, h, p.path, p.law, p.sample, p.after_saturation, c, n)
     rates(t, c.s, c.stages, p, c, n, again)
     measure(c.s, c.row)
 

@@ -16,7 +16,6 @@ from podusv_cli.engine.loop.plan import Plan, no_probe
 from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.address import (
-    PER_RUN,
     ValueRefused,
     content,
     described,
@@ -25,7 +24,7 @@ from podusv_cli.scenario.address import (
     no_entry,
 )
 from podusv_cli.scenario.load import Loaded, values
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.model import PER_RUN, Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route, dotted, route
