@@ -48,6 +48,7 @@ from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_probe, metrics_with
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import BASES
 from podusv_cli.testing_seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
@@ -199,7 +200,7 @@ def picture(sheet: Sheet, count: int, columns: int) -> bytes:
     waves = {name: np.sin(run["time"]) for name in sheet.signals if name not in known}
     about = {name: Signal(name, "1", "a wave") for name in waves}
     run = replace(run, signals={**run.signals, **waves}, about={**run.about, **about})
-    shown = dressed([(f"run {n}", run, scenario) for n in range(count)])
+    shown = dressed([(f"run {n}", run, about_of(scenario), ()) for n in range(count)])
     with house_style():
         return image(sheet.family(shown, columns), "png")
 

@@ -9,9 +9,10 @@ from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.claims import ParsedClaim
 from podusv_cli.comparison.entries import Absent, Entry
 from podusv_cli.comparison.expressions import parse
+from podusv_cli.core.about import Claim
 from podusv_cli.core.recording import Recording
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
-from podusv_cli.scenario.sections import Claim
 
 SCENARIO = """
 name: planted
@@ -33,6 +34,10 @@ FRAME = table.table(
 )
 
 
+def about(*overrides):
+    return about_of(scenario(*overrides))
+
+
 def scenario(*overrides):
     return load_text(SCENARIO, "a.yaml", overrides).scenario
 
@@ -49,7 +54,7 @@ class Folder:
 
 
 def verdicts():
-    runs = {"a": Entry("a", Folder({"iae": 3.0}), scenario()), "lost": Absent(scenario(), "killed")}
+    runs = {"a": Entry("a", Folder({"iae": 3.0}), about()), "lost": Absent(about(), "killed")}
     texts = {
         "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
     }  # fmt: skip

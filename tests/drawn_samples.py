@@ -11,6 +11,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
 
 TEXT = """
@@ -75,8 +76,12 @@ def recording(end=100.0, period=0.1, status="finished", shift=0.0, without=(), *
 def shown(*runs):
     """Recordings by label (with a scenario of their own, or the usual one) as figures take them."""
     usual = scenario()
-    triples = [(run[0], run[1], run[2] if len(run) > 2 else usual) for run in runs]
-    return dressed(triples)
+    return dressed([looked_at(label, log, *(own or [usual])) for label, log, *own in runs])
+
+
+def looked_at(label, log, plan):
+    """A recording with its scenario as figures take them."""
+    return label, log, about_of(plan), ()
 
 
 def drawn(name, runs, columns=2):

@@ -8,7 +8,7 @@ from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.scenario.model import Scenario
 
-COUNTED = ((ClosedLoop, "__init__"), (Vessel, "constants"), (Scenario, "singles"))
+COUNTED = ((ClosedLoop, "__init__"), (Vessel, "constants"), (Scenario, "in_numbers"))
 
 
 def loop_counts(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:

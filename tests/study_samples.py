@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.about import Claim
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.sections import Claim
 from podusv_cli.studies.counting.claims import ParsedClaim, judge, parse
 from podusv_cli.studies.counting.verdict import StudyVerdict
 from podusv_cli.studies.telling import summary as tables

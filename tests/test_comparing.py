@@ -10,6 +10,7 @@ import pytest
 from old_results import draw_quickly
 
 from podusv_cli.core.errors import ScenarioError
+from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
@@ -111,13 +112,15 @@ def test_other_differences_are_named(done, config, tmp_path):
     assert not done.result.differences
 
 
-def test_costs_are_measured_side_by_side(done, monkeypatch):
+def test_costs_are_measured_side_by_side(done, config, monkeypatch):
     def costs(runs):
         return [{"law_ns": float(place)} for place, _ in enumerate(runs)]
 
     monkeypatch.setattr(compare, "law_costs", costs)
     first, *rest = done.result.entries
-    entries = compare._with_costs([first, *rest], [one.label for one in rest], Extras())
+    singles = load(config).scenario.singles()
+    made = {one.label: Case.of(singles[one.label]) for one in rest}
+    entries = compare._with_costs([first, *rest], made, Extras())
     assert [entry.metric("law_ns") for entry in entries[1:]] == [0.0, 1.0]
     assert math.isnan(entries[0].metric("law_ns"))
 

@@ -3,15 +3,16 @@
 from dataclasses import replace
 
 import pytest
-from comparison_samples import FRAME, scenario, verdicts
+from comparison_samples import FRAME, about, scenario, verdicts
 from drawn_samples import recording, shown
 from html_tree import tree
 
-from podusv_cli.comparison import chase, report, settings, table
+from podusv_cli.comparison import chase, report, table
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.finding import Finding
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import Picture
+from podusv_cli.scenario.about import about_of
 
 MOVING = chase.chase(shown(("a", recording())))
 ERRORS = Picture("errors", "x_e & y_e, over <time>", b"<svg/>", "the paper's figure 4")
@@ -19,8 +20,7 @@ ERRORS = Picture("errors", "x_e & y_e, over <time>", b"<svg/>", "the paper's fig
 
 def page(**parts):
     story = {
-        "title": "planted", "scenario": scenario(),
-        "controllers": {"a": scenario().controller}, "endings": {"a": "", "lost": "killed <9>"},
+        "title": "planted", "abouts": {"a": about()}, "endings": {"a": "", "lost": "killed <9>"},
         "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}}, "table": FRAME,
         "noticed": [Finding("crosswise", "controller", "|x| < 1", ("<a>",))],
         "verdicts": verdicts(), "theories": {}, "figures": [ERRORS],
@@ -221,8 +221,8 @@ def test_the_report_has_scenario_and_provenance():
 )
 def test_what_a_scenario_sets_is_held_against_preset_and_default(override, told):
     plain, other = (
-        {(one.key, one.value, one.default) for one in settings.changed(some)}
-        for some in (scenario(), scenario(override))
+        {(one.key, one.value, one.default) for one in some.settings}
+        for some in (about(), about(override))
     )
     assert other - plain == told
     assert not plain - other
@@ -232,8 +232,8 @@ def test_legs_are_held_against_the_acceptance_that_follows_from_the_hull():
     """Legs have no points by default, so there are none that could be checked."""
     legs = "path={kind: legs, points: [[0, 0], [9, 0]]}"
     plain, other = (
-        {(one.key, one.value, one.default) for one in settings.changed(some)}
-        for some in (scenario(legs), scenario(legs, "path.acceptance=3"))
+        {(one.key, one.value, one.default) for one in some.settings}
+        for some in (about(legs), about(legs, "path.acceptance=3"))
     )
     assert other - plain == {("path.acceptance", "3", "2")}
 
@@ -242,17 +242,17 @@ def test_numbers_are_shown_where_none_follows_from_the_hull():
     """Nothing follows where the yaw moment is too small to turn the hull."""
     law = VelocityVector(**dict.fromkeys(VelocityVector.rules, 1.0))
     some = scenario("actuator.yaw_limit=5e-324").model_copy(update={"controller": law})
-    rows = {about.key: row[0].value for about, row in settings.laws({"a": law}, some)}
+    rows = {key.key: row[0].value for key, row in report.laws([about_of(some).law])}
     assert rows["N_m"] == "1"
 
 
 def test_a_law_is_held_against_its_defaults_and_the_other_laws():
-    laws = {"a": scenario("controller.K_Pu=7").controller, "b": scenario().controller}
-    rows = {about.key: [one.value for one in row] for about, row in settings.laws(laws)}
+    laws = [about("controller.K_Pu=7").law, about().law]
+    rows = {key.key: [one.value for one in row] for key, row in report.laws(laws)}
     assert list(rows) == ["kind", "K_Pu"]
     assert rows["K_Pu"] == ["7", "1100"]
     pods = "actuator={kind: pod, preset: cybership2_pod}"
-    kept = {one.key for one in settings.changed(scenario(pods))}
+    kept = {one.key for one in about(pods).settings}
     assert {key for key in kept if key.startswith("actuator")} == {
         "actuator.kind", "actuator.preset",
     }  # fmt: skip

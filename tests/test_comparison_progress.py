@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from comparison_samples import Folder, scenario
+from comparison_samples import Folder, about
 from known_signals import ABOUT
 
 from podusv_cli.cli import progress
@@ -37,7 +37,7 @@ def test_drawing_is_progress_too():
     signals = dict.fromkeys(("time", "x", "y", "x_d", "y_d", "psi", "u", "v", "r"), t)
     run = Folder({})
     run.recording = Recording("finished", "pid", signals, about=ABOUT)
-    entry = Entry("a", run, scenario())
+    entry = Entry("a", run, about())
     result = outputs.Result({}, [entry], {}, {}, pd.DataFrame(), [], {}, {})
     drawn = outputs.drawn(result, Extras(), lambda name, fraction: seen.append((name, fraction)))
     assert "velocities.png" in drawn

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from comparison_samples import FRAME, Folder, scenario, verdicts
+from comparison_samples import FRAME, Folder, about, scenario, verdicts
 from matplotlib.mathtext import MathTextParser
 
 from podusv_cli.comparison import claims, table
@@ -203,7 +203,7 @@ def test_where_kinds_differ_only_the_kind_and_what_both_have_is_shown():
 
 
 def test_an_entry_answers_for_its_run():
-    entry = Entry("a", Folder({"iae": 3.0, "rmse": None, "law_ns": 7.0}), scenario(), {"law_ns": 9})
+    entry = Entry("a", Folder({"iae": 3.0, "rmse": None, "law_ns": 7.0}), about(), {"law_ns": 9})
     assert (entry.metric("iae"), entry.metric("law_ns")) == (3.0, 9.0)
     assert math.isnan(entry.metric("rmse"))
     assert math.isnan(entry.metric("ise"))
@@ -215,15 +215,15 @@ def test_an_entry_answers_for_its_run():
 
 def test_an_entry_is_off_its_target_beyond_the_settling_radius_but_in_a_trial():
     near, far = (Folder({"e_steady": error}) for error in (0.9, 1.1))
-    assert [Entry("a", run, scenario()).off_target for run in (near, far)] == [False, True]
-    assert not Entry("a", far, scenario("metrics.settling_radius=2")).off_target
-    assert not Entry("a", far, scenario("controller={kind: zigzag}")).off_target
-    assert not Entry("a", Folder({"e_steady": 1.1}, "diverged"), scenario()).off_target
+    assert [Entry("a", run, about()).off_target for run in (near, far)] == [False, True]
+    assert not Entry("a", far, about("metrics.settling_radius=2")).off_target
+    assert not Entry("a", far, about("controller={kind: zigzag}")).off_target
+    assert not Entry("a", Folder({"e_steady": 1.1}, "diverged"), about()).off_target
 
 
 def test_an_entry_that_diverged_has_no_metrics_and_ends_early():
     run = Folder({"iae": 3.0}, "diverged", "diverged at t = 3.5 s: u is not finite; last ...")
-    entry = Entry("a", run, scenario(), {"law_ns": 9.0})
+    entry = Entry("a", run, about(), {"law_ns": 9.0})
     assert math.isnan(entry.metric("iae"))
     assert math.isnan(entry.metric("law_ns"))
     assert (entry.until, entry.ending) == (3.0, "diverged at t = 3.5 s")
@@ -232,7 +232,7 @@ def test_an_entry_that_diverged_has_no_metrics_and_ends_early():
 
 
 def test_an_absent_run_has_nothing_but_its_scenario():
-    absent = Absent(scenario(), "Traceback\n  File\nZeroDivisionError: oops\n")
+    absent = Absent(about(), "Traceback\n  File\nZeroDivisionError: oops\n")
     assert absent.ending == "has no log: ZeroDivisionError: oops"
     assert math.isnan(absent.metric("iae"))
     assert (len(absent.signal("x")), absent.until) == (0, 0.0)
@@ -241,7 +241,7 @@ def test_an_absent_run_has_nothing_but_its_scenario():
 
 
 def test_whether_an_interrupted_run_would_have_finished_cannot_be_told():
-    assert CHECKS["finished"](scenario(), "interrupted") is None
+    assert CHECKS["finished"](about(), "interrupted") is None
 
 
 # --- verdicts

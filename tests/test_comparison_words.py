@@ -12,8 +12,8 @@ from test_reproduction import rerun
 from podusv_cli.comparison.claims import ParsedClaim, judge
 from podusv_cli.comparison.curves import Curve, decay, pointwise
 from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
+from podusv_cli.core.about import Claim
 from podusv_cli.scenario.load import load
-from podusv_cli.scenario.sections import Claim
 
 CORRECTED = Path(__file__).parent.parent / "configs/mu_2017/corrected.yaml"
 

@@ -13,9 +13,9 @@ from command_samples import PATIENCE, under_way
 from html_tree import tree
 
 import podusv
-from podusv_cli.comparison import claims
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.comparison.expressions import Evaluation
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP, explored
@@ -24,6 +24,7 @@ from podusv_cli.doubt.choices import Choice, Range, choices, public
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import counted, drawn, explained
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.sweep import Quantity
@@ -479,14 +480,14 @@ def logged(leg):
     run = InMemory(
         Path(), "finished", {}, {}, "", kept=Recording("finished", "pid", signals, about=about)
     )
-    return {"a": Entry("a", run, scenario(WRITTEN))}
+    return {"a": Entry("a", run, about_of(scenario(WRITTEN)))}
 
 
 def test_the_event_nearest_to_a_window_is_named():
     text = WRITTEN.replace("expect: final(a.u)", "expect: 'max(abs(a.u), 2, 6.5)").replace(
         ", tol", "', tol", 1
     )
-    parsed, _ = claims.parse_claims(load_text(text, "a.yaml"))
+    parsed, _ = parse_claims(load_text(text, "a.yaml"))
     event = nearest_event(parsed, logged(lambda t: float(t > 1.25) + float(t > 6.85)))
     assert (event.run, event.signal, event.value, event.edge) == ("a", "leg", 2.0, 6.5)
     assert event.gap == pytest.approx(0.4)  # logged each 0.1 s

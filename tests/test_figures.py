@@ -6,14 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_samples import CENTER, WIDTH, drawn, line, panels, recording, scenario, shown
+from drawn_samples import (
+    CENTER,
+    WIDTH,
+    drawn,
+    line,
+    looked_at,
+    panels,
+    recording,
+    scenario,
+    shown,
+)
 from known_signals import ABOUT
 from matplotlib.cbook import is_math_text
 from matplotlib.text import Text
 from rerun_samples import made
 from scenario_samples import SOUND
 
-from podusv_cli.comparison.claims import parse_claims, peaks
+from podusv_cli.comparison.claims import peaks
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core import escaping
 from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures.animation import stage
@@ -22,6 +33,7 @@ from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.looks import LOOKS, nth_style
 from podusv_cli.figures.shown import FEWEST, axis_label, dressed, label, places
 from podusv_cli.figures.style import WIDTHS, house_style, image, new_figure
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.members import from_folder
 
@@ -145,7 +157,7 @@ def test_the_distance_is_shown_down_to_a_step_s_way_or_where_the_vessel_stays(pa
     near = {"z_e": lambda t: np.where(np.abs(t - 50.0) < 0.05 * passage, 1e-6, 1.0)}
     runs = shown(("a", recording(u=lambda t: 0.5 + 0.0 * t, **near)))
     bottom = panels(drawn("errors", runs))["$z_e$ [m]"].get_ylim()[0]
-    assert runs[0].scenario.simulation.step == 0.01
+    assert runs[0].about.step == 0.01
     assert 0.5 * lowest < bottom <= lowest * 1.0001
 
 
@@ -285,7 +297,7 @@ def runs(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs")
     folders = [made(place / x, f"path.x={x}", text=SCENARIO + BRIEF) for x in ("1", "2")]
     (one,), (other,) = map(from_folder, folders)
-    return labelled([(part.run.recording, part.scenario) for part in (one, other)])
+    return labelled([(part.run.recording, part.about) for part in (one, other)])
 
 
 @pytest.fixture
@@ -294,11 +306,11 @@ def followed():
     path = "{kind: waypoints, points: [[0, 0], [20, 0]], speed: 0.5}"
     legs = {"e_ct": np.cos, "along_leg": np.sqrt, "leg": np.floor}
     log, following = recording(**legs), scenario(path=path)
-    return labelled([(log, following)] * 2)
+    return labelled([(log, about_of(following))] * 2)
 
 
 def labelled(parts):
-    return dressed([(label, *part) for label, part in zip(ODD, parts, strict=True)])
+    return dressed([(label, *part, ()) for label, part in zip(ODD, parts, strict=True)])
 
 
 @pytest.mark.slow
@@ -375,7 +387,7 @@ def test_a_claim_that_names_a_peak_is_found_and_drawn_in_the_panel_of_the_demand
     loaded = load(CONFIGS / "mu_2017/figures_compare_standoff.yaml")
     found = peaks(parse_claims(loaded))
     assert found == {"tau_u_cmd": 300.0, "tau_r_cmd": 1000.0}
-    runs = dressed([("a", recording(), scenario())], found)
+    runs = dressed([looked_at("a", recording(), scenario())], found)
     with house_style():
         axes = FIGURES["controls"].family(runs, 2).axes
     levels = {

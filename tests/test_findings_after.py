@@ -16,7 +16,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import finding_kinds, postflight, preflight
 from podusv_cli.findings.limit_cycle import limit_cycle
 from podusv_cli.findings.outcome import saturated
-from podusv_cli.findings.proof import argument, input_rank
+from podusv_cli.findings.proof import argument
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 
@@ -342,7 +342,7 @@ def test_every_hull_with_every_actuator_is_underactuated(hull, actuator):
         [[vessel.m11, 0, 0], [0, vessel.m22, vessel.m23], [0, vessel.m32, vessel.m33]]
     )
     accelerations = np.linalg.solve(inertia, drive.input_matrix())
-    assert np.linalg.matrix_rank(accelerations) == input_rank(drive) == 2 < 3
+    assert np.linalg.matrix_rank(accelerations) == drive.input_rank() == 2 < 3
     text = argument(scene().model_copy(update={"vessel": vessel, "actuator": drive}))
     assert text.startswith("underactuated: ")
     assert f"{actuator} on {hull} is " in text
@@ -352,7 +352,7 @@ def test_every_hull_with_every_actuator_is_underactuated(hull, actuator):
 def test_a_third_input_is_told_apart(monkeypatch):
     drive = ACTUATORS["ideal"]
     monkeypatch.setattr(type(drive), "input_matrix", lambda self: np.eye(3))
-    assert input_rank(drive) == 3
+    assert drive.input_rank() == 3
     assert argument(scene()).startswith("fully actuated: ")
 
 

@@ -13,8 +13,8 @@ from continuous import continuous
 from findings_samples import BARE, CONFIGS, PLAIN, codes, finding, late, log, scene, simulated
 
 from podusv_cli.components.controllers.velocity_loop import Loop
-from podusv_cli.core.finding import Finding
-from podusv_cli.findings.finding import merged, preflight
+from podusv_cli.core.finding import Finding, merged
+from podusv_cli.findings.finding import preflight
 from podusv_cli.findings.outcome import saturated
 from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth
 from podusv_cli.scenario.load import load

@@ -349,6 +349,8 @@ def test_the_documentation_names_all_that_there_is():
             "label",
             "recording",
             "numbers",
+            "about",
+            "given",
         }
 
 

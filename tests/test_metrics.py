@@ -8,7 +8,7 @@ import pytest
 from command_samples import TWO, write
 from conftest import NONLINEAR, POD, Constant, corrected, example, target_at
 
-from podusv_cli.comparison.claims import parse_claims
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural

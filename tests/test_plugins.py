@@ -138,16 +138,64 @@ def test_a_finished_run_is_looked_at_without_reading_its_file(podusv):
     assert podusv("rerun", "c/soft", "--trust").code == 2
 
 
-@pytest.mark.parametrize("words", [("plot",), ("diff",), ("compare", "--no-figures")])
-def test_looking_at_finished_runs_builds_no_loop(podusv, monkeypatch, words):
+LOOKS = {
+    "plot": ("plot", "--figure", "trajectory", "--out", "looked"), "diff": ("diff",),
+    "compare": ("compare", "--figure", "errors", "--out", "looked"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", LOOKS.values(), ids=LOOKS)
+def test_looking_at_finished_runs_makes_no_scenario_and_no_loop(podusv, monkeypatch, words):
     podusv("compare", put(TWO), "--out", "c", *QUIET)
     shutil.rmtree("laws")
-    calls = loop_counts(monkeypatch)
-    command, *options = words
-    out = () if command == "diff" else ("--out", "looked")
-    figure = ("--figure", "trajectory") if command == "plot" else ()
-    assert podusv(command, "c/soft", "c/pid", *out, *figure, *options).code in (0, 3)
+    calls, (command, *options) = loop_counts(monkeypatch), words
+    assert podusv(command, "c/soft", "c/pid", *options).code in (0, 3)
     assert not calls
+    podusv("rerun", "c/pid", "--trust")
+    assert calls["Scenario"] > 0
+    assert calls["ClosedLoop"] > 0
+
+
+def without_about(folder):
+    """A run folder as podusv wrote it before there was about.json."""
+    (Path(folder) / "about.json").unlink()
+    path = Path(folder) / "manifest.json"
+    whole = json.loads(path.read_text())
+    del whole["files"]["about.json"]
+    path.write_text(json.dumps(whole))
+
+
+def test_a_run_of_before_is_looked_at_where_its_components_are_at_hand(podusv):
+    podusv("compare", put(TWO), "--out", "c", *QUIET)
+    shutil.move("laws/my_law.py", "own.py")
+    pictures = []
+    for folder in ("with", "without"):
+        said = podusv("plot", "c/pid", "c/soft", "--out", folder, "--plugin", "own.py")
+        assert said.code == 0
+        pictures.append({path.name: path.read_bytes() for path in Path(folder).iterdir()})
+        if folder == "with":
+            without_about("c/pid")
+            without_about("c/soft")
+    assert pictures[0] == pictures[1]
+    assert podusv("plot", "c/pid", "--figure", "errors", "--out", "alone").code == 0
+    assert podusv("diff", "c/soft", "c/pid").code == 3
+    assert "identical" in podusv("rerun", "c/soft", "--trust").out
+    for words in (("plot", "c/soft"), ("compare", "c/soft", "c/pid", "--out", "d")):
+        said = podusv(*words)
+        assert (said.code, said.out) == (2, "")
+        assert "c/soft: an older podusv wrote it without about.json" in one_line(said.err)
+        assert "unknown kind 'cross_track'" in said.err
+        assert "podusv rerun c/soft --trust --out NEW" in one_line(said.err)
+    Path("own.py").write_text(LAW + "\n")
+    assert podusv("plot", "c/soft", "--plugin", "own.py").code == 2
+
+
+def test_a_run_says_about_itself_what_its_plug_in_would_say(podusv):
+    podusv("run", put(), "--out", "r", *QUIET)
+    told = json.loads(Path("r/about.json").read_text())
+    assert told["values"]["controller"] == {"kind": "cross_track", "gain": 0.5}
+    (gain,) = (one for one in told["law"] if one["key"] == "gain")
+    assert (gain["value"], gain["unit"]) == ("0.5", "N/m")
 
 
 def test_an_edit_is_noticed_by_the_code_cache_and_in_the_name(podusv):

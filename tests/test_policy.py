@@ -15,7 +15,7 @@ from podusv_cli.components.controllers.policy import INPUTS, OBSERVED, Policy, o
 from podusv_cli.components.controllers.policy_weights import tensors
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import bundle, call
-from podusv_cli.pages.page import value_text
+from podusv_cli.core.phrases import value_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.studies.tuning.space import AROUND, gains

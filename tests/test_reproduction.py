@@ -13,10 +13,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from podusv_cli.comparison.claims import judge, parse_claims
+from podusv_cli.comparison.claims import judge
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.engine.running import simulate as simulation
 from podusv_cli.metrics.operations import operations
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
 
@@ -85,7 +87,7 @@ def rerun(scenario):
     recording = simulation.run(plan)
     numbers = plan.probe.summary(recording.seen) | operations(plan, recording)
     run = SimpleNamespace(recording=recording, metrics=numbers)
-    return Entry("", run, scenario)
+    return Entry("", run, about_of(scenario))
 
 
 def signs(letter, sets, laws=("adaptive_neural", "full_backstepping", "pid")):

@@ -11,9 +11,9 @@ from known_signals import ABOUT
 from pydantic import Discriminator
 from pydantic.types import Strict
 
-from podusv_cli.comparison.settings import settings
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.components.vessels.vessel import VESSELS as SHIPPED
+from podusv_cli.core.about import Claim
 from podusv_cli.core.component import Component
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
@@ -30,7 +30,7 @@ from podusv_cli.scenario.keys import (
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.schema import json_schema
-from podusv_cli.scenario.sections import Claim
+from podusv_cli.scenario.settings import settings
 from podusv_cli.scenario.yaml_tree import dotted
 
 

@@ -12,8 +12,8 @@ from scenario_samples import SOUND, findings
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.core.kernel import bundle, call
+from podusv_cli.core.phrases import value_text
 from podusv_cli.core.timed_rows import LARGEST
-from podusv_cli.pages.page import value_text
 from podusv_cli.scenario.load import load, resolved_yaml
 
 

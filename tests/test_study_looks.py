@@ -112,6 +112,13 @@ def test_a_study_json_of_before_is_read_with_the_scenario_beside_it(study, plant
     old |= {"format": 1, "metrics_of_plugins": {"largest_east": facts}}
     del facts["name"]
     (study / "study.json").write_text(json.dumps(old))
+    said = podusv("sweep", "report", study, "--no-figures")
+    assert said.code == 2
+    assert "controllers.mine.kind: unknown kind 'cross_track'" in said.err
+    assert f"have study.json written anew: podusv sweep run {study} --trust" in said.err
+    assert not (planted / MARK).exists()
+    assert podusv("sweep", "run", study, "--no-figures", "--trust").code == 0
+    (planted / MARK).unlink()
     assert podusv("sweep", "report", study, "--no-figures").code == 0
     assert {name: (study / name).read_bytes() for name in told} == before
     assert "largest |y|" in (study / "report.html").read_text()

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import NONLINEAR, PAPER
+from drawn_samples import looked_at
 from matplotlib.axes import Axes
 
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
@@ -248,7 +249,7 @@ def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path, log):
 
 def test_a_stack_shows_parts_that_make_up_all_of_V(log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    shown = dressed([("one", log, scenario), ("other", log, scenario)])
+    shown = dressed([looked_at(label, log, scenario) for label in ("one", "other")])
     value, _, *stacks = FIGURES["stability"].family(shown, 2).axes
     assert value.get_yscale() == "log"
     for stack in stacks:
@@ -264,7 +265,7 @@ def tops_of(stack: Axes) -> list[float]:
 
 def test_V_of_a_single_run_is_stacked_below_its_bound(log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    stack = FIGURES["stability"].family(dressed([("one", log, scenario)]), 2).axes[0]
+    stack = FIGURES["stability"].family(dressed([looked_at("one", log, scenario)]), 2).axes[0]
     tops = tops_of(stack)
     assert len(tops) == len(TERMS)
     width = -(-len(log["V"]) // POINTS)

@@ -35,8 +35,9 @@ def validate(
     Exit code 0, with a line for each finding; 2 with a line for each fault; or 5 for a study that
     fits neither on the disk nor into memory.
     """
-    from podusv_cli.comparison.claims import parse_claims
-    from podusv_cli.findings.finding import Case, merged, unknown_codes
+    from podusv_cli.comparison.parsing import parse_claims
+    from podusv_cli.core.finding import merged
+    from podusv_cli.findings.finding import Case, unknown_codes
     from podusv_cli.scenario.limits import largest, limits
     from podusv_cli.scenario.load import load
     from podusv_cli.scenario.plugins import of_files

@@ -54,16 +54,15 @@ def _track(run: Shown) -> dict[str, Any]:
     count = len(run.recording["time"])
     rows = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
     names = ("time", *WHERE, *(("x_d", "y_d", "z_e") if run.has("z_e") else ()))
-    legs = np.array(run.scenario.path.waypoints() if run.scenario.path.follows else ())
-    approach = run.scenario.controller.approach()
+    legs = np.array(run.about.waypoints if run.about.follows else ())
     stopped = f"{run.recording.status} at t = {run.end:g} s"
     return {
         "label": run.label,
         "color": run.color,
         "dash": [] if run.linestyle == "-" else list(run.linestyle[1]),
         "length": run.length,
-        "beam": run.scenario.vessel.beam,
-        "standoff": approach.standoff if approach else 0.0,
+        "beam": run.about.beam,
+        "standoff": run.about.standoff,
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
         "legs": [_rounded(axis) for axis in legs.T],
         **{

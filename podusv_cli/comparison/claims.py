@@ -1,4 +1,4 @@
-"""Claims of a scenario: parsed, judged, and written as JSON and Markdown."""
+"""Claims about runs: judged, and written as JSON and Markdown."""
 
 from __future__ import annotations
 
@@ -9,16 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from podusv_cli.comparison.curves import Source
-from podusv_cli.comparison.expressions import Evaluation, parse, with_labels
-from podusv_cli.core.errors import ScenarioError
+from podusv_cli.comparison.expressions import Evaluation, with_labels
+from podusv_cli.core.about import Claim, MetricAbout
 from podusv_cli.core.escaping import markdown
-from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.expressions.verdict import Verdict, as_markdown
-from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
-from podusv_cli.scenario import explain
-from podusv_cli.scenario.load import Loaded
-from podusv_cli.scenario.sections import Claim
 
 
 @dataclass(frozen=True)
@@ -82,29 +77,6 @@ def is_timed(claim: Claim) -> bool:
     return any(f".{name}" in claim.expect for name in CLOCKED)
 
 
-def parse_claims(loaded: Loaded) -> list[ParsedClaim]:
-    """The claims of a scenario. Raises ScenarioError with a line for each invalid one."""
-    scenario, claims, faults = loaded.scenario, [], []
-    signals = {signal.name: signal for signal in explain.signals(scenario.plugged)}
-    metrics = scenario.known_metrics()
-    for plan in loaded.plans.values():
-        signals |= scenario.about(plan)
-    for name, claim in scenario.claims.items():
-        trees: dict[str, ast.expr] = {}
-        for field, text in (("expect", claim.expect), ("given", claim.given)):
-            key = f"claims.{name}.{field}"
-            try:
-                if text or field == "expect":
-                    trees[field] = parse(text, scenario.labels(), signals, metrics)
-            except ExpressionError as error:
-                faults.append(f"{loaded.origins[key]}: {key}: {error}")
-        if "expect" in trees:
-            claims.append(ParsedClaim(name, claim, **trees))
-    if faults:
-        raise ScenarioError(faults)
-    return claims
-
-
 def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
     """Signals of which a claim says how large they become: `max(abs(run.signal)) == number`."""
     found = {}
@@ -124,14 +96,14 @@ def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
 
 def judge(
     claims: Sequence[ParsedClaim], runs: Mapping[str, Source],
-    metrics: Mapping[str, Metric] = METRICS,
+    metrics: Mapping[str, MetricAbout] = METRICS,
 ) -> list[RunsVerdict]:  # fmt: skip
     """A verdict on every claim; `runs` by label."""
     return [_verdict(parsed, runs, metrics) for parsed in claims]
 
 
 def _verdict(
-    parsed: ParsedClaim, runs: Mapping[str, Source], metrics: Mapping[str, Metric]
+    parsed: ParsedClaim, runs: Mapping[str, Source], metrics: Mapping[str, MetricAbout]
 ) -> RunsVerdict:
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and (given := evaluation.holds(parsed.given)) is not True:

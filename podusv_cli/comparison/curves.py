@@ -8,9 +8,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.spectrum import periodogram
-from podusv_cli.metrics.metric import Metric
 
 NEAR = 1e-9  # s; times closer than this are the same
 
@@ -62,7 +62,7 @@ class Curve:
 Quantity = float | Curve
 
 
-def metric(label: str, run: Source, about: Metric) -> float:
+def metric(label: str, run: Source, about: MetricAbout) -> float:
     """A metric of a run, infinite where its event never happened. Raises CannotTell."""
     name, number = about.name, run.metric(about.name)
     if np.isnan(number):

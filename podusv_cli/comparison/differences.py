@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from podusv_cli.pages.page import flat, value_text
+from podusv_cli.core.phrases import value_text
+from podusv_cli.pages.page import flat
 
 PROSE = (".source", ".validity")
 IGNORED = (

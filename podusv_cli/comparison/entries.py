@@ -9,25 +9,22 @@ from functools import cached_property
 
 import numpy as np
 
+from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording, Status
-from podusv_cli.findings.proof import input_rank
-from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_with
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.run_folder import FinishedRun
 from podusv_cli.theory import derived
 
 UNKNOWN = "a metric of a plug-in that is not here; its unit is in the run's metrics.csv"
-# What claims can check of a run. Arguments: the scenario, and how its run ended (None without a
-# log). None means unknown.
-CHECKS: dict[str, Callable[[Scenario, Status | None], bool | None]] = {
-    "finished": lambda scenario, status: (
+# What claims can check of a run. Arguments: what it says about itself, and how it ended (None
+# without a log). None means unknown.
+CHECKS: dict[str, Callable[[RunAbout, Status | None], bool | None]] = {
+    "finished": lambda about, status: (
         status == "finished" if status in ("finished", "diverged") else None
     ),
-    "underactuated": lambda scenario, status: (
-        None if scenario.actuator.is_recorded else input_rank(scenario.actuator) < 3
-    ),
+    "underactuated": lambda about, status: about.underactuated,
 }
 
 
@@ -40,8 +37,9 @@ class Entry:
 
     label: str
     run: FinishedRun
-    scenario: Scenario
+    about: RunAbout
     cost: Mapping[str, float] = field(default_factory=dict)
+    plugins: Plugins = ()  # with signals that follow from the log
 
     @cached_property
     def recording(self) -> Recording:
@@ -52,13 +50,13 @@ class Entry:
     def until(self) -> float:
         """The end of the run, or of its log where it did not finish [s]."""
         if self.recording.status == "finished":
-            return self.scenario.simulation.duration
+            return self.about.duration
         return float(self.recording["time"][-1]) if len(self.recording["time"]) else 0.0
 
     @property
     def every(self) -> int:
         """Steps from one logged instant to the next."""
-        return self.scenario.time_grid().log_every
+        return self.about.every
 
     @property
     def ending(self) -> str:
@@ -79,35 +77,34 @@ class Entry:
     def off_target(self) -> bool:
         """Whether the run finished, but not at its target; no table ranks it."""
         finished = self.recording.status == "finished"
-        return finished and not self.scenario.at_target(self.metrics())
+        return finished and not self.about.at_target(self.metrics())
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal; empty where the run has none of this name."""
-        log, plugins = self.recording, self.scenario.plugged
-        has = derived.has(log, name, plugins)
-        return derived.signal(log, name, plugins) if has else np.empty(0)
+        has = derived.has(self.recording, name, self.plugins)
+        return derived.signal(self.recording, name, self.plugins) if has else np.empty(0)
 
     def check(self, name: str) -> bool | None:
         """Whether a named property holds."""
-        return CHECKS[name](self.scenario, self.recording.status)
+        return CHECKS[name](self.about, self.recording.status)
 
 
-def metrics_of(entries: Sequence[Entry]) -> dict[str, Metric]:
-    """All metrics that podusv or a run's plug-ins know, and those that only a run's files name."""
-    plugins = dict.fromkeys(plugin for entry in entries for plugin in entry.scenario.plugged)
-    settings = [entry.scenario.metrics for entry in entries]
-    windows = {name: ends for one in settings for name, ends in one.windows.items()}
-    radii = {name: radius for one in settings for name, radius in one.radii.items()}
-    known = metrics_with(tuple(plugins), (tuple(windows.items()), tuple(radii.items())))
+def metrics_of(entries: Sequence[Entry]) -> dict[str, MetricAbout]:
+    """All metrics that podusv, a plug-in or a run knows, and those that only a run's files name."""
+    plugins = dict.fromkeys(plugin for entry in entries for plugin in entry.plugins)
+    known: dict[str, MetricAbout] = {**metrics_with(tuple(plugins))}
+    for entry in entries:
+        known = known | {n: m for n, m in entry.about.metrics.items() if n not in known}
     names = dict.fromkeys(name for entry in entries for name in entry.run.metrics)
-    return known | {name: Metric(name, "", UNKNOWN) for name in names if name not in known}
+    known |= {name: MetricAbout(name, "", UNKNOWN) for name in names if name not in known}
+    return {one.name: one for one in sorted(known.values(), key=lambda one: one.place)}
 
 
 @dataclass(frozen=True)
 class Absent:
     """A run without a log; `failure` is the error message. A `curves.Source`."""
 
-    scenario: Scenario
+    about: RunAbout
     failure: str
     until = 0.0
     every = 1
@@ -126,5 +123,5 @@ class Absent:
         return np.empty(0)
 
     def check(self, name: str) -> bool | None:
-        """Whether a property holds that depends on the scenario alone; else None."""
-        return CHECKS[name](self.scenario, None)
+        """Whether a property holds that does not depend on the log; else None."""
+        return CHECKS[name](self.about, None)

@@ -22,6 +22,7 @@ import numpy as np
 from podusv_cli.comparison import curves
 from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, Curve, Quantity, Source
 from podusv_cli.comparison.entries import CHECKS
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.expressions.margins import SIGNS, around, below
@@ -34,7 +35,6 @@ from podusv_cli.expressions.reading import (
     syntax_tree,
 )
 from podusv_cli.expressions.walk import Condition, Walk
-from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.theory.derived import DERIVED
 
@@ -46,7 +46,7 @@ NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(deri
 
 def parse(
     text: str, runs: Collection[str], signals: Mapping[str, Signal],
-    metrics: Mapping[str, Metric] = METRICS,
+    metrics: Mapping[str, MetricAbout] = METRICS,
 ) -> ast.expr:  # fmt: skip
     """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
@@ -63,7 +63,7 @@ class _Example:
     """A run that has every metric and signal; to check an expression before there are runs."""
 
     signals: Mapping[str, Signal]
-    metrics: Mapping[str, Metric]
+    metrics: Mapping[str, MetricAbout]
     until = math.inf
     every = 1
     ending = ""
@@ -99,7 +99,7 @@ class Evaluation(Walk):
 
     runs: Mapping[str, Source]
     tolerance: float = 0.0
-    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)
+    metrics: Mapping[str, MetricAbout] = field(default_factory=lambda: METRICS)
     numbers: dict[str, float] = field(default_factory=dict)
     doubts: list[str] = field(default_factory=list)
     signs: ClassVar = {**SIGNS, ast.Eq: lambda a, b, margin: abs(a - b) <= around(b, margin)}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from podusv_cli.comparison.claims import ParsedClaim
@@ -12,13 +12,15 @@ from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.loop_margins import loop_margins
 
 
 def with_margins(
-    entries: Sequence[Entry], made: Collection[str], claims: Sequence[ParsedClaim], extras: Extras
-) -> list[Entry]:
-    """The entries; those `made` now, each with those margins of its loop that the claims name.
+    entries: Sequence[Entry], made: Mapping[str, Scenario], claims: Sequence[ParsedClaim],
+    extras: Extras,
+) -> list[Entry]:  # fmt: skip
+    """The entries; those `made` now each with those margins of its loop that claims name.
 
     A finished run, and one whose loop has no margins, has none; `extras` says why.
     """
@@ -30,7 +32,9 @@ def with_margins(
         why = f"it is finished: podusv margins {run.folder}/resolved.yaml"
         extras.missing.append(Failure(f"margins of {run.folder.name}", why))
     return [
-        _measured(e, wanted[e.label], extras) if wanted[e.label] and e.label in made else e
+        _measured(e, made[e.label], wanted[e.label], extras)
+        if wanted[e.label] and e.label in made
+        else e
         for e in entries
     ]
 
@@ -44,8 +48,8 @@ def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
                     yield label, name
 
 
-def _measured(entry: Entry, wanted: set[str], extras: Extras) -> Entry:
-    what, scenario = f"margins of {entry.label}", entry.scenario
+def _measured(entry: Entry, scenario: Scenario, wanted: set[str], extras: Extras) -> Entry:
+    what = f"margins of {entry.label}"
     if extras.interrupted:
         return entry
     try:

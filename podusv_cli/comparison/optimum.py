@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.core.about import PROSE
 from podusv_cli.metrics.distance import OF_OPTIMUM
+from podusv_cli.pages.page import flat
 from podusv_cli.process.extras import Extras, Failure
 
 TASK = ("vessel", "start", "path", "disturbance", "actuator")
@@ -19,7 +22,7 @@ def related(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
     """
     found = list(entries)
     for metric, ratio in OF_OPTIMUM.items():
-        optima = [e for e in entries if e.scenario.controller.optimum_of() == metric]
+        optima = [e for e in entries if e.about.optimum_of == metric]
         for i, entry in enumerate(found):
             same = [other for other in optima if not any(_other(entry, other))]
             if same:
@@ -35,10 +38,15 @@ def related(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
 
 def _other(entry: Entry, other: Entry) -> Iterator[str]:
     """The keys of the task in which the two differ."""
-    one, two = entry.scenario, other.scenario
-    for key in TASK:
-        numbers = key == "vessel" and one.vessel.constants() == two.vessel.constants()
-        if not numbers and getattr(one, key) != getattr(two, key):
-            yield key
-    if one.simulation.duration != two.simulation.duration:
+    one, two = entry.about, other.about
+    yield from (key for key in TASK if _alike(one.values.get(key)) != _alike(two.values.get(key)))
+    if one.duration != two.duration:
         yield "simulation.duration"
+
+
+def _alike(section: Any) -> Any:
+    """What has to be equal in a section: of a vessel its numbers, wherever they are from."""
+    if not isinstance(section, Mapping):
+        return section
+    words = (*PROSE, ".preset")
+    return {key: value for key, value in flat(section) if not f".{key}".endswith(words)}

@@ -9,15 +9,13 @@ from typing import Any
 
 from podusv_cli.comparison import chase, claims, report, table, traces
 from podusv_cli.comparison.entries import Entry
-from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.core.finding import Finding
+from podusv_cli.core.about import MetricAbout, RunAbout
+from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures.shown import dressed
-from podusv_cli.findings.finding import merged
-from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import RunWriter
 
@@ -39,7 +37,7 @@ class Result:
     finish, "" if it did. Warnings and timings are those of the runs made for this comparison.
     """
 
-    scenarios: Mapping[str, Scenario]
+    abouts: Mapping[str, RunAbout]
     entries: Sequence[Entry]
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
@@ -47,9 +45,11 @@ class Result:
     verdicts: Sequence[claims.RunsVerdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
-    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # that the table knows
+    metrics: Mapping[str, MetricAbout] = field(default_factory=lambda: METRICS)  # of the table
     peaks: Mapping[str, float] = field(default_factory=dict)  # of signals, as claims name them
     doubts: Sequence[Sequence[str]] = ()  # head and rows of what verdicts hang on, if asked for
+    plugins: Plugins = ()  # of all runs
+    meanings: Mapping[str, str] = field(default_factory=dict)  # of the codes of warnings
 
     @property
     def unsettled(self) -> list[str]:
@@ -113,8 +113,10 @@ def drawn(
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
-    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries], result.peaks)
-    known = figures_of(run.scenario for run in shown)
+    shown = dressed(
+        [(e.label, e.recording, e.about, e.plugins) for e in result.entries], result.peaks
+    )
+    known = figures_of(run.plugins for run in shown)
     for name in names:
         if not known[name].fits(shown):
             wanted = ", ".join(known[name].signals)
@@ -134,8 +136,7 @@ def as_report(
         from podusv_cli.figures.drawing import figures_of  # matplotlib is slow to import
 
         # the figures that podusv draws again are those of one paper
-        laws = [scenario.controller for scenario in result.scenarios.values()]
-        of_paper = any(isinstance(law, PolarBackstepping) for law in laws)
+        of_paper = any(about.polar for about in result.abouts.values())
         pictures = [
             Picture(
                 name,
@@ -143,13 +144,12 @@ def as_report(
                 figures[f"{name}.{IN_REPORT}"],
                 sheet.source if of_paper else "",
             )
-            for name, sheet in figures_of(result.scenarios.values()).items()
+            for name, sheet in figures_of([result.plugins]).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-    shown = dressed([(e.label, e.recording, e.scenario) for e in result.entries])
+    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.entries])
     story = report.Story(
-        title=title, scenario=next(iter(result.scenarios.values())),
-        controllers={label: one.controller for label, one in result.scenarios.items()},
+        title=title, abouts=result.abouts, meanings=result.meanings,
         endings=result.endings, missing=[str(part) for part in missing],
         differences=result.differences,
         noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,

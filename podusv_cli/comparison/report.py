@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import itertools
 import math
 import re
@@ -10,20 +9,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from podusv_cli.comparison import chase, settings, stability
+from podusv_cli.comparison import chase, stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
 from podusv_cli.comparison.table import Row, Table, leaders, rows
 from podusv_cli.comparison.traces import PIECES
-from podusv_cli.core.component import Component
+from podusv_cli.core.about import MetricAbout, RunAbout, SettingAbout
 from podusv_cli.core.finding import Finding
-from podusv_cli.core.plugins import Plugins
+from podusv_cli.core.phrases import value_text
 from podusv_cli.expressions.verdict import by_answer
-from podusv_cli.findings.finding import finding_kinds
-from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import CLOCKED, METRICS
-from podusv_cli.pages.page import Picture, environment, flat, value_text
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.pages.page import Picture, environment, flat
 
 EQUATION = re.compile(r"\(\d+\)")  # of the first paper
 MANY, FEW = 7, 8  # more runs than MANY stand below each other, with FEW numbers in a table
@@ -36,8 +32,7 @@ class Story:
     """What a report tells."""
 
     title: str
-    scenario: Scenario
-    controllers: Mapping[str, Component]
+    abouts: Mapping[str, RunAbout]
     endings: Mapping[str, str]  # how each run ended
     differences: Mapping[str, Mapping[str, Any]]
     noticed: Sequence[Finding]
@@ -49,9 +44,10 @@ class Story:
     missing: Sequence[str] = ()  # what could not be made, and why
     chase: Mapping[str, Any] = field(default_factory=dict)  # see `chase.chase`
     traces: Mapping[str, Any] = field(default_factory=dict)  # see `traces.traces`
-    metrics: Mapping[str, Metric] = field(default_factory=lambda: METRICS)  # of the table
+    metrics: Mapping[str, MetricAbout] = field(default_factory=lambda: METRICS)  # of the table
     unsettled: Sequence[str] = ()  # runs that do not end at their target
     doubts: Sequence[Sequence[str]] = ()  # head and rows of what the verdicts hang on
+    meanings: Mapping[str, str] = field(default_factory=dict)  # of the codes of findings
 
 
 def page(story: Story) -> str:
@@ -59,19 +55,21 @@ def page(story: Story) -> str:
     from markupsafe import Markup  # with jinja2
 
     figures, parts = [*enumerate(story.figures, 1)], _parts(story)
+    about = next(iter(story.abouts.values()))
     table = rows(story.table, story.metrics, story.unsettled)
     first = [row for row in table if row.metric.headline] or table
     standings = _standings(story, first)
     return environment("podusv_cli.comparison").get_template("report.html.j2").render(
         title=story.title,
         story=story,
-        scenario=story.scenario,
+        scenario=about.values,
+        seas=[about.section(at)["kind"] for at in about.said if at.startswith("disturbance")],
         bad={label: ending for label, ending in story.endings.items() if ending},
         differing=as_text(story.differences),
         answers=by_answer(story.verdicts),
         standings=standings,
         ranked=any(one.names or one.more for one in standings.values()),
-        noticed=_by_code(story.noticed, story.scenario.plugged),
+        noticed=_by_code(story),
         metrics={row.metric.name: row.metric for row in table},
         many=MANY,
         few=FEW,
@@ -81,8 +79,8 @@ def page(story: Story) -> str:
         stability=(stability.HEAD, [*stability.rows(story.theories)]),
         beside=figures[:BESIDE],
         figures=figures,
-        changed=settings.changed(story.scenario),
-        laws=settings.laws(story.controllers, story.scenario),
+        changed=about.settings,
+        laws=laws([one.law for one in story.abouts.values()]),
         parts=parts,
         cited=any(EQUATION.search(said) for _, said, _ in parts),
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
@@ -114,7 +112,7 @@ def _standings(story: Story, rows: Sequence[Row]) -> dict[str, Standing]:
     return told
 
 
-def _fact(metric: Metric, number: float) -> str:
+def _fact(metric: MetricAbout, number: float) -> str:
     """A number in words; empty where there is none."""
     if math.isnan(number):
         return f"{metric.row}: never" if metric.happens else ""
@@ -122,24 +120,36 @@ def _fact(metric: Metric, number: float) -> str:
     return f"{metric.row}{colon} {number:.3g}{unit}"
 
 
-def _by_code(findings: Sequence[Finding], plugins: Plugins) -> dict[str, tuple[str, list[Finding]]]:
+def _by_code(story: Story) -> dict[str, tuple[str, list[Finding]]]:
     """The findings of each code, and what the code means."""
-    known, told = finding_kinds(plugins), dict[str, tuple[str, list[Finding]]]()
-    for finding in findings:
-        meaning = getattr(known.get(finding.code), "meaning", "")
+    told = dict[str, tuple[str, list[Finding]]]()
+    for finding in story.noticed:
+        meaning = story.meanings.get(finding.code, "")
         told.setdefault(finding.code, (meaning, []))[1].append(finding)
     return told
 
 
+def laws(
+    tables: Sequence[Sequence[SettingAbout]],
+) -> list[tuple[SettingAbout, list[SettingAbout | None]]]:
+    """Every key that a law sets otherwise than by default: what it is, and what each law has."""
+    keyed = [{one.key: one for one in table} for table in tables]
+    about = {key: one for table in reversed(keyed) for key, one in table.items()}
+    keys = dict.fromkeys(one.key for table in tables for one in table if one.changed)
+    ordered = sorted(keys, key=lambda key: key != "kind")
+    return [(about[key], [table.get(key) for table in keyed]) for key in ordered]
+
+
 def _parts(story: Story) -> list[tuple[str, str, str]]:
     """A row for each part: its name, the first line of what it says of itself, all its values."""
-    parts = settings.parts(story.scenario)
-    parts |= {f"controller {label}": part for label, part in story.controllers.items()}
+    (first, *_), law = story.abouts.values(), "controller"
+    found = {name: (said, name, first) for name, said in first.said.items() if name != law}
+    found |= {f"{law} {label}": (one.said[law], law, one) for label, one in story.abouts.items()}
     return [
         (
             name,
-            (inspect.getdoc(type(part)) or "").partition("\n")[0],
-            ", ".join(f"{key} {value_text(value)}" for key, value in flat(part.model_dump())),
+            said,
+            ", ".join(f"{key} {value_text(value)}" for key, value in flat(one.section(at))),
         )
-        for name, part in parts.items()
+        for name, (said, at, one) in found.items()
     ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from podusv_cli.core import escaping, quantities
-from podusv_cli.metrics.metric import Metric
+from podusv_cli.core.about import MetricAbout
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.storage import csv_files
 
@@ -32,7 +32,7 @@ Names = Collection[str]
 class Row(NamedTuple):
     """A metric's row: the metric, and for every run number and ratio to the first run."""
 
-    metric: Metric
+    metric: MetricAbout
     texts: list[str]
 
 
@@ -68,7 +68,7 @@ class Table:
 
 
 def table(
-    metrics: Mapping[str, Mapping[str, float]], known: Mapping[str, Metric] = METRICS
+    metrics: Mapping[str, Mapping[str, float]], known: Mapping[str, MetricAbout] = METRICS
 ) -> Table:
     """Metrics by label as a table: one row per metric that is known, one column per run."""
     names = [name for name in known if any(name in numbers for numbers in metrics.values())]
@@ -89,7 +89,7 @@ def numbers(frame: Table) -> dict[str, dict[str, float | None]]:
     }
 
 
-def as_csv(frame: Table, known: Mapping[str, Metric] = METRICS) -> str:
+def as_csv(frame: Table, known: Mapping[str, MetricAbout] = METRICS) -> str:
     """The table as CSV, in full precision, with ratios last."""
     first = frame.columns[0]
     heads = [METRIC, "unit", *frame.columns, *(f"{one}/{first}" for one in frame.columns[1:])]
@@ -109,7 +109,9 @@ def _ratio(number: float, first: float) -> float:
     return number / first if first else math.nan
 
 
-def rows(frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()) -> list[Row]:
+def rows(
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
+) -> list[Row]:
     """All rows, those that a reader sees first before the others; best numbers marked with *.
 
     `unsettled` are the runs that do not end at their target; they are never the best.
@@ -131,7 +133,7 @@ def rows(frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names =
 
 
 def cells(
-    frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
 ) -> list[list[str]]:
     """The rows as text: what the metric is, unit, a text a run, and the metric's name."""
     return [
@@ -145,7 +147,7 @@ def head(frame: Table) -> list[str]:
     return [*HEAD, *frame.columns, LAST]
 
 
-def _unranked(frame: Table, known: Mapping[str, Metric] = METRICS) -> list[str]:
+def _unranked(frame: Table, known: Mapping[str, MetricAbout] = METRICS) -> list[str]:
     """Metrics in which no run is marked best.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
@@ -161,7 +163,7 @@ def _unranked(frame: Table, known: Mapping[str, Metric] = METRICS) -> list[str]:
 
 
 def leaders(
-    frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
 ) -> dict[str, list[str]]:
     """The metrics in which each run is best; equal numbers and measured times rank nobody.
 
@@ -194,7 +196,7 @@ def _cell(number: float, first: float, best: float, position: int) -> str:
 
 
 def as_markdown(
-    frame: Table, endings: Mapping[str, str], known: Mapping[str, Metric] = METRICS,
+    frame: Table, endings: Mapping[str, str], known: Mapping[str, MetricAbout] = METRICS,
     unsettled: Names = (),
 ) -> str:  # fmt: skip
     """The table in Markdown, followed by the reasons why runs did not finish."""
@@ -217,7 +219,9 @@ def as_markdown(
     )
 
 
-def as_latex(frame: Table, known: Mapping[str, Metric] = METRICS, unsettled: Names = ()) -> str:
+def as_latex(
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
+) -> str:
     """The table in LaTeX: symbols or words, decimal points aligned, the best of a row in bold.
 
     Every number takes two columns, before and from its decimal point on; a run but the first has a

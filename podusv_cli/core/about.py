@@ -1,7 +1,9 @@
-"""What a finished study says about itself: all that a reader needs, without scenario or parts."""
+"""What a finished run or study says about itself: all that a reader needs, without its parts."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, Self
 
@@ -60,6 +62,28 @@ class Keep(Component):
         {}, "", "by metric: so many runs of every law, the worst that succeeded"
     )
     draws: tuple[int, ...] = value((), "", "these draws, of every law; the first is 0")
+
+
+class Claim(Component):
+    """A sentence, published or somebody's own, and how the runs are to decide on it."""
+
+    says: str = value(..., "", "the claim, in a sentence of your own")
+    source: str = value(
+        "ours", "", "where it was published: section, figure, equation; what begins with `ours` "
+        "was not published: it holds or fails, where a published claim is reproduced or not",
+    )  # fmt: skip
+    expect: str = value(..., "", "the claim as an expression over runs; see podusv docs claims")
+    given: str = value(
+        "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
+    )
+    tolerance: float = value(
+        0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
+    )
+    untestable: str = value(
+        "", "", "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
+        "show of `expect` stands beside it",
+    )  # fmt: skip
+    remark: str = value("", "", "choices made where the source is silent")
 
 
 class StudyClaim(Component):
@@ -155,3 +179,92 @@ class StudyAbout(StudyIdentity):
         if not runs <= {key.partition("]")[0] + "]" for key in self.identity}:
             raise ValueError("laws and cells: the identity has others")
         return self
+
+
+PROSE = (".source", ".validity")  # endings of keys that are read by people alone
+
+
+class SettingAbout(_Plain):
+    """A key with its value and what this would be without it, as they are shown."""
+
+    key: str
+    value: str
+    unit: str
+    default: str
+    meaning: str
+    changed: bool
+
+
+Spans = tuple[tuple[float, float], ...]
+
+
+class RunAbout(_Plain):
+    """about.json: a run as whoever reads its log has to know it.
+
+    `values` is the scenario as plain data. `metrics` are those that podusv has only with the
+    scenario's plug-ins, windows and radii. `limits` are the largest surge force [N] and yaw moment
+    [N m], None where there is no constant one. `outages` are times without samples of each of x, y,
+    psi, u, v, r. `polar` says that the law is of the first paper's family, `optimum_of` which
+    metric the motion minimises, if it is no law's. `said` is what each part says of itself, by the
+    key of its section; `settings` are what the scenario sets itself, `law` all keys of the law.
+    """
+
+    values: dict[str, Any]
+    metrics: dict[str, MetricAbout]
+    length: float  # m, of the vessel
+    beam: float  # m
+    follows: bool  # whether the path is followed, and so has no target
+    waypoints: tuple[tuple[float, float], ...]  # m, north and east
+    circles: tuple[tuple[float, float, float], ...]  # m, of the waypoints: centre and radius
+    trial: bool  # whether this is a manoeuvring trial
+    standoff: float  # m, that the law keeps on purpose
+    limits: tuple[float | None, float | None]
+    underactuated: bool
+    outages: tuple[Spans, Spans, Spans, Spans, Spans, Spans]  # s
+    duration: float  # s
+    step: float  # s
+    every: int  # steps from one logged instant to the next
+    steady_from: float  # s
+    settling_radius: float  # m
+    polar: bool
+    optimum_of: str
+    said: dict[str, str]
+    settings: tuple[SettingAbout, ...]
+    law: tuple[SettingAbout, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the scenario."""
+        return str(self.values["name"])
+
+    def section(self, key: str) -> Any:
+        """The values of a section, or of an entry of one that is a list: `disturbance.0`."""
+        name, _, place = key.partition(".")
+        return self.values[name][int(place)] if place else self.values[name]
+
+    @model_validator(mode="after")
+    def _has_its_parts(self) -> Self:
+        try:
+            parts = [self.section(key) for key in ("vessel", "path", "controller", *self.said)]
+        except (LookupError, TypeError, ValueError):
+            parts = [None]
+        if "name" not in self.values or not all(isinstance(part, dict) for part in parts):
+            raise ValueError("values: a part of the scenario is missing")
+        return self
+
+    def at_target(self, numbers: Mapping[str, float]) -> bool:
+        """Whether a run with these metrics ends at its target, see `at_target`."""
+        return at_target(
+            numbers, follows=self.follows, trial=self.trial, radius=self.settling_radius
+        )
+
+
+def at_target(numbers: Mapping[str, float], *, follows: bool, trial: bool, radius: float) -> bool:
+    """Whether a run with these metrics ends at its target.
+
+    That is with `e_steady` within the settling radius [m], or with all legs of a path done that is
+    followed. A manoeuvring trial has no target to be at.
+    """
+    if follows:
+        return numbers.get("path_done", 1.0) >= 1.0
+    return trial or numbers.get("e_steady", math.nan) <= radius

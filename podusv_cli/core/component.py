@@ -55,10 +55,10 @@ class Component(BaseModel):
     `presets` are what its field `preset` chooses from. `rows_of` has the fields that may name a
     CSV file of pairs, each with the field that takes the file's rows, `texts_of` those that may
     name a file whose text another field takes, `bytes_of` those that may name a file whose bytes
-    another field takes, as base64. `is_recorded` says that this is `Recorded`. One that
-    `stands_alone` takes no value of another kind whose place it takes. `noun` is what messages call
-    it. `rules` has the fields that may be null, and in a scenario are by default, with the rule
-    that gives the number; the field's own default is the model ship's.
+    another field takes, as base64. One that `stands_alone` takes no value of another kind whose
+    place it takes. `noun` is what messages call it. `rules` has the fields that may be null, and
+    in a scenario are by default, with the rule that gives the number; the field's own default is
+    the model ship's.
     """
 
     presets: ClassVar[Presets | None] = None
@@ -66,7 +66,6 @@ class Component(BaseModel):
     texts_of: ClassVar[dict[str, str]] = {}
     bytes_of: ClassVar[dict[str, str]] = {}
     rules: ClassVar[dict[str, Rule]] = {}
-    is_recorded: ClassVar[bool] = False
     stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
@@ -129,15 +128,6 @@ class Component(BaseModel):
     def table(self) -> Vector:
         """Numbers whose count depends on the scenario (nodes, waypoints); one zero where none."""
         return np.zeros(1)
-
-
-class Recorded(Component):
-    """A component of a finished run as plain values; its own class, in a plug-in, is not read.
-
-    It can be looked at and cannot be run.
-    """
-
-    is_recorded: ClassVar[bool] = True
 
 
 class _Field(NamedTuple):

@@ -7,8 +7,8 @@ finding.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -44,6 +44,18 @@ class Finding:
     def as_json(self) -> dict[str, str]:
         """As in metrics.json and in the output of `--json`."""
         return {"code": self.code, "where": self.where, "text": self.text}
+
+
+def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
+    """Findings of several runs (by label), each once, with its runs unless all runs have it."""
+    alike: dict[Finding, list[str]] = {}
+    for label, several in findings.items():
+        for finding in dict.fromkeys(several):
+            alike.setdefault(finding, []).append(label)
+    return [
+        replace(finding, runs=() if len(labels) == len(findings) else tuple(labels))
+        for finding, labels in alike.items()
+    ]
 
 
 class At(NamedTuple):

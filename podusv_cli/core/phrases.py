@@ -9,6 +9,8 @@ from difflib import get_close_matches
 from typing import Any
 
 MOST, NEAREST = 12, 5  # words that a message lists; of more than that, so many
+MOST_LINES = 3  # of a text that is shown as it is
+LONGEST_WORD = 400  # characters that are shown as they are
 
 
 def quoted(text: str) -> str:
@@ -31,6 +33,23 @@ def as_yaml(content: Any) -> str:
     """A plain value as it would stand in a scenario, cut where it is long."""
     text = content if isinstance(content, str) and content else json.dumps(content)
     return quoted(text) if len(text) > 60 or not text.isprintable() else text
+
+
+def value_text(value: Any) -> str:
+    """A value of a scenario as text, with all digits; a dash for None, a count for many lines.
+
+    Of a long word, such as the weights of a policy, the length and the end.
+    """
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(value_text, value))
+    if isinstance(value, str) and value.count("\n") > MOST_LINES:
+        return f"{len(value.splitlines()):,} lines"
+    if isinstance(value, str) and len(value) > LONGEST_WORD and not set(value) & {" ", "\n"}:
+        return f"{len(value):,} characters that end in {value[-8:]}"
+    if value is None:
+        return "-"
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if not isinstance(value, float) or float(text) == value else repr(value)
 
 
 def without_case(word: str) -> str:

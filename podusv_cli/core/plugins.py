@@ -11,7 +11,7 @@ import re
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint, distributions
 from importlib.util import find_spec
@@ -71,12 +71,6 @@ class Plugin:
             what = f"installed package {self}: entry point {point.name} = {point.value}"
             raise LawError(f"{what} cannot be imported: {in_a_line(error)}") from error
 
-    def without_components(self) -> Plugin:
-        """Its metrics, figures, findings and vessels alone."""
-        rest = ("vessels", "metrics", "figures", "findings")
-        offers = tuple((r, thing) for r in rest for place, thing in self.offers if place in ("", r))
-        return replace(self, name=f"{self.name} without components", offers=offers)
-
     def as_json(self) -> dict[str, str]:
         """What provenance.json says of it."""
         which = {"file": self.path} if self.path else {"package": self.name}
@@ -88,8 +82,6 @@ class Plugin:
 
 
 Plugins = tuple[Plugin, ...]
-# Stands for those of a finished run that are not here; what only they know is taken as it stands.
-ABSENT = Plugin("plug-ins that are not here", "")
 
 
 def _inside(thing: Any) -> Iterator[Any]:

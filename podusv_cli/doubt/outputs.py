@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.phrases import as_yaml
+from podusv_cli.core.phrases import as_yaml, value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.doubt.alone import ends
 from podusv_cli.doubt.answer import Answer, Told, as_json, place
 from podusv_cli.doubt.choices import Choice
-from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.storage import csv_files, json_files
 from podusv_cli.storage.run_folder import RunWriter

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -98,8 +97,8 @@ def _claimed(axes: Axes, runs: Sequence[Shown], name: str) -> None:
 
 def _limits(axes: Axes, runs: Sequence[Shown], load: int, span: Span) -> None:
     """Lines at the actuators' constant limits, seen where the loads come near them."""
-    limits = {run.scenario.actuator.limits()[load] for run in runs}
-    for limit in sorted(limit for limit in limits if math.isfinite(limit)):
+    limits = {run.about.limits[load] for run in runs}
+    for limit in sorted(limit for limit in limits if limit is not None):
         for side in (limit, -limit):
             line = np.array(span), np.array([side, side])
             draw_curve(axes, line, fitted=False, label="limit of the actuator", **LIMIT)

@@ -18,7 +18,6 @@ from podusv_cli.figures.style import FORMATS, Look, house_style, image
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import Progress, run_shares
-from podusv_cli.scenario.model import Scenario
 
 
 def _place(sheet: Sheet) -> tuple[int, str]:
@@ -36,9 +35,9 @@ FIGURES = figures_with(())
 SCREEN = Look()
 
 
-def figures_of(scenarios: Iterable[Scenario]) -> dict[str, Sheet]:
-    """All figures by name, in order, with those of these scenarios' plug-ins."""
-    return figures_with(tuple(dict.fromkeys(p for one in scenarios for p in one.plugged)))
+def figures_of(plugins: Iterable[Plugins]) -> dict[str, Sheet]:
+    """All figures by name, in order, with those of the plug-ins of several runs."""
+    return figures_with(tuple(dict.fromkeys(p for several in plugins for p in several)))
 
 
 def draw(

@@ -75,7 +75,7 @@ def _shade(panels: Sequence[Axes], runs: Sequence[Shown], place: int) -> None:
     spans = {
         (max(first, start), min(last, end))
         for run in runs
-        for first, last in run.scenario.measurement.outages_of_each()[place]
+        for first, last in run.about.outages[place]
         if first < end and last > start
     }
     for axes in panels:

@@ -82,8 +82,7 @@ def distance_axis(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_yscale("log")
     bottom, floor = axes.get_ylim()[0], min(map(_resolved, runs))
     axes.set_ylim(bottom=max(bottom, floor))
-    approaches = [run.scenario.controller.approach() for run in runs]
-    kept = sorted({approach.standoff for approach in approaches if approach} - {0.0})
+    kept = sorted({run.about.standoff for run in runs} - {0.0})
     for standoff in kept:
         label = f"standoff {kept[0]:g} m" if len(kept) == 1 else "standoffs"
         axes.axhline(standoff, label=label, **STANDOFF)
@@ -96,7 +95,7 @@ def _resolved(run: Shown) -> float:
     """
     stride = -(-len(run.recording["time"]) // SAMPLES)
     z_e, u = (np.abs(run.signal(name)[::stride]) for name in ("z_e", "u"))
-    way = run.scenario.simulation.step * float(np.median(u))
+    way = run.about.step * float(np.median(u))
     return min(way, float(np.quantile(z_e, DIP)))
 
 

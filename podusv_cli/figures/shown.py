@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core import escaping, quantities
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.figures.looks import nth_style
-from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory import derived
 
 MARKS = 24  # on the curves of a panel together
@@ -26,13 +27,14 @@ ALONE = 9  # places of a run that is shown alone, both ends among them
 class Shown:
     """A run with the name, colour, line style and marker under which every figure shows it.
 
-    `places` are fractions of a curve, in time, where its markers stand. `peaks` are those of
-    signals that a claim about the runs names.
+    `plugins` have signals that follow from the log. `places` are fractions of a curve, in time,
+    where its markers stand. `peaks` are those of signals that a claim about the runs names.
     """
 
     label: str
     recording: Recording
-    scenario: Scenario
+    about: RunAbout
+    plugins: Plugins
     color: str
     linestyle: Any
     marker: str
@@ -47,7 +49,7 @@ class Shown:
     @property
     def length(self) -> float:
         """Of the vessel [m]."""
-        return self.scenario.vessel.length
+        return self.about.length
 
     @property
     def start(self) -> float:
@@ -62,7 +64,7 @@ class Shown:
     @property
     def steady_from(self) -> float:
         """Start of the part that counts as settled [s]."""
-        return self.scenario.steady_from()
+        return self.about.steady_from
 
     @property
     def line_style(self) -> dict[str, Any]:
@@ -77,18 +79,18 @@ class Shown:
 
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
-        return derived.has(self.recording, name, self.scenario.plugged)
+        return derived.has(self.recording, name, self.plugins)
 
     @property
     def signals(self) -> list[str]:
         """The signals over time that the run has, logged and derivable."""
-        found = derived.derived_with(self.scenario.plugged)
+        found = derived.derived_with(self.plugins)
         derivable = [name for name in found if self.has(name)]
         return [*dict.fromkeys([*self.recording.signals, *derivable])]
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal."""
-        return derived.signal(self.recording, name, self.scenario.plugged)
+        return derived.signal(self.recording, name, self.plugins)
 
     def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
         """Time and a signal, all of it or that of a part [s]."""
@@ -111,7 +113,7 @@ def about(runs: Sequence[Shown], name: str) -> Signal:
     having = [run for run in runs if run.has(name)]
     if not having:
         return derived.DERIVED[name].signal
-    return derived.about(having[0].recording, name, having[0].scenario.plugged)
+    return derived.about(having[0].recording, name, having[0].plugins)
 
 
 def axis_label(runs: Sequence[Shown], name: str) -> str:
@@ -160,7 +162,8 @@ def places(place: int, count: int) -> Vector:
 
 
 def dressed(
-    runs: Sequence[tuple[str, Recording, Scenario]], peaks: Mapping[str, float] | None = None
+    runs: Sequence[tuple[str, Recording, RunAbout, Plugins]],
+    peaks: Mapping[str, float] | None = None,
 ) -> list[Shown]:
     """Labelled recordings with their looks, in order; without those too short to draw.
 
@@ -168,8 +171,8 @@ def dressed(
     """
     count = len(runs)
     shown = [
-        Shown(visible(label), recording, scenario, *nth_style(i), places(i, count), peaks or {})
-        for i, (label, recording, scenario) in enumerate(runs)
-        if len(recording["time"]) > 1
+        Shown(visible(label), log, about, plugins, *nth_style(i), places(i, count), peaks or {})
+        for i, (label, log, about, plugins) in enumerate(runs)
+        if len(log["time"]) > 1
     ]
     return shown if count > 1 else [replace(run, marker="") for run in shown]

@@ -29,17 +29,17 @@ class Target:
     @property
     def is_ahead(self) -> bool:
         """Whether it is somewhere at a time: not on a path that is followed, nor in a trial."""
-        return self.in_sight and not self.runs[0].scenario.path.follows
+        return self.in_sight and not self.runs[0].about.follows
 
     @property
     def in_sight(self) -> bool:
         """Whether there is one; a manoeuvring trial has none."""
-        return not self.runs[0].scenario.controller.trial()
+        return not self.runs[0].about.trial
 
     def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:
         """East and north [m] during a time [s]; all legs of a path, the track of a trial."""
         if self.in_sight and not self.is_ahead:
-            north, east = np.array(self.runs[0].scenario.path.waypoints()).T
+            north, east = np.array(self.runs[0].about.waypoints).T
             return east, north
         rows, names = rows_of(self.recording, span), ("y_d", "x_d") if self.is_ahead else ("y", "x")
         east, north = (self.recording[name][rows] for name in names)
@@ -50,7 +50,8 @@ def targets(runs: Sequence[Shown]) -> list[Target]:
     """Every target that differs from the others, as long as any of its runs lasts."""
     groups: list[list[Shown]] = []
     for run in runs:
-        group = next((g for g in groups if g[0].scenario.path == run.scenario.path), None)
+        path = run.about.values["path"]
+        group = next((g for g in groups if g[0].about.values["path"] == path), None)
         if group is None:
             groups.append([run])
         else:
@@ -60,7 +61,7 @@ def targets(runs: Sequence[Shown]) -> list[Target]:
 
 def _target(group: Sequence[Shown], *, only: bool) -> Target:
     longest = max(group, key=lambda run: run.end).recording
-    word = "path" if group[0].scenario.path.follows else "target"
+    word = "path" if group[0].about.follows else "target"
     if only:
         return Target(group, {**TARGET_LOOK, "label": word}, longest)
     label = f"{word} of {', '.join(run.name for run in group)}"

@@ -58,8 +58,7 @@ def map_axes(axes: Axes, east: Span, north: Span) -> None:
 def hull_of(run: Shown, t: float, scale: float) -> Vector:
     """Outline of a run's vessel at a time [s], `scale` times as large: columns east, north [m]."""
     x, y, psi = (run.at(t, name) for name in ("x", "y", "psi"))
-    vessel = run.scenario.vessel
-    ahead, right = (HULL * (scale * vessel.length, scale * vessel.beam)).T
+    ahead, right = (HULL * (scale * run.length, scale * run.about.beam)).T
     north = x + ahead * np.cos(psi) - right * np.sin(psi)
     east = y + ahead * np.sin(psi) + right * np.cos(psi)
     return np.column_stack([east, north])
@@ -154,7 +153,7 @@ def distances(axes: Axes, runs: Sequence[Shown]) -> None:
 
 def _own_distance(runs: Sequence[Shown]) -> str:
     """The signal that tells how far each run is from what it follows, "" for none."""
-    if all(run.scenario.path.follows and run.has(DEVIATION) for run in runs):
+    if all(run.about.follows and run.has(DEVIATION) for run in runs):
         return DEVIATION
     return "z_e" if len(runs) == 1 and runs[0].has("z_e") else ""
 
@@ -177,7 +176,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
             axes.add_patch(Polygon(hull_of(run, float(t), scale), **_outline(run)))
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")
-    given = {point for run in runs for point in run.scenario.path.waypoints()}
+    given = {point for run in runs for point in run.about.waypoints}
     if given:
         north, east = zip(*sorted(given), strict=True)
         axes.plot(east, north, **WAYPOINT, label="waypoint")
@@ -188,7 +187,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
 
 def _accepting(axes: Axes, runs: Sequence[Shown]) -> None:
     """The circles within which the next leg of a path becomes active."""
-    for north, east, radius in sorted({c for run in runs for c in run.scenario.path.circles()}):
+    for north, east, radius in sorted({c for run in runs for c in run.about.circles}):
         axes.add_patch(Circle((east, north), radius, **ACCEPTANCE))
 
 

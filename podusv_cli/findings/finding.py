@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from podusv_cli.components.facts import Facts
 from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.finding import Finding, FindingKind
+from podusv_cli.core.finding import Finding, FindingKind, merged
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
@@ -72,18 +71,6 @@ def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
     kinds = [kind for code, kind in known if kind.when == when and code not in scenario.silence]
     with np.errstate(all="ignore"):
         return [found for kind in kinds for found in kind.findings(scenario.controller, *seen)]
-
-
-def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
-    """Findings of several runs (by label), each once, with its runs unless all runs have it."""
-    alike: dict[Finding, list[str]] = {}
-    for label, several in findings.items():
-        for finding in dict.fromkeys(several):
-            alike.setdefault(finding, []).append(label)
-    return [
-        replace(finding, runs=() if len(labels) == len(findings) else tuple(labels))
-        for finding, labels in alike.items()
-    ]
 
 
 @dataclass(frozen=True)

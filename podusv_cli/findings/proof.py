@@ -4,20 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.bounds import Condition, ultimate_bound
-
-
-def input_rank(actuator: Actuator) -> int:
-    """Rank of the map from small demands to loads (tau_u, tau_v, tau_r) at rest.
-
-    Below 3 the vessel is underactuated. The map comes from central differences of the kernel.
-    """
-    return int(np.linalg.matrix_rank(actuator.input_matrix()))
 
 
 def argument(scenario: Scenario) -> str:
@@ -26,7 +15,7 @@ def argument(scenario: Scenario) -> str:
     Accelerations are M^-1 times the loads and M is regular, so both have the same rank.
     """
     matrix = scenario.actuator.input_matrix()
-    rank = input_rank(scenario.actuator)
+    rank = scenario.actuator.input_rank()
     rows = ", ".join("[" + ", ".join(f"{x + 0.0:.4g}" for x in row) + "]" for row in matrix)
     sway = "its sway row is zero (Y_p = 0)" if not matrix[1].any() else "sway comes with the others"
     verdict = "underactuated" if rank < len(matrix) else "fully actuated"

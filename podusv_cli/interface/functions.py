@@ -25,6 +25,7 @@ from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -61,7 +62,10 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     found = [*case.findings(), *postflight(case.scenario, whole)]
     numbers = summary(case, recording, extras)
     warned = tuple(map(str, (*found, *extras.missing)))
-    return Run(whole.controller, case.scenario, whole, numbers, warned)
+    return Run(
+        whole.controller, about_of(case.scenario), whole, numbers, warned,
+        given=case.scenario,
+    )  # fmt: skip
 
 
 def run(
@@ -76,12 +80,12 @@ def run(
     >>> import podusv
     >>> run = podusv.run("podusv:own_vessel.yaml", out="mine", figures=False)
     >>> run.status, sorted(path.name for path in run.folder.iterdir())[:3]
-    ('finished', ['log.h5', 'manifest.json', 'metrics.csv'])
+    ('finished', ['about.json', 'log.h5', 'manifest.json'])
     """
     given = loaded(source, changes)
-    _single(given)
+    one = _single(given)
     done = running.run_loaded(given, request(out, force, figures))
-    return open_run(done.folder)
+    return replace(open_run(done.folder), given=one)
 
 
 def open_run(folder: str | os.PathLike[str]) -> Run:
@@ -120,11 +124,14 @@ def compare(
     given = _several(sources)
     files = [_file(one) for one in given]
     items, options = _items(given, files, changes), request(out, force, figures)
-    done = comparing.compare_gathered(gathered(items), [f for f in files if f], options)
+    runs = gathered(items)
+    done = comparing.compare_gathered(runs, [f for f in files if f], options)
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
     claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
     failed = {label: text for label, text in done.result.endings.items() if text}
-    return Comparison(done.folder, _compared(done), done.result.table.frame(), claims, failed)
+    scenarios = {one.label: one.case.scenario for one in runs.members if one.case}
+    compared = _compared(done, scenarios)
+    return Comparison(done.folder, compared, done.result.table.frame(), claims, failed)
 
 
 def optimum(
@@ -264,18 +271,18 @@ def _opened(member: Member) -> Run:
     numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
     told = json_files.read(run.folder / "metrics.json").get("warnings", [])
     warned = tuple(str(Finding(**one)) for one in told)
-    law, scenario = run.recording.controller, member.scenario
-    return Run(law, scenario, run.recording, numbers, warned, run.folder)
+    law, log = run.recording.controller, run.recording
+    return Run(law, member.about, log, numbers, warned, run.folder)
 
 
-def _compared(done: comparing.Compared) -> dict[str, Run]:
+def _compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
     """The runs of a comparison that have a log, by label."""
     result = done.result
     folders = {e.label: done.folder / e.label for e in result.entries if e.label in result.timings}
     return {
         e.label: Run(
-            e.label, e.scenario, e.recording, e.metrics(),
-            tuple(map(str, result.warnings[e.label])), folders.get(e.label, e.run.folder),
+            e.label, e.about, e.recording, e.metrics(), tuple(map(str, result.warnings[e.label])),
+            folders.get(e.label, e.run.folder), scenarios.get(e.label),
         )
         for e in result.entries
     }  # fmt: skip

@@ -13,12 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
+from podusv_cli.core.plugins import Plugins, installed
 from podusv_cli.core.recording import Recording
 from podusv_cli.interface.border import explained
+from podusv_cli.metrics.table import metrics_with
+from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.storage.files import read_text
+from podusv_cli.storage.run_folder import RESOLVED
 from podusv_cli.theory import derived
 
 if TYPE_CHECKING:
@@ -63,11 +69,35 @@ class Run:
     """
 
     label: str
-    scenario: Scenario
+    about: RunAbout
     recording: Recording
     numbers: Mapping[str, float]
     warnings: tuple[str, ...] = ()
     folder: Path | None = None
+    given: Scenario | None = None  # of which it was made here
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """What was simulated; that of a folder is read when it is asked for.
+
+        Raises ScenarioError where a folder's has components of a file that it keeps, which only
+        `podusv.load` of its resolved.yaml executes.
+        """
+        if self.given is not None:
+            return self.given
+        assert self.folder is not None  # what is in memory has its scenario
+        path = self.folder / RESOLVED
+        return load_stored(read_text(path), str(path)).scenario
+
+    @property
+    def _plugins(self) -> Plugins:
+        """Those that have figures, metrics and signals for it."""
+        return self.given.plugged if self.given is not None else installed()
+
+    @property
+    def _looked_at(self) -> tuple[Recording, RunAbout, Plugins]:
+        """What figures show of it."""
+        return self.recording, self.about, self._plugins
 
     @property
     def status(self) -> str:
@@ -106,10 +136,10 @@ class Run:
 
     def __getitem__(self, signal: str) -> Vector:
         """A signal that the log has or that follows from it; KeyError with those that there are."""
-        log, plugins = self.recording, self.scenario.plugged
-        if not derived.has(log, signal, plugins):
+        log = self.recording
+        if not derived.has(log, signal, self._plugins):
             raise KeyError(unknown(f"signal {signal!r}", signal, log.signals))
-        return derived.signal(log, signal, plugins)
+        return derived.signal(log, signal, self._plugins)
 
     @explained
     def plot(self, *names: str, columns: int = 2) -> Figure:
@@ -134,7 +164,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """The trajectory beside the metrics, what was warned of above."""
-        known = self.scenario.known_metrics()
+        known = {**metrics_with(self._plugins), **self.about.metrics}
         rows = {n: f"{x:.5g} {known[n].unit}" for n, x in self.numbers.items() if n in known}
         table = pd.Series(rows, name=self.label, dtype=str).to_frame().to_html(border=0)
         lines = [repr(self), self.message, *self.warnings]
@@ -210,7 +240,7 @@ def animation(runs: Mapping[str, Run]) -> Animation:
     from podusv_cli.comparison.chase import page
     from podusv_cli.figures.shown import dressed
 
-    shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
+    shown = dressed([(label, *run._looked_at) for label, run in runs.items()])
     if not shown:
         raise UsageError(f"there is nothing to show: {', '.join(map(repr, runs.values()))}")
     return Animation(page(shown))
@@ -221,7 +251,7 @@ def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> F
     from podusv_cli.figures.shown import dressed
     from podusv_cli.figures.style import house_style, image
 
-    shown = dressed([(label, run.recording, run.scenario) for label, run in runs.items()])
+    shown = dressed([(label, *run._looked_at) for label, run in runs.items()])
     family = _family(runs, names or ("trajectory",), shown)
     with house_style():
         drawn = family(shown, columns)
@@ -235,7 +265,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
     from podusv_cli.figures.drawing import figures_of
     from podusv_cli.figures.panels import signals_over_time
 
-    figures = figures_of(run.scenario for run in runs.values())
+    figures = figures_of(run._plugins for run in runs.values())
     if len(names) == 1 and names[0] in figures:
         sheet = figures[names[0]]
         if not shown or not sheet.fits(shown):

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-MOST_LINES = 3  # of a text that is shown as it is
-LONGEST_WORD = 400  # characters that are shown as they are
 
 
 class Picture(NamedTuple):
@@ -96,20 +94,3 @@ def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]
             yield from flat(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
-
-
-def value_text(value: Any) -> str:
-    """A value of a scenario as text, with all digits; a dash for None, a count for many lines.
-
-    Of a long word, such as the weights of a policy, the length and the end.
-    """
-    if isinstance(value, (list, tuple)):
-        return " ".join(map(value_text, value))
-    if isinstance(value, str) and value.count("\n") > MOST_LINES:
-        return f"{len(value.splitlines()):,} lines"
-    if isinstance(value, str) and len(value) > LONGEST_WORD and not set(value) & {" ", "\n"}:
-        return f"{len(value):,} characters that end in {value[-8:]}"
-    if value is None:
-        return "-"
-    text = f"{value:g}" if isinstance(value, float) else str(value)
-    return text if not isinstance(value, float) or float(text) == value else repr(value)

@@ -48,7 +48,7 @@ HEADING = "# A complete scenario, every value written out; it runs again to the 
 
 # From a tree to the tree with its plug-ins in order, and these; see `plugins.loaded`.
 Plugged = Callable[[Node, list[Fault]], tuple[Node, Plugins]]
-LOOKED_AT: Plugged = partial(plugins.recorded, ())
+LOOKED_AT: Plugged = partial(plugins.used_of, ())
 
 
 @dataclass(frozen=True)
@@ -169,9 +169,9 @@ def load_stored(
 ) -> Loaded:  # fmt: skip
     """The scenario in the folder of a run, study or search: it refers to no file but its plug-ins.
 
-    Unless `plugged` loads these, components that are in no installed package are kept as plain
-    values. Raises StorageError where the text names another file, which is not read, or is no YAML
-    mapping at all; ScenarioError where it is one that this podusv does not know.
+    Unless `plugged` loads these, components are those of podusv and of installed packages. Raises
+    StorageError where the text names another file, which is not read, or is no YAML mapping at all;
+    ScenarioError where it is one that this podusv does not know.
     """
     faults: list[Fault] = []
     root = self_contained(text, source, overrides, faults, MOST_RESOLVED)

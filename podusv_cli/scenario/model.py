@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from types import GenericAlias
@@ -21,6 +20,7 @@ from podusv_cli.components.measurements.base import Measurement
 from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.about import Claim, at_target
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
@@ -35,7 +35,6 @@ from podusv_cli.metrics.windows import NAMED
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.sections import (
     NAME,
-    Claim,
     Control,
     Log,
     MetricSettings,
@@ -170,15 +169,6 @@ class Scenario(Component):
         }
 
     @property
-    def recorded(self) -> tuple[str, ...]:
-        """The sections that are only values of a finished run."""
-        parts = {name: getattr(self, name) for name in BASES}
-        several = {
-            name: part if isinstance(part, tuple) else (part,) for name, part in parts.items()
-        }
-        return tuple(n for n, each in several.items() if any(one.is_recorded for one in each))
-
-    @property
     def facts(self) -> Facts:
         """What null defaults follow from: the nominal vessel, the actuator, the loop's times."""
         seen = self.measurement
@@ -196,7 +186,7 @@ class Scenario(Component):
 
         Made once when a scenario is loaded, and again where a draw changes what the facts are of.
         """
-        if not self.keys_by_rule() or self.recorded:  # nobody asks an actuator that is recorded
+        if not self.keys_by_rule():
             return self
         facts = self.facts
         several = {label: law.sized(facts) for label, law in self.controllers.items()}
@@ -298,15 +288,11 @@ class Scenario(Component):
         return self.time_grid().last_part(self.metrics.steady_fraction)
 
     def at_target(self, numbers: Mapping[str, float]) -> bool:
-        """Whether a run with these metrics ends at its target.
-
-        That is with `e_steady` within `metrics.settling_radius`, or with all legs of a path done
-        that is followed. A manoeuvring trial has no target to be at.
-        """
-        if self.path.follows:
-            return numbers.get("path_done", 1.0) >= 1.0
-        error = numbers.get("e_steady", math.nan)
-        return bool(self.controller.trial()) or error <= self.metrics.settling_radius
+        """Whether a run with these metrics ends at its target, see `core.about.at_target`."""
+        return at_target(
+            numbers, follows=self.path.follows, trial=self.controller.trial() is not None,
+            radius=self.metrics.settling_radius,
+        )  # fmt: skip
 
     def disturbances(self) -> dict[str, Disturbance]:
         """The disturbance, or each of several, by its key."""

@@ -5,17 +5,13 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path as File
-from typing import Any, Literal
-
-from pydantic import create_model
 
 from podusv_cli.components.vessels.vessel import VESSELS
-from podusv_cli.core.component import Recorded, value
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.phrases import did_you_mean, found, quoted
-from podusv_cli.core.plugins import ABSENT, Plugin, Plugins, digest, from_file, installed
+from podusv_cli.core.plugins import Plugin, Plugins, from_file, installed
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import BASES, Scenario, scenario_class
 from podusv_cli.scenario.presets import preset_names
@@ -199,37 +195,22 @@ def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
     return False
 
 
-def recorded(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
-    """The tree of a finished run, and what stands in for its plug-ins.
+def used_of(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
+    """The tree of a finished run, and those of its plug-ins that are at hand.
 
     The files in its folder are not read, so that looking at it runs nobody's code. Those that
-    the user names (`files`) and installed packages are, and where they are the very ones that were
-    used, their components, too. Where one is not at hand, ABSENT is among the plug-ins, and all
-    other components are kept as plain values.
+    the user names (`files`) and installed packages are, where they are the very ones that were
+    used.
     """
     own = root.mapping.get(KEY)
     used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()
-    here = from_files(files, faults)
-    known = tuple(p if p.sha256 in used else p.without_components() for p in here)
-    if not used - {plugin.sha256 for plugin in here}:
-        return root, known
-    return root, (*known, ABSENT, *_stand_ins(root, scenario_class(known)))
+    return root, tuple(plugin for plugin in from_files(files, faults) if plugin.sha256 in used)
 
 
 def continue_with(command: str, folder: File) -> str:
     """The command line that goes on with a folder, which may have plug-in files of its own."""
     trust = " --trust" if (folder / FOLDER).is_dir() else ""
     return f"podusv {command} {shlex.quote(str(folder))}{trust}"
-
-
-def _stand_ins(root: Node, known: type[Scenario]) -> Plugins:
-    unknown: dict[tuple[str, str], frozenset[str]] = {}
-    for section, node in _components(root):
-        kind = node.word("kind")
-        if kind and kind not in kinds_of(known, section):
-            fields = {name for name in node.mapping if name.isidentifier() and name[0] != "_"}
-            unknown[section, kind] = unknown.get((section, kind), frozenset()) | fields - {"kind"}
-    return tuple(_stand_in(*key, names) for key, names in unknown.items())
 
 
 def _components(root: Node) -> Iterator[tuple[str, Node]]:
@@ -245,13 +226,3 @@ def _components(root: Node) -> Iterator[tuple[str, Node]]:
 def kinds_of(scenario: type[Scenario], section: str) -> Iterable[str]:
     """The kinds that a section may be of."""
     return keys_of(scenario).keys[section].kinds
-
-
-@cache
-def _stand_in(section: str, kind: str, names: frozenset[str]) -> Plugin:
-    """A component with these fields that holds its values and can do nothing else."""
-    fields: dict[str, Any] = {name: (Any, value(None, "", "")) for name in sorted(names)}
-    fields["kind"] = (Literal[kind], kind)
-    bases = (Recorded, BASES[section])
-    made = create_model(kind, __base__=bases, __doc__=f"Values of a {kind}.", **fields)
-    return Plugin(f"{section} {kind}", digest(repr(sorted(names))), offers=((f"{section}s", made),))

@@ -13,7 +13,7 @@ from pathlib import Path
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 from podusv_cli.core.component import Component, Presets
 from podusv_cli.core.phrases import found, quoted, unknown
-from podusv_cli.core.plugins import ABSENT, Plugins
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.kinds import over
 from podusv_cli.scenario.named_files import with_files
@@ -254,8 +254,6 @@ def _over_preset(
     if preset.content in names:
         base = preset_file(presets, str(preset.content), faults, plugins)
         return merge(base, without_misfits(base, given, faults, (key,))) if base else given
-    if ABSENT in plugins:
-        return given
     what = f"{presets.noun} {found(preset.content, preset.text)}"
     faults.append(Fault(preset.mark, f"{key}.preset", unknown(what, str(preset.content), names)))
     wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))

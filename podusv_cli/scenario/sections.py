@@ -122,28 +122,6 @@ class MetricSettings(Component):
                 yield f"metrics.radii.{name}", f"must be above 0 m, found {radius:g}"
 
 
-class Claim(Component):
-    """A sentence, published or somebody's own, and how the runs are to decide on it."""
-
-    says: str = value(..., "", "the claim, in a sentence of your own")
-    source: str = value(
-        "ours", "", "where it was published: section, figure, equation; what begins with `ours` "
-        "was not published: it holds or fails, where a published claim is reproduced or not",
-    )  # fmt: skip
-    expect: str = value(..., "", "the claim as an expression over runs; see podusv docs claims")
-    given: str = value(
-        "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
-    )
-    tolerance: float = value(
-        0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
-    )
-    untestable: str = value(
-        "", "", "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
-        "show of `expect` stands beside it",
-    )  # fmt: skip
-    remark: str = value("", "", "choices made where the source is silent")
-
-
 class Required(Component):
     """What is required of a plug-in, a Python file or an installed package."""
 

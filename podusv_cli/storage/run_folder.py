@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.core.recording import Recording, Status
@@ -23,9 +24,10 @@ from podusv_cli.storage import files, json_files, manifest
 from podusv_cli.storage.files import read_text
 from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 
-LOG, THEORY, MISSING = "log.h5", "theory.json", "missing.json"
+LOG, ABOUT, THEORY, MISSING = "log.h5", "about.json", "theory.json", "missing.json"
+RESOLVED = "resolved.yaml"
 STUDY, LOGS = "study.json", "logs"  # in the folder of a study
-NEEDED = (LOG, "metrics.json", "provenance.json", "resolved.yaml")
+NEEDED = (LOG, "metrics.json", "provenance.json", RESOLVED)
 
 
 def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
@@ -185,7 +187,10 @@ def check_free_space(final: Path, needed: float, remedy: str) -> None:
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """A run as its finished folder has it. `metrics` has None where a number was not finite."""
+    """A run as its finished folder has it. `metrics` has None where a number was not finite.
+
+    `about` is None where an older podusv wrote the folder.
+    """
 
     folder: Path
     status: Status
@@ -193,6 +198,7 @@ class FinishedRun:
     provenance: dict[str, Any]
     resolved_yaml: str
     theory: dict[str, Any] = field(default_factory=dict)  # empty without a Lyapunov function
+    about: RunAbout | None = None
 
     @cached_property
     def recording(self) -> Recording:
@@ -216,8 +222,9 @@ def open_run(folder: Path) -> FinishedRun:
         status=found.status,
         metrics=_metrics(folder / "metrics.json"),
         provenance=json_files.read(folder / "provenance.json"),
-        resolved_yaml=read_text(folder / "resolved.yaml"),
+        resolved_yaml=read_text(folder / RESOLVED),
         theory=json_files.read(folder / THEORY) if THEORY in found.files else {},
+        about=json_files.read_as(folder / ABOUT, RunAbout) if ABOUT in found.files else None,
     )
 
 

@@ -18,19 +18,20 @@ from podusv_cli.comparison.entries import Absent, Entry, metrics_of
 from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.finding import Finding
+from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.phrases import unknown
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Status
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.outputs import HEAD, Doubted, row
-from podusv_cli.findings.finding import Case, merged
+from podusv_cli.findings.finding import Case, finding_kinds
 from podusv_cli.metrics.cost import law_costs
-from podusv_cli.metrics.table import CLOCKED
+from podusv_cli.metrics.table import CLOCKED, metrics_with
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import Size, estimate, needed
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.doubt import comparison, doubt_of
@@ -125,7 +126,7 @@ def compare_gathered(
     _check_metrics(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
-    text = "".join(f"{one.label}\n{resolved_yaml(one.scenario)}" for one in given.members)
+    text = "".join(f"{one.label}\n{one.resolved}" for one in given.members)
     target = request.out or default_folder(RESULTS, given.title, text)
     _keep_apart(items, target)
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
@@ -141,8 +142,7 @@ def compare_gathered(
             doubted = doubt_of(loaded, own, progress)
             result = replace(result, doubts=[HEAD, *map(row, doubted.answers)])
             extras.interrupted = doubted.status == "interrupted"
-        plugins = dict.fromkeys(p for m in given.members for p in m.scenario.plugged)
-        origin = provenance.collect(argv, started, datetime.now(UTC), plugins)
+        origin = provenance.collect(argv, started, datetime.now(UTC), result.plugins)
         outputs.write(writer, result, extras)
         _add_report(writer, result, given.title, origin, extras, progress, request)
         writer.add_json("provenance.json", origin)
@@ -162,15 +162,16 @@ def _check_figures(request: Request, members: Sequence[Member]) -> None:
             figures_of,
         )
 
-        sheets = figures_of(member.scenario for member in members)
+        sheets = figures_of(member.plugins for member in members)
         check_names(request.names, request.formats, sheets)
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
     """UsageError for a metric that no run has."""
     logged = (name for member in members if member.run for name in member.run.metrics)
-    declared = (name for member in members for name in member.scenario.known_metrics())
-    known = dict.fromkeys((*declared, *logged))
+    plugged = (name for member in members for name in metrics_with(member.plugins))
+    own = (name for member in members for name in member.about.metrics)
+    known = dict.fromkeys((*plugged, *own, *logged))
     for name in request.metrics:
         if name not in known:
             raise UsageError(unknown(f"metric {name!r}", name, known, "podusv list metrics"))
@@ -209,10 +210,10 @@ def make_runs(
             warm_up(case, request.compiling)
     tasks = [
         Task(
-            member.scenario, member.text, folder / member.label,
+            case.scenario, member.text, folder / member.label,
             argv=request.argv, label=member.label, noticed=member.noticed,
         )
-        for member, _ in wanted
+        for member, case in wanted
     ]  # fmt: skip
 
     def advance(position: int, fraction: float) -> None:
@@ -244,29 +245,41 @@ def collect(
     }
     for label, done in finished.items():
         extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
-    entries = [Entry(m.label, runs[m.label], m.scenario) for m in members if m.label in runs]
-    cases = {m.label: m.case for m in members if m.case and m.label in finished}
-    entries = related(_with_costs(entries, cases, extras), extras)
-    entries = with_margins(entries, finished, parsed, extras)
-    sources: dict[str, Source] = {m.label: Absent(m.scenario, endings[m.label]) for m in members}
+    entries = [
+        Entry(m.label, runs[m.label], m.about, plugins=m.plugins)
+        for m in members
+        if m.label in runs
+    ]
+    made = {m.label: m.case for m in members if m.case and m.label in finished}
+    entries = related(_with_costs(entries, made, extras), extras)
+    scenarios = {label: case.scenario for label, case in made.items()}
+    entries = with_margins(entries, scenarios, parsed, extras)
+    sources: dict[str, Source] = {m.label: Absent(m.about, endings[m.label]) for m in members}
     sources |= {entry.label: entry for entry in entries}
     numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
     numbers |= {entry.label: entry.metrics() for entry in entries}
-    scenarios = {m.label: m.scenario for m in members}
+    abouts = {m.label: m.about for m in members}
     known = metrics_of(entries)
+    plugins = tuple(dict.fromkeys(plugin for m in members for plugin in m.plugins))
     return outputs.Result(
-        scenarios=scenarios,
+        abouts=abouts,
         entries=entries,
         endings=endings,
-        differences=differences({label: one.model_dump() for label, one in scenarios.items()}),
+        differences=differences({label: one.values for label, one in abouts.items()}),
         table=table.table(numbers, known),
         verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources, known))
         or [],
         timings={label: done.timing for label, done in finished.items()},
         metrics=known,
         peaks=claims.peaks(parsed),
+        plugins=plugins,
+        meanings=extras.made("what the warnings mean", lambda: _meanings(plugins)) or {},
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
+
+
+def _meanings(plugins: Plugins) -> dict[str, str]:
+    return {code: kind.meaning for code, kind in finding_kinds(plugins).items()}
 
 
 def _with_costs(entries: Sequence[Entry], made: Mapping[str, Case], extras: Extras) -> list[Entry]:
@@ -276,9 +289,12 @@ def _with_costs(entries: Sequence[Entry], made: Mapping[str, Case], extras: Extr
     is never compared; and a finished run is looked at without its law.
     """
     timed = [
-        e for e in entries
-        if e.label in made and e.scenario.simulation.compiled and len(e.recording["time"])
-    ]  # fmt: skip
+        e
+        for e in entries
+        if e.label in made
+        and made[e.label].scenario.simulation.compiled
+        and len(e.recording["time"])
+    ]
     loops = [(made[entry.label].plan, entry.recording) for entry in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
     by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}

@@ -10,7 +10,7 @@ from typing import Any
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import FinishedRun
-from podusv_cli.workflows.members import from_folder
+from podusv_cli.workflows.members import runs_of
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def diff(one: Path, other: Path) -> Differences:
 
 def _runs(path: Path) -> list[FinishedRun]:
     manifest.demand(path)
-    return [member.run for member in from_folder(path) if member.run]
+    return runs_of(path)
 
 
 def _pair(one: FinishedRun, other: FinishedRun) -> tuple[Path, Path, RunDifference]:

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.comparison import claims
-from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict, parse_claims
+from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
 from podusv_cli.comparison.entries import Entry, metrics_of
 from podusv_cli.comparison.margins import with_margins
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.doubt import outputs
@@ -28,6 +29,7 @@ from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Job, run_shares
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.address import Number, with_values
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.limits import limits
@@ -176,14 +178,12 @@ def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
     def judge(world: World) -> Judged:
         labels = dict.fromkeys(label for label, _ in world)
         try:
-            moved = {
-                label: _entry(label, _changed(compared, label, world), compared.parsed)
-                for label in labels
-            }
+            moved = {label: _changed(compared, label, world) for label in labels}
+            made = {label: _entry(label, one, compared.parsed) for label, one in moved.items()}
         except PodusvError as error:
             return Judged({}, {}, str(error))
-        every = {**entries, **moved}
-        measured = with_margins([*every.values()], every, compared.parsed, Extras())
+        every, scenarios = {**entries, **made}, {**compared.singles, **moved}
+        measured = with_margins([*every.values()], scenarios, compared.parsed, Extras())
         metrics = metrics_of(measured)
         verdicts = claims.judge(compared.parsed, {e.label: e for e in measured}, metrics)
         return Judged({v.name: v.answer for v in verdicts}, {v.name: v.numbers for v in verdicts})
@@ -220,4 +220,5 @@ def _entry(label: str, scenario: Scenario, parsed: Sequence[ParsedClaim]) -> Ent
     numbers: dict[str, float | None] = {**summary(case, recording, Extras())}
     if len(recording["time"]) and any(law_operations.name in one.claim.expect for one in parsed):
         numbers |= operations(case.plan, recording)
-    return Entry(label, InMemory(Path(), recording.status, numbers, {}, "", kept=whole), scenario)
+    run = InMemory(Path(), recording.status, numbers, {}, "", kept=whole)
+    return Entry(label, run, about_of(scenario), plugins=scenario.plugged)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli import __version__
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
@@ -27,6 +28,7 @@ from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
@@ -154,10 +156,14 @@ def execute(
         warnings = (*task.noticed, *(noticed or ()))
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
+            told = extras.made(folder.ABOUT, lambda: about_of(task.scenario))
+            if told:
+                facts = told.model_dump(exclude_defaults=True)
+                writer.add_json(folder.ABOUT, {"format": 1, **facts})
             if theory:
                 writer.add_json("theory.json", theory)
         with watch.part("figures"):
-            figures = extras.attempt("figures", lambda: _drawn(task, whole, extras)) or {}
+            figures = extras.attempt("figures", lambda: _drawn(task, whole, told, extras)) or {}
             for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
@@ -291,7 +297,7 @@ def _write(
     warnings: Sequence[Finding],
 ) -> None:  # fmt: skip
     writer.add("scenario.yaml", task.text.encode())
-    writer.add("resolved.yaml", resolved_yaml(task.scenario).encode())
+    writer.add(folder.RESOLVED, resolved_yaml(task.scenario).encode())
     for name, text in task.scenario.plugin_files().items():
         writer.add(name, text.encode())
     status = {"status": recording.status, "controller": recording.controller}
@@ -302,8 +308,10 @@ def _write(
     writer.add("metrics.csv", csv_files.lines([("metric", "value", "unit"), *rows]).encode())
 
 
-def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]:
-    if not task.figures:
+def _drawn(
+    task: Task, recording: Recording, told: RunAbout | None, extras: Extras
+) -> dict[str, bytes]:
+    if not (task.figures and told):
         return {}
     from podusv_cli.figures.drawing import (  # matplotlib is slow to import
         draw_in_parallel,
@@ -311,7 +319,8 @@ def _drawn(task: Task, recording: Recording, extras: Extras) -> dict[str, bytes]
     )
     from podusv_cli.figures.shown import dressed
 
-    shown = dressed([(task.label or recording.controller, recording, task.scenario)])
-    known = figures_of([task.scenario])
+    plugins = task.scenario.plugged
+    shown = dressed([(task.label or recording.controller, recording, told, plugins)])
+    known = figures_of([plugins])
     fitting = [known[name] for name in task.figures if known[name].fits(shown)]
     return draw_in_parallel(shown, fitting, ("png",), extras)

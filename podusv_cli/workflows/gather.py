@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
-from podusv_cli.comparison.claims import ParsedClaim, parse_claims
+from podusv_cli.comparison.claims import ParsedClaim
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded
-from podusv_cli.scenario.plugins import recorded
+from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.members import Member, distinct, numbered
 from podusv_cli.workflows.members import from_folder as members_of
@@ -68,7 +68,7 @@ def _opened(path: Path, request: Request, *, alone: bool) -> Item:
 
 def from_folder(path: Path, files: Sequence[str] = ()) -> Item:
     """The finished runs of a folder; `files` are plug-ins. Raises UsageError, StorageError."""
-    members = members_of(path, plugged=partial(recorded, files))
+    members = members_of(path, files)
     return Item(path.resolve().name, members, [member.label for member in members])
 
 
@@ -78,9 +78,12 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     cases = [Case(single, loaded.plans[label]) for label, single in singles.items()]
     members = [
-        Member(label, single, loaded.text, case=case, noticed=examined(case))
-        for label, single, case in zip(labels, singles.values(), cases, strict=True)
-    ]
+        Member(
+            label, about_of(case.scenario), resolved_yaml(case.scenario), case.scenario.plugged,
+            case=case, text=loaded.text, noticed=examined(case),
+        )
+        for label, case in zip(labels, cases, strict=True)
+    ]  # fmt: skip
     return Item(scenario.name, members, list(singles), parse_claims(loaded))
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from podusv_cli.comparison.claims import parse_claims
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.findings.finding import unknown_codes

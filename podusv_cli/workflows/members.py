@@ -6,21 +6,34 @@ import csv
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.outputs import RESERVED, TABLE
-from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.about import RunAbout
+from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.core.finding import Finding
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import Case
-from podusv_cli.scenario.load import LOOKED_AT, Check, Plugged, load_stored
-from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.load import load_stored
+from podusv_cli.scenario.plugins import continue_with, on_hand, used_of
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
-from podusv_cli.storage.run_folder import LOG, LOGS, STUDY, THEORY, FinishedRun, open_run
+from podusv_cli.storage.run_folder import (
+    ABOUT,
+    LOG,
+    LOGS,
+    RESOLVED,
+    STUDY,
+    THEORY,
+    FinishedRun,
+    open_run,
+)
 
 # Signals that every log has, as figures and comparisons need them.
 NEEDED = (
@@ -42,30 +55,47 @@ LARGEST = 1e300  # beyond it the engine calls a run diverged and logs no row
 
 @dataclass(frozen=True)
 class Member:
-    """One run of several: a scenario, and its finished `run` or the `case` of one to be made."""
+    """One run of several: finished, or the `case` of one that is still to be made.
+
+    `plugins` have figures, metrics and signals for it.
+    """
 
     label: str
-    scenario: Scenario
-    text: str = ""  # the scenario's file
+    about: RunAbout
+    resolved: str  # the text of resolved.yaml
+    plugins: Plugins = ()
     run: FinishedRun | None = None
     case: Case | None = None
+    text: str = ""  # the scenario's file
     noticed: Sequence[Finding] = ()  # before the run
 
 
-def from_folder(
-    path: Path, checks: Sequence[Check] = (), plugged: Plugged = LOOKED_AT
-) -> list[Member]:
+def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:
+    """The finished runs of a folder, as `runs_of` has them; `files` are plug-ins.
+
+    Raises UsageError for one of an older podusv of which the scenario cannot be read.
+    """
+    plugins = on_hand(files)
+    return [
+        Member(
+            run.folder.name, run.about or _told_before(run, files), run.resolved_yaml, plugins, run
+        )
+        for run in runs_of(path)
+    ]  # fmt: skip
+
+
+def runs_of(path: Path) -> list[FinishedRun]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
-    `checks` and `plugged` as `load_stored` has them. Raises UsageError for a
-    folder without finished runs, StorageError for a damaged one.
+    Their logs and theory.json were checked. Raises UsageError for a folder without finished runs,
+    StorageError for a damaged one.
     """
     if (path / STUDY).is_file():
         raise UsageError(_about_study(path))
     inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
     if not inner:
         manifest.demand(path)
-    return [_from_run(child, checks, plugged) for child in (inner or [path])]
+    return [_checked(child) for child in (inner or [path])]
 
 
 def _about_study(path: Path) -> str:
@@ -100,15 +130,26 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _from_run(path: Path, checks: Sequence[Check], plugged: Plugged) -> Member:
-    """A finished run whose log and theory.json were checked. StorageError, ScenarioError."""
+def _checked(path: Path) -> FinishedRun:
     run = open_run(path)
-    source = str(path / "resolved.yaml")
-    given = load_stored(run.resolved_yaml, source, checks=checks, plugged=plugged)
     if wrong := _fault(run.recording):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)
-    return Member(path.name, given.scenario, run=run)
+    return run
+
+
+def _told_before(run: FinishedRun, files: Sequence[str]) -> RunAbout:
+    """What a run says about itself of which an older podusv wrote no about.json."""
+    source = str(run.folder / RESOLVED)
+    try:
+        given = load_stored(run.resolved_yaml, source, plugged=partial(used_of, files))
+    except ScenarioError as error:
+        raise UsageError(
+            f"{run.folder}: an older podusv wrote it without {ABOUT}, and its scenario cannot be "
+            f"read: {str(error).splitlines()[0]}; name the files of its plug-ins with --plugin, or "
+            f"make the run anew: {continue_with('rerun', run.folder)} --out NEW"
+        ) from error
+    return about_of(given.scenario)
 
 
 def _fault(log: Recording) -> str:

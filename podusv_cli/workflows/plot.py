@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown, dressed
 from podusv_cli.figures.style import STYLES, Look
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.plugins import recorded
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
 from podusv_cli.workflows.run import Request
@@ -86,16 +84,16 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     signals of, for labels that do not fit the runs, for a time that no run has, and for a file that
     belongs to a finished folder; StorageError.
     """
-    out, plugged = request.out or Path(), partial(recorded, request.plugins)
-    members = _labelled(one for path in runs for one in from_folder(path, plugged=plugged))
+    out = request.out or Path()
+    members = _labelled(one for path in runs for one in from_folder(path, request.plugins))
     members = _named(members, choice.labels)
-    known = figures_of(member.scenario for member in members)
+    known = figures_of(member.plugins for member in members)
     check_names(request.names, request.formats, known)
-    whole = [(m.label, m.run.recording, m.scenario) for m in members if m.run]
+    whole = [(m.label, m.run.recording, m.about, m.plugins) for m in members if m.run]
     empty = _empty(members, dressed(whole))
-    shown = dressed([(label, _during(log, choice), plan) for label, log, plan in whole])
+    shown = dressed([(label, _during(log, choice), told, own) for label, log, told, own in whole])
     if not shown:
-        ends = ", ".join(f"{label} ends at {log['time'][-1]:g} s" for label, log, _ in whole)
+        ends = ", ".join(f"{label} ends at {log['time'][-1]:g} s" for label, log, *_ in whole)
         raise UsageError(
             f"no run has two instants from {choice.since:g} to {choice.until:g} s ({ends})"
         )
@@ -112,7 +110,7 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     if extras.interrupted:
         raise KeyboardInterrupt("interrupted; no figure was written")
     replaced = _put(out, drawn)
-    differing = differences({m.label: m.scenario.model_dump() for m in members})
+    differing = differences({m.label: m.about.values for m in members})
     return Drawn([out / n for n in drawn], replaced, empty, extras.missing, differing)
 
 
@@ -161,7 +159,7 @@ def _folder(member: Member) -> Path:
 
 def _short(member: Member) -> str:
     name = _folder(member).resolve().name
-    return member.scenario.name if STAMP.fullmatch(name) else name
+    return member.about.name if STAMP.fullmatch(name) else name
 
 
 def _empty(members: Sequence[Member], shown: Sequence[Shown]) -> dict[str, str]:
@@ -179,7 +177,7 @@ def _empty(members: Sequence[Member], shown: Sequence[Shown]) -> dict[str, str]:
 
 
 LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
-    lambda member: f"{_short(member)} ({member.scenario.name})",
+    lambda member: f"{_short(member)} ({member.about.name})",
     lambda member: f"{_folder(member).parent.name}/{_folder(member).name}",
     lambda member: str(_folder(member)),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -17,17 +17,21 @@ from podusv_cli.core.recording import Status
 from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
+from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.limits import limits, needed
+from podusv_cli.scenario.load import load_stored
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import loaded
 from podusv_cli.storage import manifest, provenance, run_folder
 from podusv_cli.storage.run_folder import FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
-from podusv_cli.workflows.members import Member, from_folder
+from podusv_cli.workflows.members import Member, runs_of
 from podusv_cli.workflows.run import Request
 
 Progress = Callable[[str, float], None]
+Pairs = Sequence[tuple[FinishedRun, Scenario]]
 
 
 @dataclass(frozen=True)
@@ -95,39 +99,47 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     this podusv does not know a key any more or the run is too large, and StorageError.
     """
     manifest.demand(path)
-    plugged = partial(loaded, trusted=request.trust)
-    members = from_folder(path, (limits(request.allow_large, read_back=True),), plugged)
-    for run in _runs(members):
+    runs = [(run, _scenario(run, request)) for run in runs_of(path)]
+    for run, _ in runs:
         if run.status == "interrupted":
             raise UsageError(f"{run.folder} was interrupted; there is no whole run to repeat")
-    if len(members) == 1:
-        return _one(members[0], request, progress)
-    return _several(members, request, progress)
+    return (_one if len(runs) == 1 else _several)(runs, request, progress)
 
 
-def _one(member: Member, request: Request, progress: Progress | None) -> Repetition:
-    (original,) = _runs([member])
-    label = member.label or str(original.folder)
+def _scenario(run: FinishedRun, request: Request) -> Scenario:
+    return load_stored(
+        run.resolved_yaml, str(run.folder / run_folder.RESOLVED),
+        checks=(limits(request.allow_large, read_back=True),),
+        plugged=partial(loaded, trusted=request.trust),
+    ).scenario  # fmt: skip
+
+
+def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
+    ((original, scenario),) = runs
+    label = original.folder.name or str(original.folder)
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
         target, text = request.out or place / "again", original.resolved_yaml
-        task = Task(member.scenario, text, target, request.force, argv=request.argv)
+        task = Task(scenario, text, target, request.force, argv=request.argv)
         return Repetition({label: _repeated(original, execute(task, advance))}, {})
 
 
-def _several(members: Sequence[Member], request: Request, progress: Progress | None) -> Repetition:
-    started, originals = datetime.now(UTC), _runs(members)
+def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
+    started = datetime.now(UTC)
     again = [
-        replace(member, run=None, case=Case.of(member.scenario), text=original.resolved_yaml)
-        for member, original in zip(members, originals, strict=True)
-    ]
+        Member(
+            run.folder.name, about_of(scenario), run.resolved_yaml,
+            case=Case.of(scenario), text=run.resolved_yaml,
+        )
+        for run, scenario in runs
+    ]  # fmt: skip
     with _passing(request) as place:
         target = request.out or place / "again"
         room = needed(sizes(again), available_workers())
         with run_folder.RunWriter(target, force=request.force, needed=room) as writer:
             outcomes = make_runs(again, writer.folder, request, progress)
             missing = unwritten(outcomes.values())
-            ended = zip(originals, outcomes.items(), strict=True)
+            ended = zip((run for run, _ in runs), outcomes.items(), strict=True)
             done = Repetition(
                 {label: _repeated(run, end.result) for run, (label, end) in ended if end.result},
                 {label: end.failure for label, end in outcomes.items() if not end.result},
@@ -136,10 +148,6 @@ def _several(members: Sequence[Member], request: Request, progress: Progress | N
             writer.add_json("provenance.json", origin)
             writer.finish("interrupted" if done.interrupted else "finished", missing)
         return done
-
-
-def _runs(members: Sequence[Member]) -> list[FinishedRun]:
-    return [member.run for member in members if member.run]
 
 
 @contextmanager

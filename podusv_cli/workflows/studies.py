@@ -10,11 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.core.errors import UsageError
+from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import unknown
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making import before, record
@@ -58,12 +59,24 @@ def check_study(folder: Path) -> None:
 def stored(study: Path) -> Store:
     """The store of a study's folder, for reading; its scenario and plug-ins are not looked at.
 
-    Only where an older podusv wrote study.json, its scenario is, and no plug-in.
+    Only where an older podusv wrote study.json, its scenario is, with installed plug-ins alone.
 
-    Raises UsageError where the folder is no study, StorageError where it is damaged.
+    Raises UsageError where the folder is no study, and where the scenario needs another plug-in;
+    StorageError where it is damaged.
     """
     check_study(study)
-    return Store(study, before.about(study, lambda: kept_scenario(study).scenario))
+    return Store(study, before.about(study, partial(_of_before, study)))
+
+
+def _of_before(study: Path) -> Scenario:
+    try:
+        return kept_scenario(study).scenario
+    except ScenarioError as error:
+        raise UsageError(
+            f"{study}: an older podusv wrote its {STUDY}, and its scenario cannot be read: "
+            f"{str(error).splitlines()[0]}; have {STUDY} written anew: "
+            f"{plugins.continue_with('sweep run', study)}"
+        ) from error
 
 
 def planned(study: Path, *, trusted: bool) -> Plan:

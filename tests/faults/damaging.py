@@ -22,6 +22,7 @@ from counting import counted
 from damages import DAMAGES
 
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.scenario.load import load_stored
 from podusv_cli.storage import log_reader
 from podusv_cli.workflows import members
 
@@ -53,7 +54,9 @@ def opened(folder: Path) -> tuple[Any, ...]:
     log = part.run.recording
     numbers = {name: array.tobytes() for name, array in {**log.signals, **log.fixed}.items()}
     text = log_reader.resolved_yaml(folder / "log.h5")
-    return numbers, log.status, log.controller, log.message, text, part.run.metrics, part.scenario
+    again = load_stored(part.resolved, "resolved.yaml").scenario  # as rerun takes it
+    told = log.status, log.controller, log.message, part.run.metrics, part.about
+    return numbers, text, again, *told
 
 
 def damaged(original: Path, folder: Path, way: str) -> None:

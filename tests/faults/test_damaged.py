@@ -33,7 +33,7 @@ simulation: {duration: 0.1, compiled: false}
 controller: {kind: adaptive_neural}
 """
 CALLS, MEMORY = 20_000_000, 300  # that opening a run may take; MiB
-JSON = ("metrics.json", "provenance.json", "theory.json")
+JSON = ("about.json", "metrics.json", "provenance.json", "theory.json")
 UNREAD = ("scenario.yaml", "metrics.csv")
 READ = ("log.h5", "resolved.yaml", *JSON)
 FEW = ("log.h5", "theory.json")
@@ -166,6 +166,9 @@ WRONG = [
     "metrics.json metrics []", "metrics.json metrics drop", "metrics.json metrics.iae true",
     'metrics.json metrics.iae "1"', 'theory.json windows {"a": 1}', "theory.json windows drop",
     'theory.json conditions [{"holds": false}]', "theory.json windows.whole.largest_V []",
+    "about.json values {}", "about.json values.path 5", "about.json values.vessel drop",
+    "about.json outages []", 'about.json length "1"', "about.json law [5]",
+    'about.json said {"disturbance.1": ""}',
     'theory.json windows.whole.corrected.bound "a"', "theory.json assumptions [[]]",
 ]  # fmt: skip
 

@@ -10,7 +10,7 @@ import pytest
 import yaml
 from counts import count
 
-from podusv_cli.comparison.claims import parse_claims
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.engine.running.simulate import ready
 from podusv_cli.findings.finding import preflight, unknown_codes

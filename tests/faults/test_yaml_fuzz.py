@@ -14,7 +14,7 @@ from counting import counted
 from counts import count
 from storage_samples import deadline
 
-from podusv_cli.comparison.claims import parse_claims
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.making.cells import cells

@@ -158,3 +158,7 @@ class Actuator(Component):
             for demand in SMALL * np.eye(2)
         ]
         return np.array(columns).T
+
+    def input_rank(self) -> int:
+        """Rank of `input_matrix`; below 3 the vessel is underactuated."""
+        return int(np.linalg.matrix_rank(self.input_matrix()))

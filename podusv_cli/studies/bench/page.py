@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from podusv_cli.core.escaping import markdown
-from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.core.phrases import value_text
+from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.standing import PLACE, leaderboard
 

@@ -30,7 +30,7 @@ class _Before(StudyIdentity):
 def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
     """What a study says about itself; `scenario` is asked for where its study.json is old.
 
-    No plug-in of the scenario is needed. Raises StorageError, and what `scenario` raises.
+    Raises StorageError, and what `scenario` raises.
     """
     if json_files.read(folder / STUDY).get("format") != FORMAT:
         return record.read(folder)

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from podusv_cli.core.phrases import value_text
 from podusv_cli.expressions.verdict import by_answer
-from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Failure
 from podusv_cli.studies.counting.runs import STATUSES, Mask
 from podusv_cli.studies.counting.statistics import Interval, digits

@@ -9,7 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.pages.page import Picture, environment, flat, value_text
+from podusv_cli.core.phrases import value_text
+from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Failure
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.making.sessions import sessions

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any
 
-from podusv_cli.comparison.differences import PROSE
 from podusv_cli.components.facts import Facts
+from podusv_cli.core.about import PROSE, SettingAbout
 from podusv_cli.core.component import Component, unit_of
 from podusv_cli.core.errors import SizingError
-from podusv_cli.pages.page import value_text
+from podusv_cli.core.phrases import value_text
 from podusv_cli.scenario.explain import summary
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_file, preset_names
@@ -23,18 +23,7 @@ SECTIONS = (
 WHICH = ("kind", "preset")  # are told although they equal the default or preset
 
 
-class Setting(NamedTuple):
-    """A key with its value and what this would be without it, as they are shown."""
-
-    key: str
-    value: str
-    unit: str
-    default: str
-    meaning: str
-    changed: bool
-
-
-def settings(part: Component, facts: Facts | None = None) -> list[Setting]:
+def settings(part: Component, facts: Facts | None = None) -> list[SettingAbout]:
     """Every key of a part, compared with its preset where it has one, else with its defaults.
 
     With the facts of hull and actuator also with defaults that follow from these.
@@ -42,12 +31,13 @@ def settings(part: Component, facts: Facts | None = None) -> list[Setting]:
     return list(_settings(part, _preset(part) or _sized(part, facts)))
 
 
-def changed(scenario: Scenario) -> list[Setting]:
+def changed(scenario: Scenario) -> list[SettingAbout]:
     """What the scenario says itself, controllers apart."""
+    facts = scenario.facts
     return [
-        setting._replace(key=f"{name}.{setting.key}")
+        setting.model_copy(update={"key": f"{name}.{setting.key}"})
         for name, part in parts(scenario).items()
-        for setting in settings(part, _facts(scenario))
+        for setting in settings(part, facts)
         if setting.changed
     ]
 
@@ -64,18 +54,6 @@ def parts(scenario: Scenario) -> dict[str, Component]:
     return sections
 
 
-def laws(
-    controllers: Mapping[str, Component], scenario: Scenario | None = None
-) -> list[tuple[Setting, list[Setting | None]]]:
-    """Every key that a law sets otherwise than by default: what it is, and what each law has."""
-    facts = _facts(scenario) if scenario else None
-    tables = [{one.key: one for one in settings(law, facts)} for law in controllers.values()]
-    about = {key: one for table in reversed(tables) for key, one in table.items()}
-    keys = dict.fromkeys(one.key for table in tables for one in table.values() if one.changed)
-    ordered = sorted(keys, key=lambda key: key != "kind")
-    return [(about[key], [table.get(key) for table in tables]) for key in ordered]
-
-
 def _preset(part: Component) -> Component | None:
     """The part as its preset alone would make it; None without a preset."""
     name, presets = getattr(part, "preset", ""), type(part).presets
@@ -83,10 +61,6 @@ def _preset(part: Component) -> Component | None:
         return None
     node = preset_file(presets, name, [])
     return type(part)(**{**plain(node), "preset": name}) if node else None
-
-
-def _facts(scenario: Scenario) -> Facts | None:
-    return None if scenario.recorded else scenario.facts
 
 
 def _sized(part: Component, facts: Facts | None) -> Component | None:
@@ -105,7 +79,7 @@ def _sized(part: Component, facts: Facts | None) -> Component | None:
 
 def _settings(
     part: Component, base: Component | None, prefix: str = "", unit: str = ""
-) -> Iterator[Setting]:
+) -> Iterator[SettingAbout]:
     for name, field in type(part).model_fields.items():
         content = getattr(part, name)
         default = getattr(base, name) if base else field.get_default(call_default_factory=True)
@@ -115,10 +89,10 @@ def _settings(
         if not inner:
             meaning = summary(type(part)) if name == "kind" else field.description or ""
             other = content != default and f".{name}" not in PROSE
-            yield Setting(
-                f"{prefix}{name}", value_text(content), unit_of(field, unit),
-                value_text(None if field.is_required() and not base else default), meaning,
-                other or (name in WHICH and bool(content)),
+            yield SettingAbout(
+                key=f"{prefix}{name}", value=value_text(content), unit=unit_of(field, unit),
+                default=value_text(None if field.is_required() and not base else default),
+                meaning=meaning, changed=other or (name in WHICH and bool(content)),
             )  # fmt: skip
 
 

@@ -1,0 +1,47 @@
+"""about.json: what a run says about itself, from its scenario to whoever reads its log."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from typing import Any
+
+from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.about import RunAbout
+from podusv_cli.core.component import Component
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.settings import changed, parts, settings
+
+
+def about_of(scenario: Scenario) -> RunAbout:
+    """What the run of a scenario with one law says about itself."""
+    law, approach = scenario.controller, scenario.controller.approach()
+    return RunAbout(
+        **_of_parts(scenario),
+        values=scenario.model_dump(mode="json", exclude={"sweep", "tune", "doubt"}),
+        metrics={n: m.about for n, m in scenario.known_metrics().items() if n not in METRICS},
+        trial=law.trial() is not None, standoff=approach.standoff if approach else 0.0,
+        polar=isinstance(law, PolarBackstepping), optimum_of=law.optimum_of(),
+        duration=scenario.simulation.duration, step=scenario.simulation.step,
+        every=scenario.time_grid().log_every, steady_from=scenario.steady_from(),
+        settling_radius=scenario.metrics.settling_radius,
+        said={name: _said(part) for name, part in (parts(scenario) | {"controller": law}).items()},
+        settings=tuple(changed(scenario)), law=tuple(settings(law, scenario.facts)),
+    )  # fmt: skip
+
+
+def _of_parts(scenario: Scenario) -> dict[str, Any]:
+    """What figures and claims ask of hull, path, actuator and sensors."""
+    vessel, path, actuator = scenario.vessel, scenario.path, scenario.actuator
+    return {
+        "length": vessel.length, "beam": vessel.beam,
+        "follows": path.follows, "waypoints": path.waypoints(), "circles": path.circles(),
+        "limits": tuple(x if math.isfinite(x) else None for x in actuator.limits()),
+        "underactuated": actuator.input_rank() < 3,
+        "outages": scenario.measurement.outages_of_each(),
+    }  # fmt: skip
+
+
+def _said(part: Component) -> str:
+    return (inspect.getdoc(type(part)) or "").partition("\n")[0]
