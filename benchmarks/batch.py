@@ -69,16 +69,16 @@ def side_by_side_laws(rounds: int = 7) -> dict[str, dict[str, Any]]:
     """By law and number of steps: processor time of a run side by side and of one by one [s]."""
     cases = [(case, steps) for case in USUAL for steps in RUNS]
     cases += [(case, max(RUNS)) for case in MANY_NODES]
-    return {f"{case.label}; {steps}": _abreast(case, steps, rounds) for case, steps in cases}
+    return {f"{case.label}; {steps}": _side_by_side(case, steps, rounds) for case, steps in cases}
 
 
-def _abreast(case: Case, steps: int, rounds: int) -> dict[str, Any]:
+def _side_by_side(case: Case, steps: int, rounds: int) -> dict[str, Any]:
     over, count = grid(steps, log_every=steps + 1), RUNS[steps]
     loops = variants(case.loop(), {"disturbance.scale": np.linspace(0.5, 1.5, count)})
     many = partial(simulate_many, loops, over, probe=run_probe(loops[0], over), workers=1)
     timers = {
-        name: timed(partial(many, side_by_side=abreast), 1, process_time)
-        for name, abreast in (("side by side", True), ("one by one", False))
+        name: timed(partial(many, side_by_side=beside), 1, process_time)
+        for name, beside in (("side by side", True), ("one by one", False))
     }
     times = in_turns(timers, rounds)
     return {name: quartiles(values / count) for name, values in times.items()} | {
@@ -97,12 +97,12 @@ def hours_for_a_million(rounds: int = 3) -> dict[str, dict[str, list[float]]]:
 def _hours(case: Case, rounds: int) -> dict[str, list[float]]:
     over, draws = grid(31_000, log_every=31_001), np.random.default_rng(1)
     timers = {}
-    for abreast, count in MANY.items():
+    for beside, count in MANY.items():
         starts = {f"start.{axis}": draws.uniform(-10.0, 10.0, count) for axis in "xy"}
         loops = variants(case.loop(), starts)
         probe = run_probe(loops[0], over)
-        timers["side by side" if abreast else "one by one"] = timed(
-            partial(simulate_many, loops, over, probe=probe, side_by_side=abreast), 1
+        timers["side by side" if beside else "one by one"] = timed(
+            partial(simulate_many, loops, over, probe=probe, side_by_side=beside), 1
         )
     times = in_turns(timers, rounds)
     counts = dict(zip(timers, MANY.values(), strict=True))

@@ -58,13 +58,13 @@ def _memory(command: str) -> Callable[[Results], float]:
     return lambda found: float(found["commands"][command]["megabytes"][1] - found["log_megabytes"])
 
 
-def _abreast(labels: list[str], steps: int) -> Callable[[Results], float]:
+def _side_by_side(labels: list[str], steps: int) -> Callable[[Results], float]:
     return lambda found: max(
         float(found["side_by_side_laws"][f"{label}; {steps}"]["ratio"][1]) for label in labels
     )
 
 
-def _abreast_beside_c(found: Results) -> float:
+def _beside_c(found: Results) -> float:
     return max(float(median) for _, median, _ in found["side_by_side"]["ratios"].values())
 
 
@@ -78,10 +78,10 @@ GOALS = (
         "N runs at once beside N / cores single ones", 1.05,
         lambda found: float(found["batch"]["31000"]["cost"][1]),
     ),
-    Goal("a run side by side beside one by one, 31 000 steps", 0.3, _abreast(USUAL, 31_000)),
-    Goal("the same, 1000 steps", 0.3, _abreast(USUAL, 1_000)),
-    Goal("the same, 125 nodes, 31 000 steps", 0.25, _abreast(MANY_NODES, 31_000)),
-    Goal("a run side by side beside C side by side", 1.3, _abreast_beside_c),
+    Goal("a run side by side beside one by one, 31 000 steps", 0.3, _side_by_side(USUAL, 31_000)),
+    Goal("the same, 1000 steps", 0.3, _side_by_side(USUAL, 1_000)),
+    Goal("the same, 125 nodes, 31 000 steps", 0.25, _side_by_side(MANY_NODES, 31_000)),
+    Goal("a run side by side beside C side by side", 1.3, _beside_c),
     Goal(
         "a run in current, wind, 100 waves, with sensors, beside calm water", 2.5,
         lambda found: float(found["seas"]["sea, sensors"][1]),

@@ -216,8 +216,8 @@ def test_a_policy_without_weights_is_a_sentence(controller, says):
 def test_runs_side_by_side_have_the_bits_of_runs_alone(activation):
     base = podusv.load(scenario(packed(drawn([8, 6, 5, 2]))), {"controller.activation": activation})
     many = {"vessel.m": [20.0, 23.8, 26.0, 30.0], "start.psi": [0.0, 1.0, -2.0, 3.0]}
-    alone, abreast = (
+    alone, side_by_side = (
         podusv.simulate_many(base, many, side_by_side=beside) for beside in (False, True)
     )
-    assert alone.equals(abreast)
+    assert alone.equals(side_by_side)
     assert alone["iae"].nunique() == 4

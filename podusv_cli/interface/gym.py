@@ -15,9 +15,9 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.abreast import Abreast
 from podusv_cli.engine.running.batch_threads import BatchRun
 from podusv_cli.engine.running.lanes import LaneSorter, why_alone
+from podusv_cli.engine.running.stepped import SteppedBatch
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.interface.session import DEMAND, Session, marcher_of, waiting
@@ -262,7 +262,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
             )
         self._plan, self._sorter = plan, LaneSorter(0, True)
         self._sorter.choose(plan)
-        self._marches: list[Abreast] = []
+        self._marches: list[SteppedBatch] = []
         self._views = np.zeros((INPUTS, count))
         self._times, self._gathered = np.zeros((2, count))
 
@@ -305,7 +305,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
             self._gathered[march.places] = gathered
         return rewards
 
-    def _begun(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[Abreast]:
+    def _begun(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[SteppedBatch]:
         """Runs for these environments, in marches."""
         groups, advance = [], self._sorter.advance
         assert advance is not None
@@ -315,7 +315,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
             groups.append(self._sorter.sorted(run.vectors, run))
         groups += self._sorter.rest()
         self._gathered[places] = 0.0
-        return [Abreast(self._plan, g, advance, observed, INPUTS) for g in groups if g]
+        return [SteppedBatch(self._plan, g, advance, observed, INPUTS) for g in groups if g]
 
     def _observed(self) -> tuple[Vector, Info]:
         """What all see, where a run is terminated what it saw last; the time of every run [s]."""

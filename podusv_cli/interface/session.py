@@ -15,7 +15,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import Marcher, marcher
-from podusv_cli.engine.running.stepped import Mark, SteppedMarch
+from podusv_cli.engine.running.stepped import Mark, SteppedRun
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.functions import open_run, request
 from podusv_cli.interface.results import Run
@@ -116,7 +116,7 @@ class Session:
             )
         self._metrics = scenario.probe(grid)
         plan = Plan.with_probe(scenario.closed_loop(), grid, self._metrics)
-        self._march = SteppedMarch(plan, march, compiled=scenario.simulation.compiled)
+        self._march = SteppedRun(plan, march, compiled=scenario.simulation.compiled)
         self._demand = self._march.vectors.law_table[DEMAND]
 
     @property
