@@ -15,7 +15,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.batch_threads import BatchRun
+from podusv_cli.engine.running.batch import BatchRun
 from podusv_cli.engine.running.lanes import LaneSorter, why_alone
 from podusv_cli.engine.running.stepped import SteppedBatch
 from podusv_cli.interface.border import explained

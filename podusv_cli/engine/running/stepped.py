@@ -17,7 +17,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.running.batch_threads import BatchRun
+from podusv_cli.engine.running.batch import BatchRun
 from podusv_cli.engine.running.lanes import MARCHING, Lanes, room, shared_constants
 from podusv_cli.engine.running.simulate import March, Marcher, recorded
 from podusv_cli.engine.running.watch import Ending
