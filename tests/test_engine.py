@@ -36,7 +36,7 @@ from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import simulate
-from podusv_cli.engine.running.watch import Work
+from podusv_cli.engine.running.thread import Work
 from podusv_cli.engine.step.grid import TimeGrid
 
 

@@ -36,7 +36,7 @@ from podusv_cli.engine.machine.wide import object_code
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.batch import Batch, simulate_many
 from podusv_cli.engine.running.lanes import why_alone
-from podusv_cli.engine.running.watch import Work
+from podusv_cli.engine.running.thread import Work
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.table import metrics_probe
 from podusv_cli.scenario.load import load

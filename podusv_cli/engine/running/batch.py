@@ -22,7 +22,7 @@ from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.lanes import FEWEST, Lanes, LaneSorter, room
 from podusv_cli.engine.running.simulate import March, Marcher, marcher, why
-from podusv_cli.engine.running.watch import Bell, Ending, Work
+from podusv_cli.engine.running.thread import Bell, Ending, Work
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Vectors
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
@@ -128,7 +128,7 @@ class Batch:
 
     finished      it reached the last instant
     diverged      a number is not finite
-    hung          a step took more than `watch.PATIENCE` of processor time
+    hung          a step took more than `thread.PATIENCE` of processor time
     crashed       the law, or another part, raised an exception
     invalid       its loop cannot be made, or has another structure than the others
     interrupted   an interrupt stopped it, or kept it from beginning

@@ -20,7 +20,7 @@ from podusv_cli.core.signal import NAME, Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
-from podusv_cli.engine.running.watch import Work
+from podusv_cli.engine.running.thread import Work
 
 PROVENANCE = "provenance"  # is a group in every log
 UNWRITTEN = -1.234567890123e-290  # no law writes just this

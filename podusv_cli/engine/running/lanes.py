@@ -18,7 +18,7 @@ from podusv_cli.core.kernel import LANES, Vector, whole_numbers
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.simulate import March
-from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.running.thread import Ending
 from podusv_cli.engine.step.delay_line import COUNT
 from podusv_cli.engine.step.lane_march import REACHED, advance_lanes
 from podusv_cli.engine.step.layout import STEPS, Layout, Vectors

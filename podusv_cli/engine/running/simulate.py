@@ -15,7 +15,7 @@ from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import asked, check_law
-from podusv_cli.engine.running.watch import Ending, MarchStatus, watch
+from podusv_cli.engine.running.thread import Ending, MarchStatus, marched
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
@@ -60,7 +60,7 @@ def run(
     vectors, last = plan.vectors(grid.rows, allocate), layout.steps + 1
     advance = partial(marcher(plan, compiled)(vectors, layout, grid.step), 0, last)
     with np.errstate(all="ignore"), interrupts_deferred():
-        ending = watch(
+        ending = marched(
             advance, last, vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
@@ -97,14 +97,14 @@ def marcher(
 
     march = compile.Piece(rk4.advance, signatures.ADVANCE)
     compile.prepare([*(compile.adapter(*part) for part in plan.functions), march], compiling)
-    adapters, watch = [compile.entry(*part) for part in plan.functions], compile.routine(march)
+    adapters, routine = [compile.entry(*part) for part in plan.functions], compile.routine(march)
 
     def over(vectors: Vectors, layout: Layout, h: float) -> March:
         pointers, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
 
         def march(first: int, last: int, steps: int = layout.steps) -> int:
             sizes[STEPS] = steps
-            return int(watch(*adapters, first, last, h, pointers, sizes))
+            return int(routine(*adapters, first, last, h, pointers, sizes))
 
         return march
 

@@ -20,7 +20,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch import BatchRun
 from podusv_cli.engine.running.lanes import MARCHING, Lanes, room, shared_constants
 from podusv_cli.engine.running.simulate import March, Marcher, recorded
-from podusv_cli.engine.running.watch import Ending
+from podusv_cli.engine.running.thread import Ending
 from podusv_cli.engine.step.lane_march import REACHED
 from podusv_cli.engine.step.layout import SIGNATURES, Vectors
 

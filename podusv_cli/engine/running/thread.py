@@ -134,7 +134,7 @@ class Work:
         self._bell.put(None)
 
 
-def watch(
+def marched(
     advance: Callable[[], int], last: int, under_way: Vector,
     progress: Callable[[int], None] | None = None,
 ) -> Ending:  # fmt: skip
