@@ -218,6 +218,12 @@ TABLE: dict[str, list[Row]] = {
     ("BANDWIDTH**4", "BANDWIDTH**2", "test_the_gains_are_those_of_the_linear_quadratic_regulator"),
 ],
 "scenario": [
+    ("from_files(files, faults) if plugin.sha256 in used)", "from_files(files, faults))",
+     "test_a_run_of_before_is_looked_at_where_its_components_are_at_hand"),
+    ("tuple(x if math.isfinite(x) else None for x in actuator.limits())", "actuator.limits()",
+     "test_a_limit_that_is_not_constant_is_none"),
+    ("every=scenario.time_grid().log_every", "every=1",
+     "test_the_numbers_are_those_of_the_scenario"),
     ("if period and sample and not whole_steps(sample, period):", "if False:",
      "test_a_period_that_does_not_fit_is_one_sentence_with_its_key"),
     ('        "control.period": scenario.control.period,\n', "",
@@ -492,6 +498,8 @@ TABLE: dict[str, list[Row]] = {
     ('found["machine"] == _machine() and ', "", "test_what_others_may_be_making_is_left_alone"),
 ],
 "core": [
+    ("return trial or numbers.get(", "return numbers.get(",
+     "test_an_entry_is_off_its_target_beyond_the_settling_radius_but_in_a_trial"),
     ("low = _cubic(r, r2, E[2], E[3], E[4], E[5])", "low = _cubic(r, r2, E[2], E[3], E[4], E[4])",
      "test_the_exponential_is_right_to_the_last_place"),
     ("if quarters & 1:", "if quarters & 2:", "test_cosine_and_sine_are_right_to_the_last_place"),

@@ -9,13 +9,25 @@ from typing import Any
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.component import Component
+from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.settings import changed, parts, settings
 
 
 def about_of(scenario: Scenario) -> RunAbout:
-    """What the run of a scenario with one law says about itself."""
+    """What the run of a scenario with one law says about itself.
+
+    Raises LawError where a component of a plug-in fails when it is asked.
+    """
+    try:
+        return _told_by(scenario)
+    except Exception as error:  # a plug-in's method may raise anything
+        what = f"what {scenario.name} says about itself (hull, path, limits, standoff)"
+        raise LawError(f"{what} cannot be had: {in_a_line(error)}") from error
+
+
+def _told_by(scenario: Scenario) -> RunAbout:
     law, approach = scenario.controller, scenario.controller.approach()
     return RunAbout(
         **_of_parts(scenario),
@@ -36,7 +48,9 @@ def _of_parts(scenario: Scenario) -> dict[str, Any]:
     vessel, path, actuator = scenario.vessel, scenario.path, scenario.actuator
     return {
         "length": vessel.length, "beam": vessel.beam,
-        "follows": path.follows, "waypoints": path.waypoints(), "circles": path.circles(),
+        "follows": path.follows,
+        "waypoints": tuple(map(tuple, path.waypoints())),
+        "circles": tuple(map(tuple, path.circles())),
         "limits": tuple(x if math.isfinite(x) else None for x in actuator.limits()),
         "underactuated": actuator.input_rank() < 3,
         "outages": scenario.measurement.outages_of_each(),

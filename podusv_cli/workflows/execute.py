@@ -153,10 +153,10 @@ def execute(
             whole = _logged(writer, task.scenario, whole, again=long)
         with watch.part("metrics"):
             noticed = extras.made("warnings", lambda: postflight(task.scenario, whole))
-        warnings = (*task.noticed, *(noticed or ()))
+        warnings, told_of = (*task.noticed, *(noticed or ())), partial(about_of, task.scenario)
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
-            told = extras.made(folder.ABOUT, lambda: about_of(task.scenario))
+            told = extras.made(f"{folder.ABOUT}, which figures need,", told_of)
             if told:
                 facts = told.model_dump(exclude_defaults=True)
                 writer.add_json(folder.ABOUT, {"format": 1, **facts})
