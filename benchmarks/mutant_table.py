@@ -137,7 +137,7 @@ TABLE: dict[str, list[Row]] = {
     ("sound = [t for t in self.trials if t.status == FINISHED and t.excess == 0.0]",
      "sound = [t for t in self.trials if t.status == FINISHED]",
      "test_only_a_trial_that_holds_all_inequalities_prunes_others"),
-    ("return over / (abs(one.bound) or 1.0)", "return over",
+    ("return over / (abs(inequality.bound) or 1.0)", "return over",
      "test_an_inequality_says_by_how_much_it_does_not_hold"),
 ],
 "bench": [
@@ -244,8 +244,8 @@ TABLE: dict[str, list[Row]] = {
      "test_a_fault_is_one_sentence_at_its_place"),
 ],
 "export": [
-    ('for i, one in enumerate(shown, 1) if one.causality == "output"',
-     'for i, one in enumerate(shown) if one.causality == "output"',
+    ('for i, variable in enumerate(shown, 1) if variable.causality == "output"',
+     'for i, variable in enumerate(shown) if variable.causality == "output"',
      "test_fmpy_finds_no_fault_and_the_bits_of_the_run and alos"),
 ],
 "storage": [

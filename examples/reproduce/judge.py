@@ -68,9 +68,9 @@ def all_made(study: Plan, names: Sequence[str]) -> list[UnitResult]:
     """All draws of every law by name, in as many processes as there are cores."""
     units = [Unit(name, 0, 0, study.sweep.draws) for name in names]
     outcomes = run_all([partial(make, study, unit) for unit in units])
-    if failures := [one.failure for one in outcomes if one.failure]:
+    if failures := [outcome.failure for outcome in outcomes if outcome.failure]:
         raise RuntimeError(failures[0])
-    return [one.result for one in outcomes]
+    return [outcome.result for outcome in outcomes]
 
 
 def errors(met: Sequence[Outcomes]) -> Vector:

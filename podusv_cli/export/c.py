@@ -108,7 +108,7 @@ def _texts(law: ExportedLaw) -> Mapping[str, str]:
 
 def _list(numbers: Sequence[Number]) -> str:
     return ",\n           ".join(
-        _comment(f"{one.name} [{one.unit}] {one.meaning}") for one in _few(numbers)
+        _comment(f"{number.name} [{number.unit}] {number.meaning}") for number in _few(numbers)
     )
 
 

@@ -63,7 +63,7 @@ class About(BaseModel):
     def columns(self) -> list[str]:
         """The names of the columns of check.csv."""
         numbers = (*self.inputs, *self.demand, *self.signals, *self.memory)
-        return ["time", *(one.name for one in numbers)]
+        return ["time", *(number.name for number in numbers)]
 
 
 def check(folder: Path, *, trusted: bool = True) -> list[Checked]:

@@ -54,13 +54,13 @@ def fmu(
     `first` as in `variables`. Raises UsageError where a library cannot be linked.
     """
     shown = variables(law, first)
-    starts = [c.literal(float(one.start)) for one in shown if one.start is not None]
+    starts = [c.literal(float(variable.start)) for variable in shown if variable.start is not None]
     sources = c.sources(law)
     content = "".join([text, *sources.values(), *starts])
     about = {
         **c.told(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
         "variables": shown, "starts": starts, "loads": law.needs_loads,
-        "outputs": [i for i, one in enumerate(shown, 1) if one.causality == "output"],
+        "outputs": [i for i, variable in enumerate(shown, 1) if variable.causality == "output"],
         "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),
     }  # fmt: skip
     files = {**sources, "fmu.c": c.rendered("fmu.c", about)}

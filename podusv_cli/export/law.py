@@ -52,11 +52,11 @@ class Number(NamedTuple):
     meaning: str
 
 
-def _number(one: Signal) -> Number:
-    return Number(one.name, one.unit, one.meaning)
+def _number(signal: Signal) -> Number:
+    return Number(signal.name, signal.unit, signal.meaning)
 
 
-_LOGGED = {one.name: _number(one) for one in LOOP}
+_LOGGED = {signal.name: _number(signal) for signal in LOOP}
 _MOTION = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s2"))
 TARGET_NUMBERS = tuple(
     Number(name, unit, f"{what} of the target, {way}")
@@ -164,8 +164,8 @@ class ExportedLaw:
     def memory(self) -> tuple[Number, ...]:
         """Every number that the law remembers, in order."""
         return tuple(
-            Number(one.name if size == 1 else f"{one.name}[{i}]", one.unit, one.meaning)
-            for one, size in self._slots
+            Number(number.name if size == 1 else f"{number.name}[{i}]", number.unit, number.meaning)
+            for number, size in self._slots
             for i in range(size)
         )
 
@@ -174,7 +174,7 @@ class ExportedLaw:
         """What a row of `samples` has."""
         given = (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS)
         said = (*DEMAND_NUMBERS, *self.signals, *self.memory)
-        return ["time", *(one.name for one in (*given, *said))]
+        return ["time", *(number.name for number in (*given, *said))]
 
     @property
     def needs_loads(self) -> bool:
@@ -190,7 +190,7 @@ class ExportedLaw:
         return {
             "format": 1, "law": self.loop.controller.label, "scenario": self.scenario.name,
             "period": self.period, "platforms": list(platforms), "library": list(library),
-            **{name: [one._asdict() for one in numbers] for name, numbers in about.items()},
+            **{name: [number._asdict() for number in numbers] for name, numbers in about.items()},
         }  # fmt: skip
 
     def samples(self, log: Recording) -> Vector:
@@ -201,10 +201,10 @@ class ExportedLaw:
         """
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)
-        state = [log[one.name][rows] for one in self._given]
-        loads = [np.where(rows > 0, log[one.name][before], 0.0) for one in LOAD_NUMBERS]
-        said = [log[one.name][rows] for one in (*DEMAND_NUMBERS, *self.signals)]
-        memory = [log[one.name][rows].reshape(len(rows), -1) for one, _ in self._slots]
+        state = [log[number.name][rows] for number in self._given]
+        loads = [np.where(rows > 0, log[number.name][before], 0.0) for number in LOAD_NUMBERS]
+        said = [log[number.name][rows] for number in (*DEMAND_NUMBERS, *self.signals)]
+        memory = [log[number.name][rows].reshape(len(rows), -1) for number, _ in self._slots]
         time = log["time"][rows]
         return np.column_stack([time, *state, self._targets(log, rows), *loads, *said, *memory])
 
@@ -242,7 +242,7 @@ class ExportedLaw:
         path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
-            x = np.array([log[one.name][row] for one in self._given])
+            x = np.array([log[number.name][row] for number in self._given])
             place = np.array([log[one.name][row] for one in path.places])
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target

@@ -39,7 +39,9 @@ def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, byte
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
     wanted = extras.made("the list of figures", lambda: list(sketches)) or []
-    outcomes = () if extras.interrupted else run_shares([partial(_image, one) for one in wanted])
+    outcomes = (
+        () if extras.interrupted else run_shares([partial(_image, sketch) for sketch in wanted])
+    )
     for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
         extras.interrupted |= outcome.interrupted
         if outcome.result:

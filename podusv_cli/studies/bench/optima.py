@@ -79,8 +79,8 @@ def least(of: Task, tell: Callable[[float], None]) -> Least:
         raise UsageError(f"{', '.join(case.place)}: no law reached its target to begin from")
     scenarios = {law: case.laws[law] for law in of.laws}
     guesses = {
-        law: Motion.of(simulate(one.closed_loop(), one.time_grid()))
-        for law, one in scenarios.items()
+        law: Motion.of(simulate(scenario.closed_loop(), scenario.time_grid()))
+        for law, scenario in scenarios.items()
     }
     stages = _searched(problem(scenarios[of.laws[0]], "iae"), guesses, tell)
     before, last = next(reversed(list(pairwise(stages))))
@@ -102,7 +102,9 @@ def _searched(
 def table(found: Iterable[Least]) -> pd.DataFrame:
     """A row for each case that has an optimum."""
     rows = [
-        (*place, one.iae, one.step, one.lowered, one.start) for one in found for place in one.places
+        (*place, optimum.iae, optimum.step, optimum.lowered, optimum.start)
+        for optimum in found
+        for place in optimum.places
     ]
     names = ("vessel", "task", "condition", "optimum", "step", "lowered", "start")
     return pd.DataFrame(rows, columns=pd.Index(names))

@@ -111,7 +111,7 @@ def judge(
     """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
     tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
     levels = holm(lambda i, level: tried[i].at(level).answer is not None, len(tried), level)
-    return [_verdict(c, one.at(at)) for c, one, at in zip(claims, tried, levels, strict=True)]
+    return [_verdict(c, claim.at(at)) for c, claim, at in zip(claims, tried, levels, strict=True)]
 
 
 @dataclass

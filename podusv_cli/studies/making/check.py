@@ -70,7 +70,9 @@ def unjudged(scenario: Scenario) -> str:
 def singles(scenario: Scenario) -> dict[str, Scenario]:
     """The scenario of every law that takes part in the sweep."""
     wanted = scenario.sweep.laws if scenario.sweep else ()
-    return {n: one for n, one in scenario.singles().items() if n in (wanted or scenario.labels())}
+    return {
+        n: single for n, single in scenario.singles().items() if n in (wanted or scenario.labels())
+    }
 
 
 def _laws(scenario: Scenario, sweep: Sweep) -> Faults:
@@ -91,7 +93,7 @@ def _metric_names(scenario: Scenario) -> Faults:
 
 def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep) -> Faults:
     own = {law: replace(plans[law], probe_for=no_probe).structure for law in laws}
-    taken = {*AXES, *ENDING, *(name for one in laws.values() for name in gathered_metrics(one))}
+    taken = {*AXES, *ENDING, *(name for law in laws.values() for name in gathered_metrics(law))}
     for name, quantity in sweep.vary.items():
         if wrong := _wrong_name(name, quantity, taken):
             yield ("sweep", "vary", name), wrong
@@ -119,10 +121,10 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     if section not in PER_RUN and section in Scenario.model_fields:
         yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
         return
-    lacking = [label for label, one in laws.items() if not has(one, key)]
+    lacking = [label for label, law in laws.items() if not has(law, key)]
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
-        whys = (why(one, steps) for one in laws.values() for why in (no_entry, no_section))
+        whys = (why(law, steps) for law in laws.values() for why in (no_entry, no_section))
         beyond = next(filter(None, whys), "")
         free = "" if quantity.keys or len(steps) > 1 else FREE_NAME
         yield beyond or f"unknown key {key!r}{near or free}"
@@ -131,7 +133,7 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
         who = f"{key} is no key of {', '.join(lacking)}"
         yield f"{who}; name the laws that have it, {having}, in sweep.laws"
     else:
-        yield from (t for one in laws.values() for t in _type(key, quantity, one))
+        yield from (t for law in laws.values() for t in _type(key, quantity, law))
 
 
 def no_section(scenario: Scenario, steps: Route) -> str:
@@ -152,7 +154,7 @@ def no_section(scenario: Scenario, steps: Route) -> str:
 
 def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
     """All keys of numbers that a draw can change, but for those in lists."""
-    found = [item for one in laws.values() for item in values(one).items()]
+    found = [item for law in laws.values() for item in values(law).items()]
     return [key for key, own in found if route(key)[0] in PER_RUN and _is_number(own)]
 
 
@@ -199,14 +201,15 @@ def _tried(
         *([] if discrete or quantity.seed else quantity.distribution.at(TRIED).tolist()),
         *([1] if quantity.seed else []),
     ]
-    for law, one in laws.items():
-        told = [_refused(name, quantity, one, value) for value in drawn_values]
+    for law, single in laws.items():
+        told = [_refused(name, quantity, single, value) for value in drawn_values]
         if all(told) or (discrete and any(told)):
             yield next(filter(None, told)).removeprefix(f"sweep.vary.{name}: ")
         yield from (
             "changes how the loop is put together or sampled; list its values under grid"
             for value, refused in zip(drawn_values, told, strict=True)
-            if not refused and _structure(drawn(one, {name: quantity}, {name: value})) != own[law]
+            if not refused
+            and _structure(drawn(single, {name: quantity}, {name: value})) != own[law]
         )
 
 
@@ -218,9 +221,9 @@ def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> s
     return ""
 
 
-def _structure(one: Scenario) -> Any:
+def _structure(scenario: Scenario) -> Any:
     """What runs have in common that differ in numbers only."""
-    return Plan(one.closed_loop(), one.time_grid()).structure
+    return Plan(scenario.closed_loop(), scenario.time_grid()).structure
 
 
 def _twice(sweep: Sweep) -> Faults:

@@ -36,7 +36,7 @@ class Invalid:
 
 def check_draws(made: Plan) -> Invalid:
     """The first draws of a study, each in as many laws and cells as there is time for."""
-    runs = [one for cell in made.cells for one in singles(cell.scenario).values()]
+    runs = [single for cell in made.cells for single in singles(cell.scenario).values()]
     return invalid_runs(runs, made.sweep)
 
 

@@ -111,7 +111,9 @@ def mixture(folder: Path) -> str:
 
 def _machines(folder: Path) -> list[str]:
     # A session that was killed has no end, and does not know how many runs it made.
-    made = (one for one in sessions(folder) if one["runs"] or one["finished"] is None)
+    made = (
+        session for session in sessions(folder) if session["runs"] or session["finished"] is None
+    )
     return list(dict.fromkeys(map(_machine, made)))
 
 

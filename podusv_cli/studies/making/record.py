@@ -41,17 +41,17 @@ def of_scenario(
         duration=scenario.simulation.duration, steady_fraction=scenario.metrics.steady_fraction,
         settling_radius=scenario.metrics.settling_radius,
         parts={
-            "path": scenario.path.label, "disturbance": ", ".join(one.label for one in seas),
+            "path": scenario.path.label, "disturbance": ", ".join(sea.label for sea in seas),
             "actuator": scenario.actuator.label,
         },
-        plugins={n: one.sha256 for n, one in scenario.plugins.items() if n.endswith(".py")},
+        plugins={n: plugin.sha256 for n, plugin in scenario.plugins.items() if n.endswith(".py")},
         laws=laws, cells=cells,
         grid={key: tuple(map(as_yaml, given)) for key, given in sweep.grid.items()},
         draws=sweep.draws, seed=sweep.seed, design=sweep.design, success=sweep.success,
         level=sweep.level, keep=sweep.keep, claims=sweep.claims,
         quantities={
-            name: QuantityAbout(keys=one.targets(name), drawn=in_words(one), is_seed=one.seed)
-            for name, one in sweep.vary.items()
+            name: QuantityAbout(keys=drawn.targets(name), drawn=in_words(drawn), is_seed=drawn.seed)
+            for name, drawn in sweep.vary.items()
         },
         metrics=metrics, measured=measured, identity=json_files.plain(identity), history=(),
     )  # fmt: skip
@@ -61,7 +61,7 @@ def drawing(study: StudyIdentity) -> tuple[Sweep, str]:
     """How the quantities of a study are drawn, and the stream of its draws."""
     head = "sweep.vary."
     own = study.identity
-    vary = {key.removeprefix(head): one for key, one in own.items() if key.startswith(head)}
+    vary = {key.removeprefix(head): value for key, value in own.items() if key.startswith(head)}
     told = {"seed": own["sweep.seed"], "design": own["sweep.design"], "vary": vary}
     sweep = Sweep.model_validate_json(json.dumps({**told, "draws": study.draws}))
     return sweep, own.get("stream", SWEEP)

@@ -63,15 +63,19 @@ def timing(folder: Path) -> dict[str, Any]:
     """How long the runs of each law took, over all sessions. Raises StorageError."""
     every = sessions(folder)
     runs, seconds = Counter[str](), Counter[str]()
-    for one in every:
-        runs.update(one.get("timed_runs", {}))
-        seconds.update(one.get("processor_s", {}))
+    for session in every:
+        runs.update(session.get("timed_runs", {}))
+        seconds.update(session.get("processor_s", {}))
     laws = {
         law: {"runs": n, "processor_s": seconds[law], "ms_a_run": 1e3 * seconds[law] / n}
         for law, n in runs.items()
     }
     keys = ("started", "duration_s", "runs")
-    return {"format": 1, "laws": laws, "sittings": [{k: one[k] for k in keys} for one in every]}
+    return {
+        "format": 1,
+        "laws": laws,
+        "sittings": [{k: session[k] for k in keys} for session in every],
+    }
 
 
 class SessionLog:
@@ -97,7 +101,7 @@ class SessionLog:
         with sole_writer(folder, PROVENANCE, PATIENCE):
             earlier = sessions(folder)
             for other in others:
-                earlier += [one for one in sessions(other) if one not in earlier]
+                earlier += [session for session in sessions(other) if session not in earlier]
             self._place = len(earlier)
             self._write(earlier)
 

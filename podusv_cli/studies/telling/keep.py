@@ -71,7 +71,7 @@ def wanted(results: Results) -> list[KeptRun]:
 
 def unmade(folder: Path, results: Results) -> list[KeptRun]:
     """The runs that are to be kept and are not there yet."""
-    return [one for one in wanted(results) if not (folder / LOGS / one.name).exists()]
+    return [run for run in wanted(results) if not (folder / LOGS / run.name).exists()]
 
 
 def _failed(runs: Table, law: str, count: int) -> Iterator[KeptRun]:
@@ -98,25 +98,25 @@ def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[KeptRun]:
 
 def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
     """The kept runs, compared with the table; one that is not there or differs is missing."""
-    kept = [_opened(folder / LOGS / one.name, one, results, extras) for one in wanted(results)]
+    kept = [_opened(folder / LOGS / run.name, run, results, extras) for run in wanted(results)]
     extras.missing += [
-        Failure(f"{LOGS}/{one.wanted.name}", one.difference, problem="differs from runs.h5")
-        for one in kept if one.difference
+        Failure(f"{LOGS}/{run.wanted.name}", run.difference, problem="differs from runs.h5")
+        for run in kept if run.difference
     ]  # fmt: skip
     return kept
 
 
-def _opened(path: Path, one: KeptRun, results: Results, extras: Extras) -> Kept:
+def _opened(path: Path, kept_run: KeptRun, results: Results, extras: Extras) -> Kept:
     if not path.exists():
-        return Kept(one, None)
+        return Kept(kept_run, None)
     try:
         run = open_run(path)
     except StorageError as error:
         extras.missing.append(
-            Failure(f"{LOGS}/{one.name}", str(error), problem="could not be read")
+            Failure(f"{LOGS}/{kept_run.name}", str(error), problem="could not be read")
         )
-        return Kept(one, None)
-    return Kept(one, run, difference(run, one, results.runs))
+        return Kept(kept_run, None)
+    return Kept(kept_run, run, difference(run, kept_run, results.runs))
 
 
 def difference(run: FinishedRun, one: KeptRun, runs: Table) -> str:
@@ -130,7 +130,7 @@ def difference(run: FinishedRun, one: KeptRun, runs: Table) -> str:
 
 def contradiction(kept: Sequence[Kept]) -> str:
     """Why the table is in doubt: how many kept logs differ from it; "" where none does."""
-    differing = [one for one in kept if one.difference]
+    differing = [run for run in kept if run.difference]
     if not differing:
         return ""
     first = differing[0]
@@ -143,16 +143,16 @@ def contradiction(kept: Sequence[Kept]) -> str:
 def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
     """The distance to the target over time in every kept log that has it, by law."""
     found: dict[str, list[Track]] = {}
-    for one in kept:
-        track = extras.made(f"the track of {one.wanted.name}", partial(_track, one))
+    for run in kept:
+        track = extras.made(f"the track of {run.wanted.name}", partial(_track, run))
         if track:
-            found.setdefault(one.wanted.law, []).append(track)
+            found.setdefault(run.wanted.law, []).append(track)
     return found
 
 
-def _track(one: Kept) -> Track | None:
-    if one.run is None or "z_e" not in one.run.recording:
+def _track(kept: Kept) -> Track | None:
+    if kept.run is None or "z_e" not in kept.run.recording:
         return None
-    log = one.run.recording
+    log = kept.run.recording
     rows = np.unique(np.linspace(0, len(log["time"]) - 1, POINTS).astype(int))
     return log["time"][rows], log["z_e"][rows]

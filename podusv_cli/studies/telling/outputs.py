@@ -28,7 +28,7 @@ FIGURES, REPORT = "figures", "report.html"
 
 def write_tables(folder: Path, results: Results) -> None:
     """Write tables and verdicts into the study's folder. Raises StorageError."""
-    told = {"format": 1, "claims": [one.as_json() for one in results.verdicts]}
+    told = {"format": 1, "claims": [verdict.as_json() for verdict in results.verdicts]}
     judged = as_markdown(results.verdicts)
     if results.contradicted:
         told["contradicted"] = results.contradicted

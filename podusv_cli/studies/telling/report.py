@@ -70,7 +70,7 @@ def page(
         kept=kept,
         beside=numbered[: len(beside)],
         figures=numbered,
-        missing=[str(one) for one in missing],
+        missing=[str(failure) for failure in missing],
         sittings=_sessions(folder),
         latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
         first=FIRST,
@@ -135,12 +135,12 @@ def _numbers(results: Results) -> list[list[str]]:
     """Quantiles of the shown metrics, the median with its interval."""
     rows: list[Any] = results.summary.to_dict("records")
     return [
-        [one["law"], one["cell"], one["metric"], one["unit"],
-         *(digits(one[q], infinite=word) for q in ("q05", "q25")),
-         Interval.of(one, "q50").text(infinite=word),
-         *(digits(one[q], infinite=word) for q in ("q75", "q95"))]
-        for one in rows if one["metric"] in results.shown
-        for word in [results.known[one["metric"]].infinite]
+        [row["law"], row["cell"], row["metric"], row["unit"],
+         *(digits(row[q], infinite=word) for q in ("q05", "q25")),
+         Interval.of(row, "q50").text(infinite=word),
+         *(digits(row[q], infinite=word) for q in ("q75", "q95"))]
+        for row in rows if row["metric"] in results.shown
+        for word in [results.known[row["metric"]].infinite]
     ]  # fmt: skip
 
 
@@ -165,5 +165,5 @@ def _beside(figures: Sequence[Picture], laws: int) -> list[Picture]:
 
 
 def _sessions(folder: Path) -> list[list[str]]:
-    told = [dict(flat(one)) for one in sessions(folder)]
-    return [[value_text(one.get(key)) for key in SESSION] for one in told]
+    told = [dict(flat(session)) for session in sessions(folder)]
+    return [[value_text(session.get(key)) for key in SESSION] for session in told]

@@ -89,7 +89,7 @@ class Results:
     def cells(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of the table of the answer: failures and medians of every law."""
         several, about = len(self.runs.cells) > 1, [self.known[name] for name in self.shown]
-        medians = (f"median of {one.row} [{one.unit}]" for one in about)
+        medians = (f"median of {metric.row} [{metric.unit}]" for metric in about)
         head = ["law", *(["cell"] if several else []), "failed", *medians]
         rows = []
         for law in self.runs.laws:
@@ -113,7 +113,7 @@ class Results:
             "broken": self.broken,
             "contradicted": self.contradicted,
             "summary": self.summary.to_dict("records"),
-            "claims": [one.as_json() for one in self.verdicts],
+            "claims": [verdict.as_json() for verdict in self.verdicts],
         }
 
 

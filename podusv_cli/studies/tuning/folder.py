@@ -80,7 +80,7 @@ def clear(folder: Path) -> None:
 
 
 def _asked(told: Record | None) -> list[dict[str, Any]]:
-    return [one.model_dump(by_alias=True) for one in told.history] if told else []
+    return [call.model_dump(by_alias=True) for call in told.history] if told else []
 
 
 def write(
@@ -124,7 +124,7 @@ def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, 
 def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
     """Raise UsageError where runs that are there would be thrown away."""
     for key, unit in (("budget", "runs"), ("repeats", "searches"), ("validate", "fresh draws")):
-        there = max((one[key] for one in history), default=0)
+        there = max((call[key] for call in history), default=0)
         if getattr(tune, key) < there:
             raise UsageError(
                 f"{folder} has {key}: {there} ({unit}); ask for as many or more, name another "

@@ -35,12 +35,12 @@ def find_idle(plan: TunePlan, workers: int) -> dict[str, tuple[str, ...]]:
     """
     laws = [law for law, found in plan.gains.items() if found]
     outcomes = run_all([partial(_of_law, plan, law) for law in laws], workers=workers)
-    if any(one.interrupted for one in outcomes):
+    if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt
-    for one in outcomes:
-        if one.failure and not one.killed:
-            raise PodusvError(one.failure)
-    return {law: one.result or () for law, one in zip(laws, outcomes, strict=True)}
+    for outcome in outcomes:
+        if outcome.failure and not outcome.killed:
+            raise PodusvError(outcome.failure)
+    return {law: outcome.result or () for law, outcome in zip(laws, outcomes, strict=True)}
 
 
 def _of_law(plan: TunePlan, law: str, progress: Progress) -> tuple[str, ...]:

@@ -126,11 +126,15 @@ def evaluate(
     return found if math.isfinite(found) else math.inf
 
 
-def excess(one: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]) -> float:
+def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]) -> float:
     """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
-    found = evaluate(one.tree, runs, metrics, -math.inf if one.upward else math.inf)
-    over = one.bound - found if one.upward and math.isfinite(found) else found - one.bound
-    return over / (abs(one.bound) or 1.0)
+    found = evaluate(inequality.tree, runs, metrics, -math.inf if inequality.upward else math.inf)
+    over = (
+        inequality.bound - found
+        if inequality.upward and math.isfinite(found)
+        else found - inequality.bound
+    )
+    return over / (abs(inequality.bound) or 1.0)
 
 
 def _evaluated(node: ast.expr, walk: OfGains, worst: float) -> Any:

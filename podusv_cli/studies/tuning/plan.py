@@ -54,17 +54,17 @@ class TunePlan:
     @cached_property
     def laws(self) -> dict[str, Controller]:
         """The laws that take part, by name."""
-        return {label: one.controller for label, one in singles(self.scenario).items()}
+        return {label: single.controller for label, single in singles(self.scenario).items()}
 
     @cached_property
     def gains(self) -> dict[str, tuple[Gain, ...]]:
         """The gains of every law; none for a law that is kept as it is."""
         return {
             label: tuple(
-                gain for gain in gains(one.controller, label, one, self.tune)
+                gain for gain in gains(single.controller, label, single, self.tune)
                 if gain.key not in self.idle.get(label, ())
             )
-            for label, one in singles(self.scenario).items()
+            for label, single in singles(self.scenario).items()
         }  # fmt: skip
 
     @cached_property
@@ -137,13 +137,15 @@ class TunePlan:
         """The runs of some units, in their order; failed is what the study calls no success."""
         import numpy as np
 
-        names = dict.fromkeys(name for one in results for name in one.metrics)
-        blank = {id(one): np.full(one.unit.count, np.nan) for one in results}
+        names = dict.fromkeys(name for result in results for name in result.metrics)
+        blank = {id(result): np.full(result.unit.count, np.nan) for result in results}
         metrics = {
-            name: np.concatenate([one.metrics.get(name, blank[id(one)]) for one in results])
+            name: np.concatenate(
+                [result.metrics.get(name, blank[id(result)]) for result in results]
+            )
             for name in names
         }
-        ended = np.concatenate([one.status == STATUSES.index("finished") for one in results])
+        ended = np.concatenate([result.status == STATUSES.index("finished") for result in results])
         return Outcomes(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
 
     @cached_property

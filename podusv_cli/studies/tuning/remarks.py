@@ -85,7 +85,8 @@ def _unsound(results: SearchResults) -> Iterator[str]:
     for law in results.winners:
         trial = results.winner(law)
         broken = [
-            one.text for one, over in zip(results.plan.inequalities, trial.excesses, strict=True)
+            inequality.text
+            for inequality, over in zip(results.plan.inequalities, trial.excesses, strict=True)
             if over > 0.0
         ]  # fmt: skip
         if broken:
@@ -97,7 +98,7 @@ def _unsound(results: SearchResults) -> Iterator[str]:
 def _few(results: SearchResults) -> Iterator[str]:
     told = []
     for law in results.winners:
-        whole = min(sum(t.status == FINISHED for t in one) for one in results.trials[law])
+        whole = min(sum(t.status == FINISHED for t in trials) for trials in results.trials[law])
         gains = len(results.plan.gains[law])
         if is_few(whole, gains):
             told.append(f"{law} {whole} for {gains} gains")

@@ -50,7 +50,7 @@ def page(
         beside=numbered[:1],
         figures=numbered,
         metrics=plan.metrics,
-        missing=[str(one) for one in missing],
+        missing=[str(failure) for failure in missing],
         latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
     )  # fmt: skip
 
@@ -116,8 +116,8 @@ def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
     for before, after in zip(by.get("before", ()), by.get("after", ()), strict=True):
         yield {
             "a": before["a"], "b": before["b"], "before": ratio(before), "after": ratio(after),
-            "wins": [f"{100 * one['a_wins']:.3g} %" for one in (before, after)],
-            "losses": [f"{100 * one['b_wins']:.3g} %" for one in (before, after)],
+            "wins": [f"{100 * pair['a_wins']:.3g} %" for pair in (before, after)],
+            "losses": [f"{100 * pair['b_wins']:.3g} %" for pair in (before, after)],
             "turned": _turned(before, after),
         }  # fmt: skip
 

@@ -71,7 +71,7 @@ class SearchResults:
     @cached_property
     def shown(self) -> list[str]:
         """The metrics of the tables."""
-        trees = [self.plan.objective, *(one.tree for one in self.plan.inequalities)]
+        trees = [self.plan.objective, *(inequality.tree for inequality in self.plan.inequalities)]
         told = [name for tree in trees for name in named(tree, self.plan.metrics)]
         return [n for n in dict.fromkeys([*told, *ALWAYS]) if n in self.runs.metrics]
 
@@ -130,7 +130,7 @@ class SearchResults:
         runs = {}
         for law in self.plan.laws:
             met = [self.met(name) for name in self._searched(law)]
-            runs[law] = np.array([worst_where_unknown(one, metric).ravel() for one in met])
+            runs[law] = np.array([worst_where_unknown(of_law, metric).ravel() for of_law in met])
         assert self.plan.scenario.sweep
         return searches.ratios(runs, self.level, self.plan.scenario.sweep.seed)
 
@@ -180,20 +180,21 @@ class SearchResults:
         """Every inequality on the fresh draws, before and after, for every law."""
         return pd.DataFrame(
             [
-                {"law": law, "when": when, "inequality": one.text, **self._limit(one, name),
+                {"law": law, "when": when, "inequality": inequality.text,
+                 **self._limit(inequality, name),
                  "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0}
                 for law in self.plan.laws
                 for when, name in (("before", law), ("after", self.after(law)))
-                for i, one in enumerate(self.plan.inequalities)
+                for i, inequality in enumerate(self.plan.inequalities)
             ],
             columns=["law", "when", "inequality", "value", "value_low", "value_high", "holds",
                      "held_in_training"],
         )  # fmt: skip
 
-    def _limit(self, one: Inequality, name: str) -> dict[str, Any]:
+    def _limit(self, inequality: Inequality, name: str) -> dict[str, Any]:
         runs = self.met(name)
-        holds = excess(one, runs, self.plan.metrics) <= 0.0
-        return {**self.objective(runs, one.tree).columns("value"), "holds": holds}
+        holds = excess(inequality, runs, self.plan.metrics) <= 0.0
+        return {**self.objective(runs, inequality.tree).columns("value"), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every repeat's winner, or of a law that is kept."""
@@ -229,7 +230,7 @@ class SearchResults:
             summary.pairs(self.runs, MARGIN, self.level, known, names).assign(when=when)
             for when, names in compared
         ]
-        return pd.concat([one for one in tables if len(one)] or tables, ignore_index=True)
+        return pd.concat([table for table in tables if len(table)] or tables, ignore_index=True)
 
     @cached_property
     def gains(self) -> pd.DataFrame:
@@ -259,7 +260,7 @@ class SearchResults:
     def importance(self) -> pd.DataFrame:
         """How much each gain matters, with the least and the most of repeats and of parts."""
         rows = [
-            {"law": law, "gain": gain.key, **_range([one.get(gain.key, 0.0) for one in found])}
+            {"law": law, "gain": gain.key, **_range([trial.get(gain.key, 0.0) for trial in found])}
             for law in self.trials for found in [list(self._importances(law))] if found
             for gain in self.plan.gains[law]
         ]  # fmt: skip
@@ -269,7 +270,7 @@ class SearchResults:
         """Of each repeat's trials without one part of them after the other."""
         for trials in self.trials[law]:
             for part in range(PARTS):
-                kept = [one for place, one in enumerate(trials) if place % PARTS != part]
+                kept = [trial for place, trial in enumerate(trials) if place % PARTS != part]
                 if len(kept) >= FEWEST * (PARTS - 1) / PARTS:
                     found = importances(
                         self.plan.gains[law], [t.gains for t in kept], [t.value for t in kept]

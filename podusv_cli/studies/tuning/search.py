@@ -42,7 +42,7 @@ class Attempt:
     @property
     def met(self) -> int:
         """How many draws it has met."""
-        return sum(one.unit.count for one in self.results)
+        return sum(result.unit.count for result in self.results)
 
 
 class Search:
@@ -118,10 +118,10 @@ class Search:
         Raises StorageError where the file has other gains than those asked for.
         """
         kept = [trial for trial in self._kept if trial.batch == self._batch]
-        whole = [one.draws == self.plan.tune.train for one in self._attempts]
+        whole = [attempt.draws == self.plan.tune.train for attempt in self._attempts]
         if [trial.status != CUT for trial in kept] != whole:
             return None
-        if [dict(trial.gains) for trial in kept] != [one.gains for one in self._attempts]:
+        if [dict(trial.gains) for trial in kept] != [attempt.gains for attempt in self._attempts]:
             raise StorageError(
                 f"{self._folder / trials.FOLDER}: batch {self._batch} of {self.name} has other "
                 "gains than this machine asks for; continue the search on the machine that it "
@@ -132,14 +132,14 @@ class Search:
     def _units(self, until: int) -> list[tuple[int, study.Plan, Unit]]:
         """The units that take every attempt to so many draws; those refused fail at once."""
         found = []
-        for place, one in enumerate(self._attempts):
-            unit = Unit(self.law, 0, one.met, until - one.met)
-            if not unit.count or self._is_over(one):
+        for place, attempt in enumerate(self._attempts):
+            unit = Unit(self.law, 0, attempt.met, until - attempt.met)
+            if not unit.count or self._is_over(attempt):
                 continue
-            if one.plan:
-                found.append((place, one.plan, unit))
+            if attempt.plan:
+                found.append((place, attempt.plan, unit))
             else:
-                one.results.append(self._refused(unit))
+                attempt.results.append(self._refused(unit))
         self._waiting = len(found)
         return found
 
@@ -166,23 +166,26 @@ class Search:
         self._told(list(self._made()))
         trials.write(self._folder, self.name, self.trials)
 
-    def _is_over(self, one: Attempt) -> bool:
+    def _is_over(self, attempt: Attempt) -> bool:
         """Whether a trial is pruned: a sound one of earlier batches is far better."""
-        if not self.trials or one.met < self.first:
+        if not self.trials or attempt.met < self.first:
             return False
-        value = self._value(self._first(one))
+        value = self._value(self._first(attempt))
         sound = [t for t in self.trials if t.status == FINISHED and t.excess == 0.0]
         return any(_far(trial.first, value) for trial in sound)
 
     def _made(self) -> Iterator[Trial]:
         tune = self.plan.tune
-        for place, one in enumerate(self._attempts):
-            runs, met = self._runs(one), one.met
-            status = FINISHED if met == tune.train else CUT if one.draws < tune.train else PRUNED
+        for place, attempt in enumerate(self._attempts):
+            runs, met = self._runs(attempt), attempt.met
+            status = (
+                FINISHED if met == tune.train else CUT if attempt.draws < tune.train else PRUNED
+            )
             yield Trial(
-                len(self.trials) + place, self._batch, one.gains, met, status, self._value(runs),
+                len(self.trials) + place, self._batch, attempt.gains, met, status,
+                self._value(runs),
                 tuple(excess(text, runs, self.plan.metrics) for text in self.plan.inequalities),
-                self._value(self._first(one)), float(np.mean(runs.failed)),
+                self._value(self._first(attempt)), float(np.mean(runs.failed)),
             )  # fmt: skip
 
     def _told(self, made: Sequence[Trial]) -> None:
@@ -190,12 +193,12 @@ class Search:
         self.trials += made
         self._batch += 1
 
-    def _runs(self, one: Attempt) -> Outcomes:
-        return self.plan.runs(one.results)
+    def _runs(self, attempt: Attempt) -> Outcomes:
+        return self.plan.runs(attempt.results)
 
-    def _first(self, one: Attempt) -> Outcomes:
+    def _first(self, attempt: Attempt) -> Outcomes:
         """The runs of the first draws."""
-        metrics, failed = self._runs(one)
+        metrics, failed = self._runs(attempt)
         return Outcomes({n: v[: self.first] for n, v in metrics.items()}, failed[: self.first])
 
     def _value(self, runs: Outcomes) -> float:

@@ -49,7 +49,7 @@ def ratios(runs: Mapping[str, Vector], level: float, seed: int) -> pd.DataFrame:
 def _sampled(table: Vector, met: npt.NDArray[np.int64], random: np.random.Generator) -> Vector:
     """What a law reaches in each sample of its searches and of the draws."""
     searches = random.integers(len(table), size=(SAMPLES, len(table)))
-    by_search = np.stack([np.median(one[met], axis=1) for one in table], axis=1)
+    by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
     return np.asarray(np.median(np.take_along_axis(by_search, searches, axis=1), axis=1))
 
 

@@ -167,22 +167,24 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
         if name == AROUND or not isinstance(content, Range):
             continue
         named = {label: laws[label]} if dot and label in laws else {} if dot else dict(laws)
-        having = {n: one for n, one in named.items() if key in keys(one.controller)}
+        having = {n: single for n, single in named.items() if key in keys(single.controller)}
         if not having:
             yield (
                 name,
                 f"unknown gain{did_you_mean(name, _known(laws))}; write a key of a law, or law.key",
             )
         yield from (
-            (name, text) for n, one in having.items() for text in _refused(n, one, key, content)
+            (name, text)
+            for n, single in having.items()
+            for text in _refused(n, single, key, content)
         )
 
 
 def _known(laws: Mapping[str, Scenario]) -> list[str]:
-    own = [key for one in laws.values() for key in keys(one.controller)]
+    own = [key for law in laws.values() for key in keys(law.controller)]
     return [
         *dict.fromkeys(own),
-        *(f"{n}.{key}" for n, one in laws.items() for key in keys(one.controller)),
+        *(f"{n}.{key}" for n, law in laws.items() for key in keys(law.controller)),
     ]
 
 
