@@ -70,7 +70,7 @@ class Alone:
     def silences(self, claim: str) -> bool:
         """Whether a value leaves a claim without an answer."""
         judged = (trial.judged for trial in self.trials if not trial.judged.failed)
-        return any(one.answers.get(claim) is None for one in judged)
+        return any(world.answers.get(claim) is None for world in judged)
 
     def acts(self, claim: str, base: Judged) -> bool:
         """Whether any value changes a number of the claim."""
@@ -107,7 +107,7 @@ def explored(choice: Choice, judge: Judge, base: Judged) -> Alone:
     if acting:
         for end in list(trials):
             _searched(choice, end, judge, base, trials)
-    return Alone(choice, tuple(Trial(*one) for one in trials.items()))
+    return Alone(choice, tuple(Trial(*trial) for trial in trials.items()))
 
 
 def _acts(judged: Judged, claim: str, base: Judged) -> bool:
@@ -119,7 +119,7 @@ def ends(choice: Choice) -> list[float]:
     assert choice.range
     way, own = choice.range.alone, choice.own
     drawn = way.distribution.at(np.array(EDGES)).tolist()
-    return [end for end in (way.value(own, one) for one in drawn) if end != own]
+    return [end for end in (way.value(own, number) for number in drawn) if end != own]
 
 
 def _searched(

@@ -55,7 +55,7 @@ class Compared(NamedTuple):
 
     def spread(self, claim: str, worlds: Sequence[Judged]) -> Spread:
         """Its spread over the draws that have it."""
-        drawn = np.array([self.of(one.numbers.get(claim, {})) for one in worlds])
+        drawn = np.array([self.of(world.numbers.get(claim, {})) for world in worlds])
         finite = drawn[np.isfinite(drawn)]
         low, middle, high = np.quantile(finite if len(finite) else math.nan, (0.05, 0.5, 0.95))
         return float(low), float(middle), float(high)
@@ -184,7 +184,7 @@ def answers(
 ) -> list[Answer]:
     """An answer on every verdict; `events` are those nearest to a claim's windows, by its name."""
     known = events or {}
-    return [replace(_answer(one, tried), event=known.get(one.name)) for one in verdicts]
+    return [replace(_answer(verdict, tried), event=known.get(verdict.name)) for verdict in verdicts]
 
 
 def labels_of(claim: Any) -> frozenset[str]:
@@ -198,23 +198,23 @@ def _answer(verdict: Verdict, tried: Tried) -> Answer:
     claim, base, worlds = verdict.name, tried.base, tried.worlds
     labels = labels_of(verdict.claim)
     moved = [
-        one for one in tried.alone
-        if one.possible and one.choice.labels & labels and not one.choice.is_contrast(labels)
+        alone for alone in tried.alone
+        if alone.possible and alone.choice.labels & labels and not alone.choice.is_contrast(labels)
     ]  # fmt: skip
     turns = sorted(
-        (t for one in moved for t in one.turns(claim, base)), key=lambda turn: turn.share
+        (t for alone in moved for t in alone.turns(claim, base)), key=lambda turn: turn.share
     )
-    acting = {one.choice.name: one.acts(claim, base) for one in tried.alone}
+    acting = {alone.choice.name: alone.acts(claim, base) for alone in tried.alone}
     turned, known = counted(claim, worlds, base)
-    failed = sum(bool(one.failed) for one in worlds)
+    failed = sum(bool(world.failed) for world in worlds)
     number, spread = _nearest(verdict, base, worlds)
     return Answer(
         verdict, tuple(t for t in turns if not t.choice.task),
         tuple(t for t in turns if t.choice.task),
         tuple(explained(tried.draws, turned, known, acting)),
         int((known & ~turned).sum()), int(turned.sum()), int((~known).sum()) - failed, failed,
-        len(moved), sum(acting[one.choice.name] for one in moved),
-        sum(one.silences(claim) for one in moved if not one.choice.task), base.numbers[claim],
+        len(moved), sum(acting[alone.choice.name] for alone in moved),
+        sum(alone.silences(claim) for alone in moved if not alone.choice.task), base.numbers[claim],
         number, spread,
     )  # fmt: skip
 

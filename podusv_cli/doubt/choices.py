@@ -170,10 +170,14 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
         for route, own in _leaves(scenario):
             groups[dotted(route), repr(own)].append((label, route))
     unprinted = [g for g in groups.values() if not any(_is_printed(public(p), doubt) for p in g)]
-    found = [one for places in unprinted for one in _of_places(places, singles)]
+    found = [choice for places in unprinted for choice in _of_places(places, singles)]
     own = [_given(name, quantity, singles) for name, quantity in doubt.vary.items()]
     taken = {place for choice in own for place in choice.places}
-    return [*hulls(singles, doubt), *own, *(one for one in found if not taken & {*one.places})]
+    return [
+        *hulls(singles, doubt),
+        *own,
+        *(choice for choice in found if not taken & {*choice.places}),
+    ]
 
 
 def hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
@@ -221,9 +225,9 @@ def _within(part: Any, at: Route) -> Iterator[tuple[Route, Any]]:
             if name not in FIXED:
                 yield from _within(getattr(part, name), (*at, name))
     elif isinstance(part, tuple):
-        for place, one in enumerate(part):
-            if isinstance(one, Component):
-                yield from _within(one, (*at, place))
+        for place, value in enumerate(part):
+            if isinstance(value, Component):
+                yield from _within(value, (*at, place))
     elif isinstance(part, (bool, int, float, str)):
         yield at, part
 
@@ -294,9 +298,9 @@ def _beside(places: Sequence[Place], singles: Singles) -> frozenset[str]:
     own = {label for label, _ in places}
     if places[0][1][0] != "controller":
         return frozenset()
-    kinds = {type(singles[one].controller) for one in own}
+    kinds = {type(singles[law].controller) for law in own}
     return frozenset(
         other
-        for other, one in singles.items()
-        if other not in own and type(one.controller) in kinds
+        for other, single in singles.items()
+        if other not in own and type(single.controller) in kinds
     )

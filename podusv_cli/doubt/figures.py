@@ -27,17 +27,17 @@ WIDE = 34  # letters of an axis' name on a line
 
 def sketches(told: Told) -> Iterator[Sketch]:
     """For every claim the specification curve, and a row for each choice that turns it."""
-    for one in told.answers:
-        name = one.verdict.name
+    for answer in told.answers:
+        name = answer.verdict.name
         acting = [a for a in told.tried.alone if a.choice.range and a.acts(name, told.tried.base)]
-        turning = {turn.choice.name for turn in (*one.turns, *one.neighbours)}
+        turning = {turn.choice.name for turn in (*answer.turns, *answer.neighbours)}
         rows = [alone for alone in acting if alone.choice.name in turning]
-        if acting and math.isfinite(one.spread[1]):
+        if acting and math.isfinite(answer.spread[1]):
             yield Sketch(
                 f"specification-{name}",
                 f"{name}: its number in all draws, sorted, and what was drawn: each column is one "
                 "draw, a mark's height in its lane is where the value is in its range",
-                partial(specification, told, one, acting),
+                partial(specification, told, answer, acting),
             )
         if rows:
             yield Sketch(
@@ -45,7 +45,7 @@ def sketches(told: Told) -> Iterator[Sketch]:
                 f"{name}: the ranges of the values that turn it, one at a time; where the verdict "
                 f"is another, the range is orange ({len(acting) - len(rows)} more numbers change "
                 "its number, and never the verdict)",
-                partial(ranges, one, rows),
+                partial(ranges, answer, rows),
             )
 
 
@@ -92,8 +92,8 @@ def _lanes(
             found = np.corrcoef(ranks, draws.shares[order, column])[0, 1]
         return -abs(float(np.nan_to_num(found)))
 
-    first = [draws.choices.index(one.choice) for one in answer.explained]
-    others = [i for i, one in enumerate(draws.choices) if one.name in acting]
+    first = [draws.choices.index(turn.choice) for turn in answer.explained]
+    others = [i for i, choice in enumerate(draws.choices) if choice.name in acting]
     return list(dict.fromkeys([*first, *sorted(others, key=follows)]))[:LANES]
 
 

@@ -42,4 +42,4 @@ def moved(choice: Choice, value: Any) -> World:
 
 def together(choices: Sequence[Choice], values: Sequence[Any]) -> World:
     """The world in which several choices have other values."""
-    return {place: v for one, v in zip(choices, values, strict=True) for place in one.places}
+    return {place: v for choice, v in zip(choices, values, strict=True) for place in choice.places}

@@ -27,13 +27,13 @@ def study_choices(scenario: Scenario) -> list[Choice]:
     """What a study does not draw, and its source does not print."""
     assert scenario.sweep
     doubt, singles = scenario.doubt or Doubt(), _laws(scenario)
-    taken = {key for name, one in scenario.sweep.vary.items() for key in one.targets(name)}
+    taken = {key for name, drawn in scenario.sweep.vary.items() for key in drawn.targets(name)}
     taken |= set(scenario.sweep.grid)
     given = set(doubt.vary)
     found = [
-        replace(one, range=None, values=tuple(ends(one)) if one.range else one.values)
-        for one in choices(singles, doubt)
-        if (one.values or one.name in given) and not _is_taken(one, taken)
+        replace(choice, range=None, values=tuple(ends(choice)) if choice.range else choice.values)
+        for choice in choices(singles, doubt)
+        if (choice.values or choice.name in given) and not _is_taken(choice, taken)
     ]
     return [*_own(scenario, singles), *hulls(singles, doubt), *found]
 
@@ -41,14 +41,18 @@ def study_choices(scenario: Scenario) -> list[Choice]:
 def _laws(scenario: Scenario) -> Singles:
     assert scenario.sweep
     wanted = scenario.sweep.laws
-    return {law: one for law, one in scenario.singles().items() if not wanted or law in wanted}
+    return {
+        law: single for law, single in scenario.singles().items() if not wanted or law in wanted
+    }
 
 
 def _is_taken(choice: Choice, taken: set[str]) -> bool:
     """Whether the study draws it, or has cells of it or of a section that it is in."""
     keys = {public(place) for place in choice.places}
     return any(
-        key == one or key.startswith((f"{one}.", f"{one}[")) for key in keys for one in taken
+        key == drawn or key.startswith((f"{drawn}.", f"{drawn}["))
+        for key in keys
+        for drawn in taken
     )
 
 

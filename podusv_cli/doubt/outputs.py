@@ -35,7 +35,7 @@ class Doubted:
         """What `--json` prints."""
         return {
             "format": 1, "status": self.status, "folder": str(self.folder),
-            "claims": [as_json(one) for one in self.answers],
+            "claims": [as_json(answer) for answer in self.answers],
             "missing": [str(part) for part in self.missing],
         }  # fmt: skip
 
@@ -71,14 +71,16 @@ def write(
     writer.add("scenario.yaml", text.encode())
     for name, text in told.scenario.plugin_files().items():
         writer.add(name, text.encode())
-    writer.add("doubt.json", json_files.encode({"claims": [as_json(one) for one in told.answers]}))
+    writer.add(
+        "doubt.json", json_files.encode({"claims": [as_json(answer) for answer in told.answers]})
+    )
     for name, rows in {
         "doubt.csv": table(told.answers), "turns.csv": _turns(told), "draws.csv": _draws(told),
     }.items():  # fmt: skip
         writer.add(name, csv_files.lines(rows).encode())
     pictures = _pictures(told, extras) if figures else []
-    for one in pictures:
-        writer.add(f"figures/{one.name}.png", one.file)
+    for picture in pictures:
+        writer.add(f"figures/{picture.name}.png", picture.file)
     writer.add("report.html", page(told, pictures, origin).encode())
     writer.add_json("provenance.json", origin)
     writer.add_missing(extras)
@@ -90,21 +92,22 @@ def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
         "claim", "verdict", "word", "word_for_neighbours", "kept", "turned", "unknown", "failed",
         "moved", "acted", "silent", "nearest", "turns_at", "nearest_share",
     )  # fmt: skip
-    for one in answers:
-        first = one.turns[0] if one.turns else None
+    for answer in answers:
+        first = answer.turns[0] if answer.turns else None
         nearest = (first.choice.name, first.value, first.share) if first else ("", "", "")
         yield (
-            one.verdict.name, one.verdict.verdict, one.word, one.word_for_neighbours, one.kept,
-            one.turned, one.unknown, one.failed, one.tried, one.acted, one.silent, *nearest,
+            answer.verdict.name, answer.verdict.verdict, answer.word, answer.word_for_neighbours,
+            answer.kept, answer.turned, answer.unknown, answer.failed, answer.tried, answer.acted,
+            answer.silent, *nearest,
         )  # fmt: skip
 
 
 def _turns(told: Told) -> Iterator[Sequence[Any]]:
     yield "claim", "key", "own", "turns_at", "held", "unit", "distance", "share", "task"
-    for one in told.answers:
-        for turn in (*one.turns, *one.neighbours):
+    for answer in told.answers:
+        for turn in (*answer.turns, *answer.neighbours):
             yield (
-                one.verdict.name, turn.choice.name, turn.choice.own, turn.value, turn.held,
+                answer.verdict.name, turn.choice.name, turn.choice.own, turn.value, turn.held,
                 turn.choice.unit, turn.distance, turn.share, turn.choice.task,
             )  # fmt: skip
 
@@ -112,7 +115,7 @@ def _turns(told: Told) -> Iterator[Sequence[Any]]:
 def _draws(told: Told) -> Iterator[Sequence[Any]]:
     names = [(claim, text) for claim, own in told.tried.base.numbers.items() for text in own]
     yield (
-        "draw", *(one.name for one in told.tried.draws.choices), *told.tried.base.answers,
+        "draw", *(choice.name for choice in told.tried.draws.choices), *told.tried.base.answers,
         *(f"{claim}: {text}" for claim, text in names), "failed",
     )  # fmt: skip
     for i, world in enumerate(told.tried.worlds):
@@ -131,19 +134,19 @@ def _pictures(told: Told, extras: Extras) -> list[Picture]:
 def page(told: Told, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
     """The page."""
     by_claim = {
-        one.verdict.name: [
-            (i, p) for i, p in enumerate(pictures, 1) if p.name.endswith(f"-{one.verdict.name}")
+        answer.verdict.name: [
+            (i, p) for i, p in enumerate(pictures, 1) if p.name.endswith(f"-{answer.verdict.name}")
         ]
-        for one in told.answers
+        for answer in told.answers
     }
     return environment("podusv_cli.doubt").get_template("doubt.html.j2").render(
         title=f"What the verdicts of {told.scenario.name} hang on",
         scenario=told.scenario, answers=told.answers, head=HEAD,
-        rows={one.verdict.name: row(one) for one in told.answers},
+        rows={answer.verdict.name: row(answer) for answer in told.answers},
         place=place, in_words=in_words, pictures=by_claim, draws=len(told.tried.worlds),
         moved=[
             (c.name, value_text(c.own), _moves(c), c.task)
-            for c in (one.choice for one in told.tried.alone)
+            for c in (alone.choice for alone in told.tried.alone)
         ],
         provenance=[(key, value_text(value)) for key, value in flat(origin)],
     )  # fmt: skip

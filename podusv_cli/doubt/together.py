@@ -46,11 +46,11 @@ def drawn(choices: Sequence[Choice], seed: int, count: int) -> Draws:
 
     A draw depends on the seed, the choice's name and the draw's number alone.
     """
-    moving = [one for one in choices if one.range and not (one.task or one.beside)]
+    moving = [choice for choice in choices if choice.range and not (choice.task or choice.beside)]
     shares = np.array(
-        [random_words.uniforms((seed, STREAM, one.name), 0, count) for one in moving]
+        [random_words.uniforms((seed, STREAM, choice.name), 0, count) for choice in moving]
     ).reshape(len(moving), count)
-    columns = [_values(one, u) for one, u in zip(moving, shares, strict=True)]
+    columns = [_values(choice, u) for choice, u in zip(moving, shares, strict=True)]
     return Draws(moving, shares.T, [[column[i] for column in columns] for i in range(count)])
 
 
@@ -69,7 +69,7 @@ def explained(
     Of the draws in which the claim's answer is known. The band is that of the clearest of all
     choices after the turned draws are shuffled.
     """
-    rows = [i for i, one in enumerate(draws.choices) if acting.get(one.name, False)]
+    rows = [i for i, choice in enumerate(draws.choices) if acting.get(choice.name, False)]
     turned, shares = turned[known], draws.shares[known][:, rows]
     if not rows or not turned.any() or turned.all():
         return []
@@ -101,6 +101,6 @@ def counted(
     claim: str, worlds: Sequence[Judged], base: Judged
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Which draws turn a claim's verdict, and in which its answer is known."""
-    turned = np.array([one.turned(claim, base) for one in worlds], bool)
-    known = np.array([one.answers.get(claim) is not None for one in worlds], bool)
+    turned = np.array([world.turned(claim, base) for world in worlds], bool)
+    known = np.array([world.answers.get(claim) is not None for world in worlds], bool)
     return turned, known
