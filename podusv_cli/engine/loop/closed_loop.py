@@ -109,7 +109,7 @@ class ClosedLoop:
             return
         measurement, start = self.measurement, np.array(self.start)
         known, first = measurement.measured(), measurement.first(start, 1.0)
-        marks = first[KNOWN:OWN].tolist() == [float(one) for one in known]
+        marks = first[KNOWN:OWN].tolist() == [float(flag) for flag in known]
         if len(known) != len(STATE) or not marks or len(measurement.signals) != sum(known):
             what = f"{len(measurement.signals)} signals, and measures {sum(known)} of {len(STATE)}"
             raise LawError(
@@ -148,7 +148,7 @@ class ClosedLoop:
         law, actuator = self.controller, self.actuator
         own = (partial(describe, actuator), (*actuator.states, *actuator.signals_with))
         path = (partial(describe, self.path), self.path.places)
-        common = [one for one in LOOP if self.has_target or one.name != "z_e"]
+        common = [logged for logged in LOOP if self.has_target or logged.name != "z_e"]
         loop = (lambda: "the closed loop", common)
         others = (
             *((partial(describe, part), signals) for part, signals in self.disturbance.told()),

@@ -155,10 +155,10 @@ class Plan:
             by_delay_line=int(loop.actuator.by_delay_line),
         )  # fmt: skip
 
-    def _of_sea(self, one: Signal) -> int:
+    def _of_sea(self, signal: Signal) -> int:
         """Where a disturbance writes a signal, behind its load; 0 where it does not."""
         own = self.loop.disturbance.signals
-        return len(SEA) + own.index(one) if one in own else 0
+        return len(SEA) + own.index(signal) if signal in own else 0
 
     @cached_property
     def functions(self) -> tuple[Function, ...]:
@@ -288,7 +288,7 @@ def _kinds(loop: ClosedLoop) -> str:
 
 
 def _names(signals: tuple[Signal, ...]) -> list[str]:
-    return [one.name for one in signals]
+    return [signal.name for signal in signals]
 
 
 def _offsets(parts: Mapping[str, list[str]]) -> dict[str, int]:

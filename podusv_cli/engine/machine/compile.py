@@ -74,7 +74,7 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
         [] for _ in range(max(1, min(available_workers(), whole // SHARE)))
     ]
     for piece in sorted(missing, key=lambda piece: -sizes[piece]):
-        min(shares, key=lambda share: sum(sizes[one] for one in share)).append(piece)
+        min(shares, key=lambda share: sum(sizes[other] for other in share)).append(piece)
     done = [0.0] * len(shares)
 
     def advance(share: int, size: float) -> None:

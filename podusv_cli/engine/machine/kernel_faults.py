@@ -44,11 +44,11 @@ RETURNS_NOTHING = {ast.dump(ast.Return()), ast.dump(ast.Return(ast.Constant(None
 
 def check_kernel(function: Any) -> None:
     """Look at a kernel from outside podusv, and at all kernels it calls. Raises LawError."""
-    for one in _reached(function):
-        node = _source(one)
-        for line, text in faults(node, one.__globals__) if node else ():
-            place = f"{Path(one.__code__.co_filename).name}, line {line}"
-            raise LawError(f"kernel {one.__qualname__} ({place}): {text}")
+    for called in _reached(function):
+        node = _source(called)
+        for line, text in faults(node, called.__globals__) if node else ():
+            place = f"{Path(called.__code__.co_filename).name}, line {line}"
+            raise LawError(f"kernel {called.__qualname__} ({place}): {text}")
 
 
 def check_arguments(function: Any, names: Collection[str]) -> None:
@@ -67,11 +67,11 @@ def _reached(function: Any) -> tuple[Any, ...]:
     """The kernel and all kernels from outside podusv that it calls, each once."""
     found, waiting = dict[Any, None](), [function]
     while waiting:
-        one = waiting.pop()
-        if isinstance(one, FunctionType) and one not in found:
-            found[one] = None
-            waiting += named_kernels(one).values()
-    return tuple(one for one in found if not str(one.__module__).startswith(OWN))
+        called = waiting.pop()
+        if isinstance(called, FunctionType) and called not in found:
+            found[called] = None
+            waiting += named_kernels(called).values()
+    return tuple(called for called in found if not str(called.__module__).startswith(OWN))
 
 
 def _source(function: Any) -> ast.FunctionDef | None:

@@ -123,7 +123,7 @@ class Reads:
             case ast.Name(id=name):
                 return bool(self._globals.get(name))
             case ast.Call(func=ast.Name(id="range"), args=args):
-                numbers = [whole_number(one, self._globals) for one in args]
+                numbers = [whole_number(arg, self._globals) for arg in args]
                 whole = [number for number in numbers if number is not None]
                 return len(whole) == len(args) and whole[2:] != [0] and bool(range(*whole))
         return False

@@ -50,7 +50,7 @@ def in_memory(alloca: Instruction) -> str:
 def is_cheap(row: list[Instruction]) -> bool:
     """Whether a block may as well be computed where no lane is in it: few numbers, no memory."""
     harmless = LANEWISE - {*DIVISIONS} | {"select", "phi", "br"}
-    return len(row) <= MOST_CHEAP and all(one.opcode in harmless for one in row)
+    return len(row) <= MOST_CHEAP and all(instruction.opcode in harmless for instruction in row)
 
 
 class Instructions(Values):
@@ -61,31 +61,31 @@ class Instructions(Values):
         super().__init__(masks)
         self.declared: dict[str, str] = {}
         self.sizes = {
-            one.name: SIZES.get(re.sub(r"\[\d+ x |\]", "", in_memory(one)), 0)
-            for one in masks.values.values()
-            if one.opcode == "alloca"
+            value.name: SIZES.get(re.sub(r"\[\d+ x |\]", "", in_memory(value)), 0)
+            for value in masks.values.values()
+            if value.opcode == "alloca"
         }
         self.places.append(f"%nowhere = alloca [{LANES} x i64], align 64")
 
-    def write(self, one: Instruction) -> None:
+    def write(self, instruction: Instruction) -> None:
         """Write an instruction. Raises NotForLanes."""
-        if one.opcode in LANEWISE:
-            self._lanewise(one)
-        elif write := getattr(self, f"_{one.opcode}", None):
-            write(one)
+        if instruction.opcode in LANEWISE:
+            self._lanewise(instruction)
+        elif write := getattr(self, f"_{instruction.opcode}", None):
+            write(instruction)
         else:
-            raise NotForLanes(one.words)
+            raise NotForLanes(instruction.words)
 
-    def _lanewise(self, one: Instruction) -> None:
+    def _lanewise(self, instruction: Instruction) -> None:
         """An operation on the numbers of every lane, as it is on one."""
-        kind, differs = one.kinds[0], self.differs(one.name)
-        operands = [self.wide(o, kind) if differs else self.plain(o) for o in one.operands]
-        if differs and one.opcode in DIVISIONS:  # by zero, one would end the process
-            operands[1] = self._only_here(one, operands[1], kind, f"splat ({kind} 1)")
-        words = one.words[: one.words.index(f" {kind} ")]
+        kind, differs = instruction.kinds[0], self.differs(instruction.name)
+        operands = [self.wide(o, kind) if differs else self.plain(o) for o in instruction.operands]
+        if differs and instruction.opcode in DIVISIONS:  # by zero, one would end the process
+            operands[1] = self._only_here(instruction, operands[1], kind, f"splat ({kind} 1)")
+        words = instruction.words[: instruction.words.index(f" {kind} ")]
         over = lanes(kind) if differs else kind
-        to = f" to {self.kind(one)}" if " to " in one.words else ""
-        self.set(one, f"{words} {over} {', '.join(operands)}{to}")
+        to = f" to {self.kind(instruction)}" if " to " in instruction.words else ""
+        self.set(instruction, f"{words} {over} {', '.join(operands)}{to}")
 
     def _only_here(self, one: Instruction, value: str, kind: str, other: str) -> str:
         """A value in the lanes that are in the block, and another one elsewhere."""
@@ -94,28 +94,28 @@ class Instructions(Values):
         over = lanes(kind)
         return self.let(f"select {MASK} {self.mask(one.block)}, {over} {value}, {over} {other}")
 
-    def _select(self, one: Instruction) -> None:
-        (condition, *_), differs = one.operands, self.differs(one.name)
-        chosen = self.typed(one.typed[:1], differs and self.differs(condition))
-        self.set(one, f"select {chosen}, {self.typed(one.typed[1:], differs)}")
+    def _select(self, instruction: Instruction) -> None:
+        (condition, *_), differs = instruction.operands, self.differs(instruction.name)
+        chosen = self.typed(instruction.typed[:1], differs and self.differs(condition))
+        self.set(instruction, f"select {chosen}, {self.typed(instruction.typed[1:], differs)}")
 
-    def _alloca(self, one: Instruction) -> None:
-        if one.operands != ["1"]:
-            raise NotForLanes(f"memory of a size that is computed: {one.words}")
-        self.places.append(f"{one.name} = alloca {room(in_memory(one))}, align 64")
+    def _alloca(self, instruction: Instruction) -> None:
+        if instruction.operands != ["1"]:
+            raise NotForLanes(f"memory of a size that is computed: {instruction.words}")
+        self.places.append(f"{instruction.name} = alloca {room(in_memory(instruction))}, align 64")
 
-    def _getelementptr(self, one: Instruction) -> None:
-        kind = one.words.split(", ptr ")[0].split(" ", 1)[1]
+    def _getelementptr(self, instruction: Instruction) -> None:
+        kind = instruction.words.split(", ptr ")[0].split(" ", 1)[1]
         kind = re.sub(r"^(inbounds|nuw|nusw| )+", "", kind)
-        if self.masks.points_at(one.name) == LANES_MEMORY:
+        if self.masks.points_at(instruction.name) == LANES_MEMORY:
             kind = room(kind)
-        if not self.differs(one.name):
-            self.set(one, f"getelementptr {kind}, {self.typed(one.typed, False)}")
+        if not self.differs(instruction.name):
+            self.set(instruction, f"getelementptr {kind}, {self.typed(instruction.typed, False)}")
             return
-        parts = [self.typed([(o, k)], o.startswith("%")) for o, k in one.typed]
-        self.set(one, f"getelementptr {kind}, {', '.join(parts)}")
+        parts = [self.typed([(o, k)], o.startswith("%")) for o, k in instruction.typed]
+        self.set(instruction, f"getelementptr {kind}, {', '.join(parts)}")
 
-    def _check_size(self, one: Instruction, pointer: str, kind: str) -> None:
+    def _check_size(self, instruction: Instruction, pointer: str, kind: str) -> None:
         """Refuse memory that is read as numbers of another size than it has: lanes would mix."""
         root = self.masks.values.get(pointer)
         while root and root.opcode == "getelementptr":
@@ -123,117 +123,137 @@ class Instructions(Values):
         sizes = self.sizes if root and root.opcode in ("phi", "select") else {}
         size = {*sizes.values(), self.sizes.get(root.name if root else "", NUMBER)}
         if size != {SIZES.get(kind)}:
-            raise NotForLanes(f"memory that is read otherwise than it was written: {one.words}")
+            raise NotForLanes(
+                f"memory that is read otherwise than it was written: {instruction.words}"
+            )
 
-    def _addresses(self, one: Instruction, pointer: str, kind: str) -> list[str]:
+    def _addresses(self, instruction: Instruction, pointer: str, kind: str) -> list[str]:
         """Where each lane's number lies; for lanes that are not in the block it is nowhere."""
         nowhere = ""
-        if self.masks.of[one.block] != EVERY:
+        if self.masks.of[instruction.block] != EVERY:
             nowhere = self.everywhere("%nowhere", "ptr")
-        where = self._only_here(one, self.wide(pointer, "ptr"), "ptr", nowhere)
+        where = self._only_here(instruction, self.wide(pointer, "ptr"), "ptr", nowhere)
         begins = [self.number(where, "ptr", lane) for lane in range(LANES)]
         if self.masks.points_at(pointer) == PLAIN_MEMORY:
             return begins
         return [self.let(f"getelementptr {kind}, ptr {p}, i64 {i}") for i, p in enumerate(begins)]
 
-    def _load(self, one: Instruction) -> None:
-        pointer = one.operands[0]
-        if "volatile" in one.words or "atomic" in one.words:
-            raise NotForLanes(one.words)
+    def _load(self, instruction: Instruction) -> None:
+        pointer = instruction.operands[0]
+        if "volatile" in instruction.words or "atomic" in instruction.words:
+            raise NotForLanes(instruction.words)
         if self.masks.points_at(pointer) == LANES_MEMORY:
-            self._check_size(one, pointer, one.kind)
+            self._check_size(instruction, pointer, instruction.kind)
         if self.differs(pointer):
-            places = self._addresses(one, pointer, one.kind)
-            self.by_lane(one, [self.let(f"load {one.kind}, ptr {place}") for place in places])
+            places = self._addresses(instruction, pointer, instruction.kind)
+            self.by_lane(
+                instruction, [self.let(f"load {instruction.kind}, ptr {place}") for place in places]
+            )
             return
         where = self.plain(pointer)
-        aligned = f", align {SIZES[one.kind] * LANES}" if self.differs(one.name) else ""
-        self.set(one, f"load {self.kind(one)}, ptr {where}{aligned}")
+        aligned = (
+            f", align {SIZES[instruction.kind] * LANES}" if self.differs(instruction.name) else ""
+        )
+        self.set(instruction, f"load {self.kind(instruction)}, ptr {where}{aligned}")
 
-    def _store(self, one: Instruction) -> None:
-        (number, pointer), kind = one.operands, one.kinds[0]
+    def _store(self, instruction: Instruction) -> None:
+        (number, pointer), kind = instruction.operands, instruction.kinds[0]
         if self.masks.points_at(pointer) == PLAIN_MEMORY:
-            if self.differs(number) or self.differs(pointer) or self.masks.of[one.block] != EVERY:
-                raise NotForLanes(f"a number of one lane for all of them: {one.words}")
+            if (
+                self.differs(number)
+                or self.differs(pointer)
+                or self.masks.of[instruction.block] != EVERY
+            ):
+                raise NotForLanes(f"a number of one lane for all of them: {instruction.words}")
             self.put(f"store {kind} {self.plain(number)}, ptr {self.plain(pointer)}")
             return
-        self._check_size(one, pointer, kind)
+        self._check_size(instruction, pointer, kind)
         new = self.wide(number, kind)
         if self.differs(pointer):
-            for lane, place in enumerate(self._addresses(one, pointer, kind)):
+            for lane, place in enumerate(self._addresses(instruction, pointer, kind)):
                 self.put(f"store {kind} {self.number(new, kind, lane)}, ptr {place}")
             return
         where = f"ptr {self.plain(pointer)}, align {SIZES[kind] * LANES}"
-        if self.masks.of[one.block] != EVERY:
-            new = self._only_here(one, new, kind, self.let(f"load {lanes(kind)}, {where}"))
+        if self.masks.of[instruction.block] != EVERY:
+            new = self._only_here(instruction, new, kind, self.let(f"load {lanes(kind)}, {where}"))
         self.put(f"store {lanes(kind)} {new}, {where}")
 
-    def _call(self, one: Instruction) -> None:
-        called = one.operands[-1]
+    def _call(self, instruction: Instruction) -> None:
+        called = instruction.operands[-1]
         name = called.strip('@"')
         if name.startswith(SPOKEN_TO_COMPILER):
             return
         if name.startswith("podusv."):
-            getattr(self, f"_call_{name.removeprefix('podusv.')}")(one)
+            getattr(self, f"_call_{name.removeprefix('podusv.')}")(instruction)
         elif called.startswith("%"):
-            self._call_part(one)
-        elif {*one.kinds[:-1], one.kind} - NUMBERS:
-            raise NotForLanes(f"a call: {one.words}")
-        elif self.differs(one.name):
-            self._call_in_lanes(one, "llvm.sqrt.f64" if name == "sqrt" else name)
+            self._call_part(instruction)
+        elif {*instruction.kinds[:-1], instruction.kind} - NUMBERS:
+            raise NotForLanes(f"a call: {instruction.words}")
+        elif self.differs(instruction.name):
+            self._call_in_lanes(instruction, "llvm.sqrt.f64" if name == "sqrt" else name)
         else:
-            self._declare(name, one.kind, one.kinds[:-1])
-            self.set(one, f'call {one.kind} @"{name}"({self.typed(one.typed[:-1], False)})')
+            self._declare(name, instruction.kind, instruction.kinds[:-1])
+            self.set(
+                instruction,
+                f'call {instruction.kind} @"{name}"({self.typed(instruction.typed[:-1], False)})',
+            )
 
     def _declare(self, name: str, kind: str, kinds: list[str]) -> None:
         self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'
 
-    def _call_part(self, one: Instruction) -> None:
+    def _call_part(self, instruction: Instruction) -> None:
         """A part of the loop, which has its own code for lanes."""
-        if self.masks.of[one.block] != EVERY or any(map(self.differs, one.operands)):
-            raise NotForLanes(f"a call that not every lane makes: {one.words}")
-        given = self.typed(one.typed[:-1], False)
-        self.put(f"call void {self.plain(one.operands[-1])}({given})")
+        if self.masks.of[instruction.block] != EVERY or any(
+            map(self.differs, instruction.operands)
+        ):
+            raise NotForLanes(f"a call that not every lane makes: {instruction.words}")
+        given = self.typed(instruction.typed[:-1], False)
+        self.put(f"call void {self.plain(instruction.operands[-1])}({given})")
 
-    def _call_in_lanes(self, one: Instruction, name: str) -> None:
+    def _call_in_lanes(self, instruction: Instruction, name: str) -> None:
         """A function without effects: one of exact results for all lanes, else lane by lane."""
-        operands = one.typed[:-1]
+        operands = instruction.typed[:-1]
         short = re.sub(r"(\.[if]\d+)+$", "", name.removeprefix("llvm."))
         if not name.startswith("llvm.") or short not in EXACT:
-            self._declare(name, one.kind, one.kinds[:-1])
+            self._declare(name, instruction.kind, instruction.kinds[:-1])
             vectors = [(self.wide(o, kind), kind) for o, kind in operands]
             rows = [
                 ", ".join(f"{kind} {self.number(v, kind, lane)}" for v, kind in vectors)
                 for lane in range(LANES)
             ]
-            self.by_lane(one, [self.let(f'call {one.kind} @"{name}"({row})') for row in rows])
+            self.by_lane(
+                instruction, [self.let(f'call {instruction.kind} @"{name}"({row})') for row in rows]
+            )
             return
         flags = [f"{kind} {o}" for o, kind in operands[-1:] if short in FLAGGED]
         given = [self.typed([o], True) for o in operands[: len(operands) - len(flags)]] + flags
         ending = re.sub(r"\.([if]\d+)", rf".v{LANES}\1", name.removeprefix(f"llvm.{short}"))
         kinds = [lanes(kind) for _, kind in operands[: len(operands) - len(flags)]]
         kinds += [kind for _, kind in operands[len(kinds) :]]
-        self._declare(f"llvm.{short}{ending}", lanes(one.kind), kinds)
-        self.set(one, f'call {lanes(one.kind)} @"llvm.{short}{ending}"({", ".join(given)})')
+        self._declare(f"llvm.{short}{ending}", lanes(instruction.kind), kinds)
+        self.set(
+            instruction,
+            f'call {lanes(instruction.kind)} @"llvm.{short}{ending}"({", ".join(given)})',
+        )
 
-    def _call_shared(self, one: Instruction) -> None:
+    def _call_shared(self, instruction: Instruction) -> None:
         """`kernel.shared`: the number of the first lane."""
-        number, kind = one.operands[0], one.kinds[0]
+        number, kind = instruction.operands[0], instruction.kinds[0]
         if self.differs(number):
-            self.set(one, f"extractelement {lanes(kind)} {self.plain(number)}, i32 0")
+            self.set(instruction, f"extractelement {lanes(kind)} {self.plain(number)}, i32 0")
         else:
-            self.set(one, f"freeze {kind} {self.plain(number)}")
+            self.set(instruction, f"freeze {kind} {self.plain(number)}")
 
-    def _call_lanes_any(self, one: Instruction) -> None:
+    def _call_lanes_any(self, instruction: Instruction) -> None:
         """`kernel.lanes_any`."""
-        whole = self.let(f"bitcast {MASK} {self.wide(one.operands[0], 'i1')} to i{LANES}")
-        self.set(one, f"icmp ne i{LANES} {whole}, 0")
+        whole = self.let(f"bitcast {MASK} {self.wide(instruction.operands[0], 'i1')} to i{LANES}")
+        self.set(instruction, f"icmp ne i{LANES} {whole}, 0")
 
-    def _call_lane_true(self, one: Instruction) -> None:
+    def _call_lane_true(self, instruction: Instruction) -> None:
         """`kernel.lane_true`."""
-        mask, lane = self.wide(one.operands[0], "i1"), self.plain(one.operands[1])
-        self.set(one, f"extractelement {MASK} {mask}, i64 {lane}")
+        mask, lane = self.wide(instruction.operands[0], "i1"), self.plain(instruction.operands[1])
+        self.set(instruction, f"extractelement {MASK} {mask}, i64 {lane}")
 
-    def _call_lane_numbers(self, one: Instruction) -> None:
+    def _call_lane_numbers(self, instruction: Instruction) -> None:
         """`kernel.lane_numbers`."""
-        self.set(one, f"getelementptr i8, ptr {self.plain(one.operands[0])}, i64 0")
+        self.set(instruction, f"getelementptr i8, ptr {self.plain(instruction.operands[0])}, i64 0")

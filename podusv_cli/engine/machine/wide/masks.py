@@ -33,13 +33,13 @@ class Masks:
         self.ragged: set[Loop] = set()  # loops that the lanes leave in different rounds
         self.readers: dict[str, list[Instruction]] = defaultdict(list)
         for row in function.blocks:
-            for one in row:
-                for operand in one.operands:
-                    self.readers[operand].append(one)
+            for instruction in row:
+                for operand in instruction.operands:
+                    self.readers[operand].append(instruction)
         self._follow_pointers()
-        for one in self.values.values():
-            if one.opcode == "load" and self.points_at(one.operands[0]) == LANES_MEMORY:
-                self._differ(one.name)
+        for value in self.values.values():
+            if value.opcode == "load" and self.points_at(value.operands[0]) == LANES_MEMORY:
+                self._differ(value.name)
         known = -1
         while known != (known := len(self.differing) + len(self.joins) + len(self.ragged)):
             self._wait()
@@ -54,7 +54,7 @@ class Masks:
         return self.memory.get(pointer, "") if pointer.startswith("%") else PLAIN_MEMORY
 
     def _follow_pointers(self) -> None:
-        pointers = [one for one in self.values.values() if one.kind == "ptr"]
+        pointers = [value for value in self.values.values() if value.kind == "ptr"]
         while True:
             new = {p.name: self._kind(p) for p in pointers if p.name not in self.memory}
             new = {name: kind for name, kind in new.items() if kind}
@@ -62,19 +62,21 @@ class Masks:
                 return
             self.memory |= new
 
-    def _kind(self, one: Instruction) -> str:
-        if one.opcode == "alloca":
+    def _kind(self, instruction: Instruction) -> str:
+        if instruction.opcode == "alloca":
             return LANES_MEMORY
-        if one.opcode == "load" and self.points_at(one.operands[0]) != LANES_MEMORY:
-            return LANES_MEMORY if self.points_at(one.operands[0]) else ""
-        if one.opcode == "call":
+        if instruction.opcode == "load" and self.points_at(instruction.operands[0]) != LANES_MEMORY:
+            return LANES_MEMORY if self.points_at(instruction.operands[0]) else ""
+        if instruction.opcode == "call":
             return PLAIN_MEMORY
-        if one.opcode not in ("getelementptr", "phi", "select", "freeze"):
-            raise NotForLanes(f"a pointer that is computed: {one.words}")
-        several = {"phi": one.operands, "select": one.operands[1:]}
-        kinds = {self.points_at(o) for o in several.get(one.opcode, one.operands[:1])} - {""}
+        if instruction.opcode not in ("getelementptr", "phi", "select", "freeze"):
+            raise NotForLanes(f"a pointer that is computed: {instruction.words}")
+        several = {"phi": instruction.operands, "select": instruction.operands[1:]}
+        kinds = {
+            self.points_at(o) for o in several.get(instruction.opcode, instruction.operands[:1])
+        } - {""}
         if len(kinds) > 1:
-            raise NotForLanes(f"a pointer to a constant, or to a number: {one.words}")
+            raise NotForLanes(f"a pointer to a constant, or to a number: {instruction.words}")
         return kinds.pop() if kinds else ""
 
     def _differ(self, name: str) -> None:
@@ -83,12 +85,12 @@ class Masks:
         while waiting:
             if (name := waiting.pop()) not in self.differing:
                 self.differing.add(name)
-                waiting += [one.name for one in self.readers[name] if self._passes_on(one)]
+                waiting += [reader.name for reader in self.readers[name] if self._passes_on(reader)]
 
     @staticmethod
-    def _passes_on(one: Instruction) -> bool:
-        called = one.operands[-1].strip('@"') if one.opcode == "call" else ""
-        return bool(one.name) and not called.startswith(("%", *SAME))
+    def _passes_on(reader: Instruction) -> bool:
+        called = reader.operands[-1].strip('@"') if reader.opcode == "call" else ""
+        return bool(reader.name) and not called.startswith(("%", *SAME))
 
     def splits(self, block: int) -> bool:
         """Whether a block ends with a branch on which lanes may differ."""
@@ -160,9 +162,9 @@ class Masks:
             edges = {self.edge(begin, block) for begin in self.forward(block)}
             if len(edges) > 1 or None in edges:
                 self.joins.add(block)
-            for one in row:
-                if one.opcode == "phi" and self._is_mixed(one, block in self.joins):
-                    self._differ(one.name)
+            for instruction in row:
+                if instruction.opcode == "phi" and self._is_mixed(instruction, block in self.joins):
+                    self._differ(instruction.name)
 
     def _is_mixed(self, phi: Instruction, joins: bool) -> bool:
         """Whether lanes may get different numbers though each of these is the same in all."""

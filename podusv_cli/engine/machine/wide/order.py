@@ -108,9 +108,9 @@ class Order:
         """Add a block, and all that lead to it within the loop."""
         waiting = [block]
         while waiting:
-            if (one := waiting.pop()) not in body:
-                body.add(one)
-                waiting += self.leads[one]
+            if (leading := waiting.pop()) not in body:
+                body.add(leading)
+                waiting += self.leads[leading]
 
     def around(self, block: int, without: int) -> Iterable[Loop]:
         """The loops that a block is in and another one is not, from the inside."""

@@ -85,7 +85,10 @@ def read(function: Any, unread: tuple[str, ...]) -> Function:
     if len(lines) != sum(map(len, rows)):
         raise NotForLanes("an instruction of several lines")
     texts = iter(lines)
-    blocks = [[_read(one, i, next(texts), kinds) for one in row] for i, row in enumerate(rows)]
+    blocks = [
+        [_read(instruction, i, next(texts), kinds) for instruction in row]
+        for i, row in enumerate(rows)
+    ]
     arguments = [(f"%{a.name}", kinds[a.name]) for a in function.arguments]
     successors = [_successors(row[-1]) for row in blocks]
     _clean(blocks, unread)
@@ -100,23 +103,23 @@ def _named(function: Any) -> dict[str, str]:
         kinds[f"a{i}"] = str(argument.type)
     for i, block in enumerate(function.blocks):
         block.name = f"b{i}"
-        for one in block.instructions:
-            kind = str(one.type)
+        for instruction in block.instructions:
+            kind = str(instruction.type)
             if kind != "void":
-                one.name = f"v{len(kinds)}"
-                kinds[one.name] = kind
+                instruction.name = f"v{len(kinds)}"
+                kinds[instruction.name] = kind
     return kinds
 
 
-def _read(one: Any, block: int, line: str, kinds: dict[str, str]) -> Instruction:
-    operands = [_operand(operand, kinds) for operand in one.operands]
-    name = one.name
-    opcode = one.opcode
+def _read(instruction: Any, block: int, line: str, kinds: dict[str, str]) -> Instruction:
+    operands = [_operand(operand, kinds) for operand in instruction.operands]
+    name = instruction.name
+    opcode = instruction.opcode
     return Instruction(
         opcode, f"%{name}" if name else "", kinds.get(name, "void"),
         [text for text, _ in operands], [kind for _, kind in operands],
         line.split(" = ", 1)[1] if name else line, block,
-        [int(b.name[1:]) for b in one.incoming_blocks] if opcode == "phi" else [],
+        [int(b.name[1:]) for b in instruction.incoming_blocks] if opcode == "phi" else [],
     )  # fmt: skip
 
 
@@ -153,6 +156,8 @@ def _clean(blocks: list[list[Instruction]], unread: tuple[str, ...]) -> None:
     count = -1
     while count != sum(map(len, blocks)):
         count = sum(map(len, blocks))
-        read = {operand for row in blocks for one in row for operand in one.operands}
+        read = {
+            operand for row in blocks for instruction in row for operand in instruction.operands
+        }
         for row in blocks:
             row[:] = [o for o in row if not o.name or o.name in read or o.opcode == "call"]

@@ -32,16 +32,16 @@ class Values:
         self.known: dict[str, str] = {}  # what is in registers here, by name and by mask
         self._count = 0
         self.read_elsewhere = {
-            one.name
+            set_by.name
             for name, readers in masks.readers.items()
-            if (one := masks.values.get(name)) and one.opcode != "alloca"
-            if any({one.block} != {*(r.sources or [r.block])} for r in readers)
+            if (set_by := masks.values.get(name)) and set_by.opcode != "alloca"
+            if any({set_by.block} != {*(r.sources or [r.block])} for r in readers)
         }
-        for one in masks.values.values():
-            if one.name in self.read_elsewhere:
-                self.places.append(f"{self._place(one.name)} = alloca {self.kind(one)}")
-            if one.opcode == "phi":
-                self.places.append(f"{self._place(one.name, 'phi')} = alloca {self.kind(one)}")
+        for value in masks.values.values():
+            if value.name in self.read_elsewhere:
+                self.places.append(f"{self._place(value.name)} = alloca {self.kind(value)}")
+            if value.opcode == "phi":
+                self.places.append(f"{self._place(value.name, 'phi')} = alloca {self.kind(value)}")
 
     @staticmethod
     def _place(name: str, what: str = "of") -> str:
@@ -66,24 +66,25 @@ class Values:
         """Whether a value differs between lanes."""
         return name in self.masks.differing
 
-    def kind(self, one: Instruction) -> str:
+    def kind(self, instruction: Instruction) -> str:
         """The type that the value of an instruction has here."""
-        return lanes(one.kind) if self.differs(one.name) else one.kind
+        return lanes(instruction.kind) if self.differs(instruction.name) else instruction.kind
 
-    def set(self, one: Instruction, text: str) -> None:
+    def set(self, instruction: Instruction, text: str) -> None:
         """Write the value of an instruction."""
-        self.put(f"{one.name} = {text}")
-        self.known[one.name] = one.name
-        if one.name in self.read_elsewhere:
-            self.put(f"store {self.kind(one)} {one.name}, ptr {self._place(one.name)}")
+        self.put(f"{instruction.name} = {text}")
+        self.known[instruction.name] = instruction.name
+        if instruction.name in self.read_elsewhere:
+            place = self._place(instruction.name)
+            self.put(f"store {self.kind(instruction)} {instruction.name}, ptr {place}")
 
     def plain(self, name: str) -> str:
         """An operand as it is: a constant, a number, or one a lane."""
-        one = self.masks.values.get(name)
-        if one is None or one.opcode == "alloca":
+        instruction = self.masks.values.get(name)
+        if instruction is None or instruction.opcode == "alloca":
             return name
         if name not in self.known:
-            self.known[name] = self.let(f"load {self.kind(one)}, ptr {self._place(name)}")
+            self.known[name] = self.let(f"load {self.kind(instruction)}, ptr {self._place(name)}")
         return self.known[name]
 
     def wide(self, name: str, kind: str) -> str:
@@ -107,19 +108,17 @@ class Values:
 
     def everywhere(self, value: str, kind: str) -> str:
         """A number in every lane."""
-        one = self.let(f"insertelement {lanes(kind)} poison, {kind} {value}, i32 0")
+        first_lane = self.let(f"insertelement {lanes(kind)} poison, {kind} {value}, i32 0")
         order = f"<{LANES} x i32> zeroinitializer"
-        return self.let(f"shufflevector {lanes(kind)} {one}, {lanes(kind)} poison, {order}")
+        return self.let(f"shufflevector {lanes(kind)} {first_lane}, {lanes(kind)} poison, {order}")
 
-    def by_lane(self, one: Instruction, numbers: list[str]) -> None:
+    def by_lane(self, instruction: Instruction, numbers: list[str]) -> None:
         """Write the value of an instruction from the numbers of all lanes."""
-        made = "poison"
+        made, kind = "poison", instruction.kind
         for lane, number in enumerate(numbers[:-1]):
-            made = self.let(
-                f"insertelement {lanes(one.kind)} {made}, {one.kind} {number}, i32 {lane}"
-            )
-        last = f"{one.kind} {numbers[-1]}, i32 {LANES - 1}"
-        self.set(one, f"insertelement {lanes(one.kind)} {made}, {last}")
+            made = self.let(f"insertelement {lanes(kind)} {made}, {kind} {number}, i32 {lane}")
+        last = f"{kind} {numbers[-1]}, i32 {LANES - 1}"
+        self.set(instruction, f"insertelement {lanes(kind)} {made}, {last}")
 
     def number(self, vector: str, kind: str, lane: int) -> str:
         """The number of one lane."""
@@ -162,9 +161,12 @@ class Values:
         old = self.let(f"load {MASK}, ptr {place}")
         self.put(f"store {MASK} {self.let(f'or {MASK} {old}, {mask}')}, ptr {place}")
 
-    def phi(self, one: Instruction) -> None:
+    def phi(self, instruction: Instruction) -> None:
         """Write the value of a phi, which has been left in memory."""
-        self.set(one, f"load {self.kind(one)}, ptr {self._place(one.name, 'phi')}")
+        self.set(
+            instruction,
+            f"load {self.kind(instruction)}, ptr {self._place(instruction.name, 'phi')}",
+        )
 
     def pass_on(self, phi: Instruction, operand: str, mask: str | None) -> None:
         """Leave an operand for a phi, in the lanes of a mask where there is one."""

@@ -108,11 +108,11 @@ class Blocks(Instructions):
             self.label(f"in.{block}", self.known)
         if begins:
             self._begin(level)
-        for one in row[:-1]:
-            if one.opcode == "phi":
-                self.phi(one)
+        for instruction in row[:-1]:
+            if instruction.opcode == "phi":
+                self.phi(instruction)
             else:
-                self.write(one)
+                self.write(instruction)
         self._leave(level, block)
 
     def _is_cheap(self, block: int) -> bool:
