@@ -76,9 +76,12 @@ def contract(file: Path, fields: Mapping[str, Mapping[str, Any]] | None = None) 
     import pytest  # which only tests need
 
     own = plugins.from_file(str(file), file.read_text("utf-8"))
-    made = [(one, component_kind(one), checks(one)) for one in components(own, fields or {})]
-    made += [(one, one.name, METRIC_CHECKS) for one in _members(own, "metrics", Metric)]
-    made += [(one, one.name, FIGURE_CHECKS) for one in _members(own, "figures", Sheet)]
+    made = [
+        (component, component_kind(component), checks(component))
+        for component in components(own, fields or {})
+    ]
+    made += [(member, member.name, METRIC_CHECKS) for member in _members(own, "metrics", Metric)]
+    made += [(member, member.name, FIGURE_CHECKS) for member in _members(own, "figures", Sheet)]
     return [
         pytest.param(check, part, id=f"{name}-{check.__name__}")
         for part, name, asked in made
@@ -89,7 +92,9 @@ def contract(file: Path, fields: Mapping[str, Mapping[str, Any]] | None = None) 
 def checks(component: Component) -> tuple[Check, ...]:
     """All checks of a component."""
     more = ((Measurement, MEASUREMENT_CHECKS), (Estimator, ESTIMATOR_CHECKS))
-    return CHECKS + tuple(one for base, own in more if isinstance(component, base) for one in own)
+    return CHECKS + tuple(
+        check for base, own in more if isinstance(component, base) for check in own
+    )
 
 
 def _members(own: Plugin, room: str, kind: type[Any]) -> list[Any]:

@@ -56,5 +56,5 @@ def doubt(
 def _report(done: Doubted) -> None:
     from podusv_cli.doubt.outputs import HEAD, row
 
-    echo_table(list(HEAD), [row(one) for one in done.answers])
+    echo_table(list(HEAD), [row(answer) for answer in done.answers])
     echo(f"report: {done.folder / 'report.html'}")

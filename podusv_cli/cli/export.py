@@ -77,6 +77,7 @@ def _check(folder: Path, *, trusted: bool) -> None:
     from podusv_cli.export.check import check  # heavy imports only when needed
 
     found = check(folder, trusted=trusted)
-    for one in found:
-        echo(f"{one.what}: {one.differs or f'{one.samples} samples with the bits of {one.whose}'}")
-    raise typer.Exit(DIFFERS if any(one.differs for one in found) else 0)
+    for result in found:
+        same = f"{result.samples} samples with the bits of {result.whose}"
+        echo(f"{result.what}: {result.differs or same}")
+    raise typer.Exit(DIFFERS if any(result.differs for result in found) else 0)

@@ -58,16 +58,16 @@ def list(
     from podusv_cli.scenario.plugins import on_hand
 
     every = [*parts(on_hand(plugin or ()))]
-    chosen = [one for one in every if not part or {part, f"{part}s"} & {*one.words}]
+    chosen = [group for group in every if not part or {part, f"{part}s"} & {*group.words}]
     if not chosen:
-        known = dict.fromkeys(word for one in every for word in one.words)
+        known = dict.fromkeys(word for group in every for word in group.words)
         raise UsageError(unknown(f"part {part!r}", part, known))
-    for one in chosen:
-        echo(f"{one.heading}:")
-        for name, text, facts in one.entries:
+    for group in chosen:
+        echo(f"{group.heading}:")
+        for name, text, facts in group.entries:
             echo_entry(f"  {name}", text, facts=facts)
-        if one.then:
-            echo(one.then, err=True)
+        if group.then:
+            echo(group.then, err=True)
 
 
 def parts(plugins: Known) -> Iterator[Part]:

@@ -45,10 +45,10 @@ def runs(
 
     found = workflow.runs(folder, where or (), sort)
     if as_json:
-        echo_json({"format": 1, "runs": [one.as_json() for one in found]})
+        echo_json({"format": 1, "runs": [run.as_json() for run in found]})
     elif found:
         head = ["started (UTC)", "what", "name", "law", "status", "took", sort or USUAL, "folder"]
-        echo_table(head, [_row(one, sort or USUAL) for one in found])
+        echo_table(head, [_row(run, sort or USUAL) for run in found])
     else:
         echo(f"no run or study below {folder}")
 

@@ -112,8 +112,8 @@ def by_answer(verdicts: Sequence[AnyVerdict]) -> list[Answered[AnyVerdict]]:
     kinds = [kind for kind in (True, False) if kind in {v.published for v in verdicts}]
     groups = [
         Answered(answer, words(answer, published=kind),
-                 [one for one in numbered if (one[1].answer, one[1].published) == (answer, kind)])
+                 [row for row in numbered if (row[1].answer, row[1].published) == (answer, kind)])
         for kind in kinds for answer in (True, False)
     ]  # fmt: skip
-    open_ = [one for one in numbered if one[1].answer is None]
+    open_ = [row for row in numbered if row[1].answer is None]
     return [*groups, Answered(None, ANSWERS[None], open_)]

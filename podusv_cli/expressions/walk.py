@@ -49,8 +49,8 @@ class Condition(NamedTuple):
 def all_of(conditions: Collection[Condition]) -> Condition:
     """All of them: not where one is not, unknown where one is unknown, else yes."""
     return Condition(
-        reduce(np.logical_and, (one.yes for one in conditions)),
-        reduce(np.logical_or, (one.no for one in conditions)),
+        reduce(np.logical_and, (condition.yes for condition in conditions)),
+        reduce(np.logical_or, (condition.no for condition in conditions)),
     )
 
 

@@ -122,7 +122,7 @@ def compare(
     Name: iae, dtype: float64
     """
     given = _several(sources)
-    files = [_file(one) for one in given]
+    files = [_file(source) for source in given]
     items, options = _items(given, files, changes), request(out, force, figures)
     runs = gathered(items)
     done = comparing.compare_gathered(runs, [f for f in files if f], options)
@@ -270,7 +270,7 @@ def _opened(member: Member) -> Run:
     assert run is not None  # the members of a folder are finished
     numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
     told = json_files.read(run.folder / "metrics.json").get("warnings", [])
-    warned = tuple(str(Finding(**one)) for one in told)
+    warned = tuple(str(Finding(**warning)) for warning in told)
     law, log = run.recording.controller, run.recording
     return Run(law, member.about, log, numbers, warned, run.folder)
 
@@ -314,6 +314,6 @@ def _items(
     return [
         from_folder(folder)
         if folder
-        else from_scenario(loaded(one, changes), alone=len(given) == 1)
-        for one, folder in zip(given, folders, strict=True)
+        else from_scenario(loaded(source, changes), alone=len(given) == 1)
+        for source, folder in zip(given, folders, strict=True)
     ]

@@ -282,8 +282,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
 
         Raises UsageError for demands that are not two finite numbers each; no run goes on then.
         """
-        demands, ended = self._checked(actions).T, [one for one in self._marches if one.over]
-        self._marches = [one for one in self._marches if not one.over]
+        demands, ended = self._checked(actions).T, [march for march in self._marches if march.over]
+        self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)
         for march in self._marches:
             march.law_table[DEMAND] = demands[:, march.places]
@@ -356,7 +356,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
                 f"podusv.gym: {len(each)} seeds for {self.num_envs} environments; give "
                 f"{self.num_envs}"
             )
-        return [None if one is None else self._task.seed(one) for one in each]
+        return [None if number is None else self._task.seed(number) for number in each]
 
 
 def whole(given: Any) -> int:

@@ -48,7 +48,7 @@ def _column(key: str, given: Any) -> list[Any]:
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"
         raise ParameterError(f"{key}: must be a list or array with one value a run, found {what}")
-    return [one.item() if isinstance(one, np.generic) else one for one in array.tolist()]
+    return [value.item() if isinstance(value, np.generic) else value for value in array.tolist()]
 
 
 def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
@@ -79,7 +79,7 @@ def _steps(scenario: Scenario, name: str) -> Route:
             f"{', '.join(PER_RUN)}); to change it: podusv.load(source, {{{name!r}: ...}})"
         )
     if not steps or not has(scenario, key):
-        known = [one for one in values(scenario) if has(scenario, one)]
+        known = [key for key in values(scenario) if has(scenario, key)]
         beyond = no_entry(scenario, steps)
         raise ParameterError(f"{name}: {beyond or unknown('key', key, known, 'podusv explain')}")
     if isinstance(content(scenario, steps), Component):
@@ -110,12 +110,12 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
 
 
 def _told(words: Columns, own: Iterable[Any]) -> str:
-    return ", ".join(f"{key} = {as_yaml(one)}" for key, one in zip(words, own, strict=True))
+    return ", ".join(f"{key} = {as_yaml(value)}" for key, value in zip(words, own, strict=True))
 
 
-def _is_word(one: Any) -> bool:
-    return isinstance(one, (str, bool))
+def _is_word(value: Any) -> bool:
+    return isinstance(value, (str, bool))
 
 
-def _is_integer(one: Any) -> bool:
-    return isinstance(one, float) and one.is_integer()
+def _is_integer(value: Any) -> bool:
+    return isinstance(value, float) and value.is_integer()

@@ -85,13 +85,13 @@ def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
 
     Raises UsageError where neither `period` nor the scenario says how long.
     """
-    one = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
-    period = one.control.period if period is None else period
+    single = next(iter(scenario.singles().values())) if scenario.open_choice else scenario.alone()
+    period = single.control.period if period is None else period
     if not period:
         raise UsageError(
             "for how long does a demand hold? give period=0.1 [s], or the scenario a control.period"
         )
-    return scheduled(one, period), period
+    return scheduled(single, period), period
 
 
 class Session:
@@ -199,7 +199,7 @@ class Session:
     @property
     def log(self) -> dict[str, Vector]:
         """Every signal that is logged so far, by name; a copy, which `restore` does not change."""
-        return {name: one.copy() for name, one in self._march.recording().signals.items()}
+        return {name: signal.copy() for name, signal in self._march.recording().signals.items()}
 
     @explained
     def close(

@@ -112,7 +112,7 @@ class Study(Folder):
     @property
     def claims(self) -> pd.DataFrame:
         """A row for each claim of the study."""
-        return pd.DataFrame([one.as_json() for one in self.results.verdicts])
+        return pd.DataFrame([verdict.as_json() for verdict in self.results.verdicts])
 
     def __repr__(self) -> str:
         """One line: the laws, how many runs there are, where they are."""

@@ -38,8 +38,8 @@ def course(path: Path, duration: float, at: float | None = None) -> Course:
     A straight line is preferred to a circle. Raises NotConvergedError where there is none.
     """
     times = np.linspace(0.0, duration, INSTANTS + 1)[::-1] if at is None else [at]
-    found = [one for one in (_course(path, float(t)) for t in times) if one]
-    straight = [one for one in found if abs(one.turn) < STRAIGHT]
+    found = [point for point in (_course(path, float(t)) for t in times) if point]
+    straight = [point for point in found if abs(point.turn) < STRAIGHT]
     if not found:
         when = "at no time of the run" if at is None else f"not at t = {at:g} s"
         raise NotConvergedError(

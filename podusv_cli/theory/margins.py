@@ -47,9 +47,9 @@ class Cut:
 
     def response(self, omega: Vector) -> Complex:
         """L(jw) at these frequencies [rad/s], shape (w, m, m)."""
-        opened, one = self.opened, np.eye(len(self.A))
+        opened, unit = self.opened, np.eye(len(self.A))
         parts = [
-            -self.C @ np.linalg.solve(1j * part[:, None, None] * one - opened, self.B + 0j)
+            -self.C @ np.linalg.solve(1j * part[:, None, None] * unit - opened, self.B + 0j)
             for part in np.split(omega, range(BATCH, len(omega), BATCH))
         ]
         return np.concatenate(parts)

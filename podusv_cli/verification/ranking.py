@@ -40,7 +40,7 @@ def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
         return None
     # Smallest first, NaN last; equal numbers in the order given.
     values = [{label: e.values[i] for label, e in known.items()} for i in range(3)]
-    orders = tuple(tuple(sorted(v, key=lambda one: (math.isnan(v[one]), v[one]))) for v in values)
+    orders = tuple(tuple(sorted(v, key=lambda run: (math.isnan(v[run]), v[run]))) for v in values)
     pairs = tuple(pairwise(orders[0]))
     equal = tuple((a, b) for a, b in pairs if known[a].values == known[b].values)
     close = tuple(

@@ -90,10 +90,11 @@ def verify(
 ) -> Verification:
     """Verify every run of a scenario: its one law, or all of `controllers`. Raises LawError."""
     singles = scenario.singles()
-    for one in singles.values():
-        one.ready()
+    for single in singles.values():
+        single.ready()
     runs = {
-        label: check(one, progress and partial(progress, label)) for label, one in singles.items()
+        label: check(single, progress and partial(progress, label))
+        for label, single in singles.items()
     }
     rankings, metrics = {}, scenario.known_metrics()
     for name in metrics:

@@ -57,8 +57,8 @@ def tensors(data: bytes) -> dict[str, Vector]:
             "is no safetensors file; write it with safetensors.numpy.save_file"
         ) from None
     numbers, told = data[begin:], header.__pydantic_extra__
-    found = {name: _numbers(name, one, numbers) for name, one in told.items()}
-    pieces = sorted(one.data_offsets for one in told.values())
+    found = {name: _numbers(name, tensor, numbers) for name, tensor in told.items()}
+    pieces = sorted(tensor.data_offsets for tensor in told.values())
     if [0, *(end for _, end in pieces)] != [*(first for first, _ in pieces), len(numbers)]:
         raise ValueError("its header does not fit its numbers; save it again")
     return found

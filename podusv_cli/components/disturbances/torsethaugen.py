@@ -96,4 +96,4 @@ def peaks(height: float, period: float) -> tuple[Peak, Peak]:
 def torsethaugen(rate: Vector, height: float, peak: float) -> Vector:
     """Density [m2 s] of the surface elevation at `rate` [rad/s]; `peak` is the first peak's."""
     both = peaks(height, 2.0 * math.pi / peak)
-    return np.asarray(sum(one.density(rate) for one in both if one.height > 0.0))
+    return np.asarray(sum(part.density(rate) for part in both if part.height > 0.0))

@@ -115,17 +115,23 @@ class Sensors(Measurement):
 
     def measured(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r have a sensor."""
-        return tuple(bool(one) for one, count in self.instruments().values() for _ in range(count))
+        return tuple(
+            bool(sensor) for sensor, count in self.instruments().values() for _ in range(count)
+        )
 
     def outages_of_each(self) -> tuple[tuple[Span, ...], ...]:
         """Those of the sensors."""
         sensors = self.instruments().values()
-        return tuple(one.outages if one else () for one, count in sensors for _ in range(count))
+        return tuple(
+            sensor.outages if sensor else () for sensor, count in sensors for _ in range(count)
+        )
 
     def noise_of_each(self) -> tuple[float, ...]:
         """White noise and bias of the sensors together."""
         sensors = self.instruments().values()
-        each = [(math.hypot(one.noise, one.bias) if one else 0.0, n) for one, n in sensors]
+        each = [
+            (math.hypot(sensor.noise, sensor.bias) if sensor else 0.0, n) for sensor, n in sensors
+        ]
         return tuple(noise for noise, count in each for _ in range(count))
 
     def delay_of_position(self) -> float:
@@ -167,7 +173,7 @@ class Sensors(Measurement):
 
     def first(self, start: Vector, step: float) -> Vector:
         """The start, and room for the samples that wait for their delivery."""
-        rooms = [_steps(one, step)[2] * n for one, n in self.instruments().values() if one]
+        rooms = [_steps(sensor, step)[2] * n for sensor, n in self.instruments().values() if sensor]
         return np.concatenate([super().first(start, step), np.zeros(sum(rooms))])
 
     def conflicts(self, step: float) -> Iterator[tuple[str, str]]:
