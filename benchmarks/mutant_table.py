@@ -495,7 +495,7 @@ TABLE: dict[str, list[Row]] = {
      "test_a_killed_worker_is_replaced_once"),
     ("        if isinstance(error, StorageError):\n            raise error\n", "",
      "test_extras_that_fail_are_missing_and_what_cannot_be_stored_is_an_error"),
-    ('found["machine"] == _machine() and ', "", "test_what_others_may_be_making_is_left_alone"),
+    ('match["machine"] == _machine() and ', "", "test_what_others_may_be_making_is_left_alone"),
 ],
 "core": [
     ("return trial or numbers.get(", "return numbers.get(",

@@ -99,11 +99,11 @@ def _searched(
     return collocation.searched(asked, guesses, last, lambda _, part: tell(part))[0]
 
 
-def table(found: Iterable[Least]) -> pd.DataFrame:
+def table(optima: Iterable[Least]) -> pd.DataFrame:
     """A row for each case that has an optimum."""
     rows = [
         (*place, optimum.iae, optimum.step, optimum.lowered, optimum.start)
-        for optimum in found
+        for optimum in optima
         for place in optimum.places
     ]
     names = ("vessel", "task", "condition", "optimum", "step", "lowered", "start")

@@ -67,9 +67,9 @@ def as_markdown(made: pd.DataFrame) -> str:
 def _grids(optima: Sequence[Least]) -> dict[str, Any]:
     """What the page says of the optima: the finest grid's step, its effect, and their cases."""
     return {
-        "step": f"{max(found.step for found in optima):.2g}",
-        "lowered": f"{max(abs(found.lowered) for found in optima):.1g}",
-        "count": sum(len(found.places) for found in optima),
+        "step": f"{max(optimum.step for optimum in optima):.2g}",
+        "lowered": f"{max(abs(optimum.lowered) for optimum in optima):.1g}",
+        "count": sum(len(optimum.places) for optimum in optima),
     }
 
 

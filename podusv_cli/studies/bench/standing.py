@@ -58,7 +58,7 @@ def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:
 
     `of_optimum` is inf for a failed run.
     """
-    iae = {place: found.iae for found in optima for place in found.places}
+    iae = {place: optimum.iae for optimum in optima for place in optimum.places}
     least = [iae.get(place, np.nan) for place in made[PLACE].itertuples(index=False, name=None)]
     counted = made.iae.where(made.status == "finished", np.inf)
     return made.assign(optimum=least, of_optimum=counted / least)

@@ -40,10 +40,10 @@ ROWS = 4096  # runs read or written at a time
 
 def digest(pieces: Iterable[Any]) -> str:
     """A digest of the bytes of arrays, given piece by piece."""
-    found = hashlib.sha256()
+    sha = hashlib.sha256()
     for piece in pieces:
-        found.update(piece)
-    return found.hexdigest()
+        sha.update(piece)
+    return sha.hexdigest()
 
 
 def digest_of_the_rest(file: h5py.File) -> str:
@@ -80,10 +80,10 @@ class Table:
         """Raises StorageError where a number or a word is not as it was written."""
         with hdf5.readable(self.path, "runs"):
             arrays = (self._file[name] for name in ("status", "until", *self.metrics))
-            found = {SEAL: digest(law for array in arrays for law in array)}
+            digests = {SEAL: digest(law for array in arrays for law in array)}
             if SEAL_OF_THE_REST in self._file:
-                found[SEAL_OF_THE_REST] = digest_of_the_rest(self._file)
-            same = all(bytes(self._file[name][()]) == own.encode() for name, own in found.items())
+                digests[SEAL_OF_THE_REST] = digest_of_the_rest(self._file)
+            same = all(bytes(self._file[name][()]) == own.encode() for name, own in digests.items())
         if not same:
             raise StorageError(f"cannot read {self.path}: its numbers were altered")
 
@@ -131,8 +131,8 @@ class Table:
         """Whether a run was a success. Kept, as all tables and claims ask again and again."""
         if law not in self._successes:
             read = {name: self.metric(law, name) for name in self.asked}
-            found = succeeded(self._success, read, self.finished(law), self._known)
-            self._successes[law] = np.ascontiguousarray(found)
+            successes = succeeded(self._success, read, self.finished(law), self._known)
+            self._successes[law] = np.ascontiguousarray(successes)
         return self._successes[law]
 
     def failed(self, law: str) -> Mask:
@@ -148,16 +148,16 @@ class Table:
     @property
     def drawn(self) -> dict[str, Any]:
         """The drawn quantities, one entry a draw."""
-        found: dict[str, Any] = {}
+        columns: dict[str, Any] = {}
 
         def note(name: str, thing: Any) -> None:  # returns None, so that all are visited
             if isinstance(thing, h5py.Dataset):
                 content = thing[()]
-                found[name] = np.char.decode(content) if content.dtype.kind == "S" else content
+                columns[name] = np.char.decode(content) if content.dtype.kind == "S" else content
 
         if DRAWN in self._file:
             self._file[DRAWN].visititems(note)
-        return found
+        return columns
 
     @cached_property
     def causes(self) -> dict[tuple[int, int, int], str]:

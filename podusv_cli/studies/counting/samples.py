@@ -48,8 +48,8 @@ class Sample(ABC):
 
     def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
         """Whether the comparison holds all over the interval, or nowhere in it; else None."""
-        found, margin = self.interval(level), margin if self.has_margin else 0.0
-        ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (found.low, found.high)]
+        span, margin = self.interval(level), margin if self.has_margin else 0.0
+        ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (span.low, span.high)]
         return ends[0] if self.n and ends[0] == ends[1] else None
 
 

@@ -80,16 +80,16 @@ def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:
 def _check_grid(loaded: Loaded) -> None:
     """Raise ScenarioError for keys that cannot be in a grid, empty lists, and too many cells."""
     grid = _grid(loaded)
-    found = [
+    faults = [
         _fault(loaded, key, text) for key, nodes in grid.items() for text in _wrong(key, nodes)
     ]
     count = prod(len(nodes) for nodes in grid.values())
     if count > MOST:
-        found.append(
+        faults.append(
             _fault(loaded, "", f"has {count:,} combinations, at most {MOST:,} are allowed")
         )
-    if found:
-        raise ScenarioError(found)
+    if faults:
+        raise ScenarioError(faults)
 
 
 def _wrong(key: str, nodes: tuple[Node, ...]) -> Iterator[str]:

@@ -154,8 +154,8 @@ def no_section(scenario: Scenario, steps: Route) -> str:
 
 def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
     """All keys of numbers that a draw can change, but for those in lists."""
-    found = [item for law in laws.values() for item in values(law).items()]
-    return [key for key, own in found if route(key)[0] in PER_RUN and _is_number(own)]
+    items = [item for law in laws.values() for item in values(law).items()]
+    return [key for key, own in items if route(key)[0] in PER_RUN and _is_number(own)]
 
 
 def _is_number(own: Any) -> bool:

@@ -169,9 +169,9 @@ class Cluster:
         """Whether it is part of a unit that killed its worker when nothing else was under way."""
         unit, at = task.unit, (task.variant, task.unit.law, task.unit.cell)
         return any(
-            at == (found.variant, found.unit.law, found.unit.cell)
-            and unit.first in found.unit.draws
-            for found in self._guilty
+            at == (guilty.variant, guilty.unit.law, guilty.unit.cell)
+            and unit.first in guilty.unit.draws
+            for guilty in self._guilty
         )
 
     def _submit(self, task: Task) -> None:
@@ -257,14 +257,14 @@ class Cluster:
 
 def _joined(units: Iterable[Unit]) -> Iterator[str]:
     """Units in words, those that follow each other as one: `pid[0] draws 0 to 63`."""
-    found: list[Unit] = []
+    joined: list[Unit] = []
     for unit in sorted(units):
-        last = found[-1] if found else None
+        last = joined[-1] if joined else None
         if last and (last.law, last.cell, last.draws.stop) == (unit.law, unit.cell, unit.first):
-            found[-1] = replace(last, count=last.count + unit.count)
+            joined[-1] = replace(last, count=last.count + unit.count)
         else:
-            found.append(unit)
-    for unit in found:
+            joined.append(unit)
+    for unit in joined:
         yield f"{unit.law}[{unit.cell}] draws {unit.first} to {unit.draws[-1]}"
 
 

@@ -46,12 +46,12 @@ def seeds(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP)
 def table(sweep: Sweep, first: int, count: int, stream: str = SWEEP) -> dict[str, npt.NDArray[Any]]:
     """Draws first, first + 1, ... of every quantity, by its name."""
     shares = _sobol if sweep.design == "sobol" else _random
-    found = shares(sweep, first, count, stream)
+    drawn_shares = shares(sweep, first, count, stream)
     with np.errstate(over="ignore"):  # the scenario's ranges tell
         return {
             name: seeds(sweep.seed, name, first, count, stream)
             if quantity.seed
-            else quantity.distribution.at(found[name])
+            else quantity.distribution.at(drawn_shares[name])
             for name, quantity in sweep.vary.items()
         }
 

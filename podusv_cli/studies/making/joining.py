@@ -48,11 +48,11 @@ class Comparison:
         for new in store.results():
             place, rows = (new.unit.law, new.unit.cell), slice(new.unit.first, new.unit.draws.stop)
             known, origins = self._digests[place][rows], self._origins[place][rows]
-            found = digests(new)
-            other = (origins != NOWHERE) & (known != found)
+            new_digests = digests(new)
+            other = (origins != NOWHERE) & (known != new_digests)
             if other.any():
                 self._refuse(new, other, self._stores[origins[np.argmax(other)]])
-            known[:], origins[:] = found, len(self._stores) - 1
+            known[:], origins[:] = new_digests, len(self._stores) - 1
 
     def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
         unit, folder = new.unit, self._stores[-1].folder
@@ -72,11 +72,11 @@ def digests(result: UnitResult) -> Any:
     columns = [*(result.metrics[name] for name in sorted(result.metrics)), result.until]
     table = np.column_stack([*columns, result.status])
     table[np.isnan(table)] = np.nan
-    found = (
+    run_digests = (
         hashlib.blake2b(row.tobytes() + cause.encode(), digest_size=SIZE).digest()
         for row, cause in zip(table, result.causes, strict=True)
     )
-    return np.frombuffer(b"".join(found), np.uint64)
+    return np.frombuffer(b"".join(run_digests), np.uint64)
 
 
 def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
@@ -100,11 +100,11 @@ def _run(result: UnitResult, draw: int) -> dict[str, Any]:
 
 def mixture(folder: Path) -> str:
     """A warning where the runs of a folder were made on different machines or versions, else ""."""
-    found = _machines(folder)
+    hosts = _machines(folder)
     return (
-        f"the runs in {folder} are made on different machines or versions: {' and '.join(found)}; "
+        f"the runs in {folder} are made on different machines or versions: {' and '.join(hosts)}; "
         "their numbers may differ in the last bits"
-        if len(found) > 1
+        if len(hosts) > 1
         else ""
     )
 
@@ -119,8 +119,8 @@ def _machines(folder: Path) -> list[str]:
 
 def machines(folder: Path) -> str:
     """On what the runs of a folder were made: processor, C library and versions."""
-    found = _machines(folder)
-    return " and ".join(found) or f"a machine that its {NAME} does not tell"
+    hosts = _machines(folder)
+    return " and ".join(hosts) or f"a machine that its {NAME} does not tell"
 
 
 def _machine(session: Mapping[str, Any]) -> str:
@@ -153,6 +153,6 @@ def _few(words: Sequence[str]) -> str:
 
 def _ranges(mask: Mask, first: int = 0) -> str:
     """`draw 9`, or `draws 3, 8 to 12`, where a mask is true."""
-    found = [range(r.start + first, r.stop + first) for r in stretches(mask)]
-    words = [f"{r.start} to {r[-1]}" if len(r) > 1 else str(r.start) for r in found]
+    ranges = [range(r.start + first, r.stop + first) for r in stretches(mask)]
+    words = [f"{r.start} to {r[-1]}" if len(r) > 1 else str(r.start) for r in ranges]
     return f"draw{'s' if np.sum(mask) > 1 else ''} {_few(words)}"

@@ -128,11 +128,11 @@ def plan(loaded: Loaded) -> Plan:
 def kernels(scenario: Scenario) -> str:
     """A digest of the source of all kernels of a law's loop, the same on every processor."""
     parts = [kernel for _, kernel, _ in scenario.plan().functions]
-    found = hashlib.sha256()
+    sha = hashlib.sha256()
     for kernel in (closed_loop.advance, *parts):
         for text in ingredients(kernel, {}):
-            found.update(text.encode() + b"\0")
-    return found.hexdigest()[:16]
+            sha.update(text.encode() + b"\0")
+    return sha.hexdigest()[:16]
 
 
 def digest(identity: Mapping[str, Any]) -> str:

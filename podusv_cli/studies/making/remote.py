@@ -75,13 +75,13 @@ def report(text: str, plugins: Plugins) -> Report:
 
 def differing(ours: Report, theirs: Report) -> str:
     """What is different in a worker's report, and a remedy; "" where nothing is."""
-    found = [
+    differences = [
         f"{name} is {theirs.get(name, 'not there')}, not {word}"
         for name, word in ours.items()
         if theirs.get(name) != word
     ]
     remedy = "install there what is installed here, or leave the worker out"
-    return f"{'; '.join(found)}; {remedy}" if found else ""
+    return f"{'; '.join(differences)}; {remedy}" if differences else ""
 
 
 @dataclass(frozen=True)

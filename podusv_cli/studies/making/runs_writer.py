@@ -176,11 +176,11 @@ def _fill(
             arrays = {**result.metrics, "status": result.status, "until": result.until}
             for name, numbers in arrays.items():
                 write_at(out, places[name].place(*at), places[name].content(numbers))
-        found = digest(piece for extent in places.values() for piece in _pieces(out, extent))
-        write_at(out, seal.offset, found.encode())
+        computed = digest(piece for extent in places.values() for piece in _pieces(out, extent))
+        write_at(out, seal.offset, computed.encode())
         with h5py.File(part, "r") as file:
-            found = digest_of_the_rest(file)
-        write_at(out, rest.offset, found.encode())
+            computed = digest_of_the_rest(file)
+        write_at(out, rest.offset, computed.encode())
         os.fsync(out.fileno())
 
 

@@ -98,8 +98,8 @@ class Store:
         self, folder: Path, identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:  # fmt: skip
-        if found := disagreements(identity, self.about.identity):
-            raise UsageError(f"{folder} holds another study: {found}; {remedy}")
+        if different := disagreements(identity, self.about.identity):
+            raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 
     def write(self, result: UnitResult) -> None:
         """Keep the result of a unit. Raises StorageError."""
@@ -162,18 +162,18 @@ class Store:
         """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
         path = self.folder / RUNS
         try:
-            found = runs_file.Table(path, self.about.success, self.about.metrics)
-            found.check()
+            table = runs_file.Table(path, self.about.success, self.about.metrics)
+            table.check()
             own = self.about.laws, self.about.cells
-            if found.identity != self.seal or (found.laws, found.cells) != own:
+            if table.identity != self.seal or (table.laws, table.cells) != own:
                 raise StorageError(f"cannot read {path}: its runs are of another study")
         except StorageError as error:
             raise StorageError(
                 f"{error}; restore the file, or move it away and simulate its runs again with: "
                 f"{continue_with('sweep run', self.folder)}"
             ) from error
-        self._check_metrics(set(found.metrics) == set(self.about.measured))
-        return found
+        self._check_metrics(set(table.metrics) == set(self.about.measured))
+        return table
 
     def _check_metrics(self, fit: bool) -> None:
         if not fit:
@@ -217,8 +217,8 @@ def encoded(result: UnitResult, seal: str) -> bytes:
 
 def _head(facts: Mapping[str, Any], numbers: bytes) -> bytes:
     """The line before a unit's numbers: what it is, and a digest of this and of the numbers."""
-    found = hashlib.sha256(json.dumps(facts).encode() + numbers).hexdigest()
-    return json.dumps({**facts, SEAL: found}).encode() + b"\n"
+    sha = hashlib.sha256(json.dumps(facts).encode() + numbers).hexdigest()
+    return json.dumps({**facts, SEAL: sha}).encode() + b"\n"
 
 
 def decoded(content: bytes, seal: str) -> UnitResult | None:

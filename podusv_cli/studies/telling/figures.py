@@ -143,14 +143,14 @@ def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[
 def _limited(
     results: Results, name: str, others: Sequence[ast.expr], cell: int
 ) -> dict[str, Vector]:
-    runs, found = results.runs, dict[str, Vector]()
+    runs, limited = results.runs, dict[str, Vector]()
     rest = ast.BoolOp(ast.And(), [ast.Name(FINISHED), *others])
     for law in runs.laws:
         read = {metric: runs.metric(law, metric) for metric in runs.asked}
         held = succeeded(rest, read, runs.finished(law), results.known)[cell]
         values = np.where(held, runs.metric(law, name)[cell], np.inf)
-        found[law] = values[runs.done(law)[cell]]
-    return {law: values for law, values in found.items() if len(values)}
+        limited[law] = values[runs.done(law)[cell]]
+    return {law: values for law, values in limited.items() if len(values)}
 
 
 def _heatmaps(results: Results) -> Iterator[Sketch]:
@@ -177,8 +177,8 @@ def _panel(results: Results, law: str, name: str, across: int) -> Vector:
     table = results.summary
     column = "failed" if name == "failed" else "q50"
     rows = table[(table.law == law) & ((name == "failed") | (table.metric == name))]
-    found = rows.drop_duplicates("cell").set_index("cell")[column]
-    cells = np.array([found.get(label, np.nan) for label in results.runs.cells], float)
+    by_cell = rows.drop_duplicates("cell").set_index("cell")[column]
+    cells = np.array([by_cell.get(label, np.nan) for label in results.runs.cells], float)
     return cells.reshape(across, -1).T
 
 
@@ -395,11 +395,11 @@ def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[floa
     Returns its ends.
     """
     finite = [numbers[np.isfinite(numbers)] for numbers in values.values()]
-    found = [
+    ends = [
         *shown,
         *(end for numbers in finite if len(numbers) for end in _without_tails(numbers)),
     ]
-    low, high = min(found, default=0.0), max(found, default=1.0)
+    low, high = min(ends, default=0.0), max(ends, default=1.0)
     if 0.0 < low * WIDE < high:
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
@@ -418,8 +418,8 @@ def _without_tails(numbers: Vector) -> list[float]:
 
 def _ratio_axis(axes: Axes, pairs: pd.DataFrame) -> tuple[float, float]:
     """A logarithmic axis that is as long on both sides of 1; its ends."""
-    found = pairs[["ratio_low", "ratio", "ratio_high"]].to_numpy(float).ravel()
-    usable = np.abs(np.log(found[np.isfinite(found) & (found > 0.0)]))
+    values = pairs[["ratio_low", "ratio", "ratio_high"]].to_numpy(float).ravel()
+    usable = np.abs(np.log(values[np.isfinite(values) & (values > 0.0)]))
     reach = float(np.exp(1.15 * max(usable.max(initial=0.0), 0.02)))
     axes.set_xscale("log")
     axes.set_xlim(1.0 / reach, reach)

@@ -58,15 +58,15 @@ def wanted(results: Results) -> list[KeptRun]:
     invalid has no log. The worst have the largest value of a metric among those that succeeded.
     """
     keep = results.about.keep
-    found: dict[tuple[str, int, int], KeptRun] = {}
+    chosen: dict[tuple[str, int, int], KeptRun] = {}
     for law in results.runs.laws:
-        for one in (
+        for run in (
             *_failed(results.runs, law, keep.failed),
             *(w for name, count in keep.worst.items() for w in _worst(results, law, name, count)),
             *_named(results.runs, law, keep.draws),
         ):
-            found.setdefault(one[:3], one)
-    return list(found.values())
+            chosen.setdefault(run[:3], run)
+    return list(chosen.values())
 
 
 def unmade(folder: Path, results: Results) -> list[KeptRun]:
@@ -142,12 +142,12 @@ def contradiction(kept: Sequence[Kept]) -> str:
 
 def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
     """The distance to the target over time in every kept log that has it, by law."""
-    found: dict[str, list[Track]] = {}
+    by_law: dict[str, list[Track]] = {}
     for run in kept:
         track = extras.made(f"the track of {run.wanted.name}", partial(_track, run))
         if track:
-            found.setdefault(run.wanted.law, []).append(track)
-    return found
+            by_law.setdefault(run.wanted.law, []).append(track)
+    return by_law
 
 
 def _track(kept: Kept) -> Track | None:

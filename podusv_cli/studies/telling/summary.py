@@ -124,18 +124,18 @@ def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, A
 
 
 def _quantiles(values: Vector, level: float) -> dict[str, Any]:
-    found: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
+    columns: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
     intervals = statistics.quantiles(values, QUANTILES, level)
     for q, interval in zip(QUANTILES, intervals, strict=True):
-        found |= interval.columns(f"q{round(100 * q):02d}")
-    return found
+        columns |= interval.columns(f"q{round(100 * q):02d}")
+    return columns
 
 
 def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
-    found = statistics.pairs(a, b, margin)
+    compared = statistics.pairs(a, b, margin)
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {
-        "n": found.n, "ties": found.ties, "both_failed": found.both_failed,
-        "unknown": found.unknown, **found.win_rate(level).columns("a_wins"),
-        **found.loss_rate(level).columns("b_wins"), **ratio.columns("ratio"),
+        "n": compared.n, "ties": compared.ties, "both_failed": compared.both_failed,
+        "unknown": compared.unknown, **compared.win_rate(level).columns("a_wins"),
+        **compared.loss_rate(level).columns("b_wins"), **ratio.columns("ratio"),
     }  # fmt: skip

@@ -200,7 +200,7 @@ def importance(table: pd.DataFrame) -> Figure:
 
 
 def slices(
-    tried: pd.DataFrame, gains: Sequence[Gain], found: Mapping[str, Any], label: str,
+    tried: pd.DataFrame, gains: Sequence[Gain], winner: Mapping[str, Any], label: str,
     units: Mapping[str, str],
 ) -> Figure:  # fmt: skip
     """A panel for each gain of a law, a point for each trial."""
@@ -211,7 +211,7 @@ def slices(
     values = tried.objective.to_numpy(float)
     shown = values[np.isfinite(values)]
     for gain, axes in zip(gains, panels.ravel(), strict=False):
-        _slice(axes, gain, tried, found[gain.key])
+        _slice(axes, gain, tried, winner[gain.key])
         unit = f" [{units[gain.key]}]" if units[gain.key] not in ("", "1") else ""
         axes.set_xlabel(escaping.figure(f"{gain.key}{unit}"), **SMALL)
     if len(shown):
@@ -227,14 +227,14 @@ def slices(
     return figure
 
 
-def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, found: Any) -> None:
+def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, winner: Any) -> None:
     if gain.words:
         places = {word: place for place, word in enumerate(gain.words)}
         x = tried[gain.key].map(places)
         axes.set_xticks(range(len(places)), [escaping.figure(str(word)) for word in places])
-        own, mark = places.get(gain.own), places[found]
+        own, mark = places.get(gain.own), places[winner]
     else:
-        x, own, mark = tried[gain.key], gain.own, found
+        x, own, mark = tried[gain.key], gain.own, winner
     for (repeat, whole), some in tried.assign(x=x).groupby(["repeat", "whole"]):
         colour = nth_style(int(str(repeat)))[0]
         fill = colour if whole else "none"

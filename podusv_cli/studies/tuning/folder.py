@@ -115,7 +115,7 @@ def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, 
     }  # fmt: skip
     return {
         "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
-        "gains": {law: [gain.key for gain in found] for law, found in plan.gains.items()},
+        "gains": {law: [gain.key for gain in gains] for law, gains in plan.gains.items()},
         "idle": {law: list(keys) for law, keys in plan.idle.items()},
         "identity": _identity(plan), "history": [*history, asked],
     }  # fmt: skip

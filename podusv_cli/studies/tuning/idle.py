@@ -33,7 +33,7 @@ def find_idle(plan: TunePlan, workers: int) -> dict[str, tuple[str, ...]]:
     The runs are made in processes of their own. Of a law that ends its process, none is idle.
     Raises KeyboardInterrupt, and PodusvError where a run cannot be made at all.
     """
-    laws = [law for law, found in plan.gains.items() if found]
+    laws = [law for law, gains in plan.gains.items() if gains]
     outcomes = run_all([partial(_of_law, plan, law) for law in laws], workers=workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt

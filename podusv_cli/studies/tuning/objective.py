@@ -108,8 +108,8 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
         metrics, runs=Outcomes(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
     )
     with np.errstate(all="ignore"):
-        found = _evaluated(tree, walk, math.inf)
-    if not math.isfinite(found) and FAILURES not in walk.names:  # here, no run failed
+        reached = _evaluated(tree, walk, math.inf)
+    if not math.isfinite(reached) and FAILURES not in walk.names:  # here, no run failed
         refuse(tree, f"is no finite number, whatever the runs are; example: {EXAMPLE}")
     return walk.names
 
@@ -122,17 +122,17 @@ def evaluate(
     `worst` is minus infinity where less is worse.
     """
     with np.errstate(all="ignore"):
-        found = float(_evaluated(tree, OfGains(metrics, runs=runs), worst))
-    return found if math.isfinite(found) else math.inf
+        reached = float(_evaluated(tree, OfGains(metrics, runs=runs), worst))
+    return reached if math.isfinite(reached) else math.inf
 
 
 def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]) -> float:
     """By how much an inequality does not hold, relative to its bound; 0 or less where it holds."""
-    found = evaluate(inequality.tree, runs, metrics, -math.inf if inequality.upward else math.inf)
+    reached = evaluate(inequality.tree, runs, metrics, -math.inf if inequality.upward else math.inf)
     over = (
-        inequality.bound - found
-        if inequality.upward and math.isfinite(found)
-        else found - inequality.bound
+        inequality.bound - reached
+        if inequality.upward and math.isfinite(reached)
+        else reached - inequality.bound
     )
     return over / (abs(inequality.bound) or 1.0)
 

@@ -92,16 +92,16 @@ class TunePlan:
         tune = self.tune
         return {
             law: (tune.repeats * tune.budget, (1 + tune.repeats) * tune.validate)
-            if found else (0, tune.validate)
-            for law, found in self.gains.items()
+            if of_law else (0, tune.validate)
+            for law, of_law in self.gains.items()
         }  # fmt: skip
 
     def in_words(self) -> Iterator[str]:
         """The gains of every law, and how many runs there are."""
-        for law, found in self.gains.items():
-            if found:
-                names = ", ".join(gain.key for gain in found)
-                yield f"gains of {law} ({len(found)}): {names}{self._few(len(found))}"
+        for law, of_law in self.gains.items():
+            if of_law:
+                names = ", ".join(gain.key for gain in of_law)
+                yield f"gains of {law} ({len(of_law)}): {names}{self._few(len(of_law))}"
             else:
                 yield f"{law} has no gains and is kept as it is"
         yield "gains that change no run are left out when the search begins"

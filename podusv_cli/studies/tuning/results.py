@@ -98,18 +98,18 @@ class SearchResults:
         table = pd.DataFrame([self._law(law) for law in self.plan.laws])
         for when in ("before", "after"):
             objectives = [
-                found if self.settles(law, when) and math.isfinite(found) else math.nan
-                for law, found in zip(table.law, table[f"objective_{when}"], strict=True)
+                number if self.settles(law, when) and math.isfinite(number) else math.nan
+                for law, number in zip(table.law, table[f"objective_{when}"], strict=True)
             ]
             table[f"rank_{when}"] = pd.Series(objectives).rank(method="min").astype("Int64")
             table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
-        found: dict[str, tuple[float, float]] = {}
+        places: dict[str, tuple[float, float]] = {}
         if self.plan.tune.repeats > 1:
             ranked = table.law[table.rank_after.notna()].tolist()
             pairs = self.searches
-            found |= searches.places(pairs[pairs.a.isin(ranked) & pairs.b.isin(ranked)], ranked)
+            places |= searches.places(pairs[pairs.a.isin(ranked) & pairs.b.isin(ranked)], ranked)
         table["place_low"], table["place_high"] = zip(
-            *(found.get(law, (math.nan, math.nan)) for law in table.law), strict=True
+            *(places.get(law, (math.nan, math.nan)) for law in table.law), strict=True
         )
         return table
 
@@ -137,17 +137,17 @@ class SearchResults:
     def _searched(self, law: str) -> list[str]:
         """The names of a law with the gains of each of its searches; its own where it has none."""
         own = [repeated(law, repeat) for repeat in range(len(self.winners.get(law, ())))]
-        found = [name for name in (tuned(law), *own) if name in set(self.runs.laws)]
-        return found or [law]
+        searched = [name for name in (tuned(law), *own) if name in set(self.runs.laws)]
+        return searched or [law]
 
     def _better_than(self, law: str, when: str) -> int:
         """How many laws this one is better than in the typical draw, the whole interval of it."""
-        found = self.pairs
-        if not len(found):
+        pairs = self.pairs
+        if not len(pairs):
             return 0
-        found = found[(found["when"] == when) & (found.metric == self.shown[0])]
-        ahead = (found.a == law) & (found.ratio_high < 1.0)
-        return int((ahead | (found.b == law) & (found.ratio_low > 1.0)).sum())
+        pairs = pairs[(pairs["when"] == when) & (pairs.metric == self.shown[0])]
+        ahead = (pairs.a == law) & (pairs.ratio_high < 1.0)
+        return int((ahead | (pairs.b == law) & (pairs.ratio_low > 1.0)).sum())
 
     def _law(self, law: str) -> dict[str, Any]:
         told: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
@@ -156,8 +156,8 @@ class SearchResults:
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
             told |= failed.columns(f"failed_{when}")
             told |= self.objective(runs, self.plan.objective).columns(f"objective_{when}")
-        found = self.pairs
-        own = found[(found["when"] == "tuning") & (found.a == tuned(law))]
+        pairs = self.pairs
+        own = pairs[(pairs["when"] == "tuning") & (pairs.a == tuned(law))]
         own = own[own.metric == self.shown[0]]
         for end in ("ratio", "ratio_low", "ratio_high"):
             told[end] = float(own[end].iloc[0]) if len(own) else 1.0
@@ -168,12 +168,12 @@ class SearchResults:
 
     def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
         """An objective, with an interval where it is one quantile of one number."""
-        found = evaluate(tree, runs, self.plan.metrics)
+        number = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
-            return Interval(found, math.nan, math.nan)
+            return Interval(number, math.nan, math.nan)
         values = numbers_of(tree, OfGains(self.plan.metrics, runs=runs))
         ends = statistics.quantile(values, share_of(tree), self.level)
-        return Interval(found, ends.low, ends.high)
+        return Interval(number, ends.low, ends.high)
 
     @cached_property
     def limits(self) -> pd.DataFrame:
@@ -252,16 +252,16 @@ class SearchResults:
     def history(self) -> pd.DataFrame:
         """Every trial in its order, with the best so far."""
         return pd.DataFrame(
-            [row for law, all_ in self.trials.items() for repeat, found in enumerate(all_, 1)
-             for row in _history(law, repeat, found)]
+            [row for law, all_ in self.trials.items() for repeat, trials in enumerate(all_, 1)
+             for row in _history(law, repeat, trials)]
         )  # fmt: skip
 
     @cached_property
     def importance(self) -> pd.DataFrame:
         """How much each gain matters, with the least and the most of repeats and of parts."""
         rows = [
-            {"law": law, "gain": gain.key, **_range([trial.get(gain.key, 0.0) for trial in found])}
-            for law in self.trials for found in [list(self._importances(law))] if found
+            {"law": law, "gain": gain.key, **_range([part.get(gain.key, 0.0) for part in parts])}
+            for law in self.trials for parts in [list(self._importances(law))] if parts
             for gain in self.plan.gains[law]
         ]  # fmt: skip
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
@@ -272,11 +272,11 @@ class SearchResults:
             for part in range(PARTS):
                 kept = [trial for place, trial in enumerate(trials) if place % PARTS != part]
                 if len(kept) >= FEWEST * (PARTS - 1) / PARTS:
-                    found = importances(
+                    importance = importances(
                         self.plan.gains[law], [t.gains for t in kept], [t.value for t in kept]
                     )
-                    if found:
-                        yield found
+                    if importance:
+                        yield importance
 
     @property
     def label(self) -> str:

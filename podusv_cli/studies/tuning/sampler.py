@@ -26,11 +26,11 @@ Values = Sequence[float]
 def optuna() -> Any:
     """The module. Raises UsageError where it is not installed."""
     try:
-        found = import_module("optuna")
+        module = import_module("optuna")
     except ImportError as error:
         raise UsageError("podusv tune needs Optuna: pip install 'podusv[tune]'") from error
-    found.logging.set_verbosity(found.logging.ERROR)
-    return found
+    module.logging.set_verbosity(module.logging.ERROR)
+    return module
 
 
 class Sampler:
@@ -94,8 +94,8 @@ def importances(
 
     PED-ANOVA (Watanabe et al., IJCAI 2023), of the best tenth of the trials within all.
     """
-    found = optuna()
-    kinds = found.distributions
+    module = optuna()
+    kinds = module.distributions
     space = {
         gain.key: kinds.CategoricalDistribution(list(gain.words)) if gain.words
         else kinds.IntDistribution(int(gain.low), int(gain.high)) if gain.whole
@@ -103,17 +103,17 @@ def importances(
         for gain in gains
     }  # fmt: skip
     with _quiet():
-        study = found.create_study()
+        study = module.create_study()
         for trial, number in zip(tried, values, strict=True):
             params = {gain.key: trial[gain.key] for gain in gains if gain.in_range(trial[gain.key])}
             if len(params) == len(space) and math.isfinite(number):
                 study.add_trial(
-                    found.trial.create_trial(params=params, distributions=space, value=number)
+                    module.trial.create_trial(params=params, distributions=space, value=number)
                 )
         if len({trial.value for trial in study.trials}) < 2:
             return {}
-        evaluator = found.importance.PedAnovaImportanceEvaluator()
-        return dict(found.importance.get_param_importances(study, evaluator=evaluator))
+        evaluator = module.importance.PedAnovaImportanceEvaluator()
+        return dict(module.importance.get_param_importances(study, evaluator=evaluator))
 
 
 def version() -> str:

@@ -92,10 +92,10 @@ class Search:
     def _first_units(self) -> list[tuple[int, study.Plan, Unit]]:
         """The first units of a batch; none where the law refuses all gains, and the batch ends."""
         draws = self._attempts[0].draws
-        found = self._units(min(self.first, draws)) or self._units(draws)
-        if not found:
+        units = self._units(min(self.first, draws)) or self._units(draws)
+        if not units:
             self._end()
-        return found
+        return units
 
     def _ask(self, left: int) -> None:
         """As many trials as the budget has whole ones for; the last one is cut to what is left."""
@@ -131,17 +131,17 @@ class Search:
 
     def _units(self, until: int) -> list[tuple[int, study.Plan, Unit]]:
         """The units that take every attempt to so many draws; those refused fail at once."""
-        found = []
+        units = []
         for place, attempt in enumerate(self._attempts):
             unit = Unit(self.law, 0, attempt.met, until - attempt.met)
             if not unit.count or self._is_over(attempt):
                 continue
             if attempt.plan:
-                found.append((place, attempt.plan, unit))
+                units.append((place, attempt.plan, unit))
             else:
                 attempt.results.append(self._refused(unit))
-        self._waiting = len(found)
-        return found
+        self._waiting = len(units)
+        return units
 
     def _refused(self, unit: Unit) -> UnitResult:
         nothing = np.full(unit.count, np.nan)

@@ -36,12 +36,12 @@ def ratios(runs: Mapping[str, Vector], level: float, seed: int) -> pd.DataFrame:
     samples = {law: _sampled(table, met, random) for law, table in runs.items()}
     pairs = list(combinations(runs, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
-        found = [np.log(reached[a]) - np.log(reached[b]) for a, b in pairs]
+        logs = [np.log(reached[a]) - np.log(reached[b]) for a, b in pairs]
         spread = [np.log(samples[a]) - np.log(samples[b]) for a, b in pairs]
-        width = _width([s - f for s, f in zip(spread, found, strict=True)], level)
+        width = _width([s - f for s, f in zip(spread, logs, strict=True)], level)
     rows = [
         (*pair, np.exp(ratio) if np.isfinite(ratio) else _sided(ratio), *_ends(ratio, each, width))
-        for pair, ratio, each in zip(pairs, found, spread, strict=True)
+        for pair, ratio, each in zip(pairs, logs, spread, strict=True)
     ]
     return pd.DataFrame(rows, columns=COLUMNS)
 
@@ -75,10 +75,10 @@ def _ends(ratio: float, spread: Vector, width: float) -> tuple[float, float]:
 
 def places(pairs: pd.DataFrame, laws: list[str]) -> dict[str, tuple[int, int]]:
     """The least and the largest rank that each law may have, where its intervals leave it open."""
-    found = {}
+    ranks = {}
     for law in laws:
         first, second = pairs[pairs.a == law], pairs[pairs.b == law]
         worse = int((first.ratio_low > 1.0).sum() + (second.ratio_high < 1.0).sum())
         better = int((first.ratio_high < 1.0).sum() + (second.ratio_low > 1.0).sum())
-        found[law] = 1 + worse, len(laws) - better
-    return found
+        ranks[law] = 1 + worse, len(laws) - better
+    return ranks

@@ -86,14 +86,14 @@ def gains(law: Controller, label: str, scenario: Scenario, tune: Tune) -> tuple[
 
     `scenario` is that of this law alone.
     """
-    found = []
+    chosen = []
     for key, content in _numbers(law):
         wanted = tune.space.get(f"{label}.{key}", tune.space.get(key))
         if wanted is None and _is_gain(law, key, scenario):
             wanted = tune.space.get(AROUND)
         if wanted is not None:
-            found += _of(wanted, key, content, type(law).model_fields[key])
-    return tuple(found)
+            chosen += _of(wanted, key, content, type(law).model_fields[key])
+    return tuple(chosen)
 
 
 def units_of(law: Controller) -> dict[str, str]:

@@ -37,14 +37,14 @@ def chosen(winners: Sequence[Trial]) -> int:
 
 def contestants(plan: TunePlan, winners: Winners) -> dict[str, Contestant]:
     """All laws that meet the fresh draws, by name: before, after, and those of other repeats."""
-    found: dict[str, Contestant] = {}
+    laws: dict[str, Contestant] = {}
     for law in plan.laws:
-        found[law] = law, {}
+        laws[law] = law, {}
         if law in winners:
             first = chosen(winners[law])
             for repeat, trial in enumerate(winners[law]):
-                found[tuned(law) if repeat == first else repeated(law, repeat)] = law, trial.gains
-    return found
+                laws[tuned(law) if repeat == first else repeated(law, repeat)] = law, trial.gains
+    return laws
 
 
 def validate(
