@@ -171,19 +171,19 @@ def comes_to_what_is_measured(estimator: Estimator) -> None:
     """At rest beside the place where it starts, with all measured or no more than it needs."""
     for known in (ALL, estimator.needs()):
         away = np.array([0.4, -0.3, 0.2, 0.0, 0.0, 0.0])
-        found = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), away, known)
-        left = np.abs(found - away)
+        estimate = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), away, known)
+        left = np.abs(estimate - away)
         assert (left[:3] <= NEAR * np.abs(away[:3])).all(), f"pose off by {left[:3]}"
-        assert (left[3:] <= NEAR).all(), f"at rest with velocities {found[3:]}"
+        assert (left[3:] <= NEAR).all(), f"at rest with velocities {estimate[3:]}"
 
 
 def takes_headings_by_the_nearest_turn(estimator: Estimator) -> None:
     """A measured heading that is a whole turn away is no error."""
     turned = np.array([0.0, 0.0, 2.0 * math.pi, 0.0, 0.0, 0.0])
-    found = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), turned, ALL)
-    off = math.remainder(found[2], 2.0 * math.pi)
+    estimate = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), turned, ALL)
+    off = math.remainder(estimate[2], 2.0 * math.pi)
     assert abs(off) < NEAR, f"heading off by {off:.3g} rad"
-    assert abs(found[5]) < NEAR, f"it yaws with {found[5]:.3g} rad/s"
+    assert abs(estimate[5]) < NEAR, f"it yaws with {estimate[5]:.3g} rad/s"
 
 
 def settled(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) -> Vector:
@@ -191,8 +191,8 @@ def settled(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) 
     new, old = (delivery(place, known, fresh) for fresh in (1.0, 0.0))
     tau, steps = np.zeros(3), round(PATIENCE / STEP)
     for i in range(steps):
-        found = tested.step(i * STEP, old if i % 10 else new, tau)
-    return found
+        estimate = tested.step(i * STEP, old if i % 10 else new, tau)
+    return estimate
 
 
 ALL = (True,) * SIX

@@ -43,11 +43,11 @@ def kept(known: Callable[[Plugins], Mapping[str, str]]) -> Callable[[typer.Conte
             if there["state"] == state:
                 return _beginning(incomplete, there["known"])
         plugins = _plugins(context)
-        found = dict(known(plugins or ()))
+        words = dict(known(plugins or ()))
         with suppress(OSError):
             if place and plugins is not None:  # one that fails today may be loaded tomorrow
-                write(place, json.dumps({"state": state, "known": found}).encode())
-        return _beginning(incomplete, found)
+                write(place, json.dumps({"state": state, "known": words}).encode())
+        return _beginning(incomplete, words)
 
     del complete.__wrapped__  # whose arguments are others than those that typer passes
     return complete
@@ -180,9 +180,9 @@ def names(plugins: Plugins) -> Mapping[str, str]:
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import names
 
-    found = dict.fromkeys(names(plugins), "")
-    found |= {name: metric.meaning for name, metric in metrics_with(plugins).items()}
-    return found | {name: finding.meaning for name, finding in finding_kinds(plugins).items()}
+    meanings = dict.fromkeys(names(plugins), "")
+    meanings |= {name: metric.meaning for name, metric in metrics_with(plugins).items()}
+    return meanings | {name: finding.meaning for name, finding in finding_kinds(plugins).items()}
 
 
 def _plugins(context: typer.Context) -> Plugins | None:

@@ -33,28 +33,28 @@ def diff(
     """
     from podusv_cli.workflows import diff as workflow  # heavy imports only when they are needed
 
-    found = workflow.diff(Path(one), Path(other))
+    differences = workflow.diff(Path(one), Path(other))
     if as_json:
-        echo_json(found.as_json())
+        echo_json(differences.as_json())
     else:
-        for label, (_, _, difference) in found.pairs.items():
+        for label, (_, _, difference) in differences.pairs.items():
             _report(label, difference)
-        for path, names in ((one, found.only_one), (other, found.only_other)):
+        for path, names in ((one, differences.only_one), (other, differences.only_other)):
             if names:
                 echo(f"only in {path}: {', '.join(names)}")
-    raise typer.Exit(0 if found.same else DIFFERENT)
+    raise typer.Exit(0 if differences.same else DIFFERENT)
 
 
-def _report(label: str, found: RunDifference) -> None:
+def _report(label: str, difference: RunDifference) -> None:
     if label:
         echo_entry(label)
-    if found.same:
-        log = "log.h5 byte for byte" if found.same_bytes else "every number of log.h5"
+    if difference.same:
+        log = "log.h5 byte for byte" if difference.same_bytes else "every number of log.h5"
         echo(f"identical: scenario, metrics, {log}")
-    _show_changes("scenario", found.scenario)
-    _show_changes("versions", found.versions)
-    _show_metrics(found)
-    _show_log(found.log)
+    _show_changes("scenario", difference.scenario)
+    _show_changes("versions", difference.versions)
+    _show_metrics(difference)
+    _show_log(difference.log)
 
 
 def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
@@ -62,22 +62,22 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
         echo_entry(what, *(change_in_words(key, change) for key, change in changes.items()))
 
 
-def _show_metrics(found: RunDifference) -> None:
+def _show_metrics(difference: RunDifference) -> None:
     from podusv_cli.comparison.run_difference import relative
     from podusv_cli.core.plugins import installed
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.metrics.windows import find
 
     known = metrics_with(installed())
-    units = {name: metric.unit for name in found.metrics if (metric := find(name, known))}
+    units = {name: metric.unit for name in difference.metrics if (metric := find(name, known))}
     rows = [
         [name, units.get(name, ""), _number(a), _number(b), _number(relative(a, b), "+.2g")]
-        for name, (a, b) in found.metrics.items()
+        for name, (a, b) in difference.metrics.items()
         if a != b
     ]
     if rows:
         echo_table(["metric", "unit", "first", "second", "relative"], rows)
-    one, other = found.log.ends
+    one, other = difference.log.ends
     if rows and one != other:
         echo(
             f"the first run ends at {one:g} s, the second at {other:g} s: their metrics are about "

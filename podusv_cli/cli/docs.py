@@ -46,11 +46,11 @@ def docs(
 def _list(wanted: str) -> None:
     from podusv_cli.workflows.docs import search
 
-    found = search(wanted)
-    for section, line in found[:SHOWN]:
+    hits = search(wanted)
+    for section, line in hits[:SHOWN]:
         echo_entry(f"podusv docs {section.page}", line, facts=section.heading)
-    if len(found) > SHOWN:
-        echo(f"and {len(found) - SHOWN} more places")
+    if len(hits) > SHOWN:
+        echo(f"and {len(hits) - SHOWN} more places")
 
 
 def _show(page: str) -> None:

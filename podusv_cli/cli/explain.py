@@ -52,14 +52,14 @@ def explain(
         echo_entry(key or "", metric.meaning, facts=f"metric [{metric.unit}]")
     else:
         try:
-            found = rows(key, (*findings, *metrics), plugins)
+            explained = rows(key, (*findings, *metrics), plugins)
         except UnknownKeyError:
             if not _echo_figure(key, plugins):
                 raise
             return
-        for row in found:
+        for row in explained:
             _echo(row)
-        if any(EQUATION.search(row.meaning) for row in found):
+        if any(EQUATION.search(row.meaning) for row in explained):
             echo("", "(n) is equation n of the paper that podusv docs model cites")
 
 

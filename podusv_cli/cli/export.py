@@ -76,8 +76,8 @@ def export(
 def _check(folder: Path, *, trusted: bool) -> None:
     from podusv_cli.export.check import check  # heavy imports only when needed
 
-    found = check(folder, trusted=trusted)
-    for result in found:
+    results = check(folder, trusted=trusted)
+    for result in results:
         same = f"{result.samples} samples with the bits of {result.whose}"
         echo(f"{result.what}: {result.differs or same}")
-    raise typer.Exit(DIFFERS if any(result.differs for result in found) else 0)
+    raise typer.Exit(DIFFERS if any(result.differs for result in results) else 0)

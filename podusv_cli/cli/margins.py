@@ -65,22 +65,22 @@ def margins(
         assign or (), out, force, argv=sys.argv, plugins=plugin or (), formats=formats,
         controller=controller, trust=trust, warn=Warnings(),
     )  # fmt: skip
-    found = workflow.margins(Path(config), request, at)
+    result = workflow.margins(Path(config), request, at)
     if as_json:
-        echo_json(found.as_json())
+        echo_json(result.as_json())
     else:
-        _report(found)
-    for label, why in found.failed.items():
+        _report(result)
+    for label, why in result.failed.items():
         echo(f"{label}: {why}", err=True)
-    raise typer.Exit(SOME_FAILED if found.failed else 0)
+    raise typer.Exit(SOME_FAILED if result.failed else 0)
 
 
-def _report(found: Found) -> None:
-    for label, law in found.laws.items():
+def _report(result: Found) -> None:
+    for label, law in result.laws.items():
         echo_entry(label, _motion(law), *_remarks(law), f"poles [1/s]: {_poles(law)}")
-    echo_table(HEAD, [row for label, law in found.laws.items() for row in _rows(label, law)])
-    if found.folder:
-        echo(f"written to {found.folder}")
+    echo_table(HEAD, [row for label, law in result.laws.items() for row in _rows(label, law)])
+    if result.folder:
+        echo(f"written to {result.folder}")
 
 
 def _motion(law: LoopMargins) -> str:

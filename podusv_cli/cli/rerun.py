@@ -78,15 +78,15 @@ def _verdict(run: Repeated) -> str:
 
 
 def _lines(run: Repeated) -> Iterator[str]:
-    found = run.found
-    yield from log_in_words(found.log)
-    if found.log.largest:
-        widest = max(found.log.largest, key=lambda deviation: deviation.relative_to_peak)
+    difference = run.found
+    yield from log_in_words(difference.log)
+    if difference.log.largest:
+        widest = max(difference.log.largest, key=lambda deviation: deviation.relative_to_peak)
         share = f"{widest.relative_to_peak:.2g} of its peak"
         yield f"largest difference, {share}: {deviation_in_words(widest)}"
-    if found.scenario:
-        yield f"changed in the scenario: {changes_in_words(found.scenario)}"
-    if found.versions:
-        yield f"changed in versions: {changes_in_words(found.versions)}"
-    if not (run.identical or found.scenario or found.versions):
+    if difference.scenario:
+        yield f"changed in the scenario: {changes_in_words(difference.scenario)}"
+    if difference.versions:
+        yield f"changed in versions: {changes_in_words(difference.versions)}"
+    if not (run.identical or difference.scenario or difference.versions):
         yield "no change in the scenario or in the versions of provenance.json explains it"

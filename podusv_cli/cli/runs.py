@@ -43,12 +43,12 @@ def runs(
     """
     from podusv_cli.workflows import runs as workflow  # heavy imports only when needed
 
-    found = workflow.runs(folder, where or (), sort)
+    listed = workflow.runs(folder, where or (), sort)
     if as_json:
-        echo_json({"format": 1, "runs": [run.as_json() for run in found]})
-    elif found:
+        echo_json({"format": 1, "runs": [run.as_json() for run in listed]})
+    elif listed:
         head = ["started (UTC)", "what", "name", "law", "status", "took", sort or USUAL, "folder"]
-        echo_table(head, [_row(run, sort or USUAL) for run in found])
+        echo_table(head, [_row(run, sort or USUAL) for run in listed])
     else:
         echo(f"no run or study below {folder}")
 

@@ -94,18 +94,18 @@ def seconds(text: str) -> float:
     """A time such as 30min in seconds, infinite for none. Raises UsageError."""
     if not text:
         return float("inf")
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)(s|min|h|d)", text)
-    if not found:
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)(s|min|h|d)", text)
+    if not match:
         raise UsageError(f"--until {text!r} is no time; write a number and s, min, h or d: 30min")
-    return float(found[1]) * UNITS[found[2]]
+    return float(match[1]) * UNITS[match[2]]
 
 
 def part_of(text: str) -> tuple[int, int]:
     """A shard such as 3/20 as its number from 1, and how many there are. Raises UsageError."""
-    found = re.fullmatch(r"(\d+)/(\d+)", text or "1/1")
-    if not found or not 1 <= int(found[1]) <= int(found[2]):
+    match = re.fullmatch(r"(\d+)/(\d+)", text or "1/1")
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
         raise UsageError(f"--shard {text!r} is no part; write its number and the count: 3/20")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:

@@ -42,8 +42,8 @@ def is_kernel(thing: object) -> bool:
 
 def named_kernels(function: Any) -> dict[str, Any]:
     """The kernels among the globals that a function names, by name."""
-    found = {name: function.__globals__.get(name) for name in _read_in(function.__code__)[0]}
-    return {name: thing for name, thing in found.items() if is_kernel(thing)}
+    things = {name: function.__globals__.get(name) for name in _read_in(function.__code__)[0]}
+    return {name: thing for name, thing in things.items() if is_kernel(thing)}
 
 
 def whole_numbers(function: Any) -> frozenset[str]:
@@ -54,13 +54,13 @@ def whole_numbers(function: Any) -> frozenset[str]:
 
 def _globals_read(code: Any) -> frozenset[str]:
     """Names of globals that code reads; `dis.get_instructions` takes ten times as long."""
-    found, high = set(), 0
+    names, high = set(), 0
     for operation, low in zip(code.co_code[::2], code.co_code[1::2], strict=True):
         argument = low | high
         high = argument << 8 if operation == dis.EXTENDED_ARG else 0
         if operation == LOAD_GLOBAL:
-            found.add(code.co_names[argument >> 1])  # the last bit is no part of the place
-    return frozenset(found)
+            names.add(code.co_names[argument >> 1])  # the last bit is no part of the place
+    return frozenset(names)
 
 
 @cache
@@ -197,12 +197,12 @@ def transplanted(function: Any, parts: Mapping[Any, Any]) -> Any:
     named = {part.argval for part in code if part.opname == "LOAD_GLOBAL"}
     replaced = {}
     for name in named:
-        found = function.__globals__.get(name, getattr(builtins, name, None))
-        other = next((new for old, new in parts.items() if old is found), None)
+        thing = function.__globals__.get(name, getattr(builtins, name, None))
+        other = next((new for old, new in parts.items() if old is thing), None)
         if other is not None:
             replaced[name] = other
-        elif is_kernel(found):
-            replaced[name] = transplanted(found, parts)
+        elif is_kernel(thing):
+            replaced[name] = transplanted(thing, parts)
     return with_globals(function, function.__name__, **replaced)
 
 

@@ -147,17 +147,17 @@ def installed() -> Plugins:
 
     Their modules are imported when something is looked for in their room.
     """
-    found: dict[str, Plugin] = {}
+    by_package: dict[str, Plugin] = {}
     for package in distributions():
         points = tuple(  # with the backport of importlib.metadata, which Dask imports, of its class
             (point.group.removeprefix("podusv."), EntryPoint(point.name, point.value, point.group))
             for point in package.entry_points
             if point.group in GROUPS
         )
-        if points and package.name not in found:  # another one is hidden by the first
+        if points and package.name not in by_package:  # another one is hidden by the first
             digest = _package_digest(points)
-            found[package.name] = Plugin(package.name, digest, package.version, offers=points)
-    return tuple(found[name] for name in sorted(found))
+            by_package[package.name] = Plugin(package.name, digest, package.version, offers=points)
+    return tuple(by_package[name] for name in sorted(by_package))
 
 
 def _package_digest(points: Iterable[tuple[str, EntryPoint]]) -> str:

@@ -33,17 +33,17 @@ def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, ty
 
     Raises LawError for a module that cannot be imported and for a kind that is not unique.
     """
-    found: dict[str, type[Kind]] = {}
+    by_kind: dict[str, type[Kind]] = {}
     for thing in _members(package, plugins):
         if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields:
             kind = _kind(thing)
-            if found.setdefault(kind, thing) is not thing:
+            if by_kind.setdefault(kind, thing) is not thing:
                 raise LawError(
                     f"{_place(thing)}: its kind {kind} is that of "
-                    f"{_place(found[kind]).removesuffix('.' + found[kind].__name__)}, too; "
+                    f"{_place(by_kind[kind]).removesuffix('.' + by_kind[kind].__name__)}, too; "
                     "take another name"
                 )
-    return dict(sorted(found.items()))
+    return dict(sorted(by_kind.items()))
 
 
 def _kind(component: type[Component]) -> str:
@@ -80,14 +80,14 @@ def named(package: str, kind: type[Named], plugins: Plugins = ()) -> dict[str, N
     Modules come in alphabetical order, objects in the order of their definition. Raises LawError
     for two objects of one name.
     """
-    found: dict[str, tuple[str, Named]] = {}
+    by_name: dict[str, tuple[str, Named]] = {}
     for origin, thing in _placed(package, plugins):
         if isinstance(thing, kind):
             name = thing.name  # type: ignore[attr-defined]
-            first, other = found.setdefault(name, (origin, thing))
+            first, other = by_name.setdefault(name, (origin, thing))
             if other is not thing:
                 raise LawError(f"{origin}: {first} has the name {name!r} already; take another")
-    return {name: thing for name, (_, thing) in found.items()}
+    return {name: thing for name, (_, thing) in by_name.items()}
 
 
 def signals(*packages: str, plugins: Plugins = ()) -> list[Signal]:
@@ -95,13 +95,13 @@ def signals(*packages: str, plugins: Plugins = ()) -> list[Signal]:
 
     One that several modules have comes once; a name may come with several meanings.
     """
-    found = (
+    declared = (
         part
         for package in packages
         for thing in _members(package, plugins)
         for part in _signals(thing)
     )
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(declared))
 
 
 def _signals(thing: Any) -> Iterator[Signal]:

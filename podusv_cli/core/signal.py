@@ -88,7 +88,7 @@ def by_name(
 
     Raises LawError where two have the same name; what a part is called is only asked then.
     """
-    found: dict[str, tuple[Callable[[], str], Signal]] = {}
+    owners: dict[str, tuple[Callable[[], str], Signal]] = {}
     for part, signals in declared:
         for signal in signals:
             if not isinstance(signal, Signal):
@@ -96,13 +96,13 @@ def by_name(
                     f"{part()}: it declares {signal!r}, which is no Signal; write "
                     f'Signal("{signal}", unit, meaning)'
                 )
-            other, known = found.setdefault(signal.name, (part, signal))
+            other, known = owners.setdefault(signal.name, (part, signal))
             if (other, known) != (part, signal):
                 raise LawError(
                     f"{part()}: it logs {signal.name!r}, {described(signal)}, and {other()} logs "
                     f"{described(known)} under this name; give one of them another name"
                 )
-    return {name: signal for name, (_, signal) in found.items()}
+    return {name: signal for name, (_, signal) in owners.items()}
 
 
 def described(signal: Signal) -> str:

@@ -70,11 +70,11 @@ class Compared(NamedTuple):
 def compared(expect: str, tolerance: float = 0.0) -> list[Compared]:
     """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
     tree = ast.parse(expect, mode="eval").body
-    found = []
+    links = []
     for node in (node for node in ast.walk(tree) if isinstance(node, ast.Compare)):
         sides = pairwise([node.left, *node.comparators])
-        found += [_link(*pair, sign, tolerance) for pair, sign in zip(sides, node.ops, strict=True)]
-    return found or [Compared(ast.unparse(tree), "", (0.5,))]
+        links += [_link(*pair, sign, tolerance) for pair, sign in zip(sides, node.ops, strict=True)]
+    return links or [Compared(ast.unparse(tree), "", (0.5,))]
 
 
 # By how many tolerances the right side may be larger or smaller where a comparison turns.

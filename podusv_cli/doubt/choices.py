@@ -170,13 +170,13 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
         for route, own in _leaves(scenario):
             groups[dotted(route), repr(own)].append((label, route))
     unprinted = [g for g in groups.values() if not any(_is_printed(public(p), doubt) for p in g)]
-    found = [choice for places in unprinted for choice in _of_places(places, singles)]
+    of_values = [choice for places in unprinted for choice in _of_places(places, singles)]
     own = [_given(name, quantity, singles) for name, quantity in doubt.vary.items()]
     taken = {place for choice in own for place in choice.places}
     return [
         *hulls(singles, doubt),
         *own,
-        *(choice for choice in found if not taken & {*choice.places}),
+        *(choice for choice in of_values if not taken & {*choice.places}),
     ]
 
 

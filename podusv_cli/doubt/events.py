@@ -45,12 +45,12 @@ class Event(NamedTuple):
 
 def nearest_event(claim: ParsedClaim, entries: Mapping[str, Entry]) -> Event | None:
     """The event nearest to an edge of a window; None where no window or nothing changes."""
-    found = (
+    events = (
         Event(label, *event, edge)
         for label, edges in _windows(claim) if label in entries
         for event in _events(entries[label]) for edge in edges
     )  # fmt: skip
-    return min(found, key=lambda event: event.gap, default=None)
+    return min(events, key=lambda event: event.gap, default=None)
 
 
 def _windows(claim: ParsedClaim) -> Iterator[tuple[str, list[float]]]:

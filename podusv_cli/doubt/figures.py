@@ -89,8 +89,8 @@ def _lanes(
 
     def follows(column: int) -> float:
         with np.errstate(all="ignore"):
-            found = np.corrcoef(ranks, draws.shares[order, column])[0, 1]
-        return -abs(float(np.nan_to_num(found)))
+            correlation = np.corrcoef(ranks, draws.shares[order, column])[0, 1]
+        return -abs(float(np.nan_to_num(correlation)))
 
     first = [draws.choices.index(turn.choice) for turn in answer.explained]
     others = [i for i, choice in enumerate(draws.choices) if choice.name in acting]

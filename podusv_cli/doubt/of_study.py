@@ -30,12 +30,12 @@ def study_choices(scenario: Scenario) -> list[Choice]:
     taken = {key for name, drawn in scenario.sweep.vary.items() for key in drawn.targets(name)}
     taken |= set(scenario.sweep.grid)
     given = set(doubt.vary)
-    found = [
+    undrawn = [
         replace(choice, range=None, values=tuple(ends(choice)) if choice.range else choice.values)
         for choice in choices(singles, doubt)
         if (choice.values or choice.name in given) and not _is_taken(choice, taken)
     ]
-    return [*_own(scenario, singles), *hulls(singles, doubt), *found]
+    return [*_own(scenario, singles), *hulls(singles, doubt), *undrawn]
 
 
 def _laws(scenario: Scenario) -> Singles:

@@ -74,11 +74,11 @@ def explained(
     if not rows or not turned.any() or turned.all():
         return []
     parts = np.stack([shares > 0.5, abs(shares - 0.5) > 0.25])  # (part, draw, choice)
-    found = _differences(parts, turned)
+    differences = _differences(parts, turned)
     shuffle = np.random.Generator(np.random.Philox(key=1)).permutation
     chance = [abs(_differences(parts, shuffle(turned))).max() for _ in range(PERMUTATIONS)]
-    clear = [tuple(at) for at in np.argwhere(abs(found) > np.quantile(chance, LEVEL))]
-    order = sorted(clear, key=lambda at: -abs(found[at]))
+    clear = [tuple(at) for at in np.argwhere(abs(differences) > np.quantile(chance, LEVEL))]
+    order = sorted(clear, key=lambda at: -abs(differences[at]))
     return [_told(draws.choices[rows[c]], p, parts[p, :, c], turned) for p, c in order]
 
 

@@ -81,20 +81,20 @@ def check(folder: Path, *, trusted: bool = True) -> list[Checked]:
             f"this would execute the code in {folder}; if you know who made it, allow it with "
             "--trust"
         )
-    found, unit = [], folder / FMU
+    results, unit = [], folder / FMU
     # A library that is loaded cannot be deleted on every machine.
     with TemporaryDirectory(ignore_cleanup_errors=True) as place:
         if "law.c" in listed:
             library = _library(folder, Path(place), about, listed)
-            found.append(_compared("library", samples, about, library))
+            results.append(_compared("library", samples, about, library))
         if FMU in listed and find_spec("fmpy"):
-            found.append(_compared(FMU, samples, about, _fmu(unit, Path(place), about)))
-    if not found:
+            results.append(_compared(FMU, samples, about, _fmu(unit, Path(place), about)))
+    if not results:
         raise UsageError(
             f"{folder} was exported with --no-c, and FMPy, which steps its {FMU}, is not there; "
             "install it with pip install 'podusv[export]'"
         )
-    return found
+    return results
 
 
 def _listed(folder: Path) -> Collection[str]:

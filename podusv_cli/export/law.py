@@ -130,8 +130,8 @@ class ExportedLaw:
     def pieces(self) -> Mapping[str, Piece]:
         """The kernels by the name of their C function."""
         parts = {part: (part, inner, names) for part, inner, names in self._entries()}
-        found = {PARTS[part]: adapter(*parts[part]) for part in PARTS}
-        return {**found, STEP: Piece(law_alone.demand, PROTOTYPE)}
+        adapters = {PARTS[part]: adapter(*parts[part]) for part in PARTS}
+        return {**adapters, STEP: Piece(law_alone.demand, PROTOTYPE)}
 
     def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
         path, *others = self.plan.functions

@@ -59,9 +59,9 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     case = Case(scenario, given.plan(scenario))
     recording = simulated(case, Stopwatch())
     whole, _ = monitored(case, recording)
-    found = [*case.findings(), *postflight(case.scenario, whole)]
+    findings = [*case.findings(), *postflight(case.scenario, whole)]
     numbers = summary(case, recording, extras)
-    warned = tuple(map(str, (*found, *extras.missing)))
+    warned = tuple(map(str, (*findings, *extras.missing)))
     return Run(
         whole.controller, about_of(case.scenario), whole, numbers, warned,
         given=case.scenario,

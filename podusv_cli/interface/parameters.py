@@ -32,15 +32,15 @@ Columns = dict[str, list[Any]]  # by key, with one value a run
 
 def columns(parameters: Mapping[str, Any]) -> Columns:
     """The values as Python's own. Raises ValueError where they are not one a run for every key."""
-    found = {key: _column(key, given) for key, given in parameters.items()}
-    lengths = {key: len(column) for key, column in found.items()}
-    if not found:
+    by_key = {key: _column(key, given) for key, given in parameters.items()}
+    lengths = {key: len(column) for key, column in by_key.items()}
+    if not by_key:
         raise ParameterError(
             "no parameters: give a key and its values, as {'vessel.m': [20.0, 25.0]}"
         )
     if len(set(lengths.values())) > 1:
         raise ParameterError(f"all parameters need one value a run; their lengths are {lengths}")
-    return found
+    return by_key
 
 
 def _column(key: str, given: Any) -> list[Any]:

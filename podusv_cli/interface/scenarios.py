@@ -80,10 +80,10 @@ def loaded(
 
     Unless it is `silent`, a UserWarning names values that a section loses with its kind.
     """
-    found = _loaded(source, assignments(changes), checks)
+    result = _loaded(source, assignments(changes), checks)
     if silent:
-        return found
-    return found.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
+        return result
+    return result.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
 
 
 def assignments(changes: Changes | None) -> list[str]:

@@ -91,8 +91,8 @@ class Study(Folder):
         }
         drawn = {name: ("draw", values) for name, values in runs.drawn.items()}
         axes = {"law": list(runs.laws), "cell": list(runs.cells), "draw": np.arange(runs.wanted)}
-        found = xarray.Dataset({**metrics, **ends, **drawn}, coords=axes)
-        return found if len(runs.cells) > 1 else found.squeeze("cell", drop=True)
+        dataset = xarray.Dataset({**metrics, **ends, **drawn}, coords=axes)
+        return dataset if len(runs.cells) > 1 else dataset.squeeze("cell", drop=True)
 
     @property
     def summary(self) -> pd.DataFrame:

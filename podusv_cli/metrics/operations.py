@@ -38,8 +38,8 @@ class Tally:
 
     def __getattr__(self, name: str) -> Any:
         """As the module math: a constant of it, or a function that counts."""
-        found = getattr(math, name)
-        return partial(self.apply, found) if callable(found) else found
+        member = getattr(math, name)
+        return partial(self.apply, member) if callable(member) else member
 
     def apply(self, operation: Callable[..., Any], *operands: Any) -> Counted:
         """One operation."""

@@ -25,8 +25,8 @@ def metrics_with(plugins: Plugins, own: tuple[Windows, Radii] = NONE) -> dict[st
 
     `own` are the windows and radii that a scenario names.
     """
-    found = registry.named("podusv_cli.metrics", Metric, plugins).values()
-    return {m.name: m for m in sorted((*found, *named(*own).values()), key=lambda m: m.place)}
+    of_files = registry.named("podusv_cli.metrics", Metric, plugins).values()
+    return {m.name: m for m in sorted((*of_files, *named(*own).values()), key=lambda m: m.place)}
 
 
 METRICS = metrics_with(())
@@ -164,12 +164,12 @@ def metrics_probe(
     sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
-    found = Metrics(
+    metrics = Metrics(
         _watch(parts), sum(size for _, size in parts), differing,
         parts=parts, step=plan.grid.step, known=known, layout=layout,
     )  # fmt: skip
-    found.constants_for(plan.loop)
-    return found
+    metrics.constants_for(plan.loop)
+    return metrics
 
 
 def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:

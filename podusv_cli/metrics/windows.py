@@ -133,9 +133,9 @@ def _of_radius(name: str, radius: float) -> Metric:
 @cache  # an accumulator's numbers are found by the accumulator itself
 def named(windows: Windows, radii: Radii) -> dict[str, Metric]:
     """The metrics of these windows and radii, by name."""
-    found = [metric for name, ends in windows for metric in _of_window(name, *ends)]
-    found += [_of_radius(name, radius) for name, radius in radii]
-    return {metric.name: metric for metric in found}
+    metrics = [metric for name, ends in windows for metric in _of_window(name, *ends)]
+    metrics += [_of_radius(name, radius) for name, radius in radii]
+    return {metric.name: metric for metric in metrics}
 
 
 def find(name: str, known: Mapping[str, Metric]) -> Metric | None:

@@ -166,7 +166,7 @@ class _Program:
             options = own | {"iteration_callback": watch} | self.warm
             solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
             start = np.hstack([guess.states, guess.demands]).clip(low, high).ravel()
-            found = solver(
+            solution = solver(
                 x0=start, p=eps, lbx=low.ravel(), ubx=high.ravel(), lbg=0.0, ubg=0.0,
                 **self._multipliers,
             )  # fmt: skip
@@ -175,8 +175,8 @@ class _Program:
         if not told["success"]:
             raise NotConvergedError(f"IPOPT: {told['return_status']}")
         self.warm = {"ipopt.mu_init": BARRIER, **WARM}
-        self._multipliers = {"lam_g0": found["lam_g"], "lam_x0": found["lam_x"]}
-        rows = np.array(found["x"]).reshape(self.n + 1, UNKNOWNS).clip(low, high)
+        self._multipliers = {"lam_g0": solution["lam_g"], "lam_x0": solution["lam_x"]}
+        rows = np.array(solution["x"]).reshape(self.n + 1, UNKNOWNS).clip(low, high)
         return Motion(self.times, rows[:, :STATES], rows[:, STATES:])
 
     def integral(self, motion: Motion) -> float:

@@ -61,8 +61,8 @@ def _slopes(problem: Problem, motion: Motion) -> tuple[Vector, Vector]:
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate((STATES, 2, 3))]
     both = ca.jacobian(rate(*arguments), ca.vertcat(*arguments[:2]))
-    found = ca.Function("slopes", arguments, [both]).map(len(motion.times))(
+    slopes = ca.Function("slopes", arguments, [both]).map(len(motion.times))(
         motion.states.T, motion.demands.T, problem.loads(motion.times.tolist()).T
     )
-    columns = np.array(found).reshape(STATES, len(motion.times), STATES + 2).transpose(1, 0, 2)
+    columns = np.array(slopes).reshape(STATES, len(motion.times), STATES + 2).transpose(1, 0, 2)
     return columns[:, :, :STATES], columns[:, :, STATES:]

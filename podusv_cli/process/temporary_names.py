@@ -33,9 +33,9 @@ def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
     """
     with suppress(OSError):
         for entry in list(os.scandir(folder)):
-            found = _PART.fullmatch(entry.name)
-            if found and found["machine"] == _machine() and not _alive(int(found["process"])):
-                yield Path(entry.path), found["name"] or ""
+            match = _PART.fullmatch(entry.name)
+            if match and match["machine"] == _machine() and not _alive(int(match["process"])):
+                yield Path(entry.path), match["name"] or ""
 
 
 def remove_abandoned_files(folder: Path) -> None:

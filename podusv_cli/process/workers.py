@@ -99,15 +99,15 @@ def run_shares(
         progress(sum(done.values()) / len(jobs))
 
     together = [partial(_one_by_one, [jobs[number] for number in share]) for share in shares]
-    found: dict[int, Outcome] = {}
+    by_job: dict[int, Outcome] = {}
     for share, whole in zip(shares, run_all(together, advance, workers), strict=True):
         if whole.killed and len(share) > 1:
-            found |= zip(share, run_all([jobs[n] for n in share], workers=workers), strict=True)
+            by_job |= zip(share, run_all([jobs[n] for n in share], workers=workers), strict=True)
         else:
             outcomes = whole.result or [whole] * len(share)
-            found |= zip(share, (replace(o, interrupted=whole.interrupted or o.interrupted)
+            by_job |= zip(share, (replace(o, interrupted=whole.interrupted or o.interrupted)
                                  for o in outcomes), strict=True)  # fmt: skip
-    return [found[number] for number in range(len(jobs))]
+    return [by_job[number] for number in range(len(jobs))]
 
 
 def _one_by_one(jobs: Sequence[Job], tell: Progress) -> list[Outcome]:

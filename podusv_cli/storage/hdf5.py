@@ -58,12 +58,12 @@ def check_link(group: h5py.h5g.GroupID, name: str) -> None:
 def dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
     """A dataset with all its data in this file. Raises ValueError for another one."""
     check_link(group, name)
-    found = h5py.h5d.open(group, name.encode())
+    handle = h5py.h5d.open(group, name.encode())
     # Checked before anything else: the mere shape of a virtual dataset can open other files.
-    made = found.get_create_plist()
+    made = handle.get_create_plist()
     if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
         raise ValueError(f"{name} keeps its data in another file")
-    return found
+    return handle
 
 
 def check(file: h5py.File) -> None:

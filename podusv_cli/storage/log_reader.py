@@ -70,8 +70,8 @@ def _opened(
     """A log with the known format, and its open file; errors in the block become StorageError."""
     with opened(path) as raw:
         if file_size(raw) > largest:
-            found = f"{file_size(raw)} bytes, at most {largest} allowed"
-            raise StorageError(f"cannot read {path}: {found}{ELSEWHERE}")
+            sizes = f"{file_size(raw)} bytes, at most {largest} allowed"
+            raise StorageError(f"cannot read {path}: {sizes}{ELSEWHERE}")
         with hdf5.readable(path, "a log"), h5py.File(raw) as file:
             if misfit := other_format(int(file.attrs["podusv_format"])):
                 raise ValueError(misfit)
@@ -84,10 +84,10 @@ def _text(words: Any) -> str:
 
 
 def _status(file: h5py.File) -> Status:
-    found = _text(file.attrs["status"])
-    if found not in get_args(Status):
-        raise ValueError(f"unknown status {found!r}")
-    return found  # type: ignore[return-value]
+    status = _text(file.attrs["status"])
+    if status not in get_args(Status):
+        raise ValueError(f"unknown status {status!r}")
+    return status  # type: ignore[return-value]
 
 
 def _signal(name: str, dataset: h5py.Dataset) -> Signal:

@@ -72,11 +72,11 @@ def read(folder: Path) -> Manifest:
     return manifest
 
 
-def other_format(found: object) -> str:
+def other_format(written: object) -> str:
     """Why this podusv cannot read a format; empty if it can."""
-    if found == FORMAT:
+    if written == FORMAT:
         return ""
-    return f"written in format {found!r}; this podusv reads format {FORMAT}"
+    return f"written in format {written!r}; this podusv reads format {FORMAT}"
 
 
 def check(folder: Path) -> Manifest:

@@ -161,8 +161,8 @@ def _check_replaceable(final: Path, force: bool) -> None:
         except FileNotFoundError:  # another writer has just renamed it
             return
     try:
-        found = manifest.read(final)
-        foreign = manifest.foreign(final, found)
+        contents = manifest.read(final)
+        foreign = manifest.foreign(final, contents)
     except StorageError as error:  # or another writer has just renamed it
         raise Taken(f"{final} exists and is not a finished run folder") from error
     if not force:
@@ -213,18 +213,18 @@ def open_run(folder: Path) -> FinishedRun:
 
     Raises StorageError naming the first fault.
     """
-    found = manifest.check(folder)
-    missing = [name for name in NEEDED if name not in found.files]
+    contents = manifest.check(folder)
+    missing = [name for name in NEEDED if name not in contents.files]
     if missing:
         raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")
     return FinishedRun(
         folder=folder,
-        status=found.status,
+        status=contents.status,
         metrics=_metrics(folder / "metrics.json"),
         provenance=json_files.read(folder / "provenance.json"),
         resolved_yaml=read_text(folder / RESOLVED),
-        theory=json_files.read(folder / THEORY) if THEORY in found.files else {},
-        about=json_files.read_as(folder / ABOUT, RunAbout) if ABOUT in found.files else None,
+        theory=json_files.read(folder / THEORY) if THEORY in contents.files else {},
+        about=json_files.read_as(folder / ABOUT, RunAbout) if ABOUT in contents.files else None,
     )
 
 

@@ -38,16 +38,16 @@ def course(path: Path, duration: float, at: float | None = None) -> Course:
     A straight line is preferred to a circle. Raises NotConvergedError where there is none.
     """
     times = np.linspace(0.0, duration, INSTANTS + 1)[::-1] if at is None else [at]
-    found = [point for point in (_course(path, float(t)) for t in times) if point]
-    straight = [point for point in found if abs(point.turn) < STRAIGHT]
-    if not found:
+    steady = [point for point in (_course(path, float(t)) for t in times) if point]
+    straight = [point for point in steady if abs(point.turn) < STRAIGHT]
+    if not steady:
         when = "at no time of the run" if at is None else f"not at t = {at:g} s"
         raise NotConvergedError(
             f"the target moves steadily (straight on or in a circle, at constant speed) {when}, "
             "and margins are those of a steady motion; choose another time with --at SECONDS, or "
             "another path, as with --set path.kind=line"
         )
-    return (straight or found)[0]
+    return (straight or steady)[0]
 
 
 def _course(path: Path, t: float) -> Course | None:

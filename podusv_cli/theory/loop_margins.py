@@ -58,12 +58,12 @@ class LoopMargins:
 
     def numbers(self) -> dict[str, float]:
         """The margins by the names that claims have for them (`metrics.margins`)."""
-        found = {
+        by_name = {
             f"{name}_{AXES[axis]}": float(getattr(loop, name))
             for axis, loop in self.loops.items() for name in NUMBERS
         }  # fmt: skip
         together = ("delay_margin", "delay_margin_loads", "decay_rate")
-        return found | {name: float(getattr(self, name)) for name in together}
+        return by_name | {name: float(getattr(self, name)) for name in together}
 
 
 def loop_margins(
@@ -86,26 +86,26 @@ def loop_margins(
             f"{describe(loop.path)}: its target moves with the vessel, and margins are those of a "
             "law that follows a target with a timetable; take one, as with --set path.kind=line"
         )
-    found = linearised(
+    linear = linearised(
         loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
     )
     cuts = {
-        axis: Cut(found.A, found.B[:, [i]], found.C[[i]]) for i, axis in enumerate(AXES)
+        axis: Cut(linear.A, linear.B[:, [i]], linear.C[[i]]) for i, axis in enumerate(AXES)
     }  # fmt: skip
     return LoopMargins(
-        found, {axis: margins(cut) for axis, cut in cuts.items()},
-        delay_margin(Cut(found.A, found.B_command, found.C_command)),
-        delay_margin(Cut(found.A, found.B, found.C)),
-        tuple(_left_out(loop, grid, found)),
+        linear, {axis: margins(cut) for axis, cut in cuts.items()},
+        delay_margin(Cut(linear.A, linear.B_command, linear.C_command)),
+        delay_margin(Cut(linear.A, linear.B, linear.C)),
+        tuple(_left_out(loop, grid, linear)),
     )  # fmt: skip
 
 
-def _left_out(loop: ClosedLoop, grid: TimeGrid, found: Linear) -> Iterator[str]:
+def _left_out(loop: ClosedLoop, grid: TimeGrid, linear: Linear) -> Iterator[str]:
     if loop.measured:
         yield "measurement and estimator"
     if grid.hold_every:
         yield f"the sampling of the law every {grid.hold_every * grid.step:g} s"
     if loop.actuator.delay():
         yield f"the command's delay of {loop.actuator.delay():g} s"
-    if found.course.turn and not loop.disturbance.of_time:
+    if linear.course.turn and not loop.disturbance.of_time:
         yield "what the load does as the vessel turns with the circle"

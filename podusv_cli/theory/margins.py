@@ -93,14 +93,14 @@ class Margins:
 
 def poles(A: Vector) -> Complex:
     """Eigenvalues [1/s], the slowest to decay first."""
-    found = np.linalg.eigvals(A)
-    return np.asarray(found[np.lexsort((found.imag, -found.real))], dtype=complex)
+    eigenvalues = np.linalg.eigvals(A)
+    return np.asarray(eigenvalues[np.lexsort((eigenvalues.imag, -eigenvalues.real))], dtype=complex)
 
 
 def stable(A: Vector) -> bool:
     """Whether no pole is to the right of the imaginary axis by more than rounding."""
-    found = np.linalg.eigvals(A)
-    return bool(found.real.max() <= STABLE * abs(found).max())
+    eigenvalues = np.linalg.eigvals(A)
+    return bool(eigenvalues.real.max() <= STABLE * abs(eigenvalues).max())
 
 
 def margins(cut: Cut) -> Margins:
@@ -140,20 +140,20 @@ def _crossed(cut: Cut, omega: Vector) -> tuple[Vector, Vector]:
     def size(w: float, i: int) -> float:
         return float(np.log(np.abs(cut.loci(np.array([w]))[0, i])))
 
-    sizes, found = np.log(np.abs(cut.loci(omega))), list[tuple[float, int]]()
+    sizes, roots = np.log(np.abs(cut.loci(omega))), list[tuple[float, int]]()
     for i, values in enumerate(sizes.T):
-        found += ((root, i) for root in _roots(partial(size, i=i), omega, values))
-    loci = [cut.loci(np.array([root]))[0, i] for root, i in sorted(found)]
-    return np.array([root for root, _ in sorted(found)]), np.angle(-np.array(loci, dtype=complex))
+        roots += ((root, i) for root in _roots(partial(size, i=i), omega, values))
+    loci = [cut.loci(np.array([root]))[0, i] for root, i in sorted(roots)]
+    return np.array([root for root, _ in sorted(roots)]), np.angle(-np.array(loci, dtype=complex))
 
 
 def _gains(cut: Cut, omega: Vector, L: Complex) -> list[float]:
     """Factors of the gain with which a pole lies on the imaginary axis, at 0 as well."""
     at = _roots(lambda w: float(cut.response(np.array([w]))[0, 0, 0].imag), omega, L.imag)
-    found = [complex(cut.response(np.array([w]))[0, 0, 0]).real for w in at]
+    values = [complex(cut.response(np.array([w]))[0, 0, 0]).real for w in at]
     if abs(np.linalg.eigvals(cut.opened)).min() > SLOWEST:
-        found.append(complex(cut.response(np.zeros(1))[0, 0, 0]).real)
-    return [-1.0 / value for value in found if value < 0.0]
+        values.append(complex(cut.response(np.zeros(1))[0, 0, 0]).real)
+    return [-1.0 / value for value in values if value < 0.0]
 
 
 def _roots(f: Callable[[float], float], omega: Vector, values: Vector) -> list[float]:
@@ -170,7 +170,7 @@ def _peak(cut: Cut, omega: Vector, values: Vector, of: Callable[[complex], float
 
     at = int(np.argmax(values))
     ends = omega[max(at - 1, 0)], omega[min(at + 1, len(omega) - 1)]
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda w: -of(complex(cut.response(np.array([w]))[0, 0, 0])), bounds=ends, method="bounded"
     )
-    return max(float(values[at]), -float(found.fun))
+    return max(float(values[at]), -float(minimum.fun))

@@ -60,9 +60,9 @@ class Verification:
     @property
     def unconverged(self) -> dict[str, list[str]]:
         """Names of numbers that are not converged, by run, and of metrics under `ranking`."""
-        found = {label: run.unconverged(self.tolerance) for label, run in self.runs.items()}
-        found["ranking"] = [name for name, rank in self.rankings.items() if not rank.converged]
-        return {label: names for label, names in found.items() if names}
+        by_run = {label: run.unconverged(self.tolerance) for label, run in self.runs.items()}
+        by_run["ranking"] = [name for name, rank in self.rankings.items() if not rank.converged]
+        return {label: names for label, names in by_run.items() if names}
 
     def as_json(self) -> dict[str, Any]:
         """The output of `--json`."""

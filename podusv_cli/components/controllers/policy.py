@@ -109,8 +109,8 @@ class Policy(Controller):
 
     def constants(self) -> dict[str, float]:
         """The fields' numbers, how many hidden layers there are, and the width of the widest."""
-        found = self.network()
-        return super().constants() | {"hidden": float(found.hidden), "width": float(found.width)}
+        layers = self.network()
+        return super().constants() | {"hidden": float(layers.hidden), "width": float(layers.width)}
 
     def table(self) -> Vector:
         """Mean and scale of the observation, then layer by layer as `layer` takes them."""

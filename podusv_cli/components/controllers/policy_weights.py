@@ -57,11 +57,11 @@ def tensors(data: bytes) -> dict[str, Vector]:
             "is no safetensors file; write it with safetensors.numpy.save_file"
         ) from None
     numbers, told = data[begin:], header.__pydantic_extra__
-    found = {name: _numbers(name, tensor, numbers) for name, tensor in told.items()}
+    arrays = {name: _numbers(name, tensor, numbers) for name, tensor in told.items()}
     pieces = sorted(tensor.data_offsets for tensor in told.values())
     if [0, *(end for _, end in pieces)] != [*(first for first, _ in pieces), len(numbers)]:
         raise ValueError("its header does not fit its numbers; save it again")
-    return found
+    return arrays
 
 
 def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
@@ -73,10 +73,10 @@ def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
     kind = KINDS[tensor.dtype]
     if end > len(numbers) or end - begin != math.prod(tensor.shape) * kind.itemsize:
         raise ValueError(f"the file ends within {name}, or its header does not fit; save it again")
-    found = np.frombuffer(numbers[begin:end], kind).astype(float).reshape(tensor.shape)
-    if not np.isfinite(found).all():
+    array = np.frombuffer(numbers[begin:end], kind).astype(float).reshape(tensor.shape)
+    if not np.isfinite(array).all():
         raise ValueError(f"{name} has a number that is not finite; train again, or save it again")
-    return found
+    return array
 
 
 def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> PolicyNetwork:
@@ -85,11 +85,11 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
     Raises ValueError for what is no network from so many inputs to so many outputs.
     """
     try:
-        found = tensors(base64.b64decode("".join(content.split()), validate=True))
+        arrays = tensors(base64.b64decode("".join(content.split()), validate=True))
     except binascii.Error:
         raise ValueError("is no base64") from None
-    given = _normal(found, inputs)
-    layers = list(_layers(found))
+    given = _normal(arrays, inputs)
+    layers = list(_layers(arrays))
     _check_shapes(layers, inputs, outputs, names)
     width = max((len(bias) for _, _, bias in layers[:-1]), default=0)
     sizes = [inputs, *[width] * (len(layers) - 1), outputs]
@@ -100,9 +100,9 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
     return PolicyNetwork(len(layers) - 1, width, np.concatenate([*given, *filled]))
 
 
-def _normal(found: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
+def _normal(arrays: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
     """Mean and scale of the inputs, taken out of the tensors."""
-    mean, scale = found.pop("mean", np.zeros(inputs)), found.pop("scale", np.ones(inputs))
+    mean, scale = arrays.pop("mean", np.zeros(inputs)), arrays.pop("scale", np.ones(inputs))
     for name, vector in (("mean", mean), ("scale", scale)):
         if vector.shape != (inputs,):
             raise ValueError(f"{name} has shape {vector.shape}, must be {(inputs,)}")
@@ -111,9 +111,9 @@ def _normal(found: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
     return mean, scale
 
 
-def _layers(found: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]]:
+def _layers(arrays: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]]:
     """Name, weight and bias of every layer, in the order of their numbers."""
-    named = {name: LAYER.fullmatch(name) for name in found}
+    named = {name: LAYER.fullmatch(name) for name in arrays}
     if strange := [name for name, match in named.items() if not match]:
         raise ValueError(
             f"{strange[0]!r} is no tensor of a policy; it has mean, scale, and of every layer "
@@ -126,9 +126,9 @@ def _layers(found: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]]
     for of, number in sorted(places):
         name = f"{of}{number}"
         for part in (f"{name}.weight", f"{name}.bias"):
-            if part not in found:
+            if part not in arrays:
                 raise ValueError(f"{part} is missing; every layer has a weight and a bias")
-        yield name, found[f"{name}.weight"], found[f"{name}.bias"]
+        yield name, arrays[f"{name}.weight"], arrays[f"{name}.bias"]
 
 
 def _check_shapes(

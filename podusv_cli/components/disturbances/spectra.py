@@ -174,8 +174,8 @@ def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
     """
     fine = np.linspace(low, high, FINE + 1)
     rate = (fine[:-1] + fine[1:]) / 2.0
-    square, found = rate * rate, density(rate)
-    sums = (np.cumsum(part) for part in (found, found * square, found * square * square))
+    square, values = rate * rate, density(rate)
+    sums = (np.cumsum(part) for part in (values, values * square, values * square * square))
     shares = np.concatenate([[0.0], sum(each / each[-1] for each in sums) / 3.0])
     return by_lines(np.linspace(0.0, 1.0, count + 1), shares, fine)
 

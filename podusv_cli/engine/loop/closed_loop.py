@@ -132,7 +132,7 @@ class ClosedLoop:
             "disturbance": self.disturbance.conflicts(self.vessel, step),
             "measurement": self.measurement.conflicts(step),
         }
-        told = [f"{part}.{key}: {text}" for part, found in parts.items() for key, text in found]
+        told = [f"{part}.{key}: {text}" for part, faults in parts.items() for key, text in faults]
         if lacking := self.estimator.lacking(self.measurement.measured()):
             told.append(f"estimator: {lacking}")
         if told:

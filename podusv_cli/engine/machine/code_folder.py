@@ -98,10 +98,10 @@ def _made(root: Path, name: str) -> Path:
 def _check(folder: Path) -> None:
     """Raise PermissionError where somebody else owns this folder or can write into it."""
     with suppress(FileNotFoundError):
-        found = folder.stat()
-        _demand(stat.S_ISDIR(found.st_mode), f"{folder} is not a folder")
-        _demand(found.st_uid == os.getuid(), f"another user owns {folder}")
-        _demand(not found.st_mode & OTHERS, f"others can write to {folder}: chmod go-w {folder}")
+        status = folder.stat()
+        _demand(stat.S_ISDIR(status.st_mode), f"{folder} is not a folder")
+        _demand(status.st_uid == os.getuid(), f"another user owns {folder}")
+        _demand(not status.st_mode & OTHERS, f"others can write to {folder}: chmod go-w {folder}")
 
 
 def _is_marked(folder: Path) -> bool:

@@ -65,13 +65,13 @@ def check_arguments(function: Any, names: Collection[str]) -> None:
 @cache
 def _reached(function: Any) -> tuple[Any, ...]:
     """The kernel and all kernels from outside podusv that it calls, each once."""
-    found, waiting = dict[Any, None](), [function]
+    reached, waiting = dict[Any, None](), [function]
     while waiting:
         called = waiting.pop()
-        if isinstance(called, FunctionType) and called not in found:
-            found[called] = None
+        if isinstance(called, FunctionType) and called not in reached:
+            reached[called] = None
             waiting += named_kernels(called).values()
-    return tuple(called for called in found if not str(called.__module__).startswith(OWN))
+    return tuple(called for called in reached if not str(called.__module__).startswith(OWN))
 
 
 def _source(function: Any) -> ast.FunctionDef | None:
@@ -96,12 +96,12 @@ def faults(node: ast.FunctionDef, known: Mapping[str, Any]) -> Iterator[tuple[in
 def _vectors(node: ast.FunctionDef) -> set[str]:
     """The names of a kernel that stand for vectors."""
     arguments = (a for a in node.args.args if "tuple" not in ast.unparse(a.annotation or a).lower())
-    found = {argument.arg for argument in arguments}
+    vectors = {argument.arg for argument in arguments}
     for part in ast.walk(node):
         match part:
-            case ast.Assign(targets=[ast.Name(id=name)], value=value) if _is_vector(value, found):
-                found.add(name)
-    return found
+            case ast.Assign(targets=[ast.Name(id=name)], value=value) if _is_vector(value, vectors):
+                vectors.add(name)
+    return vectors
 
 
 def _is_vector(node: ast.expr, vectors: Collection[str]) -> bool:
@@ -129,11 +129,11 @@ def _unsupported(function: Any) -> str:
         return ""
     looks = (_without_code, _of_numpy)
     told = ((part, look(part, function.__globals__)) for look in looks for part in _body(node))
-    found = [(part.lineno, text) for part, text in told if text]  # type: ignore[attr-defined]
+    marked = [(part.lineno, text) for part, text in told if text]  # type: ignore[attr-defined]
     if line := _returns_at_times(node):
-        found.append((line, "it returns a value here only; always return one"))
+        marked.append((line, "it returns a value here only; always return one"))
     file = Path(function.__code__.co_filename).name
-    return next((f"{file}, line {line}: {text}" for line, text in found), "")
+    return next((f"{file}, line {line}: {text}" for line, text in marked), "")
 
 
 def _body(node: ast.FunctionDef) -> Iterator[ast.AST]:

@@ -19,13 +19,13 @@ EVERYTHING = None  # the names that are set where control never comes
 def whole_number(node: ast.expr, known: Mapping[str, Any]) -> int | None:
     """The whole number that an expression always is; None for any other."""
     if isinstance(node, ast.Name):
-        found = known.get(node.id)
+        number = known.get(node.id)
     else:
         with suppress(ValueError, TypeError, SyntaxError):
-            found = ast.literal_eval(node)
-            return found if isinstance(found, int) else None
+            number = ast.literal_eval(node)
+            return number if isinstance(number, int) else None
         return None
-    return found if isinstance(found, int) else None
+    return number if isinstance(number, int) else None
 
 
 @dataclass

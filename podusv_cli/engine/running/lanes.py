@@ -104,17 +104,17 @@ def _pieces(plan: Plan) -> list[Any]:
 def places(plan: Plan) -> list[tuple[int, list[int]]]:
     """Where the numbers that are alike lie: positions of vectors in `Vectors`, and in these."""
     loop = plan.loop
-    found = {
+    positions = {
         owner: [i for i, name in enumerate(plan.constants[owner]) if name in names]
         for owner, names in shared_constants(plan).items()
     }
-    found |= {
+    positions |= {
         "disturbance_table": loop.disturbance.shared_places(),
         "measurement_table": loop.measurement.shared_places(),
         "sensed": list(range(KNOWN, OWN)) if loop.measured else [],
         "delay_line": [COUNT],
     }
-    return [(Vectors._fields.index(vector), inside) for vector, inside in found.items()]
+    return [(Vectors._fields.index(vector), inside) for vector, inside in positions.items()]
 
 
 def room(count: int) -> Vector:

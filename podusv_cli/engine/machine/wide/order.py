@@ -63,14 +63,14 @@ def depth_first(begin: Hashable, successors: Mapping[Any, Iterable[Any]]) -> lis
 
 def dominators(order: list[Any], leads: Mapping[Any, Iterable[Any]]) -> dict[Any, set[Any]]:
     """By node all nodes that are on every way from the first one to it, itself included."""
-    found: dict[Any, set[Any]] = {order[0]: {order[0]}}
+    dominating: dict[Any, set[Any]] = {order[0]: {order[0]}}
     while True:
-        before = sum(map(len, found.values())), len(found)
+        before = sum(map(len, dominating.values())), len(dominating)
         for node in order[1:]:
-            ways = [found[p] for p in leads[node] if p in found]
-            found[node] = set.intersection(*ways) | {node}
-        if before == (sum(map(len, found.values())), len(found)):
-            return found
+            ways = [dominating[p] for p in leads[node] if p in dominating]
+            dominating[node] = set.intersection(*ways) | {node}
+        if before == (sum(map(len, dominating.values())), len(dominating)):
+            return dominating
 
 
 class Order:
