@@ -93,7 +93,11 @@ def _metric_names(scenario: Scenario) -> Faults:
 
 def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep) -> Faults:
     own = {law: replace(plans[law], probe_for=no_probe).structure for law in laws}
-    taken = {*AXES, *ENDING, *(name for law in laws.values() for name in gathered_metrics(law))}
+    taken = {
+        *AXES,
+        *ENDING,
+        *(name for single in laws.values() for name in gathered_metrics(single)),
+    }
     for name, quantity in sweep.vary.items():
         if wrong := _wrong_name(name, quantity, taken):
             yield ("sweep", "vary", name), wrong
@@ -121,10 +125,10 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     if section not in PER_RUN and section in Scenario.model_fields:
         yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
         return
-    lacking = [label for label, law in laws.items() if not has(law, key)]
+    lacking = [law for law, single in laws.items() if not has(single, key)]
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
-        whys = (why(law, steps) for law in laws.values() for why in (no_entry, no_section))
+        whys = (why(single, steps) for single in laws.values() for why in (no_entry, no_section))
         beyond = next(filter(None, whys), "")
         free = "" if quantity.keys or len(steps) > 1 else FREE_NAME
         yield beyond or f"unknown key {key!r}{near or free}"
@@ -133,7 +137,7 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
         who = f"{key} is no key of {', '.join(lacking)}"
         yield f"{who}; name the laws that have it, {having}, in sweep.laws"
     else:
-        yield from (t for law in laws.values() for t in _type(key, quantity, law))
+        yield from (t for single in laws.values() for t in _type(key, quantity, single))
 
 
 def no_section(scenario: Scenario, steps: Route) -> str:
@@ -154,7 +158,7 @@ def no_section(scenario: Scenario, steps: Route) -> str:
 
 def _numbers(laws: Mapping[str, Scenario]) -> list[str]:
     """All keys of numbers that a draw can change, but for those in lists."""
-    items = [item for law in laws.values() for item in values(law).items()]
+    items = [item for single in laws.values() for item in values(single).items()]
     return [key for key, own in items if route(key)[0] in PER_RUN and _is_number(own)]
 
 
