@@ -23,9 +23,9 @@ class Unit:
             archive.extractall(place)
         tree = ET.parse(place / "modelDescription.xml").getroot()
         shown = [*tree.iter("ScalarVariable")]
-        self.names = [one.get("name") for one in shown]
+        self.names = [variable.get("name") for variable in shown]
         self.inputs = [one.get("name") for one in shown if one.get("causality") == "input"]
-        self.starts = [float(one[0].attrib["start"]) for one in shown[: len(self.inputs)]]
+        self.starts = [float(variable[0].attrib["start"]) for variable in shown[: len(self.inputs)]]
         self.period = float(next(tree.iter("DefaultExperiment")).attrib["stepSize"])
         self._library = ctypes.CDLL(
             str(place / "binaries" / machine / f"law{PLATFORMS[machine].library}")

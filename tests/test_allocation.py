@@ -108,11 +108,11 @@ class Problem:
 
     def __init__(self, pods: Pods, demand: Vector) -> None:
         p = pods.pods
-        self.ahead = np.array([one.T_nn * one.n_max**2 for one in p])
-        self.astern = np.array([one.T_nn_astern * one.n_max_astern**2 for one in p])
-        self.angle = np.array([one.angle_limit for one in p])
+        self.ahead = np.array([pod.T_nn * pod.n_max**2 for pod in p])
+        self.astern = np.array([pod.T_nn_astern * pod.n_max_astern**2 for pod in p])
+        self.angle = np.array([pod.angle_limit for pod in p])
         self.most = np.maximum(self.ahead, self.astern)
-        x, y = np.array([one.x for one in p]), np.array([one.y for one in p])
+        x, y = np.array([pod.x for pod in p]), np.array([pod.y for pod in p])
         size = np.array([self.most.sum(), self.most.sum(), (self.most * np.hypot(x, y)).sum()])
         weight = [1.0, pods.sway_weight, PREFERENCE]
         if pods.priority == "surge":
@@ -217,7 +217,7 @@ def test_with_a_horizon_only_what_rates_allow_is_asked_for():
         state = np.array([10.0] * count + [0.2] * count)
         T, delta = allocated(pods, np.array([7.0, -3.0]), state)
         assert delta == pytest.approx(0.2 + turn)
-        ahead = np.array([one.T_nn for one in pods.pods]) * (10.0 + change) ** 2
+        ahead = np.array([pod.T_nn for pod in pods.pods]) * (10.0 + change) ** 2
         assert (ahead * (1 + 1e-9) >= T).all()
         free = pods.model_copy(update={"horizon": 0.0})
         assert np.abs(allocated(free, np.array([7.0, -3.0]), state)[1]).max() > 0.2 + 2 * turn

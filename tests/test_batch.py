@@ -191,10 +191,10 @@ def test_no_run_that_fails_changes_a_bit_of_the_others() -> None:
     }  # fmt: skip
 
     def make(position: int) -> ClosedLoop:
-        one = bad.get(position, sound[position])
-        if isinstance(one, BaseException):
-            raise one
-        return one
+        made = bad.get(position, sound[position])
+        if isinstance(made, BaseException):
+            raise made
+        return made
 
     grid, fractions = TimeGrid(0.01, 20), list[float]()
     probe = metrics_probe(Plan(sound[0], grid), **SETTINGS)

@@ -104,8 +104,8 @@ def test_every_key_that_can_be_drawn_gives_the_metrics_of_the_run_alone(
     }
     batch = podusv.simulate_many(base, table, side_by_side=False)
     assert set(batch["status"]) <= {"finished", "diverged"}
-    for row, one in enumerate(runs.values()):
-        expected = alone(one)
+    for row, run in enumerate(runs.values()):
+        expected = alone(run)
         found = batch.loc[row, list(expected)].to_numpy(float)
         np.testing.assert_array_equal(found, list(expected.values()), err_msg=list(runs)[row])
 
@@ -188,11 +188,11 @@ def test_the_documented_monte_carlo_runs(capsys: pytest.CaptureFixture[str]) -> 
 
 def test_variants_change_what_they_name_and_nothing_else() -> None:
     loop = corrected()
-    (one, two) = variants(loop, {"controller.network.spread": [0.5, 0.9], "start.psi": [1, 2]})
+    (first, two) = variants(loop, {"controller.network.spread": [0.5, 0.9], "start.psi": [1, 2]})
     assert isinstance(two.controller, AdaptiveNeural)
     assert two.controller.network == Network(spread=0.9)
     assert two.start == (-10.0, -10.0, 2.0, 0.0, 0.0, 0.0)
-    back = variants(one, {"controller.network.spread": [0.7], "start.psi": [0.0]})
+    back = variants(first, {"controller.network.spread": [0.7], "start.psi": [0.0]})
     assert back == [loop]
     heavy = variants(loop, {"vessel.m": [30.0]})[0]
     assert (heavy.vessel.m, heavy.nominal) == (30.0, NONLINEAR)

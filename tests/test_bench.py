@@ -305,8 +305,8 @@ def test_cases_that_differ_in_what_laws_know_share_an_optimum_and_pods_have_none
     ]
     found, refused = wanted(every, done)
     shared = {"sea", "hull_light", "hull_heavy", "hull_other", "sampled"}
-    assert [{case.condition for case in one.cases} for one in found] == [{"calm"}, shared]
-    assert [list(one.laws) for one in found] == [["pid", "dsc"]] * 2
+    assert [{case.condition for case in group.cases} for group in found] == [{"calm"}, shared]
+    assert [list(group.laws) for group in found] == [["pid", "dsc"]] * 2
     assert len(refused) == 2
     assert any("actuator.kind: pod" in text for text in refused)
     assert any("loads that depend on time alone" in text for text in refused)

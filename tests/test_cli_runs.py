@@ -35,7 +35,7 @@ def listed(podusv: Command, *words: str) -> list[list[str]]:
 
 def test_a_line_each_the_latest_first_with_what_it_is(podusv: Command, results: Path) -> None:
     told = json.loads(podusv("runs", "r", "--json").out)["runs"]
-    kinds = {one["folder"]: (one["kind"], one["status"], one["laws"]) for one in told}
+    kinds = {run["folder"]: (run["kind"], run["status"], run["laws"]) for run in told}
     assert kinds == {
         "r/s": ("study", "finished", ["pid"]), "r/m/60": ("run", "finished", ["pid"]),
         "r/m/50": ("run", "finished", ["pid"]), "r/m/70": ("run", "damaged", []),
@@ -51,7 +51,7 @@ def test_runs_are_chosen_by_their_scenario_and_sorted_by_a_metric(
 ) -> None:
     found = runs.runs(results, ["vessel.m=60"])
     assert [str(one.folder) for one in found] == ["r/s", "r/m/60"]
-    energies = [one.metrics["energy"] for one in runs.runs(results, [], "energy")[:2]]
+    energies = [run.metrics["energy"] for run in runs.runs(results, [], "energy")[:2]]
     assert energies == sorted(energies)
     rows = listed(podusv, "--sort", "energy", "--where", "controller.kind=pid")
     assert [float(row[-2]) for row in rows] == pytest.approx(energies, rel=1e-4)

@@ -121,7 +121,7 @@ def test_growth_and_margin_are_those_of_the_delay_equation(gain, delay):
 
 def test_a_delayed_run_has_no_rate_of_v_and_no_bound():
     scenes = (scene("log.monitor=true", *given) for given in ((AT.format(0.1),), ()))
-    told, now = (set(one.about(one.plan())) for one in scenes)
+    told, now = (set(scene.about(scene.plan())) for scene in scenes)
     assert now - told == {"V_dot"}
     window = monitored(AT.format(0.1))
     assert window.observed is None

@@ -228,7 +228,7 @@ def test_a_study_hangs_on_what_it_does_not_draw(podusv):
     )
     (turn,) = rows("answer/turns.csv")
     assert turn["turns_at"] == "finished and z_e_steady <= 0.75"
-    assert {one.name for one in Path("out/studies").iterdir()} == {
+    assert {path.name for path in Path("out/studies").iterdir()} == {
         "own", "sweep.seed-1", "sweep.seed-2", "sweep.success-1", "sweep.success-2",
     }  # fmt: skip
     words = ("--set", "sweep.seed=2", "--no-figures", "--workers", "1", "--out", "apart")
@@ -378,7 +378,7 @@ TWO = WRITTEN.replace(
 
 
 def by_name():
-    return {one.name: one for one in choices(scenario(TWO).singles())}
+    return {choice.name: choice for choice in choices(scenario(TWO).singles())}
 
 
 def test_a_value_that_laws_share_moves_in_all():
@@ -449,7 +449,7 @@ def test_a_number_turns_where_the_verdict_on_the_claim_does(expect, edges):
     scale = 5.0 if number.right else 1.0
     for edge in number.edges:
         runs = [{"a": Numbered(scale * edge * f), "b": Numbered(5.0)} for f in (0.999, 1.001)]
-        answers = [Evaluation(one, 0.1).holds(ast.parse(expect, mode="eval").body) for one in runs]
+        answers = [Evaluation(run, 0.1).holds(ast.parse(expect, mode="eval").body) for run in runs]
         assert sorted(answers) == [False, True], (edge, answers)
     assert number.edges == pytest.approx(edges)
 
@@ -475,7 +475,7 @@ def test_worlds_that_cannot_be_are_counted():
 def logged(leg):
     """A run of ten seconds that logs a leg, as far as a claim's windows are about it."""
     t = np.linspace(0.0, 10.0, 101)
-    signals = {"time": t, "leg": np.array([leg(one) for one in t]), "u": t}
+    signals = {"time": t, "leg": np.array([leg(instant) for instant in t]), "u": t}
     about = {"leg": Signal("leg", "1", "legs done"), "u": Signal("u", "m/s", "speed")}
     run = InMemory(
         Path(), "finished", {}, {}, "", kept=Recording("finished", "pid", signals, about=about)

@@ -266,8 +266,8 @@ def test_a_lost_demand_and_a_late_one_are_counted_and_the_last_one_holds(monkeyp
     network = Network(arriving)
     faked = {"socket": SimpleNamespace(socket=network.socket, AF_INET=0, SOCK_DGRAM=0)}
     faked |= {"select": network.select, "sleep": network.sleep, "monotonic": lambda: network.now}
-    for name, one in faked.items():
-        monkeypatch.setitem(steer.__globals__, name, one)
+    for name, module in faked.items():
+        monkeypatch.setitem(steer.__globals__, name, module)
     session = podusv.open_session(HARDWARE / "boat.yaml", {"simulation.duration": 0.4})
     assert steer(session, ("boat", 4000)) == 2
     held = slice(0, 40, 10)
@@ -332,8 +332,8 @@ def test_the_node_in_the_documentation_demands_what_the_law_inside_demands(tmp_p
         node.measure(odometry(*(row[name] for name in ("x", "y", "psi", "u", "v", "r"))))
         node.aim(SimpleNamespace(data=[*row][7:13]))
         node.step()
-    surge = [one.wrench.force.x for one in messages]
-    yaw = [-one.wrench.torque.z for one in messages]
+    surge = [message.wrench.force.x for message in messages]
+    yaw = [-message.wrench.torque.z for message in messages]
     np.testing.assert_allclose(surge, rows["tau_u_cmd"], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(yaw, rows["tau_r_cmd"], rtol=1e-9, atol=1e-9)
 
@@ -357,7 +357,7 @@ def test_the_description_of_the_fmu_names_every_variable_once():
         "variables": variables(law, np.arange(15.0)), "loads": True,
     }  # fmt: skip
     tree = ET.fromstring(c.rendered("modelDescription.xml", about))
-    found = [one.get("name") for one in tree.iter("ScalarVariable")]
+    found = [variable.get("name") for variable in tree.iter("ScalarVariable")]
     assert found == law.columns[1:]
     starts = [real.get("start") for real in tree.iter("Real")]
     assert starts[:15] == [f"{i}.0" for i in range(15)]
@@ -462,7 +462,7 @@ def test_an_export_says_which_law_it_takes_where_nobody_chose(tmp_path):
             platforms=["linux64"], say=said.append,
         )  # fmt: skip
         workflow.export(HARDWARE / "boat.yaml", request)
-    notes = [one for one in said if one.startswith("exporting")]
+    notes = [line for line in said if line.startswith("exporting")]
     assert notes == [
         "exporting `controller`; --controller chooses among velocity_vector, momentum_vector"
     ]
@@ -499,7 +499,7 @@ ABOUT = {
     "inputs": [{"name": f"i{i}"} for i in range(15)], "demand": [{"name": "u"}, {"name": "r"}],
     "signals": [], "memory": [], "period": 0.1, "platforms": [], "of_run": True,
 }  # fmt: skip
-HEAD = ",".join(["time", *(one["name"] for one in ABOUT["inputs"] + ABOUT["demand"])])
+HEAD = ",".join(["time", *(number["name"] for number in ABOUT["inputs"] + ABOUT["demand"])])
 
 
 def described(folder: Path, rows: str, **changes: Any) -> None:
@@ -586,8 +586,8 @@ def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     folder = workflow.export(Path(SOURCE), request)
     assert validate_fmu(str(folder / "law.fmu")) == []
     found = check(folder)
-    assert [one.what for one in found] == ["library", "law.fmu"]
-    assert all(one.samples == 3001 and not one.differs for one in found)
+    assert [checked.what for checked in found] == ["library", "law.fmu"]
+    assert all(checked.samples == 3001 and not checked.differs for checked in found)
     with zipfile.ZipFile(folder / "law.fmu") as archive:
         assert "modelDescription.xml" in archive.namelist()
 

@@ -131,16 +131,16 @@ def test_environments_side_by_side_have_the_bits_of_single_ones(reward):
     many = podusv.gym.VectorEnv(SCENARIO, count=11, reward=reward)
     ones = [podusv.gym.Env(SCENARIO, reward=reward) for _ in range(11)]
     seen, _ = many.reset(seed=4)
-    np.testing.assert_array_equal(seen, [one.reset(seed=4 + i)[0] for i, one in enumerate(ones)])
+    np.testing.assert_array_equal(seen, [env.reset(seed=4 + i)[0] for i, env in enumerate(ones)])
     random = np.random.default_rng(0)
     for step in range(30):
         actions = random.normal(0.0, 2.0, (11, 2))
         seen, gained, dead, cut, info = many.step(actions)
-        each = [one.step(action) for one, action in zip(ones, actions, strict=True)]
+        each = [env.step(action) for env, action in zip(ones, actions, strict=True)]
         np.testing.assert_array_equal(seen, [one[0] for one in each])
         np.testing.assert_array_equal(gained, [one[1] for one in each])
         assert not dead.any()
-        assert set(cut) == {step == 29} == {one[3] for one in each}
+        assert set(cut) == {step == 29} == {answer[3] for answer in each}
         assert set(info["time"]) == {each[0][4]["time"]}
     seen, gained, dead, cut, info = many.step(np.full((11, 2), 9.0))
     assert not np.concatenate([gained, dead, cut, info["time"]]).any()
@@ -163,12 +163,12 @@ def test_an_estimate_and_a_target_on_legs_are_seen_side_by_side_as_alone(case):
     many = podusv.gym.VectorEnv(SCENARIO, SEEN[case], count=5, **given)
     ones = [podusv.gym.Env(SCENARIO, SEEN[case], **given) for _ in range(5)]
     many.reset(seed=0)
-    for i, one in enumerate(ones):
-        one.reset(seed=i)
+    for i, env in enumerate(ones):
+        env.reset(seed=i)
     for _ in range(20):
         seen, *_ = many.step(np.full((5, 2), 2.0))
-        np.testing.assert_array_equal(seen, [one.step((2.0, 2.0))[0] for one in ones])
-    assert len({tuple(one.session.observe().target[2:4]) for one in ones}) > 1
+        np.testing.assert_array_equal(seen, [env.step((2.0, 2.0))[0] for env in ones])
+    assert len({tuple(env.session.observe().target[2:4]) for env in ones}) > 1
 
 
 def test_what_was_seen_stays_as_it_was():
@@ -197,11 +197,11 @@ def test_where_one_diverges_the_others_of_its_march_are_truncated():
     assert not np.concatenate([dead, cut, gained[:8]]).any()
     assert gained[8] < 0.0
     assert list(info["time"]) == [0.0] * 8 + [2 * PERIOD]
-    one = podusv.gym.Env(SCENARIO, free, limits=(1e300, 1e300))
-    one.reset(seed=2)
-    assert one.step(np.array([1e200, 1e200]))[2:4] == (True, False)
+    env = podusv.gym.Env(SCENARIO, free, limits=(1e300, 1e300))
+    env.reset(seed=2)
+    assert env.step(np.array([1e200, 1e200]))[2:4] == (True, False)
     with pytest.raises(UsageError, match="the episode is over; call reset"):
-        one.step(np.zeros(2))
+        env.step(np.zeros(2))
 
 
 def test_spaces_are_the_actuator_s_limits_or_those_that_are_given():

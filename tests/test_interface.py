@@ -224,7 +224,7 @@ def test_a_figure_shows_in_a_notebook(kept):
 
 def test_signals_are_drawn_over_time_one_a_panel(kept):
     axes = kept.plot("psi", "u").axes
-    assert [one.get_ylabel() for one in axes] == [r"$\psi$ [rad]", "$u$ [m/s]"]
+    assert [axis.get_ylabel() for axis in axes] == [r"$\psi$ [rad]", "$u$ [m/s]"]
     (line,) = axes[1].get_lines()
     np.testing.assert_array_equal(line.get_ydata()[-1], kept["u"][-1])
     with pytest.raises(UsageError, match=r"'pssi'.*'psi'"):

@@ -99,7 +99,7 @@ def shipped() -> Iterator[Any]:
         if not part.name.endswith("__main__"):
             module = vars(importlib.import_module(part.name))
             classes = [thing for thing in module.values() if isinstance(thing, type)]
-            inner = [getattr(f, "__func__", f) for one in classes for f in vars(one).values()]
+            inner = [getattr(f, "__func__", f) for cls in classes for f in vars(cls).values()]
             for thing in (*module.values(), *inner):
                 if isinstance(thing, FunctionType) and is_kernel(thing) and has_source(thing):
                     yield thing
@@ -109,7 +109,9 @@ def test_no_kernel_of_podusv_has_such_a_fault() -> None:
     """Kernels from outside are looked at before they are compiled; these here."""
     kernels = set(shipped())
     assert len(kernels) > 200
-    told = {one.__qualname__: list(faults(source(one), one.__globals__)) for one in kernels}
+    told = {
+        kernel.__qualname__: list(faults(source(kernel), kernel.__globals__)) for kernel in kernels
+    }
     assert {name: found for name, found in told.items() if found} == {}
 
 

@@ -73,8 +73,8 @@ def test_every_path_disturbance_and_actuator_can_march_side_by_side(part: str) -
         "path": Path, "disturbance": Disturbance, "actuator": Actuator,
     }  # fmt: skip
     for name, kind in kinds(f"podusv_cli.components.{part}s", rooms[part]).items():
-        one = replace(base, **{part: made(kind)})
-        assert (name, why_alone(Plan.with_probe(one, GRID, Probe()))) == (name, "")
+        changed = replace(base, **{part: made(kind)})
+        assert (name, why_alone(Plan.with_probe(changed, GRID, Probe()))) == (name, "")
 
 
 def test_numbers_of_paths_and_currents_differ_from_run_to_run() -> None:

@@ -171,7 +171,8 @@ def test_runs_of_other_delays_march_beside_their_like(part: str, others: list[An
     base = replace(loop("pid"), actuator=Saturated(command=Command(delay=0.05)))
     scattered_loops = scattered(base, 5) + scattered(base, 6)
     loops = [
-        replace(one, **{part: others[i % len(others)]}) for i, one in enumerate(scattered_loops)
+        replace(scattered_loop, **{part: others[i % len(others)]})
+        for i, scattered_loop in enumerate(scattered_loops)
     ]
     together, alone = both(loops, replace(GRID, steps=60))
     assert why_alone(Plan.with_probe(loops[0], GRID, Probe())) == ""
@@ -187,7 +188,7 @@ class AllBut(Measurement):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        return tuple(one for one, has in zip(MEASURED, self.measured(), strict=True) if has)
+        return tuple(state for state, has in zip(MEASURED, self.measured(), strict=True) if has)
 
     def measured(self) -> tuple[bool, ...]:
         return tuple(i != self.lacking for i in range(6))

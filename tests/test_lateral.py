@@ -65,7 +65,7 @@ def test_velocity_vector_s_polynomial_is_that_of_its_equations():
     law = VelocityVector(k_p=0.4, k_psi=1.1, k_r=1.7, T_v=3.0)
     numbers = {k_p: 0.4, a: 1.1, b: 1.7, T: 3.0, p: 1.2, d: 0.3, V: 0.6}
     known = velocity_vector_polynomial(law, SwayAnswer(1.2, 0.3))
-    assert [float(one.subs(numbers)) for one in derived] == pytest.approx(list(known), rel=1e-12)
+    assert [float(term.subs(numbers)) for term in derived] == pytest.approx(list(known), rel=1e-12)
 
 
 def test_at_the_defaults_it_bears_p_eff_of_0_989_at_cybership_s_damping():

@@ -159,7 +159,8 @@ def test_a_path_needs_two_points_apart(points: Any) -> None:
 def test_findings_tell_of_a_leg_too_short_and_of_legs_that_are_left() -> None:
     def codes(**changes: Any) -> set[str]:
         return {
-            one.partition("[")[2].partition("]")[0] for one in run("los_pid", **changes).warnings
+            warning.partition("[")[2].partition("]")[0]
+            for warning in run("los_pid", **changes).warnings
         }
 
     legs = SCENARIO["path"]
@@ -167,14 +168,14 @@ def test_findings_tell_of_a_leg_too_short_and_of_legs_that_are_left() -> None:
     assert not {"short-leg", "never-arrives", "never-settles"} & codes()
     assert "never-arrives" in codes(**{"simulation.duration": 40.0})
     missed = run("los_pid", path=legs | {"acceptance": 0.05})
-    (told,) = (one for one in missed.warnings if "never-arrives" in one)
+    (told,) = (warning for warning in missed.warnings if "never-arrives" in warning)
     assert "path.switch: passed" in told
 
 
 def test_a_trial_leaves_the_legs_aside_and_no_finding_asks_for_them() -> None:
     trial = run("zigzag", **{"simulation.duration": 2.0})
-    assert any("trial-unfinished" in one for one in trial.warnings)
-    assert not any("never-arrives" in one for one in trial.warnings)
+    assert any("trial-unfinished" in warning for warning in trial.warnings)
+    assert not any("never-arrives" in warning for warning in trial.warnings)
     of_legs = {"e_ct_integral", "e_ct_rms", "e_ct_max", "e_ct_steady", "path_time", "path_done"}
     assert not of_legs & set(trial.metrics.index)
     assert of_legs <= set(run("los_pid", **{"simulation.duration": 2.0}).metrics.index)
@@ -182,7 +183,7 @@ def test_a_trial_leaves_the_legs_aside_and_no_finding_asks_for_them() -> None:
 
 def test_a_number_that_a_run_has_not_is_never_or_a_dash(podusv: Any, tmp_path: Any) -> None:
     short = ("simulation.duration=1", "actuator={kind: pod, preset: otter}")
-    sets = [word for one in short for word in ("--set", one)]
+    sets = [word for change in short for word in ("--set", change)]
     said = podusv("run", "podusv:laws/legs.yaml", "--no-figures", "--out", tmp_path / "r", *sets)
     shown = {line.split()[-1]: line.split()[-2] for line in said.out.splitlines()}
     assert shown["path_time"] == "never"

@@ -62,7 +62,7 @@ def test_the_rates_of_the_errors_are_their_derivatives():
     swaps = [(f.diff(t, 2), n) for f, n in zip((x_d, y_d), numbers[8:], strict=True)]
     swaps += [(f.diff(t), n) for f, n in zip(places, numbers[4:8], strict=True)]
     swaps += list(zip(places, numbers[:4], strict=True))
-    rates = [one.diff(t).subs(swaps) for one in (along, across, sight)]
+    rates = [expression.diff(t).subs(swaps) for expression in (along, across, sight)]
     rate = sp.lambdify(numbers, rates, ["numpy", {"Heaviside": np.heaviside}])
     for state, _, target in situations(LosPid(), 100):
         over_ground = (state[3] + 1j * state[4]) * np.exp(1j * state[2])
@@ -116,11 +116,11 @@ def test_port_and_starboard_are_alike(law):
     parts = [signal for signal, _ in law.slots()]
     own = np.array([1.0 if s.name in ("force_i", "u_hat", "b_obs_u") else -1.0 for s in parts])
     for x, memory, target in situations(law, 30):
-        one = ask(law, x, memory, target, NONLINEAR)
+        answer = ask(law, x, memory, target, NONLINEAR)
         other = ask(law, x * mirror, memory * own, target * flip, NONLINEAR)
-        np.testing.assert_allclose(other.tau, one.tau * [1, -1], rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(other.rate, one.rate * own, rtol=1e-9, atol=1e-9)
-        assert wrap(other.signals["psi_r"] + one.signals["psi_r"]) == pytest.approx(0, abs=1e-9)
+        np.testing.assert_allclose(other.tau, answer.tau * [1, -1], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(other.rate, answer.rate * own, rtol=1e-9, atol=1e-9)
+        assert wrap(other.signals["psi_r"] + answer.signals["psi_r"]) == pytest.approx(0, abs=1e-9)
 
 
 # --- los_pid

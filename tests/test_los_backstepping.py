@@ -92,7 +92,7 @@ def test_a_whole_turn_of_heading_or_filter_changes_nothing(turns: int) -> None:
 def test_its_velocity_loops_are_those_of_surge_and_of_yaw_at_a_held_heading() -> None:
     surge, yaw = (Axis(name, m, m, 0.1) for name, m in (("surge", 25.8), ("yaw", 2.76)))
     loops = LosBackstepping().velocity_loops((surge, yaw), np.zeros(3))
-    assert [one.growth for one in loops] == pytest.approx(
+    assert [loop.growth for loop in loops] == pytest.approx(
         [-0.1 - 25.0 / 25.8, -0.1 - 2.5 / 2.76 - 0.75]
     )
 
@@ -272,7 +272,7 @@ def test_verdicts_that_do_not_hang_on_what_could_not_be_read(name: str) -> None:
 @pytest.mark.parametrize("name", ["claims", "sensitivities"])
 def test_the_verdicts_on_the_page_are_those_of_the_studies(name: str) -> None:
     found = json.loads((RESULTS / "fossen_2003" / f"{name}.json").read_text())["claims"]
-    told = {one["claim"]: in_words(one) for one in found}
+    told = {claim["claim"]: in_words(claim) for claim in found}
     assert set(told) == {"claims": {"G1", "G2", "G3", "G4"}, "sensitivities": {"F8"}}[name]
     assert told.items() <= VERDICTS.items()
 

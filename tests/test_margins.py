@@ -463,7 +463,7 @@ def test_claims_compare_margins(podusv):
         text += f"  {name}: {{says: a, source: b, expect: {expect}}}\n"
     Path("a.yaml").write_text(text)
     told = json.loads(podusv("compare", "a.yaml", "--no-figures", "--json", "--out", "c").out)
-    verdicts = {one["claim"]: one["verdict"] for one in told["claims"]}
+    verdicts = {claim["claim"]: claim["verdict"] for claim in told["claims"]}
     assert verdicts == {
         "yes": "reproduced", "no": "not reproduced", "never": "reproduced", "unknown": "cannot tell"
     }  # fmt: skip

@@ -91,12 +91,12 @@ def test_port_and_starboard_are_alike():
     """Mirrored in the x axis, demands in yaw and sway change sign and nothing else does."""
     mirror = np.array([1, -1, -1, 1, -1, -1.0])
     for x, memory, target in situations(LAW, 30):
-        one = ask(LAW, x, memory, target, CYBERSHIP)
+        answer = ask(LAW, x, memory, target, CYBERSHIP)
         flip, held = np.array([1, -1, 1, -1, 1, -1.0]), np.array([*[1, -1, -1] * 2, -1, 1, -1, -1])
         other = ask(LAW, x * mirror, memory * held, target * flip, CYBERSHIP)
-        np.testing.assert_allclose(other.tau, one.tau * [1, -1], rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(other.rate, one.rate * held, rtol=1e-9, atol=1e-9)
-        assert wrap(other.signals["chi_e"] + one.signals["chi_e"]) == pytest.approx(0, abs=1e-9)
+        np.testing.assert_allclose(other.tau, answer.tau * [1, -1], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(other.rate, answer.rate * held, rtol=1e-9, atol=1e-9)
+        assert wrap(other.signals["chi_e"] + answer.signals["chi_e"]) == pytest.approx(0, abs=1e-9)
 
 
 # --- what is promised: no offset

@@ -58,8 +58,8 @@ def test_cosine_and_sine_count_their_arithmetic_and_a_direction_once():
 def counts(*keys):
     scenario = load(CONFIGS / "mu_2017/corrected_compare.yaml", ["simulation.duration=1", *keys])
     found = {}
-    for name, one in scenario.scenario.singles().items():
-        plan = one.plan()
+    for name, single in scenario.scenario.singles().items():
+        plan = single.plan()
         found[name] = operations(plan, run(plan))["law_operations"]
     return found
 

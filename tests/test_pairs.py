@@ -214,14 +214,14 @@ def rewards_and_metric(drawn: Drawn, place: Path) -> None:
     many = gym.VectorEnv(scenario, count=count, **given)
     ones = [gym.Env(scenario, **given) for _ in range(count)]
     seen, _ = many.reset(seed=seed)
-    same(seen, [one.reset(seed=seed + i)[0] for i, one in enumerate(ones)], "first")
+    same(seen, [env.reset(seed=seed + i)[0] for i, env in enumerate(ones)], "first")
     gained, over = np.zeros(count), False
     while not over:
         actions = drawn.random.normal(0.0, 4.0, (count, 2))
         seen, rewards, dead, cut, _ = many.step(actions)
-        alone = [one.step(action) for one, action in zip(ones, actions, strict=True)]
+        alone = [env.step(action) for env, action in zip(ones, actions, strict=True)]
         for at, together in enumerate((seen, rewards, dead, cut)):
-            same(together, [one[at] for one in alone], f"{reward} {at}")
+            same(together, [answer[at] for answer in alone], f"{reward} {at}")
         gained += rewards
         over = bool(cut.any())
     run = ones[0].session.close(place / "run", figures=False)
@@ -244,7 +244,7 @@ def exported_law(drawn: Drawn, place: Path) -> None:
     path.write_text(resolved_yaml(scenario))
     request = exporting.Request(place / "law", platforms=[link.this_machine()])
     folder = exporting.export(path, request)
-    assert [one.differs for one in check(folder)] == [""] * (1 + bool(find_spec("fmpy")))
+    assert [checked.differs for checked in check(folder)] == [""] * (1 + bool(find_spec("fmpy")))
     unit = Unit(folder / "law.fmu", place / "unit")
     inputs = len(unit.inputs)
     same(unit.read()[:inputs], unit.starts, "start")
@@ -282,22 +282,22 @@ def value_at(scenario: Scenario, key: str) -> Any:
 def test_the_draws_are_no_convenient_numbers():
     """Among those of `make test` every time divides another one here, and does not there."""
     scenarios = [Drawn(seed).scenario() for seed in range(4 * FEW)]
-    grids = [one.time_grid() for one in scenarios]
-    held = [one for one in grids if one.hold_every]
-    late = [(one.actuator.delay(), one.control.period) for one in scenarios]
+    grids = [scenario.time_grid() for scenario in scenarios]
+    held = [grid for grid in grids if grid.hold_every]
+    late = [(scenario.actuator.delay(), scenario.control.period) for scenario in scenarios]
     for found in (
-        {one.hold_every > 0 for one in grids},
+        {grid.hold_every > 0 for grid in grids},
         {one.steps % one.hold_every > 0 for one in held},
-        {one.steps % one.log_every > 0 for one in grids},
+        {grid.steps % grid.log_every > 0 for grid in grids},
         {one.update_first for one in held},
         {0.0 < delay < period for delay, period in late},
         {0.0 < period < delay for delay, period in late},
-        {one.path.follows for one in scenarios},
-        {bool(one.controller.trial()) for one in scenarios},
-        {one.measurement.is_exact for one in scenarios},
+        {scenario.path.follows for scenario in scenarios},
+        {bool(scenario.controller.trial()) for scenario in scenarios},
+        {scenario.measurement.is_exact for scenario in scenarios},
     ):
         assert found == {True, False}
-    assert len({one.step for one in grids}) == len(STEPS)
+    assert len({grid.step for grid in grids}) == len(STEPS)
 
 
 @pytest.mark.parametrize(

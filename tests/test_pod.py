@@ -69,8 +69,8 @@ NORMAL = partial(st.floats, allow_subnormal=False)  # 1e-323 N is beyond a root'
     form=st.sampled_from(["physical", "printed"]),
 )  # fmt: skip
 def test_the_inverse_gives_the_thrust_back(T, u, v, T_nV, astern, form):
-    one = pods({"T_nV": T_nV, "T_nV_astern": astern}, thrust_form=form)
-    k, table, x = bundle(one.constants()), one.table(), np.array([0, 0, 0, u, v, 0.1])
+    actuator = pods({"T_nV": T_nV, "T_nV_astern": astern}, thrust_form=form)
+    k, table, x = bundle(actuator.constants()), actuator.table(), np.array([0, 0, 0, u, v, 0.1])
     flow = inflow(x, table, 0.3, k)
     n = speed_for(T, flow, table, k)
     assert thrust(n, flow, table, k) == pytest.approx(T, abs=1e-12, rel=1e-9)
@@ -80,32 +80,32 @@ def test_the_inverse_gives_the_thrust_back(T, u, v, T_nV, astern, form):
 def test_physical_thrust_falls_with_speed_and_the_printed_one_rises():
     ahead = np.array([0, 0, 0, 0.5, 0, 0])
     for form, sign in (("physical", -1), ("printed", 1)):
-        one = pods({"T_nV": 2e-3}, thrust_form=form)
-        tau, _, _ = loads(one, state_of(one, 20.0, 0.0), ahead)
+        actuator = pods({"T_nV": 2e-3}, thrust_form=form)
+        tau, _, _ = loads(actuator, state_of(actuator, 20.0, 0.0), ahead)
         assert tau[0] == pytest.approx(POD["T_nn"] * 400 + sign * 2e-3 * 20 * 0.5)
 
 
 def test_astern_a_propeller_loses_thrust_by_a_coefficient_of_its_own():
     """CyberShip II's: at 20/s and 0.5 m/s 0.0015 N less ahead, 0.456 N more astern."""
-    one = pods({"T_nV": 1.52468e-4, "T_nV_astern": 4.55822e-2})
+    actuator = pods({"T_nV": 1.52468e-4, "T_nV_astern": 4.55822e-2})
     ahead = np.array([0, 0, 0, 0.5, 0, 0])
     for n, slope in ((20.0, 1.52468e-4), (-20.0, 4.55822e-2)):
-        tau, _, _ = loads(one, state_of(one, n, 0.0), ahead)
-        at_rest, _, _ = loads(one, state_of(one, n, 0.0), np.zeros(6))
+        tau, _, _ = loads(actuator, state_of(actuator, n, 0.0), ahead)
+        at_rest, _, _ = loads(actuator, state_of(actuator, n, 0.0), np.zeros(6))
         assert tau[0] - at_rest[0] == pytest.approx(-slope * 20.0 * 0.5)
 
 
 def test_the_advance_speed_is_that_of_the_water_along_the_pod():
-    one = pods({"T_nV": 2e-3, "y": 0.1})
+    actuator = pods({"T_nV": 2e-3, "y": 0.1})
     x, delta = np.array([0, 0, 0, 0.5, 0.2, 0.3]), 0.4
     velocity = [0.5 - 0.1 * 0.3, 0.2 - 0.499 * 0.3]  # nu + r x (x_p, y_p)
     V_a = velocity @ np.array([math.cos(delta), math.sin(delta)])
-    assert inflow(x, one.table(), delta, bundle(one.constants())) == pytest.approx(-V_a)
+    assert inflow(x, actuator.table(), delta, bundle(actuator.constants())) == pytest.approx(-V_a)
 
 
 def test_at_rest_nothing_is_undefined():
-    one = pods({"T_nV": 2e-3})
-    tau, rate, signals = loads(one, np.zeros(2), np.zeros(6))
+    actuator = pods({"T_nV": 2e-3})
+    tau, rate, signals = loads(actuator, np.zeros(2), np.zeros(6))
     assert not tau.any()
     assert not rate.any()
     assert signals["saturated"] == 0.0
@@ -142,8 +142,8 @@ def step_response(lag: float, rate: float, goal: float, t: Vector) -> Vector:
 def test_speed_and_angle_follow_their_lags_and_rates_exactly(rate):
     T, angle = 4.0, 0.5
     law = Constant(surge=T * math.cos(angle), yaw=-0.499 * T * math.sin(angle))
-    one = pods({"n_rate": rate, "n_lag": 0.25, "angle_rate": rate / 60, "angle_lag": 0.125})
-    out = run(adrift(actuator=one, controller=law), 2.0, 0.0005)
+    actuator = pods({"n_rate": rate, "n_lag": 0.25, "angle_rate": rate / 60, "angle_lag": 0.125})
+    out = run(adrift(actuator=actuator, controller=law), 2.0, 0.0005)
     n = math.sqrt(T / POD["T_nn"])
     # The corner where the ramp ends lies between two steps.
     np.testing.assert_allclose(
@@ -199,7 +199,7 @@ def test_a_demand_out_of_reach_is_an_event_and_no_accident():
 
 
 def test_energy_and_travel_are_those_of_the_log():
-    actuator = pods(*({**one, "power_nnn": 2e-4} for one in TWIN))
+    actuator = pods(*({**pod, "power_nnn": 2e-4} for pod in TWIN))
     log, got = gathered(corrected(actuator=actuator), steps=2000)
     power = 2e-4 * np.abs(log["n"]) ** 3
     np.testing.assert_allclose(log["power"], power)
@@ -246,8 +246,8 @@ def test_fixed_propellers_need_no_numbers_of_an_angle_and_move_as_with_any():
     assert bare.shortest_lag() == slow.shortest_lag() == 0.2  # nothing turns
     state, command = np.array([3.0, -5.0, 0.0, 0.0]), np.array([20.0, 9.0, 0.0, 0.0])
     rates = np.empty((2, 4))
-    for rate, one in zip(rates, (bare, full), strict=True):
-        follow(state, command, bundle(one.constants()), one.table(), rate)
+    for rate, actuator in zip(rates, (bare, full), strict=True):
+        follow(state, command, bundle(actuator.constants()), actuator.table(), rate)
     assert np.array_equal(rates[0], rates[1])
     assert rates[0, :2] == pytest.approx([60.0, 60.0])  # the limit of 17/0.2 and 14/0.2 1/s2
 

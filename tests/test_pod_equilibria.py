@@ -78,8 +78,8 @@ def steady_run(actuator: Pods, b: Loads, duration: float = 240.0) -> Recording:
 @pytest.mark.parametrize(("b", "kept", "told"), LINES, ids=lambda value: str(value)[-24:])
 def test_on_a_line_the_pod_turns_by_what_the_balance_of_loads_says(b, kept, told):
     u, v, T, delta = straight(b, kept)
-    one = pods({"angle_limit": 1.2}, neglect_sway_force=not kept)
-    log = steady_run(one, b)
+    actuator = pods({"angle_limit": 1.2}, neglect_sway_force=not kept)
+    log = steady_run(actuator, b)
     got = [float(log[name][-1].sum()) for name in ("u", "v", "thrust", "delta")]
     assert got == pytest.approx([u, v, T, delta], abs=2e-4)
     said = told.rstrip(" deg)").split()[-1].strip("(")

@@ -258,7 +258,7 @@ def test_all_sets_of_the_search_were_judged_on_the_draws_of_the_scenario(hull):
 def test_the_sentences_about_other_hulls_are_those_of_the_runs():
     other, fresh, otter = (judged(h).set_index("law") for h in ("cybership2", "fresh", "otter"))
     better = other[other.ratio_high < 1.0]
-    ends = [100 * (1 - one) for one in (better.ratio.max(), better.ratio.min())]
+    ends = [100 * (1 - ratio) for ratio in (better.ratio.max(), better.ratio.min())]
     assert "five laws are better with found gains, by {:.0f} to {:.0f} %".format(*ends) in ELSEWHERE
     words = " ".join(ELSEWHERE.split())
     four = ["adaptive_crab", "full_backstepping", "dsc", "adaptive_neural"]
@@ -304,7 +304,7 @@ def test_sets_that_keep_a_law_faster_than_its_target_fail_on_the_otter():
     faster = {}
     for law, row in found.iterrows():
         factor = scenario.controllers[law].U_min / row.before
-        kept = [factor * float(one) for one in row.repeats.split()]
+        kept = [factor * float(repeat) for repeat in row.repeats.split()]
         faster[law] = [u for u in kept if u > scenario.path.speed]
     told = [f"{u:.2f}" for law in ("ilos", "alos") for u in faster[law]]
     assert f"{told[0]}, {told[1]} and {told[2]} m/s" in ELSEWHERE
@@ -368,7 +368,7 @@ def test_hulls_matter_less_than_the_start():
 def test_the_sentences_about_told_hulls_are_those_of_the_study():
     text = " ".join(TOLD.split())
     verdicts = json.loads((RESULTS / "studies/unknown_dynamics/claims.json").read_text())["claims"]
-    assert {one["claim"]: one["verdict"] for one in verdicts} == {
+    assert {verdict["claim"]: verdict["verdict"] for verdict in verdicts} == {
         "U1": "reproduced", "U2": "not reproduced", "U3": "reproduced", "U4": "reproduced",
         "U5": "not reproduced",
     }  # fmt: skip
@@ -419,8 +419,8 @@ def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_stud
         f"{100 * (li.ratio - 1):.0f} % worse in the median" in (RESULTS / "README.md").read_text()
     )
     for law in ("no_adaptation", "full_backstepping"):
-        one = told.loc[law]
-        assert f"{one.ratio:.3f} [{one.ratio_low:.3f}, {one.ratio_high:.3f}]" in text
+        row = told.loc[law]
+        assert f"{row.ratio:.3f} [{row.ratio_low:.3f}, {row.ratio_high:.3f}]" in text
     assert (
         f"with full backstepping better in {100 * told.loc['full_backstepping'].b_wins:.1f} %"
         in text
@@ -458,7 +458,7 @@ def test_the_table_of_cybership_ii_is_that_of_the_study():
         settled, after = (numbers.loc[metric, law] for metric in ("e_steady", "error_after_max"))
         assert failed == f"{100 * settled.failed:.1f}"
         assert iae == f"{numbers.loc['iae', law].q50:.0f}"
-        millimetres = [1000 * one for row in (settled, after) for one in (row.q50, row.q95)]
+        millimetres = [1000 * metres for row in (settled, after) for metres in (row.q50, row.q95)]
         assert ends == [f"{one:.0f}" if np.isfinite(one) else "fails" for one in millimetres]
     pairs = table("pairs.csv", "rivals_cybership2").query("metric == 'iae'").set_index(["a", "b"])
     found = pairs.loc["velocity_vector", "momentum_vector"]
@@ -494,7 +494,7 @@ def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
         json.loads((RESULTS / "studies" / name / "claims.json").read_text())
         for name in ("rivals", "rivals_earth")
     ]
-    seen = [[claim["verdict"] for claim in one["claims"]] for one in verdicts]
+    seen = [[claim["verdict"] for claim in verdict["claims"]] for verdict in verdicts]
     assert seen[0] == seen[1]
 
 
@@ -517,9 +517,15 @@ def test_found_gains_of_the_paper_s_family_live_on_the_limit(law, keys, low, hig
         "path": {"kind": "line", "speed": 0.5}, "simulation.duration": 0.5,
     }  # fmt: skip
     source = "podusv:mu_2017/corrected.yaml"
-    ends = [podusv.simulate(source, free | {"controller": one}).status for one in controllers]
+    ends = [
+        podusv.simulate(source, free | {"controller": controller}).status
+        for controller in controllers
+    ]
     assert ends.count("diverged") == lost
-    peaks = [podusv.simulate(source, {"controller": one}).metrics.peak_tau_u for one in controllers]
+    peaks = [
+        podusv.simulate(source, {"controller": controller}).metrics.peak_tau_u
+        for controller in controllers
+    ]
     assert [float(f"{end:.1e}") for end in (min(peaks), max(peaks))] == pytest.approx(
         [low, high], rel=0.07
     )

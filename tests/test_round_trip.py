@@ -102,6 +102,6 @@ def test_a_shipped_scenario_says_what_it_is_for_and_its_runs_read_back(name):
         return
     scenario = load(path).scenario
     assert scenario.description
-    of_each_law = {type(one.controller): one for one in scenario.singles().values()}
+    of_each_law = {type(single.controller): single for single in scenario.singles().values()}
     for one in () if name in ALIKE else of_each_law.values():
         assert load_stored(resolved_yaml(one), "resolved.yaml").scenario == one

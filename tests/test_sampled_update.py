@@ -66,7 +66,7 @@ def test_the_predicted_growth_converges_to_that_of_the_loop_integrated_by_hand()
         return [*moved(lambda t, y: -loop.damping * y + c, [e]), *m]
 
     size = len(loop.feedback)
-    through = np.array([period(one[0], one[1:]) for one in np.eye(size)]).T
+    through = np.array([period(unit[0], unit[1:]) for unit in np.eye(size)]).T
     growth = np.abs(np.linalg.eigvals(through)).max()
     coarse, fine = (sampled_growth(loop, T / n, n, update_first=True) - growth for n in (16, 32))
     assert coarse / fine == pytest.approx(2.0**4, rel=0.1)

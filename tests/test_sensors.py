@@ -150,7 +150,7 @@ def test_the_law_acts_on_the_measurement_and_the_metrics_on_the_truth():
     """A law at rest on its target, told a heading that is wrong, steers away from it."""
     wrong = Sensor(period=H, bias=0.5, bias_time=1e6)
     true, seen = (
-        run(corrected(measurement=sensors(**one)), 20.0) for one in ({}, {"heading": wrong})
+        run(corrected(measurement=sensors(**fields)), 20.0) for fields in ({}, {"heading": wrong})
     )
     assert np.abs(true["psi"] - seen["psi"]).max() > 0.1
     np.testing.assert_allclose(seen["psi_est"], seen["psi_m"], atol=0)

@@ -146,7 +146,7 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(site
     for page in pages:
         seen = Loaded()
         seen.feed(page.read_text())
-        assert [one for one in seen.found if "//" in one] == [], page
+        assert [address for address in seen.found if "//" in address] == [], page
     for style in site.rglob("*.css"):
         assert not re.search(r"url\([\"']?(https?:)?//", style.read_text()), style
 
@@ -156,8 +156,8 @@ def found(site: Path, word: str) -> set[str]:
     text = (site / "searchindex.js").read_text()
     index = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
     places = [index[kind].get(word, []) for kind in ("terms", "titleterms")]
-    every = [one for some in places for one in (some if isinstance(some, list) else [some])]
-    return {index["docnames"][one] for one in every}
+    every = [place for some in places for place in (some if isinstance(some, list) else [some])]
+    return {index["docnames"][place] for place in every}
 
 
 @pytest.mark.slow

@@ -152,8 +152,8 @@ def test_a_law_of_a_scenario_has_no_key_without_a_number():
         f"{kind.model_fields['kind'].default}: {{kind: {kind.model_fields['kind'].default}}}"
         for kind in LAWS
     )
-    for one in loaded(f"controllers={{{every}}}").scenario.singles().values():
-        assert all(getattr(one.controller, name) > 0.0 for name in one.controller.rules)
+    for single in loaded(f"controllers={{{every}}}").scenario.singles().values():
+        assert all(getattr(single.controller, name) > 0.0 for name in single.controller.rules)
 
 
 class Nothing(Ideal):
@@ -197,13 +197,13 @@ def each(vary: str, *overrides: str) -> list:
     given = loaded(*overrides, text=CATAMARAN + STUDY % vary)
     assert not sweep_faults(given)
     own = given.scenario
-    return [own, *(drawn(own.alone(), own.sweep.vary, one) for one in draws(own.sweep, 0, 4))]
+    return [own, *(drawn(own.alone(), own.sweep.vary, draw) for draw in draws(own.sweep, 0, 4))]
 
 
 def test_draws_of_the_true_vessel_do_not_reach_the_law():
     own, *others = each("vessel.m: {uniform: [120.0, 240.0]}")
-    assert len({one.vessel.m for one in others}) == 4
-    assert {one.controller for one in others} == {own.controller}
+    assert len({other.vessel.m for other in others}) == 4
+    assert {other.controller for other in others} == {own.controller}
 
 
 @pytest.mark.parametrize(
@@ -217,9 +217,9 @@ def test_a_draw_of_what_the_law_is_told_is_as_if_it_were_loaded(key, numbers):
     others = ["measurement={kind: sensors}", "estimator={kind: ekf}", "actuator.command={}"]
     own, *rest = each(f"{key}: {{choice: {numbers}}}", *others)
     assert any(one.controller != own.controller for one in rest)
-    for one in rest:
-        again = loaded(*others, f"{key}={content(one, route(key))!r}").scenario
-        assert (one.controller, one.estimator) == (again.controller, again.estimator)
+    for draw in rest:
+        again = loaded(*others, f"{key}={content(draw, route(key))!r}").scenario
+        assert (draw.controller, draw.estimator) == (again.controller, again.estimator)
 
 
 def test_numbers_of_the_scenario_stay_where_others_follow_a_draw():
@@ -228,31 +228,31 @@ def test_numbers_of_the_scenario_stay_where_others_follow_a_draw():
         "controller.k_p=0.21",
     )
     assert (
-        len({one.controller.U for one in others})
+        len({other.controller.U for other in others})
         == 4
-        == len({one.controller.a_m for one in others})
+        == len({other.controller.a_m for other in others})
     )
-    assert {one.controller.k_p for one in others} == {0.21}
+    assert {other.controller.k_p for other in others} == {0.21}
 
 
 def test_a_drawn_noise_is_what_the_filter_assumes():
     seeing = ("measurement={kind: sensors}", "estimator={kind: ekf, sigma_psi: 0.01}")
     _, *others = each("measurement.position.noise: {choice: [0.05, 0.5]}", *seeing)
-    assert all(one.estimator.sigma_p == one.measurement.position.noise for one in others)
-    assert {one.estimator.sigma_psi for one in others} == {0.01}
+    assert all(other.estimator.sigma_p == other.measurement.position.noise for other in others)
+    assert {other.estimator.sigma_psi for other in others} == {0.01}
 
 
 def test_runs_side_by_side_have_the_bits_that_they_have_alone():
     _, *others = each("nominal.m: {uniform: [120.0, 240.0]}", "simulation.duration=4.0")
     grid = others[0].time_grid()
     done = simulate_many(
-        [one.closed_loop() for one in others],
+        [other.closed_loop() for other in others],
         grid,
         probe=others[0].probe(),
         side_by_side=True,
     )
-    for place, one in enumerate(others):
-        alone = simulate_many([one.closed_loop()], grid, probe=one.probe())
+    for place, other in enumerate(others):
+        alone = simulate_many([other.closed_loop()], grid, probe=other.probe())
         assert np.array_equal(done.seen[place], alone.seen[0], equal_nan=True)
 
 
@@ -294,10 +294,10 @@ def test_a_batch_from_python_follows_what_its_runs_are_told():
     base = loaded("simulation.duration=3.0").scenario
     table = package.simulate_many(base, {"nominal.X_uu": [-300.0, -80.0]})
     for row, number in enumerate((-300.0, -80.0)):
-        one = loaded("simulation.duration=3.0", f"nominal.X_uu={number}").scenario
-        probe = one.probe()
+        scenario = loaded("simulation.duration=3.0", f"nominal.X_uu={number}").scenario
+        probe = scenario.probe()
         alone = probe.summaries(
-            simulate_many([one.closed_loop()], one.time_grid(), probe=probe).seen
+            simulate_many([scenario.closed_loop()], scenario.time_grid(), probe=probe).seen
         )
         assert table.loc[row, "energy"] == alone["energy"][0]
 

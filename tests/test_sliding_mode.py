@@ -34,7 +34,7 @@ def constants(law: SlidingMode) -> Any:
 def against(s: Any) -> float:
     """s . reach(s) of both axes, without loads."""
     k = constants(LAYER)
-    return float(sum(one * reach(one, 0.0, k) for one in s))
+    return float(sum(number * reach(number, 0.0, k) for number in s))
 
 
 @pytest.mark.parametrize("share", [0.3, 0.95])
@@ -65,7 +65,7 @@ def test_the_missing_velocity_comes_into_the_ball_of_the_bound_and_stays(share):
     k, s, lengths, step = constants(LAYER), np.array([0.8, -0.3]), [], 1e-3
     for _ in range(8000):
         turned = 0.4 * np.array([s[1], -s[0]])
-        answer = np.array([reach(one, 0.0, k) for one in s])
+        answer = np.array([reach(number, 0.0, k) for number in s])
         s = s + step * (turned - answer + D * s / np.hypot(*s))
         lengths.append(np.hypot(*s))
     inside = np.array(lengths) <= ball

@@ -38,7 +38,7 @@ def test_the_ittc_spectrum_is_the_published_one(period, A, B):
 
 @pytest.mark.parametrize("gamma", [1.0, 3.3, 7.0])
 def test_periods_are_those_of_the_moments(gamma):
-    mean, crossing = (spectra.peak_period(gamma, one) for one in ("mean", "zero_crossing"))
+    mean, crossing = (spectra.peak_period(gamma, kind) for kind in ("mean", "zero_crossing"))
     assert moment(1, gamma) / moment(0, gamma) / PEAK == pytest.approx(mean, rel=1e-3)
     found = math.sqrt(moment(2, gamma) / moment(0, gamma)) / PEAK
     assert found == pytest.approx(crossing, rel=2e-3)

@@ -103,7 +103,7 @@ def test_a_cluster_without_workers_is_refused():
 def test_which_worker_made_which_draws_is_told(tmp_path):
     _, executor, (_, whole) = marched(tmp_path / "study", stub("ab"))
     assert whole
-    told = {one["worker"]: one["units"] for one in executor.provenance()["workers"]}
+    told = {worker["worker"]: worker["units"] for worker in executor.provenance()["workers"]}
     assert told["a"] == ["pid[0] draws 0 to 39"]
     assert told["b"] == ["li[0] draws 0 to 39"]
 

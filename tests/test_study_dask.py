@@ -80,9 +80,9 @@ def test_dask_as_a_user_starts_it_and_an_interrupt(distributed, tmp_path):
     one, other = ((tmp_path / name / RUNS).read_bytes() for name in ("study", "local"))
     assert one == other
     sittings = json.loads((tmp_path / "study/provenance.json").read_text())["sittings"]
-    assert sum(one["runs"] for one in sittings) == 2000
+    assert sum(sitting["runs"] for sitting in sittings) == 2000
     assert sittings[0]["runs"] > 0
-    assert {len(one["workers"]) for one in sittings} <= {1, 2}
+    assert {len(sitting["workers"]) for sitting in sittings} <= {1, 2}
 
 
 @contextmanager

@@ -98,12 +98,14 @@ def test_draws_do_not_depend_on_chunks_order_or_other_quantities(design: str) ->
     whole = list(draws(sweep, 0, 50))
     parts = [(first, min(7, 50 - first)) for first in range(0, 50, 7)]
     random.Random(1).shuffle(parts)
-    pieces = {first + i: one for first, n in parts for i, one in enumerate(draws(sweep, first, n))}
+    pieces = {
+        first + i: draw for first, n in parts for i, draw in enumerate(draws(sweep, first, n))
+    }
     assert [pieces[i] for i in range(50)] == whole
     if design == "random":
         fewer = {n: q for n, q in reversed(sweep.vary.items()) if n != "damping"}
         less = list(draws(sweep.model_copy(update={"vary": fewer}), 0, 50))
-        assert less == [{n: one[n] for n in fewer} for one in whole]
+        assert less == [{n: draw[n] for n in fewer} for draw in whole]
 
 
 def test_other_seeds_streams_and_names_give_other_draws() -> None:
@@ -184,10 +186,10 @@ def test_a_draw_out_of_range_names_quantity_value_key_and_range(draw: Any, words
 
 
 def test_applying_a_draw_takes_few_calls() -> None:
-    one, sweep = scenario(), swept()
+    single, sweep = scenario(), swept()
     several = [{n: d[n] for n in d if n != "log.every"} for d in draws(sweep, 0, 20)]
-    drawn(one, sweep.vary, several[0])
-    _, calls = counted(lambda: [drawn(one, sweep.vary, draw) for draw in several])
+    drawn(single, sweep.vary, several[0])
+    _, calls = counted(lambda: [drawn(single, sweep.vary, draw) for draw in several])
     assert calls / 20 < 350  # 0.15 ms
 
 
@@ -219,7 +221,7 @@ def with_kind(folder: str, kind: type[Component]) -> Scenario:
 def awkward(own: float) -> list[float]:
     """Values off the grid of steps, below all ranges, far beyond, and at the end of many."""
     numbers = [own + 0.0037, 3.0 * own + 0.02, -own - 1.0, own * 1e9, 0.0]
-    return [int(one) for one in numbers] if isinstance(own, int) else numbers
+    return [int(number) for number in numbers] if isinstance(own, int) else numbers
 
 
 def answers(scenario: Scenario, key: str, number: float) -> tuple[str, str]:

@@ -192,7 +192,7 @@ def test_every_sitting_is_kept(study, tmp_path):
         run(config, part, overrides=["sweep.draws=4"], shard=(number, 2))
     merged = merge(parts, tmp_path / "merged", sweep.Request(figures=False))
     told = json.loads((merged.folder / "provenance.json").read_text())["sittings"]
-    assert [one["runs"] for one in told] == [4, 4, 0]
+    assert [session["runs"] for session in told] == [4, 4, 0]
 
 
 def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):

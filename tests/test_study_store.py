@@ -39,9 +39,9 @@ def test_a_run_of_the_table_is_the_run_that_simulate_makes(whole):
     runs, plan = whole.runs(), small()
     for law, number in (("pid", 0), ("li", 39)):
         (draw,) = draws(plan.sweep, number, 1)
-        one = drawn(plan.single(law, 0), plan.sweep.vary, draw)
-        probe = one.probe()
-        log = simulate(one.closed_loop(), one.time_grid(), probe=probe)
+        single = drawn(plan.single(law, 0), plan.sweep.vary, draw)
+        probe = single.probe()
+        log = simulate(single.closed_loop(), single.time_grid(), probe=probe)
         alone = probe.summary(log.seen)
         for name in runs.metrics:
             assert np.array_equal(runs.metric(law, name)[0, number], alone[name], equal_nan=True)
@@ -215,7 +215,7 @@ def test_times_of_all_sittings_are_added_up(tmp_path):
         )
         sweep.run(config, request, lambda tally: None)
     told = json.loads((tmp_path / "s/timing.json").read_text())
-    assert [one["runs"] for one in told["sittings"]] == [16, 32]
+    assert [sitting["runs"] for sitting in told["sittings"]] == [16, 32]
     for law in ("pid", "li"):
         found = told["laws"][law]
         assert found["runs"] == 24
@@ -229,7 +229,7 @@ def test_a_sitting_keeps_those_that_others_noted_meanwhile(tmp_path):
     for _ in range(3):
         SessionLog(tmp_path, ["report"], now, ()).end(0)
     driver.end(7)
-    assert [one["runs"] for one in sessions(tmp_path)] == [7, 0, 0, 0]
+    assert [session["runs"] for session in sessions(tmp_path)] == [7, 0, 0, 0]
 
 
 def test_draws_beyond_those_asked_for_are_refused(whole, tmp_path):

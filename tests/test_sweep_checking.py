@@ -201,9 +201,9 @@ def test_what_changes_the_structure_of_the_loop_belongs_in_the_grid(key: str, va
 def test_only_who_asks_for_the_study_is_told_of_keys() -> None:
     """`run`, `compare`, `plot` and `verify` ignore the sweep."""
     scenario = load_text(BASE + vary("vessel.mm: {angle: all}"), "a.yaml").scenario
-    for one in (*scenario.singles().values(), scenario.alone()):
-        assert one.sweep is None
-        assert "sweep" not in resolved_yaml(one)
+    for single in (*scenario.singles().values(), scenario.alone()):
+        assert single.sweep is None
+        assert "sweep" not in resolved_yaml(single)
 
 
 def test_the_loader_knows_all_ways_to_draw() -> None:
@@ -230,9 +230,9 @@ def test_all_draws_that_a_run_could_not_take_are_counted(text: str) -> None:
     laws = list(singles(loaded.scenario).values())
     reasons: list[tuple[int, str]] = []
     for i, draw in enumerate(draws(sweep, 0, 60)):
-        for one in laws:
+        for law in laws:
             try:
-                drawn(one, sweep.vary, draw)
+                drawn(law, sweep.vary, draw)
             except ValueRefused as error:
                 reasons.append((i, str(error)))
     found = invalid_runs(laws, sweep)
@@ -301,10 +301,10 @@ def test_a_quantity_of_one_of_several_disturbances():
     sweep = '  draws: 5\n  vary: {flow: {keys: ["disturbance[1].speed"], uniform: [%s, %s]}}\n'
     scenario = load_text(several + sweep % (0.1, 1), "a.yaml", checks=[sweep_faults]).scenario
     each = [drawn(scenario, scenario.sweep.vary, draw) for draw in draws(scenario.sweep, 0, 5)]
-    speeds = [one.disturbance[1].speed for one in each]
+    speeds = [run.disturbance[1].speed for run in each]
     assert len(set(speeds)) == 5
     assert all(0.1 < speed < 1.0 for speed in speeds)
-    assert {one.disturbance[0] for one in each} == {scenario.disturbance[0]}
+    assert {run.disturbance[0] for run in each} == {scenario.disturbance[0]}
     with pytest.raises(ScenarioError, match=re.escape("disturbance[1].speed")):
         load_text(several + sweep % (-2, -1), "a.yaml", checks=[sweep_faults])
     other = sweep.replace("disturbance[1]", "disturbance.1")

@@ -65,8 +65,8 @@ def test_failed_draws_count_as_not_settled_and_half_of_the_draws_are_enough(done
     monkeypatch.setattr(
         type(done.results.plan.scenario), "at_target", lambda scenario, numbers: True
     )
-    for name, one in zip(FAILED, draws, strict=True):
-        monkeypatch.setattr(type(done.results), "met", lambda results, law, one=one: one)
+    for name, draw in zip(FAILED, draws, strict=True):
+        monkeypatch.setattr(type(done.results), "met", lambda results, law, one=draw: one)
         assert done.results.settles("toy", "before") == (name == "half")
 
 

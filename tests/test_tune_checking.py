@@ -223,7 +223,7 @@ def test_the_streams_reach_the_runs(tmp_path):
         made.variant({law: (law, {}) for law in made.laws}, stream, 10)
         for stream in (TRAIN, VALIDATE)
     ]
-    drawn = [table(one.sweep, 0, 10, one.stream)["start.psi"].tolist() for one in plans]
+    drawn = [table(plan.sweep, 0, 10, plan.stream)["start.psi"].tolist() for plan in plans]
     own = table(made.scenario.sweep, 0, 10)["start.psi"].tolist()
     assert len({*drawn[0], *drawn[1], *own}) == 30
     assert plans[0].identity["stream"] != plans[1].identity["stream"]
@@ -239,4 +239,4 @@ def test_validate_tells_gains_runs_and_laws_without_gains(podusv, tmp_path):
 
 def test_a_comparison_ignores_the_search(tmp_path):
     made = planned(tmp_path).scenario
-    assert all(one.tune is None and one.sweep is None for one in made.singles().values())
+    assert all(single.tune is None and single.sweep is None for single in made.singles().values())

@@ -94,7 +94,7 @@ def test_a_cluster_gives_the_bytes_of_this_machine(near, tmp_path):
     assert sum(unit.count for unit in near.made) == 2 * 40 + fresh
     assert 1 < near.most <= 4
     (told,) = json.loads((far.folder / "provenance.json").read_text())["sittings"]
-    assert [one["runs"] for one in told["workers"]] == [2 * 40 + fresh]
+    assert [worker["runs"] for worker in told["workers"]] == [2 * 40 + fresh]
 
 
 def test_a_trial_that_ends_its_worker_fails_and_no_other(near, tmp_path):

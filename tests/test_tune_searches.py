@@ -31,9 +31,9 @@ def test_a_law_counts_by_the_median_of_its_searches_and_its_spread_is_in_the_int
 def test_searches_that_fail_in_draws_of_their_own_do_not_make_a_law_that_never_fails():
     """Each search fails in its own three fifths of the draws."""
     broken = np.tile(0.9 * BASE, (5, 1))
-    for search, one in enumerate(broken):
-        one[[(search + i) % 5 for i in range(3)]] = np.inf
-        one.reshape(-1, 5)[:, [(search + i) % 5 for i in range(3)]] = np.inf
+    for search, reached in enumerate(broken):
+        reached[[(search + i) % 5 for i in range(3)]] = np.inf
+        reached.reshape(-1, 5)[:, [(search + i) % 5 for i in range(3)]] = np.inf
     found = row(searches.ratios({"a": broken, "b": BASE[None]}, 0.95, 1), "a", "b")
     assert found["ratio"] == np.inf
 

@@ -59,10 +59,10 @@ def reference() -> Any:
     wanted = sp.Matrix(at[2:]).diff(t) + kappa * e
     both = [*wanted, *wanted.diff(t)]
     numbers = sp.symbols("x y x_d y_d dx dy dx_d dy_d ddx_d ddy_d")
-    swaps = list(zip([one.diff(t, 2) for one in at[2:]], numbers[8:], strict=True))
-    swaps += list(zip([one.diff(t) for one in at], numbers[4:8], strict=True))
+    swaps = list(zip([state.diff(t, 2) for state in at[2:]], numbers[8:], strict=True))
+    swaps += list(zip([state.diff(t) for state in at], numbers[4:8], strict=True))
     swaps += list(zip(at, numbers[:4], strict=True))
-    return sp.lambdify((*numbers, k_p, s_max), [one.subs(swaps) for one in both])
+    return sp.lambdify((*numbers, k_p, s_max), [expression.subs(swaps) for expression in both])
 
 
 def test_the_wanted_velocity_and_its_rate_are_those_of_the_derivation():
@@ -213,11 +213,11 @@ def test_port_and_starboard_are_alike():
     """Mirrored in the x axis, demands in yaw change sign and nothing else does."""
     mirror = np.array([1, -1, -1, 1, -1, -1.0])
     for x, memory, target in situations(LAW, 30):
-        one = ask(LAW, x, memory, target, NONLINEAR)
+        answer = ask(LAW, x, memory, target, NONLINEAR)
         flip = np.array([1, -1, 1, -1, 1, -1.0])
         other = ask(LAW, x * mirror, memory * np.array([1, -1, -1] * 2), target * flip, NONLINEAR)
-        np.testing.assert_allclose(other.tau, one.tau * [1, -1], rtol=1e-9, atol=1e-9)
-        assert wrap(other.signals["chi_e"] + one.signals["chi_e"]) == pytest.approx(0, abs=1e-9)
+        np.testing.assert_allclose(other.tau, answer.tau * [1, -1], rtol=1e-9, atol=1e-9)
+        assert wrap(other.signals["chi_e"] + answer.signals["chi_e"]) == pytest.approx(0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("ahead", "heading"), [(15.0, 0.0), (10.0, -0.7)])

@@ -65,7 +65,7 @@ def test_pid_no_longer_overruns_the_target_and_goes_on_astern():
 @pytest.mark.parametrize("kind", [AdaptiveNeural, FullBackstepping])
 def test_behind_a_real_pod_it_decides_whether_the_law_tracks(kind):
     slow = {"n_rate": 200.0, "n_lag": 0.1, "angle_rate": 1.75, "angle_lag": 0.1}
-    pair = pods(*({**one, **slow} for one in TWIN))
+    pair = pods(*({**pod, **slow} for pod in TWIN))
     without, with_it = both(kind, 100.0, actuator=pair, start=PRINTED_START)
     assert without["z_e"][-1] > 5.0
     assert with_it["z_e"][-1] == pytest.approx(0.5, abs=0.2)

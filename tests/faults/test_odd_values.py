@@ -78,8 +78,8 @@ def verdict(text: str) -> str:
         checks = (unknown_codes, limits(), sweep_faults, tune_faults)
         loaded = load_text(text, "odd.yaml", (), checks)
         parse_claims(loaded)
-        for one in loaded.scenario.singles().values():
-            ready(one.plan(), compiled=False)
+        for single in loaded.scenario.singles().values():
+            ready(single.plan(), compiled=False)
         preflight(loaded.scenario)
         if loaded.scenario.sweep:
             plan(loaded)

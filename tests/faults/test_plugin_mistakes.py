@@ -157,7 +157,7 @@ def test_threads_find_a_whole_module():
     text = f"import time\ntime.sleep(0.05)\nWHOLE = {id(object())}\n"
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda _: plugins.from_file("slow.py", text), range(4)))
-    assert all("WHOLE" in vars(module) for one in found for _, module in one.offers)
+    assert all("WHOLE" in vars(module) for plugin in found for _, module in plugin.offers)
 
 
 def test_a_package_s_digest_tells_where_its_files_are(tmp_path, monkeypatch):

@@ -92,7 +92,7 @@ def verdict(path: Path) -> str:
         parse_claims(loaded)
         made = [cell.scenario for cell in cells(loaded, sweep_faults)]
         if sweep := loaded.scenario.sweep:
-            runs = [one for scenario in made for one in singles(scenario).values()]
+            runs = [single for scenario in made for single in singles(scenario).values()]
             invalid_runs(runs, sweep, 20 * len(runs))
     except ScenarioError as error:
         return str(error)
