@@ -95,8 +95,8 @@ def measures_the_vessel(sensors: Measurement) -> None:
     for i, state in enumerate(STATE):
         came = rows[:, FRESH + i] == 1.0
         if came.sum() > 2:
-            told = np.corrcoef(rows[came, i], true[came, i])[0, 1]
-            assert told > 0.5, f"{state.name}: correlation {told:.2g} with the truth"
+            correlation = np.corrcoef(rows[came, i], true[came, i])[0, 1]
+            assert correlation > 0.5, f"{state.name}: correlation {correlation:.2g} with the truth"
 
 
 def errs_alike_in_a_longer_run(sensors: Measurement) -> None:

@@ -151,8 +151,8 @@ def laws(context: typer.Context, incomplete: str) -> Offered:
     from pathlib import Path
 
     try:
-        told = json.loads((Path(context.params["study"]) / "study.json").read_text())
-        return _beginning(incomplete, dict.fromkeys(map(str, told["laws"]), ""))
+        about = json.loads((Path(context.params["study"]) / "study.json").read_text())
+        return _beginning(incomplete, dict.fromkeys(map(str, about["laws"]), ""))
     except (KeyError, TypeError, OSError, ValueError):
         return []  # no study, or none that can be read: there is no place for a message
 

@@ -106,10 +106,10 @@ def _size(presets: Presets, name: str, plugins: Known) -> str:
     """Length, beam and mass of a vessel; nothing of other presets."""
     from podusv_cli.scenario.presets import preset_text
 
-    told = {key: preset_text(presets, name, key, plugins) for key in SIZES}
+    sizes = {key: preset_text(presets, name, key, plugins) for key in SIZES}
     return ", ".join(
         f"{key if key != 'm' else 'mass'} {number} {SIZES[key]}"
-        for key, number in told.items()
+        for key, number in sizes.items()
         if number != "None"
     )
 

@@ -79,11 +79,11 @@ def unknown(what: str, word: str, known: Iterable[str], listed: str = "") -> str
     Of many words the nearest, if there is a command that lists all of them.
     """
     words = list(known)
-    told = ", ".join(words)
+    allowed = ", ".join(words)
     if listed and len(words) > MOST:
         near = get_close_matches(word, words, n=NEAREST, cutoff=0.0)
-        told = f"{', '.join(near)} and {len(words) - len(near)} more, see {listed}"
-    return f"unknown {what}{did_you_mean(word, words)} (allowed: {told})"
+        allowed = f"{', '.join(near)} and {len(words) - len(near)} more, see {listed}"
+    return f"unknown {what}{did_you_mean(word, words)} (allowed: {allowed})"
 
 
 # Text that looks like a value of another type, and how to write that value.

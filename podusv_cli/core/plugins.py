@@ -137,8 +137,8 @@ def _fault(error: BaseException, path: str) -> str:
         return visible(f"{type(error).__name__}: {error}")
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
     place = f" ({Path(path).name}, line {lines[-1]})" if lines else ""
-    told = " ".join(str(error).split("\n\nFor further information")[0].split())
-    return visible(f"{type(error).__name__}: {told}{place}")
+    message = " ".join(str(error).split("\n\nFor further information")[0].split())
+    return visible(f"{type(error).__name__}: {message}{place}")
 
 
 @cache

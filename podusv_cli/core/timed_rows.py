@@ -119,8 +119,8 @@ def columns(header: Line, names: Sequence[str], noun: str) -> list[int]:
     strange = [i for i, cell in enumerate(cells, 1) if cell not in known]
     if None in places or len(cells) != len(names):
         found = f"column {strange[0]} is none of these" if strange else "one is missing or twice"
-        told = f"line {header.number} of {noun} names columns that are not {', '.join(names)}"
-        raise ValueError(f"{told} (in any order, units may be left out): {found}")
+        fault = f"line {header.number} of {noun} names columns that are not {', '.join(names)}"
+        raise ValueError(f"{fault} (in any order, units may be left out): {found}")
     return [place for place in places if place is not None]
 
 

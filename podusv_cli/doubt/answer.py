@@ -171,7 +171,7 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Told:
+class DoubtReport:
     """What figures and page are about: a scenario, the answers on its claims, what was tried."""
 
     scenario: Scenario

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.doubt.alone import Alone, ends
-from podusv_cli.doubt.answer import Answer, Told, place
+from podusv_cli.doubt.answer import Answer, DoubtReport, place
 from podusv_cli.doubt.together import counted
 from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.style import legend, new_figure
@@ -25,11 +25,13 @@ ROW, LANE = 0.19, 0.3  # inches
 WIDE = 34  # letters of an axis' name on a line
 
 
-def sketches(told: Told) -> Iterator[Sketch]:
+def sketches(report: DoubtReport) -> Iterator[Sketch]:
     """For every claim the specification curve, and a row for each choice that turns it."""
-    for answer in told.answers:
+    for answer in report.answers:
         name = answer.verdict.name
-        acting = [a for a in told.tried.alone if a.choice.range and a.acts(name, told.tried.base)]
+        acting = [
+            a for a in report.tried.alone if a.choice.range and a.acts(name, report.tried.base)
+        ]
         turning = {turn.choice.name for turn in (*answer.turns, *answer.neighbours)}
         rows = [alone for alone in acting if alone.choice.name in turning]
         if acting and math.isfinite(answer.spread[1]):
@@ -37,7 +39,7 @@ def sketches(told: Told) -> Iterator[Sketch]:
                 f"specification-{name}",
                 f"{name}: its number in all draws, sorted, and what was drawn: each column is one "
                 "draw, a mark's height in its lane is where the value is in its range",
-                partial(specification, told, answer, acting),
+                partial(specification, report, answer, acting),
             )
         if rows:
             yield Sketch(
@@ -49,14 +51,14 @@ def sketches(told: Told) -> Iterator[Sketch]:
             )
 
 
-def specification(told: Told, answer: Answer, acting: Sequence[Alone]) -> Figure:
+def specification(report: DoubtReport, answer: Answer, acting: Sequence[Alone]) -> Figure:
     """A claim's number over the draws, sorted, with what was drawn below."""
-    tried, name = told.tried, answer.verdict.name
+    tried, name = report.tried, answer.verdict.name
     number = answer.number
     numbers = np.array([number.of(world.numbers.get(name, {})) for world in tried.worlds])
     turned, _ = counted(name, tried.worlds, tried.base)
     order = [i for i in np.argsort(numbers) if np.isfinite(numbers[i])]
-    lanes = _lanes(told, answer, {a.choice.name for a in acting}, numbers[order], order)
+    lanes = _lanes(report, answer, {a.choice.name for a in acting}, numbers[order], order)
     figure = new_figure(COLUMNS, 2.2 + LANE * len(lanes))
     top, below = figure.subplots(
         2, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, LANE * len(lanes)]}
@@ -81,10 +83,10 @@ def specification(told: Told, answer: Answer, acting: Sequence[Alone]) -> Figure
 
 
 def _lanes(
-    told: Told, answer: Answer, acting: set[str], numbers: Vector, order: Sequence[int]
+    report: DoubtReport, answer: Answer, acting: set[str], numbers: Vector, order: Sequence[int]
 ) -> list[int]:
     """The columns of the draws that explain the turns, then those that the number follows."""
-    draws = told.tried.draws
+    draws = report.tried.draws
     ranks = np.argsort(np.argsort(numbers))
 
     def follows(column: int) -> float:

@@ -12,7 +12,7 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import as_yaml, value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.doubt.alone import ends
-from podusv_cli.doubt.answer import Answer, Told, as_json, place
+from podusv_cli.doubt.answer import Answer, DoubtReport, as_json, place
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
@@ -64,24 +64,25 @@ def row(answer: Answer) -> list[str]:
 
 
 def write(
-    writer: RunWriter, told: Told, text: str, origin: Mapping[str, Any], extras: Extras, *,
+    writer: RunWriter, report: DoubtReport, text: str, origin: Mapping[str, Any], extras: Extras, *,
     figures: bool,
 ) -> None:  # fmt: skip
     """All files of the folder but the manifest; `text` is the scenario's file."""
     writer.add("scenario.yaml", text.encode())
-    for name, text in told.scenario.plugin_files().items():
+    for name, text in report.scenario.plugin_files().items():
         writer.add(name, text.encode())
     writer.add(
-        "doubt.json", json_files.encode({"claims": [as_json(answer) for answer in told.answers]})
+        "doubt.json", json_files.encode({"claims": [as_json(answer) for answer in report.answers]})
     )
     for name, rows in {
-        "doubt.csv": table(told.answers), "turns.csv": _turns(told), "draws.csv": _draws(told),
+        "doubt.csv": table(report.answers), "turns.csv": _turns(report),
+        "draws.csv": _draws(report),
     }.items():  # fmt: skip
         writer.add(name, csv_files.lines(rows).encode())
-    pictures = _pictures(told, extras) if figures else []
+    pictures = _pictures(report, extras) if figures else []
     for picture in pictures:
         writer.add(f"figures/{picture.name}.png", picture.file)
-    writer.add("report.html", page(told, pictures, origin).encode())
+    writer.add("report.html", page(report, pictures, origin).encode())
     writer.add_json("provenance.json", origin)
     writer.add_missing(extras)
 
@@ -102,9 +103,9 @@ def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
         )  # fmt: skip
 
 
-def _turns(told: Told) -> Iterator[Sequence[Any]]:
+def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
     yield "claim", "key", "own", "turns_at", "held", "unit", "distance", "share", "task"
-    for answer in told.answers:
+    for answer in report.answers:
         for turn in (*answer.turns, *answer.neighbours):
             yield (
                 answer.verdict.name, turn.choice.name, turn.choice.own, turn.value, turn.held,
@@ -112,41 +113,41 @@ def _turns(told: Told) -> Iterator[Sequence[Any]]:
             )  # fmt: skip
 
 
-def _draws(told: Told) -> Iterator[Sequence[Any]]:
-    names = [(claim, text) for claim, own in told.tried.base.numbers.items() for text in own]
+def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
+    names = [(claim, text) for claim, own in report.tried.base.numbers.items() for text in own]
     yield (
-        "draw", *(choice.name for choice in told.tried.draws.choices), *told.tried.base.answers,
+        "draw", *(choice.name for choice in report.tried.draws.choices), *report.tried.base.answers,
         *(f"{claim}: {text}" for claim, text in names), "failed",
     )  # fmt: skip
-    for i, world in enumerate(told.tried.worlds):
-        answers = (world.answers.get(claim) for claim in told.tried.base.answers)
+    for i, world in enumerate(report.tried.worlds):
+        answers = (world.answers.get(claim) for claim in report.tried.base.answers)
         numbers = (world.numbers.get(claim, {}).get(text, math.nan) for claim, text in names)
-        yield i, *told.tried.draws.values[i], *answers, *numbers, visible(world.failed)
+        yield i, *report.tried.draws.values[i], *answers, *numbers, visible(world.failed)
 
 
-def _pictures(told: Told, extras: Extras) -> list[Picture]:
+def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
     from podusv_cli.doubt.figures import sketches  # matplotlib is slow to import
     from podusv_cli.studies.sketch import rendered
 
-    return rendered(sketches(told), extras)[1]
+    return rendered(sketches(report), extras)[1]
 
 
-def page(told: Told, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
+def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
     """The page."""
     by_claim = {
         answer.verdict.name: [
             (i, p) for i, p in enumerate(pictures, 1) if p.name.endswith(f"-{answer.verdict.name}")
         ]
-        for answer in told.answers
+        for answer in report.answers
     }
     return environment("podusv_cli.doubt").get_template("doubt.html.j2").render(
-        title=f"What the verdicts of {told.scenario.name} hang on",
-        scenario=told.scenario, answers=told.answers, head=HEAD,
-        rows={answer.verdict.name: row(answer) for answer in told.answers},
-        place=place, in_words=in_words, pictures=by_claim, draws=len(told.tried.worlds),
+        title=f"What the verdicts of {report.scenario.name} hang on",
+        scenario=report.scenario, answers=report.answers, head=HEAD,
+        rows={answer.verdict.name: row(answer) for answer in report.answers},
+        place=place, in_words=in_words, pictures=by_claim, draws=len(report.tried.worlds),
         moved=[
             (c.name, value_text(c.own), _moves(c), c.task)
-            for c in (alone.choice for alone in told.tried.alone)
+            for c in (alone.choice for alone in report.tried.alone)
         ],
         provenance=[(key, value_text(value)) for key, value in flat(origin)],
     )  # fmt: skip

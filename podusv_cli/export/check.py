@@ -133,8 +133,8 @@ def _compared(what: str, samples: Vector, about: About, step: Step) -> Checked:
         out = step(row[:given])
         for name, one, other in zip(names[given:], out, row[given:], strict=True):
             if struct.pack("d", one) != struct.pack("d", other):
-                told = f"t = {row[0]:g} s: {name} is {one!r}, and is {float(other)!r} in {SAMPLES}"
-                return Checked(what, len(samples), whose, told)
+                where = f"t = {row[0]:g} s: {name} is {one!r}, and is {float(other)!r} in {SAMPLES}"
+                return Checked(what, len(samples), whose, where)
     return Checked(what, len(samples), whose)
 
 

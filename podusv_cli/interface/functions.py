@@ -269,8 +269,8 @@ def _opened(member: Member) -> Run:
     run = member.run
     assert run is not None  # the members of a folder are finished
     numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
-    told = json_files.read(run.folder / "metrics.json").get("warnings", [])
-    warned = tuple(str(Finding(**warning)) for warning in told)
+    warnings = json_files.read(run.folder / "metrics.json").get("warnings", [])
+    warned = tuple(str(Finding(**warning)) for warning in warnings)
     law, log = run.recording.controller, run.recording
     return Run(law, member.about, log, numbers, warned, run.folder)
 

@@ -71,8 +71,8 @@ class Task:
                 "path is followed, take e_ct_integral in place of iae"
             )
         if reward not in known:
-            told = unknown(f"reward {reward!r}", reward, known, "podusv list")
-            raise UsageError(f"podusv.gym: {told}")
+            sentence = unknown(f"reward {reward!r}", reward, known, "podusv list")
+            raise UsageError(f"podusv.gym: {sentence}")
         return reward
 
     def _limits(self, given: Limits | None) -> Vector:

@@ -55,8 +55,8 @@ class Numbers(pd.Series):
         try:
             return super().__getitem__(name)
         except KeyError:
-            told = unknown(f"metric {name!r} of this run", str(name), map(str, self.index))
-            raise KeyError(told) from None
+            sentence = unknown(f"metric {name!r} of this run", str(name), map(str, self.index))
+            raise KeyError(sentence) from None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -219,10 +219,10 @@ def tune(
     config, overrides = _config(source, changes)
     request = Request(overrides, _path(out), workers, figures=figures, trust=trust)
     done = searching.tune(config, request, lambda tally, text: None)
-    told = done.as_json()
+    answer = done.as_json()
     return Tuning(
-        done.folder, done.results.laws, pd.DataFrame(told["gains"]).rename_axis("gain"),
-        tuple(told["remarks"]),
+        done.folder, done.results.laws, pd.DataFrame(answer["gains"]).rename_axis("gain"),
+        tuple(answer["remarks"]),
     )  # fmt: skip
 
 

@@ -89,12 +89,12 @@ def searched(
     count = len(guesses) + GRIDS - 1
     stages: list[Stage] = []
     for start, guess in guesses.items():
-        told = partial(_tell, tell, len(stages), count)
-        stages.append(_solved(_Program(problem, n, told), start, guess))
+        report = partial(_tell, tell, len(stages), count)
+        stages.append(_solved(_Program(problem, n, report), start, guess))
     best = min(stages, key=lambda stage: (stage.motion is None, stage.integral))
     for grid in range(1, GRIDS):
-        told = partial(_tell, tell, len(stages), count)
-        program = _Program(problem, n * 2**grid, told, warm={"ipopt.mu_init": BARRIER})
+        report = partial(_tell, tell, len(stages), count)
+        program = _Program(problem, n * 2**grid, report, warm={"ipopt.mu_init": BARRIER})
         best = _solved(program, best.start, _found(best))
         stages.append(best)
     return stages, _found(best)
@@ -170,10 +170,10 @@ class _Program:
                 x0=start, p=eps, lbx=low.ravel(), ubx=high.ravel(), lbg=0.0, ubg=0.0,
                 **self._multipliers,
             )  # fmt: skip
-        told = solver.stats()
-        self.iterations = int(told["iter_count"])
-        if not told["success"]:
-            raise NotConvergedError(f"IPOPT: {told['return_status']}")
+        stats = solver.stats()
+        self.iterations = int(stats["iter_count"])
+        if not stats["success"]:
+            raise NotConvergedError(f"IPOPT: {stats['return_status']}")
         self.warm = {"ipopt.mu_init": BARRIER, **WARM}
         self._multipliers = {"lam_g0": solution["lam_g"], "lam_x0": solution["lam_x"]}
         rows = np.array(solution["x"]).reshape(self.n + 1, UNKNOWNS).clip(low, high)

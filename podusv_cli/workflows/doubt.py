@@ -18,7 +18,7 @@ from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import Alone, explored
-from podusv_cli.doubt.answer import Told, Tried, answers, labels_of
+from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import HULL, Choice, Singles, choices
 from podusv_cli.doubt.events import nearest_event
@@ -68,11 +68,11 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
         interrupts_deferred(),
         RunWriter(target, force=request.force, named=request.out is not None) as writer,
     ):
-        told, extras = doubted(world, scenario, request, progress)
+        report, extras = doubted(world, scenario, request, progress)
         origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
-        outputs.write(writer, told, loaded.text, origin, extras, figures=request.figures)
+        outputs.write(writer, report, loaded.text, origin, extras, figures=request.figures)
         status: Status = "interrupted" if extras.interrupted else "finished"
-        return outputs.Doubted(writer.finish(status), told.answers, status, tuple(extras.missing))
+        return outputs.Doubted(writer.finish(status), report.answers, status, tuple(extras.missing))
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def comparison(loaded: Loaded) -> Compared:
 
 def doubted(
     compared: Compared, scenario: Scenario, request: Request, progress: Progress | None
-) -> tuple[Told, Extras]:
+) -> tuple[DoubtReport, Extras]:
     """All that is tried, and what it says of every claim."""
     for one in compared.singles.values():
         case = Case.of(one)
@@ -129,7 +129,7 @@ def doubted(
         for one in compared.parsed
     ]
     events = {one.name: nearest_event(one, entries) for one in compared.parsed}
-    return Told(scenario, answers(verdicts, tried, events), tried), extras
+    return DoubtReport(scenario, answers(verdicts, tried, events), tried), extras
 
 
 def search(

@@ -14,7 +14,7 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import Alone, Trial
-from podusv_cli.doubt.answer import Told, Tried, answers
+from podusv_cli.doubt.answer import DoubtReport, Tried, answers
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.of_study import overrides, study_choices
@@ -91,14 +91,14 @@ def doubt_study(
             f"interrupted; the studies that are made are kept, continue with: {again}"
         ) from stop
     tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
-    told = Told(scenario, answers(verdicts, tried), tried)
+    report = DoubtReport(scenario, answers(verdicts, tried), tried)
     origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
     extras = Extras()
     extras.missing += _failed(alone)
     with RunWriter(folder / "answer", force=True, named=True) as writer:
-        outputs.write(writer, told, loaded.text, origin, extras, figures=False)
+        outputs.write(writer, report, loaded.text, origin, extras, figures=False)
         at, missing = writer.finish("finished"), tuple(extras.missing)
-        return outputs.Doubted(at, told.answers, "finished", missing)
+        return outputs.Doubted(at, report.answers, "finished", missing)
 
 
 def _failed(alone: Sequence[Alone]) -> Iterator[Failure]:

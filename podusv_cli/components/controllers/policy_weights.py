@@ -56,9 +56,9 @@ def tensors(data: bytes) -> dict[str, Vector]:
         raise ValueError(
             "is no safetensors file; write it with safetensors.numpy.save_file"
         ) from None
-    numbers, told = data[begin:], header.__pydantic_extra__
-    arrays = {name: _numbers(name, tensor, numbers) for name, tensor in told.items()}
-    pieces = sorted(tensor.data_offsets for tensor in told.values())
+    numbers, entries = data[begin:], header.__pydantic_extra__
+    arrays = {name: _numbers(name, tensor, numbers) for name, tensor in entries.items()}
+    pieces = sorted(tensor.data_offsets for tensor in entries.values())
     if [0, *(end for _, end in pieces)] != [*(first for first, _ in pieces), len(numbers)]:
         raise ValueError("its header does not fit its numbers; save it again")
     return arrays

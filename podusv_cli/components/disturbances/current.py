@@ -73,8 +73,8 @@ class Current(Disturbance):
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
         """An interval that the step does not divide: a kink within a step costs accuracy."""
-        if not self._steady() and (told := misfit(self.interval, step)):
-            yield "interval", told
+        if not self._steady() and (fault := misfit(self.interval, step)):
+            yield "interval", fault
 
     @staticmethod
     @kernel

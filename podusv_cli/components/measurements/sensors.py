@@ -77,8 +77,8 @@ class Sensor(Component):
     def conflicts(self, step: float) -> Iterator[tuple[str, str]]:
         """Key and message for times that do not fit."""
         for key, time in (("period", self.period), ("delay", self.delay)):
-            if time and (told := misfit(time, step)):
-                yield key, told
+            if time and (fault := misfit(time, step)):
+                yield key, fault
         if (waiting := self.delay / self.period) > MOST_WAITING:
             text = f"{self.delay:g} s are {waiting:.3g} periods; at most {MOST_WAITING:,} can wait"
             yield "delay", text

@@ -132,11 +132,11 @@ class ClosedLoop:
             "disturbance": self.disturbance.conflicts(self.vessel, step),
             "measurement": self.measurement.conflicts(step),
         }
-        told = [f"{part}.{key}: {text}" for part, faults in parts.items() for key, text in faults]
+        texts = [f"{part}.{key}: {text}" for part, faults in parts.items() for key, text in faults]
         if lacking := self.estimator.lacking(self.measurement.measured()):
-            told.append(f"estimator: {lacking}")
-        if told:
-            raise LawError("; ".join(told))
+            texts.append(f"estimator: {lacking}")
+        if texts:
+            raise LawError("; ".join(texts))
 
     def estimated(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""

@@ -93,16 +93,16 @@ def inlined(function: Any) -> Any:
     return njit(**INNER)(_with_inlined(function))
 
 
-def in_short(told: str) -> str:
+def in_short(message: str) -> str:
     """What numba says of the innermost place, and where that is."""
-    reason = re.search(r"raised a specific error:\n +TypingError: (.*)", told)
+    reason = re.search(r"raised a specific error:\n +TypingError: (.*)", message)
     words = (
         reason[1]
         if reason
-        else told.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
+        else message.split("\n\nFile")[0].split("\nThere are")[0].split("\nDuring")[0]
     )
     kept = [line for line in words.splitlines() if not line.startswith("Failed in nopython mode")]
-    place = re.search(r'^File "([^"]+)", line (\d+):\n(?:.*\n)*?(.*)\n +\^', told, re.MULTILINE)
+    place = re.search(r'^File "([^"]+)", line (\d+):\n(?:.*\n)*?(.*)\n +\^', message, re.MULTILINE)
     where = f" ({Path(place[1]).name}, line {place[2]}: {place[3].strip()})" if place else ""
     return f"{' '.join(' '.join(kept).split())}{where}"
 

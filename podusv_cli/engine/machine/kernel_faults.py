@@ -128,8 +128,8 @@ def _unsupported(function: Any) -> str:
     if not node:
         return ""
     looks = (_without_code, _of_numpy)
-    told = ((part, look(part, function.__globals__)) for look in looks for part in _body(node))
-    marked = [(part.lineno, text) for part, text in told if text]  # type: ignore[attr-defined]
+    texts = ((part, look(part, function.__globals__)) for look in looks for part in _body(node))
+    marked = [(part.lineno, text) for part, text in texts if text]  # type: ignore[attr-defined]
     if line := _returns_at_times(node):
         marked.append((line, "it returns a value here only; always return one"))
     file = Path(function.__code__.co_filename).name

@@ -132,12 +132,12 @@ def _circumstances() -> tuple[str, ...]:
     return (*settings, *versions, *cpu, llvm.get_host_cpu_features().flatten())
 
 
-def ingredients(function: Any, told: dict[Any, int]) -> Iterator[str]:
+def ingredients(function: Any, numbered: dict[Any, int]) -> Iterator[str]:
     """Everything that the machine code of a kernel depends on, the kernels it calls included.
 
     `told` counts the functions and attributes of modules that have been told already.
     """
-    told[function] = len(told)
+    numbered[function] = len(numbered)
     names: dict[str, None] = {}
     for code in _codes(function.__code__):
         yield code.co_code.hex()
@@ -147,7 +147,7 @@ def ingredients(function: Any, told: dict[Any, int]) -> Iterator[str]:
     # Names of attributes are among these names, too. That one of them may add to the digest what
     # the kernel does not use does no harm.
     for name in names:
-        yield from _described(function.__globals__.get(name), names, told)
+        yield from _described(function.__globals__.get(name), names, numbered)
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
@@ -159,7 +159,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 @singledispatch
-def _described(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+def _described(thing: Any, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
     """What stands behind a name of a function that uses these names.
 
     A class or a function of a library is told by what it is called. What has no name is told by its
@@ -170,38 +170,38 @@ def _described(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterat
     fields = getattr(thing, "_fields", ())  # of a named tuple
     yield repr((getattr(thing, "__module__", ""), called or thing, fields, members))
     if source := getattr(thing, "py_func", None):  # of what numba's own decorators made
-        yield from _described(source, names, told)
+        yield from _described(source, names, numbered)
 
 
 @_described.register
-def _(thing: FunctionType, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
-    if thing in told:
-        yield str(told[thing])
+def _(thing: FunctionType, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
+    if thing in numbered:
+        yield str(numbered[thing])
     else:
-        yield from ingredients(thing, told)
+        yield from ingredients(thing, numbered)
 
 
 @_described.register
-def _(thing: ModuleType, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+def _(thing: ModuleType, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
     """A module, by what it has of these names: `settings.GAIN`."""
     yield thing.__name__
     for name in names:
-        if (thing, name) not in told and hasattr(thing, name):
-            told[thing, name] = len(told)
+        if (thing, name) not in numbered and hasattr(thing, name):
+            numbered[thing, name] = len(numbered)
             yield name
-            yield from _described(getattr(thing, name), names, told)
+            yield from _described(getattr(thing, name), names, numbered)
 
 
 @_described.register
-def _(thing: tuple, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:  # type: ignore[type-arg]
+def _(thing: tuple, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:  # type: ignore[type-arg]
     yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
     for item in thing:
-        yield from _described(item, names, told)
+        yield from _described(item, names, numbered)
 
 
 @_described.register(np.ndarray)
 @_described.register(np.generic)
-def _(thing: Any, names: Iterable[str], told: dict[Any, int]) -> Iterator[str]:
+def _(thing: Any, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
     yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
 
 

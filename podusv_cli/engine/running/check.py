@@ -77,8 +77,8 @@ def _constant(error: BaseException | None) -> str:
     names = error.obj._fields
     inherited = ["those of the nominal vessel"] if set(COEFFICIENTS) <= set(names) else []
     known = ", ".join(name for name in names if name not in COEFFICIENTS)
-    told = ", and ".join(filter(None, [known, *inherited]))
-    return f"{in_a_line(error)}; it has {told or 'none'}"
+    constants = ", and ".join(filter(None, [known, *inherited]))
+    return f"{in_a_line(error)}; it has {constants or 'none'}"
 
 
 def _check_declared(plan: Plan) -> None:

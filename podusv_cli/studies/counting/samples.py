@@ -155,9 +155,9 @@ def _alone(call: ast.Call, walk: OverLaws) -> Sampler:
         def count(where: Mask) -> int:
             return int(np.sum(where[cell] & used))
 
-        told = (first.yes | first.no) & (second.yes | second.no)
+        decided = (first.yes | first.no) & (second.yes | second.no)
         alone, other = count(first.yes & second.no), count(first.no & second.yes)
-        return Alone(label, int(used.sum()), count(~told), alone, differ=alone + other)
+        return Alone(label, int(used.sum()), count(~decided), alone, differ=alone + other)
 
     return sample
 

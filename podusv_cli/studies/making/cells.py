@@ -40,14 +40,14 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
     that is not given. `check` is made of each. Raises ScenarioError with all that is wrong.
     """
     _check_grid(loaded)
-    told: dict[Hashable, None] = {}
-    made = list(_made(loaded, check, told))
-    if told:
-        raise ScenarioError(list(told))
+    faults: dict[Hashable, None] = {}
+    made = list(_made(loaded, check, faults))
+    if faults:
+        raise ScenarioError(list(faults))
     return tuple(made)
 
 
-def _made(loaded: Loaded, check: Check | None, told: dict[Hashable, None]) -> Iterator[Cell]:
+def _made(loaded: Loaded, check: Check | None, faults: dict[Hashable, None]) -> Iterator[Cell]:
     grid = _grid(loaded)
     for index, nodes in enumerate(product(*grid.values())):
         each = [placed(key, node, loaded.root) for key, node in zip(grid, nodes, strict=True)]
@@ -57,7 +57,7 @@ def _made(loaded: Loaded, check: Check | None, told: dict[Hashable, None]) -> It
         try:
             yield Cell(index, values, loaded.changed(top, checks))
         except ScenarioError as error:
-            told |= dict.fromkeys(error.faults)
+            faults |= dict.fromkeys(error.faults)
 
 
 def _label(values: tuple[tuple[str, Any], ...]) -> str:

@@ -206,12 +206,12 @@ def _tried(
         *([1] if quantity.seed else []),
     ]
     for law, single in laws.items():
-        told = [_refused(name, quantity, single, value) for value in drawn_values]
-        if all(told) or (discrete and any(told)):
-            yield next(filter(None, told)).removeprefix(f"sweep.vary.{name}: ")
+        refusals = [_refused(name, quantity, single, value) for value in drawn_values]
+        if all(refusals) or (discrete and any(refusals)):
+            yield next(filter(None, refusals)).removeprefix(f"sweep.vary.{name}: ")
         yield from (
             "changes how the loop is put together or sampled; list its values under grid"
-            for value, refused in zip(drawn_values, told, strict=True)
+            for value, refused in zip(drawn_values, refusals, strict=True)
             if not refused
             and _structure(drawn(single, {name: quantity}, {name: value})) != own[law]
         )

@@ -112,14 +112,14 @@ class Cluster:
 
     def _check(self, worker: str, future: Any, patience: float) -> None:
         try:
-            told = future.result(timeout=patience)
+            report = future.result(timeout=patience)
         except TimeoutError:  # it is slow, or gone
             return
         except Exception as error:  # podusv or Dask may be another one there, or miss
             raise UsageError(f"worker {worker} cannot load the study: {_words(error)}") from error
         finally:
             future.release()
-        if wrong := remote.differing(self._ours, told):
+        if wrong := remote.differing(self._ours, report):
             raise UsageError(f"worker {worker} computes with something else: {wrong}")
 
     def __call__(self, units: Units, done: Done) -> bool:
@@ -231,7 +231,7 @@ class Cluster:
             return
         self._looked = time.monotonic()
         workers = self._client.scheduler_info(n_workers=-1)["workers"]
-        self._threads = {name: told["nthreads"] for name, told in workers.items()}
+        self._threads = {name: worker["nthreads"] for name, worker in workers.items()}
         for future, task in list(self._running.items()):
             if task.allowed is not None and task.allowed.isdisjoint(self._threads):
                 self._again.append(self._running.pop(future))

@@ -21,9 +21,9 @@ def check_fits(plan: Plan, folder: Path, parts: int = 1) -> None:
     They need their table on the disk, and a few numbers a run in memory.
     """
     shape = (len(plan.laws), len(plan.cells), plan.sweep.draws)
-    runs, told = math.prod(shape), f"{math.prod(shape):,} runs (sweep.draws: {shape[2]:,})"
+    runs, size = math.prod(shape), f"{math.prod(shape):,} runs (sweep.draws: {shape[2]:,})"
     fewer = (
-        f"{told} were asked for; ask for fewer draws, or name a folder on a larger disk with --out"
+        f"{size} were asked for; ask for fewer draws, or name a folder on a larger disk with --out"
     )
     table = runs_writer.bytes_of(shape, len(plan.metrics), len(plan.sweep.vary))
     check_free_space(folder, table / parts, fewer)
@@ -31,5 +31,5 @@ def check_fits(plan: Plan, folder: Path, parts: int = 1) -> None:
     if (held := HELD_BYTES * runs) > memory:
         raise StorageError(
             f"cannot make {folder}: its tables take {bytes_in_words(held)} of memory or more, and "
-            f"this machine has {bytes_in_words(memory)}; {told} were asked for; ask for fewer draws"
+            f"this machine has {bytes_in_words(memory)}; {size} were asked for; ask for fewer draws"
         )

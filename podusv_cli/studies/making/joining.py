@@ -138,8 +138,8 @@ def gaps(store: Store) -> list[str]:
     for (law, cell), there in covered.items():
         if not there.all():
             label = store.about.cells[cell]
-            told = lacking.setdefault(_ranges(np.logical_not(there)), [])
-            told.append(f"{law}{f' at {label}' if label else ''}")
+            lacking_it = lacking.setdefault(_ranges(np.logical_not(there)), [])
+            lacking_it.append(f"{law}{f' at {label}' if label else ''}")
     every = len(covered)
     return [
         f"missing: {ranges} of {'every law and cell' if len(of) == every else _few(of)}"

@@ -85,11 +85,11 @@ class Plan:
     def identity(self) -> dict[str, Any]:
         """All that the numbers depend on, by dotted keys; two studies that agree can be joined."""
         sweep = self.sweep
-        told: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
+        facts: dict[str, Any] = {"sweep.seed": sweep.seed, "sweep.design": sweep.design}
         if self.stream != SWEEP:
-            told["stream"] = self.stream
+            facts["stream"] = self.stream
         for name, quantity in sweep.vary.items():
-            told[f"sweep.vary.{name}"] = quantity.model_dump(exclude_defaults=True)
+            facts[f"sweep.vary.{name}"] = quantity.model_dump(exclude_defaults=True)
         for cell in self.cells:
             for law in self.laws:
                 single = self.single(law, cell.index)
@@ -97,9 +97,9 @@ class Plan:
                     key: value for key, value in values(single).items()
                     if key.partition(".")[0] not in COSMETIC
                 }  # fmt: skip
-                told |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                told[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
-        return told
+                facts |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
+                facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
+        return facts
 
     def varied(self, variant: Variant) -> Plan:
         """The variant of this study, which has no grid. Raises ValidationError."""

@@ -62,8 +62,8 @@ def drawing(study: StudyIdentity) -> tuple[Sweep, str]:
     head = "sweep.vary."
     own = study.identity
     vary = {key.removeprefix(head): value for key, value in own.items() if key.startswith(head)}
-    told = {"seed": own["sweep.seed"], "design": own["sweep.design"], "vary": vary}
-    sweep = Sweep.model_validate_json(json.dumps({**told, "draws": study.draws}))
+    settings = {"seed": own["sweep.seed"], "design": own["sweep.design"], "vary": vary}
+    sweep = Sweep.model_validate_json(json.dumps({**settings, "draws": study.draws}))
     return sweep, own.get("stream", SWEEP)
 
 

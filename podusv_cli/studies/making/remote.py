@@ -52,20 +52,20 @@ def _plan(recipe: StudyText) -> Plan:
 
 
 @lru_cache(PLANS)
-def _variant(recipe: StudyText, told: tuple[Any, ...]) -> Plan:
-    return _plan(recipe).varied(Variant(*told))
+def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> Plan:
+    return _plan(recipe).varied(Variant(*variant))
 
 
 @lru_cache(PLANS)
 def _report(recipe: StudyText) -> Report:
     made = _plan(recipe)
-    told = {"podusv": podusv_cli.__version__, "Python": platform.python_version()}
-    told |= {name: version(name) for name in PACKAGES}
+    facts = {"podusv": podusv_cli.__version__, "Python": platform.python_version()}
+    facts |= {name: version(name) for name in PACKAGES}
     for law in made.laws:
         sources = [made.identity[f"{law}[{cell.index}] kernels"] for cell in made.cells]
-        told[f"the kernels of {law}"] = digest(dict.fromkeys(sources))
-    told["the study"] = digest(made.identity)
-    return told
+        facts[f"the kernels of {law}"] = digest(dict.fromkeys(sources))
+    facts["the study"] = digest(made.identity)
+    return facts
 
 
 def report(text: str, plugins: Plugins) -> Report:
@@ -104,10 +104,10 @@ def made(
     """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
     from distributed import get_worker
 
-    told, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)
-    if digest(told) == expected:
+    facts, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)
+    if digest(facts) == expected:
         plan = _variant(recipe, variant) if variant else _plan(recipe)
         job = partial(timed, plan, Unit(*unit))
         outcome = outcome_of(job, lambda fraction: None, Interrupts())
     machine = f"{processor()} ({' '.join(platform.libc_ver())})"
-    return Reply(get_worker().address, machine, told, outcome)
+    return Reply(get_worker().address, machine, facts, outcome)

@@ -105,10 +105,10 @@ class SessionLog:
             self._place = len(earlier)
             self._write(earlier)
 
-    def end(self, runs: int, told: Mapping[str, Any] = MappingProxyType({})) -> None:
+    def end(self, runs: int, facts: Mapping[str, Any] = MappingProxyType({})) -> None:
         """Note how many runs it made, and what else is told of it. Raises StorageError."""
         times = provenance.times(self._started, datetime.now(UTC))
-        self._origin |= {**times, "runs": runs, **told}
+        self._origin |= {**times, "runs": runs, **facts}
         with sole_writer(self._folder, PROVENANCE, PATIENCE):
             self._write(sessions(self._folder))
 

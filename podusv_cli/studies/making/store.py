@@ -144,8 +144,8 @@ class Store:
     def _causes(self, result: UnitResult) -> dict[RunKey, str]:
         """Why runs of a unit did not finish."""
         unit, law = result.unit, self.about.laws.index(result.unit.law)
-        told = zip(unit.draws, result.causes, strict=True)
-        return {(law, unit.cell, draw): cause for draw, cause in told if cause}
+        causes = zip(unit.draws, result.causes, strict=True)
+        return {(law, unit.cell, draw): cause for draw, cause in causes if cause}
 
     def _these(
         self, earlier: Sequence[runs_file.Table], units: Sequence[Path]

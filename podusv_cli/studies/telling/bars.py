@@ -60,8 +60,8 @@ def _bar(link: Link, part: Statistic) -> Bar:
 
 def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
     """The ends of an axis that has bound and interval on it."""
-    told = [n for n in (part.low, part.high, part.estimate, link.bound) if math.isfinite(n)]
-    low, high = min(told), max(told)
+    ends = [n for n in (part.low, part.high, part.estimate, link.bound) if math.isfinite(n)]
+    low, high = min(ends), max(ends)
     room = MARGIN * (high - low) or 0.1 * abs(high) or 1.0
     low, high = low - room, high + room
     return (max(low, 0.0), min(high, 1.0)) if shares else (low, high)

@@ -28,16 +28,16 @@ FIGURES, REPORT = "figures", "report.html"
 
 def write_tables(folder: Path, results: Results) -> None:
     """Write tables and verdicts into the study's folder. Raises StorageError."""
-    told = {"format": 1, "claims": [verdict.as_json() for verdict in results.verdicts]}
+    answer = {"format": 1, "claims": [verdict.as_json() for verdict in results.verdicts]}
     judged = as_markdown(results.verdicts)
     if results.contradicted:
-        told["contradicted"] = results.contradicted
+        answer["contradicted"] = results.contradicted
         judged = f"{markdown(sentence(results.contradicted))}\n"
     contents = {
         "summary.csv": summary.as_csv(results.summary).encode(),
         "pairs.csv": summary.as_csv(results.pairs).encode(),
         "sensitivity.csv": summary.as_csv(results.sensitivity).encode(),
-        "claims.json": encode(told),
+        "claims.json": encode(answer),
         "claims.md": judged.encode(),
         "timing.json": encode(timing(folder)),
     }

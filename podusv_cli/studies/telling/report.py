@@ -111,16 +111,16 @@ def _row(results: Results, law: str, cell: int, draw: int) -> Row:
     cause = runs.causes.get((runs.laws.index(law), cell, draw), "") or _short_of(
         results, law, cell, draw
     )
-    told = "-" if np.isnan(until) else f"{until:.4g} s"
-    return Row(law, cell, runs.cells[cell], draw, status, told, cause)
+    end = "-" if np.isnan(until) else f"{until:.4g} s"
+    return Row(law, cell, runs.cells[cell], draw, status, end, cause)
 
 
 def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
     """Why a run that finished is no success: the metrics that decide."""
-    told = [
+    reasons = [
         f"{name} = {results.runs.metric(law, name)[cell, draw]:.5g}" for name in results.runs.asked
     ]
-    return ", ".join(told)
+    return ", ".join(reasons)
 
 
 def _pairs(results: Results) -> list[Any]:
@@ -165,5 +165,5 @@ def _beside(figures: Sequence[Picture], laws: int) -> list[Picture]:
 
 
 def _sessions(folder: Path) -> list[list[str]]:
-    told = [dict(flat(session)) for session in sessions(folder)]
-    return [[value_text(session.get(key)) for key in SESSION] for session in told]
+    rows = [dict(flat(session)) for session in sessions(folder)]
+    return [[value_text(session.get(key)) for key in SESSION] for session in rows]

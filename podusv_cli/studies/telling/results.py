@@ -75,11 +75,11 @@ class Results:
         Runs without any of the most common, as manoeuvring trials are, have those that a reader
         sees first in their place; such metrics always come before the others.
         """
-        told = " ".join(claim.expect for claim in self.about.claims.values())
+        expected = " ".join(claim.expect for claim in self.about.claims.values())
         gathered = self.runs.metrics
         headlines = [m for m in gathered if self.known[m].headline]
         usual = [m for m in gathered if m in ALWAYS] or headlines
-        shown = [m for m in gathered if m in usual or f".{m}" in told]
+        shown = [m for m in gathered if m in usual or f".{m}" in expected]
         return sorted(shown, key=lambda name: not self.known[name].headline)
 
     def without_verdicts(self, contradicted: str) -> Results:

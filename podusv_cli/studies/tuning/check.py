@@ -36,11 +36,11 @@ def _study(scenario: Scenario) -> Faults:
             "needs the key sweep: its `vary` says what is drawn (podusv docs tuning)",
         )
     elif scenario.sweep.grid:
-        told = "needs a study without a grid: put what laws have to cope with under sweep.vary"
-        yield ("tune",), f"{told}, and write `grid: {{{next(iter(scenario.sweep.grid))}: null}}`"
+        fault = "needs a study without a grid: put what laws have to cope with under sweep.vary"
+        yield ("tune",), f"{fault}, and write `grid: {{{next(iter(scenario.sweep.grid))}: null}}`"
     elif not scenario.sweep.independent:
-        told = f"{scenario.sweep.design} points have no intervals, which a comparison needs"
-        yield ("sweep", "design"), f"{told}; write design: random"
+        fault = f"{scenario.sweep.design} points have no intervals, which a comparison needs"
+        yield ("sweep", "design"), f"{fault}; write design: random"
 
 
 def _budget(tune: Tune) -> Faults:

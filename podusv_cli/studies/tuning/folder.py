@@ -64,14 +64,14 @@ def known(folder: Path, plan: TunePlan) -> Record | None:
         if not files.is_empty(folder):
             raise UsageError(f"{folder} is no search and not empty; name another with --out")
         return None
-    told = json_files.read_as(folder / TUNE, Record)
-    if different := disagreements(told.identity, _identity(plan)):
+    noted = json_files.read_as(folder / TUNE, Record)
+    if different := disagreements(noted.identity, _identity(plan)):
         raise UsageError(
             f"{folder} holds another search: {different}; name another folder with --out, or begin "
             "anew with --force"
         )
-    _as_much(folder, _asked(told), plan.tune)
-    return told
+    _as_much(folder, _asked(noted), plan.tune)
+    return noted
 
 
 def clear(folder: Path) -> None:
@@ -79,32 +79,32 @@ def clear(folder: Path) -> None:
     manifest.remove(folder, "search", TUNE, UNFINISHED)
 
 
-def _asked(told: Record | None) -> list[dict[str, Any]]:
-    return [call.model_dump(by_alias=True) for call in told.history] if told else []
+def _asked(noted: Record | None) -> list[dict[str, Any]]:
+    return [call.model_dump(by_alias=True) for call in noted.history] if noted else []
 
 
 def write(
-    folder: Path, plan: TunePlan, told: Record | None, started: str, texts: Mapping[str, str]
+    folder: Path, plan: TunePlan, noted: Record | None, started: str, texts: Mapping[str, str]
 ) -> None:
     """Note what is asked for, after what is `known` of the search.
 
     `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
     """
-    content = json_files.encode(_content(plan, _asked(told), started))
+    content = json_files.encode(_content(plan, _asked(noted), started))
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
     # without tune.json, a folder that is not empty is no search.
-    if told:
+    if noted:
         files.write_texts(folder, texts)
     files.make_folder(folder)
     files.write_bytes(folder / TUNE, content)
     files.make_folder(folder / trials.FOLDER)
-    if not told:
+    if not noted:
         files.write_texts(folder, texts)
 
 
 def _identity(plan: TunePlan) -> dict[str, Any]:
-    told = {"format of tune.json": FORMAT, "optuna": sampler.version(), **plan.identity}
-    return json_files.plain(told)
+    identity = {"format of tune.json": FORMAT, "optuna": sampler.version(), **plan.identity}
+    return json_files.plain(identity)
 
 
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
@@ -142,14 +142,14 @@ def tuned_yaml(results: SearchResults) -> bytes:
         for law, own in plan.laws.items()
     }
     end = "-tuned"
-    told = {
+    tuned = {
         "extends": SCENARIO,
         "name": f"{scenario.name[: LONGEST_NAME - len(end)]}{end}",
         "description": _told(results),
         "controllers": {law: content for law, content in laws.items() if content},
         "tune": None,
     }
-    return f"# The gains that podusv tune found.\n{yaml_text(told)}".encode()
+    return f"# The gains that podusv tune found.\n{yaml_text(tuned)}".encode()
 
 
 def _told(results: SearchResults) -> str:

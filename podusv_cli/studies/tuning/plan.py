@@ -130,8 +130,8 @@ class TunePlan:
 
     def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> study.Plan:
         """The study of laws by their new names, on draws of a stream."""
-        told = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
-        return self.base.varied(study.Variant(stream, draws, told))
+        renamed = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
+        return self.base.varied(study.Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
         """The runs of some units, in their order; failed is what the study calls no success."""
@@ -152,6 +152,6 @@ class TunePlan:
     def identity(self) -> dict[str, Any]:
         """All that the trials depend on, by dotted keys."""
         whole = self.variant({law: (law, {}) for law in self.laws}, TRAIN, self.tune.train)
-        told = {f"tune.{k}": v for k, v in self.tune.model_dump(exclude=set(OPEN)).items()}
+        settings = {f"tune.{k}": v for k, v in self.tune.model_dump(exclude=set(OPEN)).items()}
         assert self.scenario.sweep
-        return {**told, "sweep.success": self.scenario.sweep.success, **whole.identity}
+        return {**settings, "sweep.success": self.scenario.sweep.success, **whole.identity}

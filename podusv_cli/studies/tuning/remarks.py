@@ -96,16 +96,16 @@ def _unsound(results: SearchResults) -> Iterator[str]:
 
 
 def _few(results: SearchResults) -> Iterator[str]:
-    told = []
+    few = []
     for law in results.winners:
         whole = min(sum(t.status == FINISHED for t in trials) for trials in results.trials[law])
         gains = len(results.plan.gains[law])
         if is_few(whole, gains):
-            told.append(f"{law} {whole} for {gains} gains")
-    if told:
+            few.append(f"{law} {whole} for {gains} gains")
+    if few:
         yield (
             f"fewer than {ENOUGH} trials on all draws for each gain, so chance has a part in what "
-            f"was found: {', '.join(told)}; give a larger tune.budget"
+            f"was found: {', '.join(few)}; give a larger tune.budget"
         )
 
 
@@ -134,12 +134,12 @@ def _beyond(results: SearchResults) -> Iterator[str]:
 
 def _bounds(results: SearchResults) -> Iterator[str]:
     rows = results.gains[results.gains["at"] != ""].to_dict("records")
-    told = []
+    at_ends = []
     for row in rows:
         end = row["low"] if row["at"] == "lower" else row["high"]
-        told.append(f"{row['law']}: {row['gain']} at the {row['at']} end, {end:.4g}")
-    if told:
+        at_ends.append(f"{row['law']}: {row['gain']} at the {row['at']} end, {end:.4g}")
+    if at_ends:
         yield (
             "the table is not final, since gains are at an end of their range, and a wider one may "
-            f"give more: {'; '.join(told)}"
+            f"give more: {'; '.join(at_ends)}"
         )

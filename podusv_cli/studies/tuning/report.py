@@ -137,12 +137,12 @@ def _gains(results: SearchResults) -> Iterator[dict[str, Any]]:
     rows: Any = results.gains.to_dict("records")
     for row in rows:
         at = (row["law"], row["gain"])
-        told = "-"
+        text = "-"
         if share is not None and at in share.index:
-            told = f"{Interval(*share.loc[at]):.0f%}"
+            text = f"{Interval(*share.loc[at]):.0f%}"
         numbers = {name: value_text(row[name]) for name in ("before", "after")}
         numbers |= {name: _end(row[name]) for name in ("low", "high")}
-        yield row | numbers | {"unit": units[row["law"]][row["gain"]], "share": told}
+        yield row | numbers | {"unit": units[row["law"]][row["gain"]], "share": text}
 
 
 def _end(number: float) -> str:

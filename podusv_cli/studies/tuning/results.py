@@ -72,8 +72,8 @@ class SearchResults:
     def shown(self) -> list[str]:
         """The metrics of the tables."""
         trees = [self.plan.objective, *(inequality.tree for inequality in self.plan.inequalities)]
-        told = [name for tree in trees for name in named(tree, self.plan.metrics)]
-        return [n for n in dict.fromkeys([*told, *ALWAYS]) if n in self.runs.metrics]
+        wanted = [name for tree in trees for name in named(tree, self.plan.metrics)]
+        return [n for n in dict.fromkeys([*wanted, *ALWAYS]) if n in self.runs.metrics]
 
     def after(self, law: str) -> str:
         """The name of a law after the search, its own where it is kept as it is."""
@@ -150,21 +150,21 @@ class SearchResults:
         return int((ahead | (pairs.b == law) & (pairs.ratio_low > 1.0)).sum())
 
     def _law(self, law: str) -> dict[str, Any]:
-        told: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
+        row: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
         for when, name in (("before", law), ("after", self.after(law))):
             runs = self.met(name)
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
-            told |= failed.columns(f"failed_{when}")
-            told |= self.objective(runs, self.plan.objective).columns(f"objective_{when}")
+            row |= failed.columns(f"failed_{when}")
+            row |= self.objective(runs, self.plan.objective).columns(f"objective_{when}")
         pairs = self.pairs
         own = pairs[(pairs["when"] == "tuning") & (pairs.a == tuned(law))]
         own = own[own.metric == self.shown[0]]
         for end in ("ratio", "ratio_low", "ratio_high"):
-            told[end] = float(own[end].iloc[0]) if len(own) else 1.0
+            row[end] = float(own[end].iloc[0]) if len(own) else 1.0
         spread = self.spread(law)
         ends = float(np.median(spread)), min(spread), max(spread)
-        told |= zip(("repeats_median", "repeats_low", "repeats_high"), ends, strict=True)
-        return told
+        row |= zip(("repeats_median", "repeats_low", "repeats_high"), ends, strict=True)
+        return row
 
     def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
         """An objective, with an interval where it is one quantile of one number."""

@@ -84,9 +84,9 @@ def read(folder: Path, name: str) -> list[Trial]:
     return [stored.trial() for stored in json_files.read_as(path, File).trials]
 
 
-def _number(told: float | None) -> float:
+def _number(number: float | None) -> float:
     """JSON knows no infinity, the only number of a trial that is not finite."""
-    return math.inf if told is None else told
+    return math.inf if number is None else number
 
 
 def best(trials: Sequence[Trial]) -> Trial:

@@ -71,8 +71,8 @@ def _clear(store: Store) -> None:
     folder = store.folder
     if not (folder / STUDY).exists():
         return
-    told = record.begun(folder)
-    if told.identity == store.about.identity and told.draws <= store.about.draws:
+    begun = record.begun(folder)
+    if begun.identity == store.about.identity and begun.draws <= store.about.draws:
         return
     with files.storage_errors(f"cannot remove old runs in {folder}"):
         if (folder / UNITS).exists():
