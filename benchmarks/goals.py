@@ -26,18 +26,18 @@ class Goal:
 
 
 def _worst(labels: list[str], ratio: str) -> Callable[[Results], float]:
-    return lambda found: max(
-        float(found["beside_c"][label]["ratios"][ratio][1]) for label in labels
+    return lambda results: max(
+        float(results["beside_c"][label]["ratios"][ratio][1]) for label in labels
     )
 
 
-def _steps(found: Results) -> float:
-    cost = found["growth"]["steps"]
+def _steps(results: Results) -> float:
+    cost = results["growth"]["steps"]
     return float(cost["100000"][1] / cost["10000"][1])
 
 
-def _nodes(found: Results) -> float:
-    cost = {int(nodes): values[1] for nodes, values in found["growth"]["nodes"].items()}
+def _nodes(results: Results) -> float:
+    cost = {int(nodes): values[1] for nodes, values in results["growth"]["nodes"].items()}
     few, some, many = sorted(cost)[-3:]
     slopes = (cost[b] - cost[a] for a, b in ((few, some), (some, many)))
     first, last = (
@@ -47,25 +47,27 @@ def _nodes(found: Results) -> float:
 
 
 def _seconds(command: str) -> Callable[[Results], float]:
-    return lambda found: float(found["commands"][command]["seconds"][1])
+    return lambda results: float(results["commands"][command]["seconds"][1])
 
 
 def _beside_imports(command: str) -> Callable[[Results], float]:
-    return lambda found: float(found["commands"][command]["ratio"][1])
+    return lambda results: float(results["commands"][command]["ratio"][1])
 
 
 def _memory(command: str) -> Callable[[Results], float]:
-    return lambda found: float(found["commands"][command]["megabytes"][1] - found["log_megabytes"])
-
-
-def _side_by_side(labels: list[str], steps: int) -> Callable[[Results], float]:
-    return lambda found: max(
-        float(found["side_by_side_laws"][f"{label}; {steps}"]["ratio"][1]) for label in labels
+    return lambda results: float(
+        results["commands"][command]["megabytes"][1] - results["log_megabytes"]
     )
 
 
-def _beside_c(found: Results) -> float:
-    return max(float(median) for _, median, _ in found["side_by_side"]["ratios"].values())
+def _side_by_side(labels: list[str], steps: int) -> Callable[[Results], float]:
+    return lambda results: max(
+        float(results["side_by_side_laws"][f"{label}; {steps}"]["ratio"][1]) for label in labels
+    )
+
+
+def _beside_c(results: Results) -> float:
+    return max(float(median) for _, median, _ in results["side_by_side"]["ratios"].values())
 
 
 GOALS = (
@@ -76,7 +78,7 @@ GOALS = (
     Goal("a node of 343 beside one of 125", 1.1, _nodes),
     Goal(
         "N runs at once beside N / cores single ones", 1.05,
-        lambda found: float(found["batch"]["31000"]["cost"][1]),
+        lambda results: float(results["batch"]["31000"]["cost"][1]),
     ),
     Goal("a run side by side beside one by one, 31 000 steps", 0.3, _side_by_side(USUAL, 31_000)),
     Goal("the same, 1000 steps", 0.3, _side_by_side(USUAL, 1_000)),
@@ -84,7 +86,7 @@ GOALS = (
     Goal("a run side by side beside C side by side", 1.3, _beside_c),
     Goal(
         "a run in current, wind, 100 waves, with sensors, beside calm water", 2.5,
-        lambda found: float(found["seas"]["sea, sensors"][1]),
+        lambda results: float(results["seas"]["sea, sensors"][1]),
     ),
     Goal("peak memory less the log, without figures", 150.0, _memory(RUN), "MB"),
     Goal("peak memory less the log, with figures", 150.0, _memory("podusv run"), "MB"),
@@ -95,16 +97,16 @@ GOALS = (
     Goal("the same, a comparison of four laws with report", 12, _beside_imports("podusv compare")),
     Goal(
         "the report of that comparison", 3.0,
-        lambda found: float(found["commands"]["podusv compare"]["report_megabytes"]), "MB",
+        lambda results: float(results["commands"]["podusv compare"]["report_megabytes"]), "MB",
     ),
     Goal("the very first run", 10.0, _seconds(f"{RUN}, for the first time"), "s"),
     Goal("`podusv --help`", 0.15, _seconds("podusv --help"), "s"),
 )  # fmt: skip
 
 
-def goal_rows(found: Results) -> Iterator[list[str]]:
+def goal_rows(results: Results) -> Iterator[list[str]]:
     """Goal, limit, what was measured, and whether that is within the limit."""
     for goal in GOALS:
-        value = goal.measured(found)
+        value = goal.measured(results)
         limit, got = (f"{number:.3g} {goal.unit}".strip() for number in (goal.most, value))
         yield [goal.says, limit, got, "yes" if value <= goal.most else "**no**"]

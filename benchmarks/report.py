@@ -129,8 +129,8 @@ def _laws(costs: Results) -> str:
 def _ratios(beside_c: Results) -> str:
     names = list(next(iter(beside_c.values()))["ratios"])
     rows = (
-        [case, *(spread(found["ratios"][name]) for name in names), f"{found['apart']:.1g}"]
-        for case, found in beside_c.items()
+        [case, *(spread(measured["ratios"][name]) for name in names), f"{measured['apart']:.1g}"]
+        for case, measured in beside_c.items()
     )
     return table(["law, network", *names, "apart"], rows)
 
@@ -138,8 +138,8 @@ def _ratios(beside_c: Results) -> str:
 def _seconds(beside_c: Results) -> str:
     names = list(next(iter(beside_c.values()))["seconds"])
     rows = (
-        [case, *(spread(found["seconds"][name], 1e3) for name in names)]
-        for case, found in beside_c.items()
+        [case, *(spread(measured["seconds"][name], 1e3) for name in names)]
+        for case, measured in beside_c.items()
     )
     return table(["ms a run", *(f"C -{n}" if n.startswith("O") else n for n in names)], rows)
 
@@ -148,11 +148,11 @@ def _batch(batch: Results) -> str:
     rows = (
         [
             steps,
-            f"{found['runs']} on {found['cores']}",
-            *(spread(found["seconds"][name], 1e3) for name in ("alone", "batch")),
-            *(spread(found[name]) for name in ("cost", "processor cost")),
+            f"{measured['runs']} on {measured['cores']}",
+            *(spread(measured["seconds"][name], 1e3) for name in ("alone", "batch")),
+            *(spread(measured[name]) for name in ("cost", "processor cost")),
         ]
-        for steps, found in batch.items()
+        for steps, measured in batch.items()
     )
     header = ["steps", "runs on cores", "ms a run alone", "ms a run in the batch"]
     return table([*header, "cost", "cost in processor time"], rows)
@@ -162,30 +162,30 @@ def _laws_side_by_side(laws: Results) -> str:
     rows = (
         [
             *label.split("; "),
-            *(spread(found[name], 1e3) for name in ("side by side", "one by one")),
-            spread(found["ratio"]),
+            *(spread(measured[name], 1e3) for name in ("side by side", "one by one")),
+            spread(measured["ratio"]),
         ]
-        for label, found in laws.items()
+        for label, measured in laws.items()
     )
     return table(["law, network", "steps", "ms side by side", "ms one by one", "ratio"], rows)
 
 
 def _million(laws: Results) -> str:
     names = ("side by side", "one by one")
-    rows = ([law, *(spread(found[name]) for name in names)] for law, found in laws.items())
+    rows = ([law, *(spread(measured[name]) for name in names)] for law, measured in laws.items())
     return table(["law, network", *(f"hours {name}" for name in names)], rows)
 
 
-def _side_by_side(found: Results) -> str:
-    ours = [["podusv, all metrics", spread(found["seconds"]["podusv"], 1e3), ""]]
+def _side_by_side(measured: Results) -> str:
+    ours = [["podusv, all metrics", spread(measured["seconds"]["podusv"], 1e3), ""]]
     others = [
-        [name, spread(found["seconds"][name], 1e3), spread(relative)]
-        for name, relative in found["ratios"].items()
+        [name, spread(measured["seconds"][name], 1e3), spread(relative)]
+        for name, relative in measured["ratios"].items()
     ]
     return table(["eight runs side by side", "ms a run", "podusv / C"], [*ours, *others])
 
 
-def _by_steps(found: Results) -> str:
+def _by_steps(measured: Results) -> str:
     rows = (
         [
             name,
@@ -193,7 +193,7 @@ def _by_steps(found: Results) -> str:
             _rounded(1.0 / one["seconds"][1]),
             spread(one["faster"]),
         ]
-        for name, one in found.items()
+        for name, one in measured.items()
     )
     return table(["", "us a step", "steps a second", "times as many as one by one"], rows)
 
@@ -218,18 +218,18 @@ def _plain(plain_engine: Results) -> str:
     return table(["podusv with `simulation.compiled: false`", "us a step"], rows)
 
 
-def _alternatives(found: Results) -> str:
+def _alternatives(measured: Results) -> str:
     labels = {
         "podusv": "podusv",
         "numpy": "classes, numpy, a loop with RK4",
-        "solve_ivp": f"the same classes, scipy's solve_ivp, RK45 with rtol {found['rtol']:.1g}",
+        "solve_ivp": f"the same classes, scipy's solve_ivp, RK45 with rtol {measured['rtol']:.1g}",
     }
     text = (
-        f"The first {found['span_s']:g} s with adaptive_neural and 27 nodes. RK4 with the usual "
-        f"step is off by {found['rk4_error']:.1g} (m, rad, m/s, rad/s) at the end; RK45 has the "
+        f"The first {measured['span_s']:g} s with adaptive_neural and 27 nodes. RK4 with the usual "
+        f"step is off by {measured['rk4_error']:.1g} (m, rad, m/s, rad/s) at the end; RK45 has the "
         "largest tolerance with which it is no further off.\n"
     )
-    rows = ([labels[n], spread(q, 1e3)] for n, q in found["per_simulated_s"].items())
+    rows = ([labels[n], spread(q, 1e3)] for n, q in measured["per_simulated_s"].items())
     return text + "\n" + table(["", "ms a simulated second"], rows)
 
 
@@ -238,7 +238,7 @@ def _commands(commands: Results) -> list[str]:
         [name, *(spread(found[key]) for key in ("seconds", "busy")), f"{found['megabytes'][1]:.0f}"]
         for name, found in commands.items()
     )
-    runs = {name: found["parts"] for name, found in commands.items() if found["parts"]}
+    runs = {name: measured["parts"] for name, measured in commands.items() if measured["parts"]}
     parts = list(next(iter(runs.values())))
     where = ([name, *(f"{spent[part]:.3f}" for part in parts)] for name, spent in runs.items())
     return [

@@ -91,8 +91,8 @@ def test_a_verdict_turns_where_algebra_says(out):
     X_u = MASS * math.log(1.03 * left() / 0.5) / 10.0
     m = HULL.X_u * 10.0 / math.log(1.03 * left() / 0.5) + HULL.X_udot
     for key, value in {"start.u": u, "vessel.X_u": X_u, "vessel.m": m}.items():
-        found, held, own = (float(turns[key][name]) for name in ("turns_at", "held", "own"))
-        assert abs(held - own) < abs(value - own) <= abs(found - own) <= SHARP * abs(held - own)
+        turns_at, held, own = (float(turns[key][name]) for name in ("turns_at", "held", "own"))
+        assert abs(held - own) < abs(value - own) <= abs(turns_at - own) <= SHARP * abs(held - own)
     assert "vessel.Y_v" not in turns  # a hull that goes straight does not feel it
     (slow, still) = rows("doubt.csv", out[0])
     nearest = min(abs(X_u / HULL.X_u - 1.0), abs(m / HULL.m - 1.0), 0.03 * 0.5 / 1.0)

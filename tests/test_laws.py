@@ -80,7 +80,7 @@ def test_demand_and_adaptation_are_26_to_28_and_35_to_37(kind):
     k, Gamma, sigma = np.array([[3.0, 30.0], [90.0, 80.0], [0.2, 0.3]])
     gamma, sigma_b, b_0 = np.array([[700.0, 600.0], [0.02, 0.03], [0.1, 0.2]])
     for at in situations(law, 100):
-        found, e = evaluate(law, at)
+        answer, e = evaluate(law, at)
         beta, beta_dot = filtered(law, at, e)
         b_hat, W_hat = at.memory[2:4], at.memory[4:58].reshape(2, 27)
         error = at.x[[3, 5]] - beta
@@ -89,16 +89,16 @@ def test_demand_and_adaptation_are_26_to_28_and_35_to_37(kind):
         f_hat = W_hat @ Phi
         coupling = np.array([e.z_e * math.cos(e.psi_e), e.psi_e])
         tau = -k * error - m * f_hat - b_hat * phi + m * beta_dot + coupling
-        np.testing.assert_allclose(found.tau, tau, rtol=1e-12, atol=1e-11)
+        np.testing.assert_allclose(answer.tau, tau, rtol=1e-12, atol=1e-11)
         np.testing.assert_allclose(
-            found.rate[2:4], gamma * (error * phi - sigma_b * (b_hat - b_0)), rtol=1e-12
+            answer.rate[2:4], gamma * (error * phi - sigma_b * (b_hat - b_0)), rtol=1e-12
         )
         W_rate = Gamma[:, None] * (np.outer(error * m, Phi) - sigma[:, None] * W_hat)
-        np.testing.assert_allclose(found.rate[4:58], W_rate.ravel(), rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(answer.rate[4:58], W_rate.ravel(), rtol=1e-12, atol=1e-12)
         if kind is not FullBackstepping:
-            np.testing.assert_allclose(found.rate[58:], beta_dot, rtol=1e-12)
-        assert not found.rate[:2].any()
-        said = [found.signals[name] for name in ("u_e", "r_e", "f_hat_u", "f_hat_r")]
+            np.testing.assert_allclose(answer.rate[58:], beta_dot, rtol=1e-12)
+        assert not answer.rate[:2].any()
+        said = [answer.signals[name] for name in ("u_e", "r_e", "f_hat_u", "f_hat_r")]
         np.testing.assert_allclose(said, [*error, *f_hat], rtol=1e-12, atol=1e-14)
 
 
@@ -121,14 +121,14 @@ def test_the_sign_of_the_coupling_changes_its_own_terms_only(kind):
 def test_pid_is_three_gains_on_the_velocity_errors():
     law = Pid(K_Pu=11.0, K_Iu=12.0, K_Du=13.0, K_Pr=21.0, K_Ir=22.0, K_Dr=23.0, T_d=0.3)
     for at in situations(law, 100):
-        found, e = evaluate(law, at)
+        answer, e = evaluate(law, at)
         error = np.array([e.alpha_u - at.x[3], e.alpha_r - at.x[5]])
         integral, lag = at.memory[2:4], at.memory[4:6]
         slope = (error - lag) / 0.3
         P, I, D = np.array([[11.0, 21.0], [12.0, 22.0], [13.0, 23.0]])  # noqa: E741
-        np.testing.assert_allclose(found.tau, P * error + I * integral + D * slope, rtol=1e-12)
-        np.testing.assert_array_equal(found.rate, [0, 0, *error, *slope])
-        assert (found.signals["u_e"], found.signals["r_e"]) == (-error[0], -error[1])
+        np.testing.assert_allclose(answer.tau, P * error + I * integral + D * slope, rtol=1e-12)
+        np.testing.assert_array_equal(answer.rate, [0, 0, *error, *slope])
+        assert (answer.signals["u_e"], answer.signals["r_e"]) == (-error[0], -error[1])
 
 
 def test_pid_may_follow_the_path_s_own_speed_and_yaw_rate():
@@ -142,9 +142,9 @@ def test_pid_may_follow_the_path_s_own_speed_and_yaw_rate():
         target = np.concatenate(
             [at.target[:2], speed * along, gain * along + speed * turn * across]
         )
-        found, _ = evaluate(law, at._replace(target=target))
+        answer, _ = evaluate(law, at._replace(target=target))
         np.testing.assert_allclose(
-            found.tau, [speed - at.x[3], turn - at.x[5]], rtol=1e-9, atol=1e-12
+            answer.tau, [speed - at.x[3], turn - at.x[5]], rtol=1e-9, atol=1e-12
         )
     standing = at._replace(target=np.array([5.0, 5.0, 0, 0, 0.1, 0.1]))
     assert evaluate(law, standing)[0].tau.tolist() == [-at.x[3], -at.x[5]]
@@ -157,9 +157,9 @@ def test_the_filter_starts_at_zero_or_settled(kind):
         warm = kind(filter_start="alpha").start(at.x, at.target, NONLINEAR)
         assert cold[-2:].tolist() == [0.0, 0.0]
         np.testing.assert_array_equal(cold[:-2], warm[:-2])
-        found, e = evaluate(kind(), at._replace(memory=warm))
+        answer, e = evaluate(kind(), at._replace(memory=warm))
         assert warm[-2:].tolist() == [e.alpha_u, e.alpha_r]
-        assert found.rate[-2:].tolist() == [0.0, 0.0]
+        assert answer.rate[-2:].tolist() == [0.0, 0.0]
 
 
 def test_the_lag_starts_at_zero_or_at_the_error():
@@ -168,9 +168,9 @@ def test_the_lag_starts_at_zero_or_at_the_error():
         warm = Pid(lag_start="error").start(at.x, at.target, NONLINEAR)
         assert not cold[2:].any()
         # Without a derivative at the start, the demand is the proportional part alone.
-        found, _ = evaluate(Pid(), at._replace(memory=warm))
-        expected = [-1100 * found.signals["u_e"], -80 * found.signals["r_e"]]
-        np.testing.assert_allclose(found.tau, expected, rtol=1e-12)
+        answer, _ = evaluate(Pid(), at._replace(memory=warm))
+        expected = [-1100 * answer.signals["u_e"], -80 * answer.signals["r_e"]]
+        np.testing.assert_allclose(answer.tau, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("kind", POLAR)

@@ -64,25 +64,25 @@ def fed_back(gain: float, numerator: list[float], denominator: list[float]) -> C
 
 
 def test_the_gain_of_a_triple_lag_may_grow_until_rouths_limit():
-    found = margins(fed_back(2.0, [1.0], [1.0, 3.0, 2.0, 0.0]))  # 2/(s (s + 1) (s + 2))
-    assert found.gain_margin == pytest.approx(6.0 / 2.0, rel=1e-9)
-    assert found.gain_reduction == 0.0
-    (omega,) = found.crossovers
+    measured = margins(fed_back(2.0, [1.0], [1.0, 3.0, 2.0, 0.0]))  # 2/(s (s + 1) (s + 2))
+    assert measured.gain_margin == pytest.approx(6.0 / 2.0, rel=1e-9)
+    assert measured.gain_reduction == 0.0
+    (omega,) = measured.crossovers
     assert abs(2.0 / (1j * omega * (1j * omega + 1) * (1j * omega + 2))) == pytest.approx(1.0)
     phase = math.pi / 2 - math.atan(omega) - math.atan(omega / 2)
-    assert found.phase_margin == pytest.approx(phase, rel=1e-9)
-    assert found.delay_margin == pytest.approx(phase / omega, rel=1e-9)
+    assert measured.phase_margin == pytest.approx(phase, rel=1e-9)
+    assert measured.delay_margin == pytest.approx(phase / omega, rel=1e-9)
 
 
 def test_an_unstable_plant_needs_its_gain():
-    found = margins(fed_back(2.0, [1.0], [1.0, -1.0]))  # 2/(s - 1), stable for gains above 1
-    assert found.gain_reduction == pytest.approx(0.5, rel=1e-12)
-    assert found.gain_margin == math.inf
-    assert found.crossovers == pytest.approx([math.sqrt(3.0)])
-    assert found.phase_margin == pytest.approx(math.pi / 3.0)
-    assert found.delay_margin == pytest.approx(math.pi / 3.0 / math.sqrt(3.0))
-    assert found.peak_S == pytest.approx(1.0)
-    assert found.peak_T == pytest.approx(2.0, rel=1e-4)  # at 0
+    measured = margins(fed_back(2.0, [1.0], [1.0, -1.0]))  # 2/(s - 1), stable for gains above 1
+    assert measured.gain_reduction == pytest.approx(0.5, rel=1e-12)
+    assert measured.gain_margin == math.inf
+    assert measured.crossovers == pytest.approx([math.sqrt(3.0)])
+    assert measured.phase_margin == pytest.approx(math.pi / 3.0)
+    assert measured.delay_margin == pytest.approx(math.pi / 3.0 / math.sqrt(3.0))
+    assert measured.peak_S == pytest.approx(1.0)
+    assert measured.peak_T == pytest.approx(2.0, rel=1e-4)  # at 0
 
 
 def test_of_several_gains_that_the_loop_needs_the_nearest_to_its_own_is_told():
@@ -102,20 +102,20 @@ def test_of_several_gains_that_the_loop_needs_the_nearest_to_its_own_is_told():
 
 def test_a_sharp_resonance_is_found_with_its_peak_and_all_crossovers():
     zeta = 1e-4  # L = 0.1/(s^2 + 2 zeta s + 1) is above 1 in a band around 1 rad/s
-    found = margins(fed_back(0.1, [1.0], [1.0, 2 * zeta, 1.0]))
+    measured = margins(fed_back(0.1, [1.0], [1.0, 2 * zeta, 1.0]))
     exact = [math.sqrt(1 - 0.1), math.sqrt(1 + 0.1)]
-    assert found.crossovers == pytest.approx(exact, rel=1e-6)
-    assert found.peak_S == pytest.approx(0.1 / (2 * zeta * math.sqrt(1.1)), rel=1e-3)
+    assert measured.crossovers == pytest.approx(exact, rel=1e-6)
+    assert measured.peak_S == pytest.approx(0.1 / (2 * zeta * math.sqrt(1.1)), rel=1e-3)
 
 
 def test_a_lead_is_a_lag_of_a_turn_less():
-    found = margins(
+    measured = margins(
         fed_back(-0.1, [1.0], [1.0, 2e-4, 1.0])
     )  # from -1 a lead, then nearly half a turn
-    low, high = found.crossovers
+    low, high = measured.crossovers
     lead, lag = math.atan(2e-4 * low / 0.1), math.pi + math.atan(2e-4 * high / 0.1)
-    assert found.phase_margin == pytest.approx(lead, rel=1e-3)
-    assert found.delay_margin == pytest.approx(
+    assert measured.phase_margin == pytest.approx(lead, rel=1e-3)
+    assert measured.delay_margin == pytest.approx(
         min((2 * math.pi - lead) / low, lag / high), rel=1e-6
     )
 
@@ -127,10 +127,10 @@ def test_a_root_at_a_frequency_that_is_looked_at_counts_once():
 
 
 def test_an_undamped_plant_has_margins():
-    found = margins(fed_back(1.0, [1.0, 0.0], [1.0, 0.0, 1.0]))  # s/(s^2 + 1), infinite at 1 rad/s
+    loop = margins(fed_back(1.0, [1.0, 0.0], [1.0, 0.0, 1.0]))  # s/(s^2 + 1), infinite at 1 rad/s
     golden = (1.0 + math.sqrt(5.0)) / 2.0
-    assert found.crossovers == pytest.approx([1.0 / golden, golden])
-    assert found.phase_margin == pytest.approx(math.pi / 2.0)
+    assert loop.crossovers == pytest.approx([1.0 / golden, golden])
+    assert loop.phase_margin == pytest.approx(math.pi / 2.0)
 
 
 def test_a_loop_that_never_reaches_one_has_no_limit_and_an_unstable_one_no_margin():
@@ -174,16 +174,16 @@ def calm(law: Controller, **parts: Any) -> ClosedLoop:
 def test_a_proportional_law_has_the_loop_of_its_formula():
     hull = VESSELS["paper"]
     loop = calm(Proportional(), vessel=hull, nominal=hull)
-    found = loop_margins(loop, TimeGrid(0.01, 500), compiled=False).loops["surge"]
+    measured = loop_margins(loop, TimeGrid(0.01, 500), compiled=False).loops["surge"]
     k, m, d = 40.0, hull.m11, -hull.X_u
     omega = math.sqrt(k * k - d * d) / m
     phase = math.pi - math.atan(m * omega / d)
-    assert found.crossovers == pytest.approx([omega], rel=1e-7)
-    assert found.phase_margin == pytest.approx(phase, rel=1e-7)
-    assert found.delay_margin == pytest.approx(phase / omega, rel=1e-7)
-    s = 1j * found.omega
-    np.testing.assert_allclose(found.S, abs((m * s + d) / (m * s + d + k)), rtol=1e-6)
-    np.testing.assert_allclose(found.T, abs(k / (m * s + d + k)), rtol=1e-6)
+    assert measured.crossovers == pytest.approx([omega], rel=1e-7)
+    assert measured.phase_margin == pytest.approx(phase, rel=1e-7)
+    assert measured.delay_margin == pytest.approx(phase / omega, rel=1e-7)
+    s = 1j * measured.omega
+    np.testing.assert_allclose(measured.S, abs((m * s + d) / (m * s + d + k)), rtol=1e-6)
+    np.testing.assert_allclose(measured.T, abs(k / (m * s + d + k)), rtol=1e-6)
 
 
 class Idle(Proportional):
@@ -333,12 +333,12 @@ def test_a_delay_sensors_and_sampling_are_left_out_and_told():
     delayed = calm(
         Pid(standoff=0.5), actuator=Ideal(command=Command(delay=0.1)), measurement=Sensors()
     )
-    found = loop_margins(delayed, TimeGrid(0.01, 3000, hold_every=5))
-    assert found.left_out == (
+    measured = loop_margins(delayed, TimeGrid(0.01, 3000, hold_every=5))
+    assert measured.left_out == (
         "measurement and estimator", "the sampling of the law every 0.05 s",
         "the command's delay of 0.1 s",
     )  # fmt: skip
-    assert found.numbers() == pytest.approx(of(Pid(standoff=0.5)).numbers(), rel=1e-6)
+    assert measured.numbers() == pytest.approx(of(Pid(standoff=0.5)).numbers(), rel=1e-6)
 
 
 def test_the_last_straight_line_is_taken_before_any_circle():

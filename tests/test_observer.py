@@ -44,9 +44,9 @@ def test_limits_do_not_disturb_the_observer(kind, vessel):
     assert out["saturated"].mean() > 0.4
     wt = np.outer(out["time"], [law.omega_u, law.omega_v, law.omega_r])
     missing = (1.0 + wt) * np.exp(-wt) * np.linalg.solve(M, MEANS)
-    found = np.transpose([out[f"b_obs_{name}"] for name in "uvr"])
-    np.testing.assert_allclose(found, MEANS - missing @ M.T, atol=1e-5)
-    np.testing.assert_allclose(found[-1], MEANS, atol=1e-5)
+    answer = np.transpose([out[f"b_obs_{name}"] for name in "uvr"])
+    np.testing.assert_allclose(answer, MEANS - missing @ M.T, atol=1e-5)
+    np.testing.assert_allclose(answer[-1], MEANS, atol=1e-5)
 
 
 def test_without_the_loads_that_act_it_would_wind_up():
@@ -69,23 +69,23 @@ def test_its_rates_are_those_of_the_vessel_and_a_double_pole(kind, vessel):
     k, rate = bundle(law.constants_with(vessel)), np.zeros(6)
     for at in situations(law, 50):
         at.memory[6:] = 0.0  # what a law keeps beside the observer
-        found = ask(law, *at, vessel)
-        tau = np.array([found.tau[0], 0.7, 0.5 * found.tau[1]])  # what an actuator made of it
+        answer = ask(law, *at, vessel)
+        tau = np.array([answer.tau[0], 0.7, 0.5 * answer.tau[1]])  # what an actuator made of it
         call(
             law.after_saturation,
             t=1.0,
             memory=at.memory,
-            demand=found.tau,
+            demand=answer.tau,
             tau=tau,
             k=k,
             table=law.table(),
-            rate=found.rate,
+            rate=answer.rate,
         )
         plant(at.x, tau, at.memory[3:6], bundle(vessel.constants()), rate)
         error = at.x[3:] - at.memory[:3]
-        np.testing.assert_allclose(found.rate[:3], rate[3:] + 2 * omega * error, rtol=1e-9)
+        np.testing.assert_allclose(answer.rate[:3], rate[3:] + 2 * omega * error, rtol=1e-9)
         learnt = mass_matrix(vessel) @ (omega**2 * error)
-        np.testing.assert_allclose(found.rate[3:6], learnt, rtol=1e-12)
+        np.testing.assert_allclose(answer.rate[3:6], learnt, rtol=1e-12)
 
 
 def test_the_pole_is_double():
@@ -109,9 +109,9 @@ def test_its_loops_are_the_law_s_own(kind, axis):
         memory = law.start(x, target, NONLINEAR)
         x[at] += d[0]
         memory[[at - 3, at]] += d[1], d[2] * inertia
-        found = ask(law, x, memory, target, NONLINEAR)
-        plant(x, np.array([found.tau[0], 0.0, found.tau[1]]), np.zeros(3), k, rate)
-        return np.array([rate[at], found.rate[at - 3], found.rate[at] / inertia])
+        answer = ask(law, x, memory, target, NONLINEAR)
+        plant(x, np.array([answer.tau[0], 0.0, answer.tau[1]]), np.zeros(3), k, rate)
+        return np.array([rate[at], answer.rate[at - 3], answer.rate[at] / inertia])
 
     steps = 1e-6 * np.eye(3)
     measured = np.transpose([(rates(d) - rates(-d)) / 2e-6 for d in steps])

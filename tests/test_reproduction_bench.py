@@ -102,8 +102,8 @@ def of_optimum():
     least = pd.read_csv(RESULTS / "bench" / "optima.csv").set_index(["task", "condition"]).optimum
     runs = RUNS[(RUNS.vessel == "paper_nonlinear") & RUNS.condition.isin(CONDITIONS)]
     keys = zip(runs.task, runs.condition, strict=True)
-    found = [least[task, "calm" if condition == "calm" else "sea"] for task, condition in keys]
-    return runs.assign(of=runs.iae.where(runs.status == "finished", np.inf) / found)
+    optimum = [least[task, "calm" if condition == "calm" else "sea"] for task, condition in keys]
+    return runs.assign(of=runs.iae.where(runs.status == "finished", np.inf) / optimum)
 
 
 def test_the_table_of_the_optimum_is_that_of_runs_and_optima():
@@ -137,10 +137,10 @@ def tuning_table(case, name):
 
 
 def section(case):
-    (found,) = re.findall(
+    (text,) = re.findall(
         rf"(?ms)^## [^\n]*\n\n`configs/studies/tune_{case}.yaml`.*?(?=^## |\Z)", TUNING
     )
-    return found
+    return text
 
 
 def whole(number):
@@ -180,11 +180,11 @@ def test_every_law_had_the_runs_that_the_scenario_says(case):
 @pytest.mark.parametrize("case", CASES)
 def test_the_pairs_that_are_named_are_those_of_the_search(case):
     pairs = tuning_table(case, "searches").set_index(["a", "b"])
-    found = re.findall(
+    sentences = re.findall(
         r"`(\w+)` / `(\w+)`: (\S+) \[(\S+), ([\d.]+)\]", " ".join(section(case).split())
     )
-    assert found
-    for a, b, *told in found:
+    assert sentences
+    for a, b, *told in sentences:
         row = pairs.loc[a, b]
         assert told == [f"{row[name]:.3f}" for name in ("ratio", "ratio_low", "ratio_high")]
 
@@ -300,9 +300,9 @@ def test_the_pairs_that_are_apart_on_other_hulls_are_those_of_the_runs(hull, cou
 
 def test_sets_that_keep_a_law_faster_than_its_target_fail_on_the_otter():
     scenario = load(ROOT / "configs/studies/judge_otter.yaml", (), [tune_faults]).scenario
-    found = tuning_table("hull", "gains").query("gain == 'U_min'").set_index("law")
+    rows = tuning_table("hull", "gains").query("gain == 'U_min'").set_index("law")
     faster = {}
-    for law, row in found.iterrows():
+    for law, row in rows.iterrows():
         factor = scenario.controllers[law].U_min / row.before
         kept = [factor * float(repeat) for repeat in row.repeats.split()]
         faster[law] = [u for u in kept if u > scenario.path.speed]
@@ -347,8 +347,8 @@ def test_the_table_of_laws_is_that_of_the_study(study, text, laws):
 def test_the_sentences_about_pairs_are_those_of_the_study():
     pairs = table("pairs.csv").query("metric == 'iae'").set_index(["a", "b"])
     for b, wins, losses in (("pid", "77.5", "21.9"), ("full_backstepping", "5.0", "73.1")):
-        found = pairs.loc["adaptive_neural", b]
-        assert (f"{100 * found.a_wins:.1f}", f"{100 * found.b_wins:.1f}") == (wins, losses)
+        pair = pairs.loc["adaptive_neural", b]
+        assert (f"{100 * pair.a_wins:.1f}", f"{100 * pair.b_wins:.1f}") == (wins, losses)
         assert wins in STUDIES_PAGE
         assert losses in STUDIES_PAGE
     ratio = pairs.loc["adaptive_neural", "full_backstepping"]
@@ -357,8 +357,8 @@ def test_the_sentences_about_pairs_are_those_of_the_study():
 
 
 def test_hulls_matter_less_than_the_start():
-    found = table("sensitivity.csv").query("metric == 'iae' and law == 'adaptive_neural'")
-    by = found.set_index("quantity")["correlation"].abs()
+    rows = table("sensitivity.csv").query("metric == 'iae' and law == 'adaptive_neural'")
+    by = rows.set_index("quantity")["correlation"].abs()
     assert round(by["start.x"], 2) == 0.77
     hull = [q for q in by.index if not q.startswith(("start.", "disturbance."))]
     assert len(hull) == 6
@@ -393,13 +393,13 @@ def test_the_sentences_about_told_hulls_are_those_of_the_study():
 
 
 def test_what_the_laws_are_told_hardly_matters():
-    found = table("sensitivity.csv", "unknown_dynamics").query("metric == 'iae'")
-    by = found[found.law == "adaptive_neural"].set_index("quantity")["correlation"].abs().round(2)
+    rows = table("sensitivity.csv", "unknown_dynamics").query("metric == 'iae'")
+    by = rows[rows.law == "adaptive_neural"].set_index("quantity")["correlation"].abs().round(2)
     told = [q for q in by.index if q.startswith(("nominal.", "told_"))]
     assert len(told) == 4
     assert by[told].max() <= 0.04
     assert by[["surge_damping", "vessel.m"]].tolist() == [0.86, 0.49]
-    assert round(found.by_chance.max(), 2) == 0.04
+    assert round(rows.by_chance.max(), 2) == 0.04
 
 
 def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_studies():
@@ -429,8 +429,8 @@ def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_stud
 
 
 def test_the_told_mass_sets_peak_demand_and_settled_error():
-    found = table("sensitivity.csv", "unknown_dynamics").query("law == 'adaptive_neural'")
-    by = found.set_index(["metric", "quantity"])["correlation"]
+    rows = table("sensitivity.csv", "unknown_dynamics").query("law == 'adaptive_neural'")
+    by = rows.set_index(["metric", "quantity"])["correlation"]
     told = " ".join(TOLD.split())
     assert f"the peak demand ({by['peak_tau_u', 'nominal.m']:.2f})" in told
     assert f"about a millimetre ({by['e_steady', 'nominal.m']:.2f})" in told
@@ -461,8 +461,8 @@ def test_the_table_of_cybership_ii_is_that_of_the_study():
         millimetres = [1000 * metres for row in (settled, after) for metres in (row.q50, row.q95)]
         assert ends == [f"{one:.0f}" if np.isfinite(one) else "fails" for one in millimetres]
     pairs = table("pairs.csv", "rivals_cybership2").query("metric == 'iae'").set_index(["a", "b"])
-    found = pairs.loc["velocity_vector", "momentum_vector"]
-    told = f"{found.ratio:.3f} [{found.ratio_low:.3f}, {found.ratio_high:.3f}]"
+    pair = pairs.loc["velocity_vector", "momentum_vector"]
+    told = f"{pair.ratio:.3f} [{pair.ratio_low:.3f}, {pair.ratio_high:.3f}]"
     assert f"`velocity_vector` / `momentum_vector` {told} in IAE" in " ".join(section.split())
 
 
@@ -484,8 +484,8 @@ def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
     assert f"{lost[0]:.1f} % of the draws both times" in section
     pairs = table("pairs.csv", "rivals_earth").query("metric == 'iae'").set_index(["a", "b"])
     for rival in ("momentum_vector", "adrc"):
-        found = pairs.loc["velocity_vector", rival]
-        ratio = f"{found.ratio:.3f} [{found.ratio_low:.3f}, {found.ratio_high:.3f}]"
+        pair = pairs.loc["velocity_vector", rival]
+        ratio = f"{pair.ratio:.3f} [{pair.ratio_low:.3f}, {pair.ratio_high:.3f}]"
         assert (
             f"`velocity_vector` / `{rival}` is {ratio}" in section
             or f"`{rival}` {ratio}" in section

@@ -110,31 +110,31 @@ def test_super_twisting_takes_a_load_that_grows_below_its_bound():
 def test_a_load_is_not_learnt_with_the_first_order_and_not_while_the_actuator_falls_short():
     assert twist(0.3, constants(LAYER)) == 0.0
     for x, memory, target in situations(TWIST, 20):
-        found, k = ask(TWIST, x, memory, target, NONLINEAR), constants(TWIST)
-        full, tau = found.rate.copy(), np.array([found.tau[0], 0.0, found.tau[1]])
+        answer, k = ask(TWIST, x, memory, target, NONLINEAR), constants(TWIST)
+        full, tau = answer.rate.copy(), np.array([answer.tau[0], 0.0, answer.tau[1]])
         call(
             TWIST.after_saturation,
             t=0.0,
             memory=memory,
-            demand=found.tau,
+            demand=answer.tau,
             tau=tau,
             k=k,
             table=TWIST.table(),
-            rate=found.rate,
+            rate=answer.rate,
         )
-        np.testing.assert_array_equal(found.rate, full)
+        np.testing.assert_array_equal(answer.rate, full)
         short = tau - [TWIST.eta * NONLINEAR.m11, 0.0, 3 * TWIST.eta * NONLINEAR.m33 / TWIST.hand]
         call(
             TWIST.after_saturation,
             t=0.0,
             memory=memory,
-            demand=found.tau,
+            demand=answer.tau,
             tau=short,
             k=k,
             table=TWIST.table(),
-            rate=found.rate,
+            rate=answer.rate,
         )
-        np.testing.assert_allclose(found.rate, full * [1 / 2, 1 / 10, 1.0], rtol=1e-12)
+        np.testing.assert_allclose(answer.rate, full * [1 / 2, 1 / 10, 1.0], rtol=1e-12)
 
 
 def test_without_that_what_is_learnt_winds_up():
@@ -188,15 +188,15 @@ def test_its_loops_are_its_own_at_rest(law, axis):
         x, memory, rate = np.zeros(6), np.zeros(3), np.zeros(6)
         x[at] += d[0]
         memory[axis] = d[1] * scale
-        found = ask(law, x, memory, np.zeros(6), NONLINEAR)
-        plant(x, np.array([found.tau[0], 0.0, found.tau[1]]), np.zeros(3), k, rate)
-        return np.array([rate[at], found.rate[axis] / scale])
+        answer = ask(law, x, memory, np.zeros(6), NONLINEAR)
+        plant(x, np.array([answer.tau[0], 0.0, answer.tau[1]]), np.zeros(3), k, rate)
+        return np.array([rate[at], answer.rate[axis] / scale])
 
     steps = 1e-7 * np.eye(2)
     measured = np.transpose([(rates(d) - rates(-d)) / 2e-7 for d in steps])
-    found = law.velocity_loops(axes, np.zeros(3))[axis].matrix
-    count = len(found)  # z stays 0 with the first order
-    np.testing.assert_allclose(found, measured[:count, :count], rtol=1e-4, atol=1e-4)
+    answer = law.velocity_loops(axes, np.zeros(3))[axis].matrix
+    count = len(answer)  # z stays 0 with the first order
+    np.testing.assert_allclose(answer, measured[:count, :count], rtol=1e-4, atol=1e-4)
 
 
 @PATHS

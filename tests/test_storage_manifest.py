@@ -91,8 +91,8 @@ def test_files_of_others_are_allowed_and_told(folder):
     (folder / "notes.txt").write_text("good run")
     (folder / "figures/mine.png").touch()
     (folder / "latest").symlink_to(folder)
-    found = manifest.check(folder)
-    assert manifest.foreign(folder, found) == ["figures/mine.png", "latest", "notes.txt"]
+    contents = manifest.check(folder)
+    assert manifest.foreign(folder, contents) == ["figures/mine.png", "latest", "notes.txt"]
 
 
 @pytest.mark.parametrize(
@@ -199,22 +199,22 @@ FINISHED = datetime(2026, 3, 1, 10, 0, 3, tzinfo=UTC)
 
 
 def test_versions_platform_command_and_times():
-    found = provenance.collect(["podusv", "run", "a.yaml"], STARTED, FINISHED)
-    assert found["podusv"] == podusv_cli.__version__
-    assert found["python"] == ".".join(map(str, sys.version_info[:3]))
-    assert found["packages"] == {
+    origin = provenance.collect(["podusv", "run", "a.yaml"], STARTED, FINISHED)
+    assert origin["podusv"] == podusv_cli.__version__
+    assert origin["python"] == ".".join(map(str, sys.version_info[:3]))
+    assert origin["packages"] == {
         "numpy": np.__version__, "scipy": scipy.__version__, "numba": numba.__version__,
         "h5py": h5py.__version__, "pydantic": pydantic.VERSION,
     }  # fmt: skip
     system = os.uname()
     expected = {"system": system.sysname, "release": system.release, "machine": system.machine}
-    assert expected.items() <= found["platform"].items()
-    assert set(found["platform"]) - set(expected) == {"processor", "libc"}
-    assert found["argv"] == ["podusv", "run", "a.yaml"]
-    assert found["started"] == "2026-03-01T10:00:00.250+00:00"
-    assert found["finished"] == "2026-03-01T10:00:03.000+00:00"
-    assert found["duration_s"] == 2.75
-    assert json_files.encode(found)
+    assert expected.items() <= origin["platform"].items()
+    assert set(origin["platform"]) - set(expected) == {"processor", "libc"}
+    assert origin["argv"] == ["podusv", "run", "a.yaml"]
+    assert origin["started"] == "2026-03-01T10:00:00.250+00:00"
+    assert origin["finished"] == "2026-03-01T10:00:03.000+00:00"
+    assert origin["duration_s"] == 2.75
+    assert json_files.encode(origin)
 
 
 def test_a_package_that_is_not_installed_has_no_version(monkeypatch):
@@ -222,8 +222,8 @@ def test_a_package_that_is_not_installed_has_no_version(monkeypatch):
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(provenance, "version", version)
-    found = provenance.collect([], STARTED, FINISHED)
-    assert set(found["packages"].values()) == {None}
+    origin = provenance.collect([], STARTED, FINISHED)
+    assert set(origin["packages"].values()) == {None}
 
 
 def git(folder: Path, *words: str) -> str:
@@ -261,9 +261,9 @@ def test_a_checkout_is_known_by_its_commit(package):
 )
 def test_only_what_changes_the_package_makes_it_dirty(package, changed, dirty):
     (package / changed).write_text("changed")
-    found = provenance.source_tree(package)
-    assert found is not None
-    assert found["dirty"] is dirty
+    tree = provenance.source_tree(package)
+    assert tree is not None
+    assert tree["dirty"] is dirty
 
 
 def test_a_package_installed_below_another_checkout_is_no_part_of_it(package):
@@ -293,6 +293,6 @@ def test_inside_a_hook_of_another_checkout(package, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks what the GNU C library says of itself")
 def test_processor_and_c_library_are_told():
-    found = provenance.collect([], STARTED, FINISHED)["platform"]
-    assert found["processor"] is None or found["processor"] in Path("/proc/cpuinfo").read_text()
-    assert found["libc"] == os.confstr("CS_GNU_LIBC_VERSION")
+    machine = provenance.collect([], STARTED, FINISHED)["platform"]
+    assert machine["processor"] is None or machine["processor"] in Path("/proc/cpuinfo").read_text()
+    assert machine["libc"] == os.confstr("CS_GNU_LIBC_VERSION")

@@ -216,39 +216,39 @@ def written(tmp_path):
 
 def objects(content: bytes) -> dict[str, h5py.Group | h5py.Dataset]:
     """Everything in a log by name, the file open for as long as these live."""
-    found = {"/": h5py.File(io.BytesIO(content))["/"]}
-    found["/"].visititems(lambda name, thing: found.update({name: thing}))
-    return found
+    things = {"/": h5py.File(io.BytesIO(content))["/"]}
+    things["/"].visititems(lambda name, thing: things.update({name: thing}))
+    return things
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4", None])
 def test_xarray_reads_every_signal_with_its_axes_and_units(written, engine):
     recorded = recording()
-    with xr.open_dataset(written, engine=engine) as found:
-        assert {name: found[name].dims for name in found.variables} == DIMENSIONS
-        assert dict(found.sizes) == {"time": 50, "node": 8, "input": 3}
+    with xr.open_dataset(written, engine=engine) as dataset:
+        assert {name: dataset[name].dims for name in dataset.variables} == DIMENSIONS
+        assert dict(dataset.sizes) == {"time": 50, "node": 8, "input": 3}
         for name, array in {**recorded.signals, **recorded.fixed}.items():
-            assert_array_equal(found[name].to_numpy(), array, err_msg=name)
+            assert_array_equal(dataset[name].to_numpy(), array, err_msg=name)
             signal = recorded.about[name]
-            assert found[name].attrs == {
+            assert dataset[name].attrs == {
                 "units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol,
                 "axes": " ".join(DIMENSIONS[name]),
             }  # fmt: skip
-        assert "time" in found.x.coords
-        assert_array_equal(found.node, np.arange(8))
+        assert "time" in dataset.x.coords
+        assert_array_equal(dataset.node, np.arange(8))
 
 
 def test_every_axis_has_its_scale_by_name():
-    found = objects(log())
+    things = objects(log())
     for name, axes in DIMENSIONS.items():
-        scales = [list(axis.keys()) for axis in found[name].dims]
-        assert found[name].is_scale or scales == [[axis] for axis in axes], name
+        scales = [list(axis.keys()) for axis in things[name].dims]
+        assert things[name].is_scale or scales == [[axis] for axis in axes], name
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 def test_attributes_of_the_file(written, engine):
-    with xr.open_dataset(written, engine=engine) as found:
-        assert found.attrs == {
+    with xr.open_dataset(written, engine=engine) as dataset:
+        assert dataset.attrs == {
             "podusv_format": 2, "podusv_version": "1.2.3", "Conventions": "CF-1.11",
             "title": TEXTS["title"], "source": TEXTS["source"], "status": "finished",
             "controller": "pid",
@@ -257,8 +257,8 @@ def test_attributes_of_the_file(written, engine):
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
 def test_the_scenario_is_in_the_log(written, engine):
-    with xr.open_dataset(written, engine=engine, group="provenance") as found:
-        text = found.resolved_yaml.item()
+    with xr.open_dataset(written, engine=engine, group="provenance") as dataset:
+        text = dataset.resolved_yaml.item()
         assert (text.decode() if isinstance(text, bytes) else text) == YAML
 
 
@@ -266,9 +266,9 @@ def test_the_scenario_is_in_the_log(written, engine):
 def test_a_run_that_logged_nothing_opens(tmp_path, engine):
     path = tmp_path / "log.h5"
     path.write_bytes(log(recording(rows=0, status="diverged", message="diverged at t = 0 s")))
-    with xr.open_dataset(path, engine=engine) as found:
-        assert dict(found.sizes) == {"time": 0, "node": 8, "input": 3}
-        assert found.attrs["message"] == "diverged at t = 0 s"
+    with xr.open_dataset(path, engine=engine) as dataset:
+        assert dict(dataset.sizes) == {"time": 0, "node": 8, "input": 3}
+        assert dataset.attrs["message"] == "diverged at t = 0 s"
 
 
 def test_nothing_in_a_log_is_of_variable_length():
@@ -285,16 +285,16 @@ def test_nothing_in_a_log_is_of_variable_length():
 def test_every_array_lies_in_one_piece_where_a_map_can_use_it():
     datasets = objects(log())
     for name in (*recording().signals, *recording().fixed):
-        found = datasets[name]
-        assert found.chunks is None
-        assert found.id.get_offset() % 8 == 0
+        array = datasets[name]
+        assert array.chunks is None
+        assert array.id.get_offset() % 8 == 0
 
 
 def test_compressed_arrays_are_the_same_and_smaller(tmp_path):
     recorded = recording(rows=20_000)
     plain, packed = log(recorded), log(recorded, compress=True)
-    found = objects(packed)["W_hat_u"]
-    assert (found.compression, found.shuffle) == ("gzip", True)
+    array = objects(packed)["W_hat_u"]
+    assert (array.compression, array.shuffle) == ("gzip", True)
     assert len(packed) < 0.98 * len(plain)
     (tmp_path / "log.h5").write_bytes(packed)
     assert_same(recorded, log_reader.read_log(tmp_path / "log.h5"))
@@ -321,8 +321,8 @@ def test_texts_longer_than_an_attribute_of_old_files_can_be(tmp_path):
     path, text = tmp_path / "log.h5", "# Schräglage ψ\n" * 20_000
     path.write_bytes(log(title=text, resolved_yaml=text))
     assert log_reader.resolved_yaml(path) == text
-    with xr.open_dataset(path, engine="netcdf4") as found:
-        assert found.attrs["title"] == text
+    with xr.open_dataset(path, engine="netcdf4") as dataset:
+        assert dataset.attrs["title"] == text
 
 
 def test_a_text_that_no_file_can_hold_is_spelt_out():
@@ -334,9 +334,9 @@ def test_a_simulated_run_comes_back_as_it_was(tmp_path):
     recorded, path = run(corrected(), 2.0), tmp_path / "log.h5"
     path.write_bytes(log(recorded))
     assert_same(recorded, log_reader.read_log(path))
-    with xr.open_dataset(path, engine="netcdf4") as found:
-        assert found.W_hat_r.dims == ("time", "node")
-        assert set(found.data_vars) | {"time"} == {*recorded.signals, *recorded.fixed}
+    with xr.open_dataset(path, engine="netcdf4") as dataset:
+        assert dataset.W_hat_r.dims == ("time", "node")
+        assert set(dataset.data_vars) | {"time"} == {*recorded.signals, *recorded.fixed}
 
 
 # --- signals of laws that podusv does not know

@@ -15,9 +15,9 @@ inf, nan = math.inf, math.nan
 
 
 def row(frame: pd.DataFrame, **keys: str) -> pd.Series:
-    found = frame.loc[np.logical_and.reduce([frame[k] == v for k, v in keys.items()])]
-    assert len(found) == 1
-    return found.iloc[0]
+    entry = frame.loc[np.logical_and.reduce([frame[k] == v for k, v in keys.items()])]
+    assert len(entry) == 1
+    return entry.iloc[0]
 
 
 def interval(row: pd.Series, name: str) -> tuple[float, ...]:
@@ -29,19 +29,19 @@ def test_the_summary_has_failures_and_quantiles_of_every_law_and_cell():
     runs = Made({"a": {"iae": a}, "b": {"iae": 2 * a}}, ("s=1", "s=2"), 40)
     frame = summary(runs)
     assert len(frame) == 4
-    found = row(frame, law="a", cell="s=2")
-    assert (found.n, found.broken, found.unknown, found.unit) == (40, 0, 0, "m s")
-    assert interval(found, "failed") == tuple(st.share(10, 40, 0.95))
-    assert interval(found, "q75") == tuple(st.quantile(a[1], 0.75, 0.95))
-    assert found.q95 == inf
+    entry = row(frame, law="a", cell="s=2")
+    assert (entry.n, entry.broken, entry.unknown, entry.unit) == (40, 0, 0, "m s")
+    assert interval(entry, "failed") == tuple(st.share(10, 40, 0.95))
+    assert interval(entry, "q75") == tuple(st.quantile(a[1], 0.75, 0.95))
+    assert entry.q95 == inf
     assert row(frame, law="b", cell="s=1").q50 == 40.0
 
 
 def test_the_summary_counts_only_runs_that_are_there_and_broken_ones_as_failed():
     a, broken = np.r_[np.ones(8), inf, inf], np.arange(10) == 8
     runs = Made({"a": {"iae": a}}, undone={"a": np.arange(10) < 3}, broke={"a": broken})
-    found = summary(runs).iloc[0]
-    assert (found.n, found.broken, found.failed) == (7, 1, 2 / 7)
+    entry = summary(runs).iloc[0]
+    assert (entry.n, entry.broken, entry.failed) == (7, 1, 2 / 7)
     nothing = Made({"a": {"iae": a}}, undone={"a": True})
     assert summary(nothing).empty
     assert pairs(nothing).empty
@@ -67,13 +67,13 @@ def test_metrics_that_a_law_lacks_are_left_out_and_missing_numbers_are_counted()
 def test_pairs_have_both_win_rates_and_the_median_ratio():
     a = np.r_[np.ones(10), 1.995, inf, inf]
     b = np.r_[np.full(10, 2.0), 2.0, inf, 1.0]
-    found = row(pairs(study(a=a, b=b)), metric="iae")
-    assert (found.a, found.b, found.n, found.margin) == ("a", "b", 13, 0.01)
-    assert (found.ties, found.both_failed) == (2, 1)
-    assert interval(found, "a_wins") == tuple(st.share(10, 13, 0.95))
-    assert interval(found, "b_wins") == tuple(st.share(1, 13, 0.95))
-    assert interval(found, "ratio") == tuple(st.quantile(st.ratios(a, b), 0.5, 0.95))
-    assert found.ratio == 0.5
+    entry = row(pairs(study(a=a, b=b)), metric="iae")
+    assert (entry.a, entry.b, entry.n, entry.margin) == ("a", "b", 13, 0.01)
+    assert (entry.ties, entry.both_failed) == (2, 1)
+    assert interval(entry, "a_wins") == tuple(st.share(10, 13, 0.95))
+    assert interval(entry, "b_wins") == tuple(st.share(1, 13, 0.95))
+    assert interval(entry, "ratio") == tuple(st.quantile(st.ratios(a, b), 0.5, 0.95))
+    assert entry.ratio == 0.5
     assert len(pairs(study(a=a, b=b, c=a))) == 3
 
 
@@ -97,11 +97,11 @@ def test_sensitivity_is_of_the_draws_in_which_the_number_is_known():
     mass = random.random(40)
     energy = np.where((mass < 0.4) | (random.random(40) < 0.2), nan, mass + random.random(40))
     runs, known = Made({"a": {"iae": np.ones(40), "energy": energy}}), ~np.isnan(energy)
-    found = row(sensitivity(runs, {"vessel.m": mass}), metric="energy")
-    assert found.n == known.sum() < 40
+    entry = row(sensitivity(runs, {"vessel.m": mass}), metric="energy")
+    assert entry.n == known.sum() < 40
     expected = spearmanr(mass[known], energy[known]).statistic
-    assert found.correlation == pytest.approx(expected, rel=1e-12)
-    assert found.by_chance == pytest.approx(1.959964 / math.sqrt(known.sum() - 1), rel=1e-6)
+    assert entry.correlation == pytest.approx(expected, rel=1e-12)
+    assert entry.by_chance == pytest.approx(1.959964 / math.sqrt(known.sum() - 1), rel=1e-6)
 
 
 def test_measured_times_are_in_no_table():

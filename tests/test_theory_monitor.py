@@ -49,9 +49,9 @@ every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
 def watched(loop: ClosedLoop, duration: float, step: float = 0.01, **options: Any) -> Monitored:
     """A run with its monitor."""
     grid = TimeGrid(step, round(duration / step))
-    found = monitored(Plan(loop, grid), run(loop, duration, step, **options))
-    assert found
-    return found
+    monitor = monitored(Plan(loop, grid), run(loop, duration, step, **options))
+    assert monitor
+    return monitor
 
 
 def smooth(law: PolarBackstepping, **parts: Any) -> ClosedLoop:
@@ -151,9 +151,9 @@ def moving(loop: ClosedLoop, law: PolarBackstepping, x: Vector, memory: Vector) 
     return recorded(np.stack([row - TINY * ds, row, row + TINY * ds]))
 
 
-def sum_of_terms(loop: ClosedLoop, found: Monitored) -> Vector:
+def sum_of_terms(loop: ClosedLoop, monitor: Monitored) -> Vector:
     """V' of the corrected law as docs/theory.md derives it, from what was logged."""
-    law, log, trace = loop.controller, found.recording, found.traces
+    law, log, trace = loop.controller, monitor.recording, monitor.traces
     assert isinstance(law, PolarBackstepping)
     z_e, psi_e, u_e, r_e = log["z_e"] - law.standoff, log["psi_e"], log["u_e"], log["r_e"]
     y_u, y_r = log["beta_u"] - log["alpha_u"], log["beta_r"] - log["alpha_r"]
@@ -176,10 +176,10 @@ def sum_of_terms(loop: ClosedLoop, found: Monitored) -> Vector:
     )  # fmt: skip
 
 
-def mismatch(loop: ClosedLoop, found: Monitored) -> float:
+def mismatch(loop: ClosedLoop, monitor: Monitored) -> float:
     """Largest gap between V' along the run and the sum of its terms, relative to V'."""
-    rate = found.recording["V_dot"]
-    return float(np.max(np.abs(rate - sum_of_terms(loop, found))) / np.max(np.abs(rate)))
+    rate = monitor.recording["V_dot"]
+    return float(np.max(np.abs(rate - sum_of_terms(loop, monitor))) / np.max(np.abs(rate)))
 
 
 @pytest.mark.parametrize("law", LAWS[:2], ids=lambda law: law.label)
@@ -209,34 +209,34 @@ def test_a_wrong_sign_planted_in_the_law_is_caught(sign):
 
     loop = smooth(Wrong(**GENTLE.model_dump()))
     recording = run(loop, 1.0, 0.02, compiled=False)
-    found = monitored(Plan(loop, TimeGrid(0.02, 50)), recording, compiled=False)
-    assert found
-    assert mismatch(loop, found) > 1e-5
+    monitor = monitored(Plan(loop, TimeGrid(0.02, 50)), recording, compiled=False)
+    assert monitor
+    assert mismatch(loop, monitor) > 1e-5
     honest = replace(loop, controller=GENTLE)
     assert mismatch(honest, watched(honest, 1.0, 0.02)) < 1e-10
 
 
 @every_law
 def test_V_is_the_sum_of_its_terms_and_stays_below_its_bound(law):
-    found = watched(smooth(law, vessel=NONLINEAR), 200.0)
-    log = found.recording
+    monitor = watched(smooth(law, vessel=NONLINEAR), 200.0)
+    log = monitor.recording
     np.testing.assert_allclose(log["V"], sum(log[term.name] for term in TERMS), rtol=1e-13)
-    for window in found.windows.values():
+    for window in monitor.windows.values():
         bound = window.bound.corrected
         assert window.kept == 1.0  # V' <= -2 lambda V + Delta in every row
         envelope = log["V"][0] * np.exp(-2.0 * bound.lambda_ * log["time"]) + bound.value
         if window.since == 0.0:
             assert np.all(log["V"] <= envelope)
-    assert found.windows["settled"].largest_V < found.windows["settled"].bound.corrected.value
+    assert monitor.windows["settled"].largest_V < monitor.windows["settled"].bound.corrected.value
 
 
 def test_ideal_weights_are_what_makes_their_share_of_Delta_least():
     loop = smooth(GENTLE, vessel=NONLINEAR)
-    found = watched(loop, 15.0)  # short enough for the fit to take every row
-    log, law = found.recording, GENTLE
+    monitor = watched(loop, 15.0)  # short enough for the fit to take every row
+    log, law = monitor.recording, GENTLE
     phi = activation(law.network, np.column_stack([log["u"], log["v"], log["r"]]))
     for axis, m, sigma in (("u", NONLINEAR.m11, law.sigma_u), ("r", NONLINEAR.m33, law.sigma_r)):
-        W, left = log[f"W_star_{axis}"], found.traces[f"epsilon_{axis}"]
+        W, left = log[f"W_star_{axis}"], monitor.traces[f"epsilon_{axis}"]
         gradient = -(m**2) * (phi.T @ left) / len(left) + sigma * W
         assert np.abs(gradient).max() < 1e-9 * np.abs(sigma * W).max()
 
@@ -244,9 +244,9 @@ def test_ideal_weights_are_what_makes_their_share_of_Delta_least():
 def test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one():
     # What the proof does not know of is in `rest`, and V' stays below its bound all the same.
     loop = smooth(GENTLE, vessel=VESSELS["cybership2"], nominal=PAPER)
-    found = watched(loop, 60.0)
-    assert found.windows["whole"].kept == 1.0
-    assert np.abs(found.traces["rest_r"] - PAPER.m33 * found.traces["epsilon_r"]).max() > 1e-2
+    monitor = watched(loop, 60.0)
+    assert monitor.windows["whole"].kept == 1.0
+    assert np.abs(monitor.traces["rest_r"] - PAPER.m33 * monitor.traces["epsilon_r"]).max() > 1e-2
     told = watched(smooth(GENTLE, vessel=PAPER), 60.0).traces  # where there is nothing else
     np.testing.assert_allclose(told["rest_r"], PAPER.m33 * told["epsilon_r"], atol=1e-10)
 
@@ -261,14 +261,14 @@ def test_sway_stays_below_its_bound():
 
 def test_sampled_control_has_V_but_no_rate():
     loop, grid = smooth(GENTLE), TimeGrid(0.01, 100, hold_every=10)
-    found = monitored(Plan(loop, grid), run(loop, 1.0, hold_every=10))
-    assert found
-    assert "V" in found.recording
-    assert "V_dot" not in found.recording
-    assert found.windows["whole"].observed is None
+    monitor = monitored(Plan(loop, grid), run(loop, 1.0, hold_every=10))
+    assert monitor
+    assert "V" in monitor.recording
+    assert "V_dot" not in monitor.recording
+    assert monitor.windows["whole"].observed is None
     # V is of the state as it is, not as the law last saw it.
-    z_e = found.recording["z_e"] - GENTLE.standoff
-    np.testing.assert_allclose(found.recording["V_z_e"], z_e**2 / 2.0)
+    z_e = monitor.recording["z_e"] - GENTLE.standoff
+    np.testing.assert_allclose(monitor.recording["V_z_e"], z_e**2 / 2.0)
 
 
 def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
@@ -277,10 +277,10 @@ def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
     loop = corrected(controller=law, vessel=PAPER)
     recording = run(loop, 5.0)
     assert recording.status == "diverged"
-    found = monitored(Plan(loop, TimeGrid(0.01, 500)), recording)
-    assert found
-    assert len(found.recording["V"]) == len(recording["time"])
-    assert np.isfinite(found.recording["W_star_u"]).all()
+    monitor = monitored(Plan(loop, TimeGrid(0.01, 500)), recording)
+    assert monitor
+    assert len(monitor.recording["V"]) == len(recording["time"])
+    assert np.isfinite(monitor.recording["W_star_u"]).all()
 
 
 def test_plain_and_compiled_monitor_agree():
@@ -295,10 +295,10 @@ def test_plain_and_compiled_monitor_agree():
 
 def test_what_a_limit_withholds_counts_as_disturbance():
     loop = smooth(GENTLE, actuator=Saturated(surge_limit=2.0, yaw_limit=0.5))
-    found = watched(loop, 20.0)
-    log = found.recording
+    monitor = watched(loop, 20.0)
+    log = monitor.recording
     withheld = log["tau_u"] - log["tau_u_cmd"]
     assert np.abs(withheld).max() > 1.0
-    expected = PAPER.m11 * found.traces["epsilon_u"] + withheld
-    np.testing.assert_allclose(found.traces["rest_u"], expected, atol=1e-9)
-    assert found.windows["whole"].kept == 1.0
+    expected = PAPER.m11 * monitor.traces["epsilon_u"] + withheld
+    np.testing.assert_allclose(monitor.traces["rest_u"], expected, atol=1e-9)
+    assert monitor.windows["whole"].kept == 1.0

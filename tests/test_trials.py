@@ -64,10 +64,10 @@ def crossing(state, change, sign=1.0):
 
 
 def integrated(scenario, angle, state, event, seconds=60.0):
-    found = solve_ivp(
+    numbers = solve_ivp(
         slope(scenario, angle), (0.0, seconds), state, events=event, rtol=1e-10, atol=1e-12
     )
-    return found.y[:, -1]
+    return numbers.y[:, -1]
 
 
 def approach(scenario):
@@ -80,28 +80,28 @@ def approach(scenario):
 )
 def test_a_turning_circle_is_that_of_an_independent_integration(preset, thrust):
     vessel = [f"vessel.preset={preset}", f"controller.thrust={thrust}"]
-    scenario, _, found = done("turning_circle", *IDEAL, *vessel)
+    scenario, _, numbers = done("turning_circle", *IDEAL, *vessel)
     begun, angle = approach(scenario), math.radians(35.0)
     quarter = integrated(scenario, angle, begun, crossing(begun, 0.5 * math.pi))
     half = integrated(scenario, angle, begun, crossing(begun, math.pi))
-    assert found["advance"] == pytest.approx(quarter[0] - begun[0], abs=2e-5)
-    assert found["transfer"] == pytest.approx(quarter[1], abs=2e-5)
-    assert found["tactical_diameter"] == pytest.approx(half[1], abs=2e-5)
+    assert numbers["advance"] == pytest.approx(quarter[0] - begun[0], abs=2e-5)
+    assert numbers["transfer"] == pytest.approx(quarter[1], abs=2e-5)
+    assert numbers["tactical_diameter"] == pytest.approx(half[1], abs=2e-5)
 
 
 def test_the_turning_diameter_is_that_of_the_circle_at_the_end():
-    _, log, found = done("turning_circle", *IDEAL)
+    _, log, numbers = done("turning_circle", *IDEAL)
     late = log["time"] > 60.0
     x, y = log["x"][late], log["y"][late]
     columns = np.column_stack([x, y, np.ones_like(x)])
     a, b, c = np.linalg.lstsq(columns, x * x + y * y, rcond=None)[0]
     diameter = 2.0 * math.sqrt(c + 0.25 * (a * a + b * b))
-    assert found["turning_diameter"] == pytest.approx(diameter, rel=1e-3)
+    assert numbers["turning_diameter"] == pytest.approx(diameter, rel=1e-3)
 
 
 def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
     degrees = math.radians(20.0)
-    scenario, log, found = done("zigzag_20", *IDEAL, *OTTER)
+    scenario, log, numbers = done("zigzag_20", *IDEAL, *OTTER)
     begun = approach(scenario)
     state, overshoots = begun, []
     for leg in range(3):
@@ -110,7 +110,7 @@ def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
             peak = integrated(scenario, side * degrees, state, turning(-side))
             overshoots.append(-side * (peak[2] - begun[2]) - degrees)
         state = integrated(scenario, side * degrees, state, crossing(begun, degrees, side))
-    assert [found["overshoot_1"], found["overshoot_2"]] == pytest.approx(
+    assert [numbers["overshoot_1"], numbers["overshoot_2"]] == pytest.approx(
         np.degrees(overshoots), abs=6e-5
     )
     first = solve_ivp(
@@ -119,7 +119,7 @@ def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
     )  # fmt: skip
     way = np.trapezoid(np.hypot(first.y[3], first.y[4]), first.t)
     off = 5e-5  # the heading bends within a step: U (r'/r) h^2 / 8
-    assert found["initial_turning"] == pytest.approx(way, abs=off)
+    assert numbers["initial_turning"] == pytest.approx(way, abs=off)
     sides = np.sign(log["delta_s"][log["time"] >= EXECUTE])
     assert set(sides.tolist()) == {1.0, -1.0}
 
@@ -147,21 +147,21 @@ def turning(side):
 
 
 def test_a_trial_that_does_not_get_so_far_has_no_number():
-    _, _, found = done("turning_circle", *IDEAL, "simulation.duration=21")
-    assert math.isnan(found["advance"])
-    assert math.isnan(found["tactical_diameter"])
+    _, _, numbers = done("turning_circle", *IDEAL, "simulation.duration=21")
+    assert math.isnan(numbers["advance"])
+    assert math.isnan(numbers["tactical_diameter"])
     _, _, short = done("zigzag_20", *IDEAL, "simulation.duration=21")
     assert math.isnan(short["overshoot_1"])
 
 
 def test_a_trial_that_does_not_lead_to_its_numbers_is_told():
     """CyberShip II turns on and on at 10 deg behind its pods; the Otter reverses."""
-    scenario, log, found = done("zigzag_10", "simulation.duration=80")
-    assert math.isnan(found["overshoot_1"])
+    scenario, log, numbers = done("zigzag_10", "simulation.duration=80")
+    assert math.isnan(numbers["overshoot_1"])
     (text,) = trial_unfinished.search(scenario, log)
     assert text.startswith("the zig-zag reverses 1 times, and its second overshoot needs 3; ")
-    scenario, log, found = done("zigzag_10", *IDEAL, *OTTER)
-    assert found["overshoot_2"] > 0.0
+    scenario, log, numbers = done("zigzag_10", *IDEAL, *OTTER)
+    assert numbers["overshoot_2"] > 0.0
     assert list(trial_unfinished.search(scenario, log)) == []
     scenario, log, _ = done("turning_circle", *IDEAL, "simulation.duration=21")
     assert "its diameter needs 180" in next(trial_unfinished.search(scenario, log))
@@ -173,22 +173,22 @@ def test_a_trial_that_does_not_lead_to_its_numbers_is_told():
 def test_a_stopping_hull_with_linear_damping_goes_as_far_as_algebra_says(astern):
     """m u' = -F - d u from u_0: (m/d)(u_0 - (F/d) ln(1 + d u_0/F)) in (m/d) ln(1 + d u_0/F)."""
     sets = ["actuator={kind: ideal}", f"controller.astern={astern}", "simulation.duration=30"]
-    scenario, log, found = done("stopping", *sets, hull="")
+    scenario, log, numbers = done("stopping", *sets, hull="")
     mass, damping = scenario.vessel.m11, -scenario.vessel.X_u
     u_0 = scenario.controller.thrust / damping  # the approach is steady
     logarithm = math.log(1.0 + damping * u_0 / astern)
     way = mass / damping * (u_0 - astern / damping * logarithm)
-    assert found["stopping_time"] == pytest.approx(mass / damping * logarithm, abs=2e-5)
-    assert found["track_reach"] == pytest.approx(way, abs=1e-6)
-    assert found["head_reach"] == pytest.approx(way, abs=1e-6)
+    assert numbers["stopping_time"] == pytest.approx(mass / damping * logarithm, abs=2e-5)
+    assert numbers["track_reach"] == pytest.approx(way, abs=1e-6)
+    assert numbers["head_reach"] == pytest.approx(way, abs=1e-6)
     assert abs(log["u"][-1]) < 0.02, "no thrust once it lies still"
     assert list(trial_unfinished.search(scenario, log)) == []
 
 
 @pytest.mark.parametrize("wind", ["{kind: none}", "{kind: step, b_v: 20, time: 10}"])
 def test_no_track_is_shorter_than_the_way_ahead(wind):
-    found = done("stopping", f"disturbance={wind}", hull="")[2]
-    assert found["track_reach"] >= found["head_reach"] - 1e-9
+    numbers = done("stopping", f"disturbance={wind}", hull="")[2]
+    assert numbers["track_reach"] >= numbers["head_reach"] - 1e-9
 
 
 def test_a_trial_s_own_numbers_come_first_and_it_has_none_of_a_target(podusv):
@@ -205,8 +205,8 @@ def test_a_trial_s_own_numbers_come_first_and_it_has_none_of_a_target(podusv):
 
 
 def test_a_hull_that_still_goes_ahead_is_told():
-    scenario, log, found = done("stopping", "simulation.duration=20.3", hull="")
-    assert math.isnan(found["track_reach"])
+    scenario, log, numbers = done("stopping", "simulation.duration=20.3", hull="")
+    assert math.isnan(numbers["track_reach"])
     assert "the hull still goes ahead at" in next(trial_unfinished.search(scenario, log))
     scenario, log, _ = done("stopping", "simulation.duration=10", hull="")
     assert "ends before the trial begins, at 20 s" in next(trial_unfinished.search(scenario, log))
@@ -216,9 +216,9 @@ def test_a_hull_that_still_goes_ahead_is_told():
 
 @pytest.mark.parametrize("name", ["turning_circle", "zigzag_10", "zigzag_20", "stopping"])
 def test_a_shipped_trial_leads_to_all_of_its_numbers(name):
-    scenario, log, found = done(name, hull="")
+    scenario, log, numbers = done(name, hull="")
     assert list(trial_unfinished.search(scenario, log)) == []
-    assert all(math.isfinite(found[key]) for key in found if key in OF_TRIALS)
+    assert all(math.isfinite(numbers[key]) for key in numbers if key in OF_TRIALS)
 
 
 def test_only_trials_have_the_metrics_of_trials():

@@ -83,9 +83,9 @@ def test_every_search_spends_the_whole_budget_and_counts_pruned_trials(done):
 
 
 def test_the_first_trial_has_the_published_gains(done):
-    for found in done.results.trials["toy"]:
-        assert found[0].gains == {"gain": 1.0, "other": 1.0}
-        assert found[0].status == FINISHED
+    for search in done.results.trials["toy"]:
+        assert search[0].gains == {"gain": 1.0, "other": 1.0}
+        assert search[0].status == FINISHED
 
 
 def test_an_objective_is_told_with_its_unit(done):

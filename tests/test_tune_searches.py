@@ -10,22 +10,22 @@ BASE = 300.0 * np.exp(RANDOM.normal(0.0, 0.3, 80))  # of each draw
 
 
 def row(frame, a, b):
-    (found,) = frame[(frame.a == a) & (frame.b == b)].to_dict("records")
-    return found
+    (pair,) = frame[(frame.a == a) & (frame.b == b)].to_dict("records")
+    return pair
 
 
 def test_searches_that_all_end_alike_leave_the_ratio_of_the_draws():
     runs = {"a": np.tile(0.9 * BASE, (4, 1)), "b": np.tile(BASE, (6, 1))}
-    found = row(searches.ratios(runs, 0.95, 1), "a", "b")
-    assert [found[end] for end in ("ratio", "ratio_low", "ratio_high")] == pytest.approx([0.9] * 3)
+    pair = row(searches.ratios(runs, 0.95, 1), "a", "b")
+    assert [pair[end] for end in ("ratio", "ratio_low", "ratio_high")] == pytest.approx([0.9] * 3)
 
 
 def test_a_law_counts_by_the_median_of_its_searches_and_its_spread_is_in_the_interval():
     factors = np.array([0.7, 0.8, 0.9, 1.3, 1.4])[:, None]
-    found = row(searches.ratios({"a": factors * BASE, "b": BASE[None]}, 0.95, 1), "a", "b")
-    assert found["ratio"] == pytest.approx(0.9)
-    assert found["ratio_low"] < 0.75
-    assert found["ratio_high"] > 1.1
+    pair = row(searches.ratios({"a": factors * BASE, "b": BASE[None]}, 0.95, 1), "a", "b")
+    assert pair["ratio"] == pytest.approx(0.9)
+    assert pair["ratio_low"] < 0.75
+    assert pair["ratio_high"] > 1.1
 
 
 def test_searches_that_fail_in_draws_of_their_own_do_not_make_a_law_that_never_fails():
@@ -34,26 +34,26 @@ def test_searches_that_fail_in_draws_of_their_own_do_not_make_a_law_that_never_f
     for search, reached in enumerate(broken):
         reached[[(search + i) % 5 for i in range(3)]] = np.inf
         reached.reshape(-1, 5)[:, [(search + i) % 5 for i in range(3)]] = np.inf
-    found = row(searches.ratios({"a": broken, "b": BASE[None]}, 0.95, 1), "a", "b")
-    assert found["ratio"] == np.inf
+    pair = row(searches.ratios({"a": broken, "b": BASE[None]}, 0.95, 1), "a", "b")
+    assert pair["ratio"] == np.inf
 
 
 def test_places_are_the_ranks_that_the_intervals_leave_open():
     spread = np.exp(np.linspace(-0.1, 0.1, 6))[:, None]
     runs = {"best": 0.5 * BASE[None], "one": spread * BASE, "other": spread[::-1] * 1.01 * BASE,
             "last": 3.0 * BASE[None]}  # fmt: skip
-    found = searches.places(searches.ratios(runs, 0.95, 1), list(runs))
-    assert found == {"best": (1, 1), "one": (2, 3), "other": (2, 3), "last": (4, 4)}
+    places = searches.places(searches.ratios(runs, 0.95, 1), list(runs))
+    assert places == {"best": (1, 1), "one": (2, 3), "other": (2, 3), "last": (4, 4)}
 
 
 def test_a_law_that_fails_in_every_other_draw_has_no_interval_and_one_that_always_fails_is_worse():
     half = BASE.copy()
     half[::2] = np.inf
     lost = np.full((1, len(BASE)), np.inf)
-    found = searches.ratios({"half": half[None], "whole": BASE[None], "lost": lost}, 0.95, 1)
-    assert [row(found, "half", "whole")[end] for end in ("ratio_low", "ratio_high")] == [0, np.inf]
-    assert row(found, "whole", "lost")["ratio_high"] == 0.0
-    assert searches.places(found, ["half", "whole", "lost"])["lost"] == (2, 3)
+    table = searches.ratios({"half": half[None], "whole": BASE[None], "lost": lost}, 0.95, 1)
+    assert [row(table, "half", "whole")[end] for end in ("ratio_low", "ratio_high")] == [0, np.inf]
+    assert row(table, "whole", "lost")["ratio_high"] == 0.0
+    assert searches.places(table, ["half", "whole", "lost"])["lost"] == (2, 3)
 
 
 @pytest.mark.slow
@@ -69,10 +69,10 @@ def test_of_equal_laws_hardly_any_table_tells_one_apart_and_a_better_one_is_told
                 * np.exp(random.normal(0, 0.05, (6, 1)) + random.normal(0, 0.05, (6, 80)))
                 for i in range(10)
             }
-            found = searches.places(searches.ratios(runs, 0.95, trial), list(runs))
+            places = searches.places(searches.ratios(runs, 0.95, trial), list(runs))
             if best == 1.0:
-                wrong += any(place != (1, 10) for place in found.values())
+                wrong += any(place != (1, 10) for place in places.values())
             else:
-                told += found["law 0"] == (1, 1)
+                told += places["law 0"] == (1, 1)
     assert wrong <= 6, "of 40, in 2 of which a table at 95 % may err"
     assert told >= 34

@@ -77,10 +77,10 @@ def test_the_wanted_velocity_and_its_rate_are_those_of_the_derivation():
         V_A = reference()(*x[:2], *target[:2], *rate, *target[2:], LAW.k_p, s_max)
         V, A = np.reshape(V_A, (2, 2))
         turn = (V[0] * A[1] - V[1] * A[0]) / max(V @ V, LAW.V_m**2)
-        found = guidance(x, target, K)
-        np.testing.assert_allclose([found.a, found.b], to_body @ V, rtol=1e-10, atol=1e-12)
-        np.testing.assert_allclose(found.A_a, (to_body @ A)[0], rtol=1e-9, atol=1e-11)
-        np.testing.assert_allclose(found.turn, np.clip(turn, -0.3, 0.3), rtol=1e-9, atol=1e-11)
+        wanted = guidance(x, target, K)
+        np.testing.assert_allclose([wanted.a, wanted.b], to_body @ V, rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(wanted.A_a, (to_body @ A)[0], rtol=1e-9, atol=1e-11)
+        np.testing.assert_allclose(wanted.turn, np.clip(turn, -0.3, 0.3), rtol=1e-9, atol=1e-11)
 
 
 @given(
@@ -92,8 +92,8 @@ def test_no_speed_above_U_is_wanted_of_a_slower_target(distance, bearing, speed,
         distance * np.cos(bearing), distance * np.sin(bearing),
         speed * np.cos(course), speed * np.sin(course), 0.0, 0.0,
     ])  # fmt: skip
-    found = guidance(np.zeros(6), target, K)
-    assert np.hypot(found.a, found.b) <= LAW.U * (1 + 1e-12)
+    wanted = guidance(np.zeros(6), target, K)
+    assert np.hypot(wanted.a, wanted.b) <= LAW.U * (1 + 1e-12)
 
 
 def test_the_yaw_rate_s_rate_is_the_derivative_of_the_limited_angle():
@@ -171,10 +171,10 @@ def test_at_rest_on_the_target_it_wants_what_the_observed_loads_take():
     x = np.array([3.0, 1.0, psi, u, v, 0.0])
     assert abs(sway_force(u, v, 0.0, K) + 0.5) < 1e-12
     target = np.array([3.0, 1.0, 0.5, 0.0, 0.0, 0.0])
-    found = ask(LAW, x, np.array([u, v, 0.0, *load]), target, NONLINEAR)
-    assert found.signals["chi_e"] == pytest.approx(0.0, abs=1e-12)
-    assert found.signals["u_d"] == pytest.approx(u, rel=1e-12)
-    assert found.rate == pytest.approx(np.zeros(6), abs=1e-12)
+    answer = ask(LAW, x, np.array([u, v, 0.0, *load]), target, NONLINEAR)
+    assert answer.signals["chi_e"] == pytest.approx(0.0, abs=1e-12)
+    assert answer.signals["u_d"] == pytest.approx(u, rel=1e-12)
+    assert answer.rate == pytest.approx(np.zeros(6), abs=1e-12)
 
 
 # --- what it reaches on the paper's task
@@ -254,8 +254,8 @@ def test_the_settled_error_is_within_the_bound_of_the_cascade():
     path, largest = LineCircle(), 0.0
     for i in late:
         x = np.array([out[name][i] for name in state])
-        found = guidance(x, target_at(path, out["time"][i]), K)
-        largest = max(largest, float(np.hypot(found.a - x[3], found.b - x[4])))
+        wanted = guidance(x, target_at(path, out["time"][i]), K)
+        largest = max(largest, float(np.hypot(wanted.a - x[3], wanted.b - x[4])))
     bound = largest / (0.99 * LAW.k_p)  # kappa is k_p but for 1 % within 0.1 m
     assert 0.1 * bound < within(out, 150).max() <= bound
 

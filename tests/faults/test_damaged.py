@@ -96,14 +96,14 @@ def opened(run):
     opener.close()
 
 
-def check(way: str, found: Outcome, *allowed: str) -> None:
+def check(way: str, outcome: Outcome, *allowed: str) -> None:
     """Whether the outcome is one that is allowed, with little work and small."""
-    assert found.word in allowed, (way, found)
-    assert found.code == (0 if found.word == "same" else 5), (way, found)
-    assert found.calls < CALLS, (way, found)
-    assert found.mebibytes < MEMORY, (way, found)
-    assert found.said.isprintable(), (way, found)  # on one line, too
-    assert len(found.said) < 400, (way, found)
+    assert outcome.word in allowed, (way, outcome)
+    assert outcome.code == (0 if outcome.word == "same" else 5), (way, outcome)
+    assert outcome.calls < CALLS, (way, outcome)
+    assert outcome.mebibytes < MEMORY, (way, outcome)
+    assert outcome.said.isprintable(), (way, outcome)  # on one line, too
+    assert len(outcome.said) < 400, (way, outcome)
 
 
 def size(run: Path, name: str = "log.h5") -> int:
@@ -135,12 +135,12 @@ def test_a_flipped_bit_that_the_manifest_does_not_tell_ends_nothing(opened):
     words = set()
     for seed in range(count(20, 2000)):
         way = f"!flip log.h5 {seed}"
-        found = opened(way)
-        words.add(found.word)
-        assert found.word in ("refused", "same", "WRONG"), (way, found)
-        assert found.code in (0, 5), (way, found)
-        assert found.calls < CALLS, (way, found)
-        assert found.mebibytes < MEMORY, (way, found)
+        outcome = opened(way)
+        words.add(outcome.word)
+        assert outcome.word in ("refused", "same", "WRONG"), (way, outcome)
+        assert outcome.code in (0, 5), (way, outcome)
+        assert outcome.calls < CALLS, (way, outcome)
+        assert outcome.mebibytes < MEMORY, (way, outcome)
     assert {"refused", "same"} <= words  # some bytes of the file mean nothing
 
 
