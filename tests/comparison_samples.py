@@ -7,7 +7,7 @@ from known_signals import ABOUT
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.claims import ParsedClaim
-from podusv_cli.comparison.entries import Absent, Entry
+from podusv_cli.comparison.entries import Entry, EntryWithoutLog
 from podusv_cli.comparison.expressions import parse
 from podusv_cli.core.about import Claim
 from podusv_cli.core.recording import Recording
@@ -54,7 +54,10 @@ class Folder:
 
 
 def verdicts():
-    runs = {"a": Entry("a", Folder({"iae": 3.0}), about()), "lost": Absent(about(), "killed")}
+    runs = {
+        "a": Entry("a", Folder({"iae": 3.0}), about()),
+        "lost": EntryWithoutLog(about(), "killed"),
+    }
     texts = {
         "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
     }  # fmt: skip

@@ -8,7 +8,7 @@ from matplotlib.mathtext import MathTextParser
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.differences import as_text, differences
-from podusv_cli.comparison.entries import CHECKS, Absent, Entry
+from podusv_cli.comparison.entries import CHECKS, Entry, EntryWithoutLog
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.windows import NAMED, named
 
@@ -232,7 +232,7 @@ def test_an_entry_that_diverged_has_no_metrics_and_ends_early():
 
 
 def test_an_absent_run_has_nothing_but_its_scenario():
-    absent = Absent(about(), "Traceback\n  File\nZeroDivisionError: oops\n")
+    absent = EntryWithoutLog(about(), "Traceback\n  File\nZeroDivisionError: oops\n")
     assert absent.ending == "has no log: ZeroDivisionError: oops"
     assert math.isnan(absent.metric("iae"))
     assert (len(absent.signal("x")), absent.until) == (0, 0.0)

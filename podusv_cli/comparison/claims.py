@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from podusv_cli.comparison.curves import Source
+from podusv_cli.comparison.curves import ClaimedRun
 from podusv_cli.comparison.expressions import Evaluation, with_labels
 from podusv_cli.core.about import Claim, MetricAbout
 from podusv_cli.core.escaping import markdown
@@ -95,7 +95,7 @@ def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
 
 
 def judge(
-    claims: Sequence[ParsedClaim], runs: Mapping[str, Source],
+    claims: Sequence[ParsedClaim], runs: Mapping[str, ClaimedRun],
     metrics: Mapping[str, MetricAbout] = METRICS,
 ) -> list[RunsVerdict]:  # fmt: skip
     """A verdict on every claim; `runs` by label."""
@@ -103,7 +103,7 @@ def judge(
 
 
 def _verdict(
-    parsed: ParsedClaim, runs: Mapping[str, Source], metrics: Mapping[str, MetricAbout]
+    parsed: ParsedClaim, runs: Mapping[str, ClaimedRun], metrics: Mapping[str, MetricAbout]
 ) -> RunsVerdict:
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and (given := evaluation.holds(parsed.given)) is not True:

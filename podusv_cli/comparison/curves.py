@@ -15,7 +15,7 @@ from podusv_cli.core.spectrum import periodogram
 NEAR = 1e-9  # s; times closer than this are the same
 
 
-class Source(Protocol):
+class ClaimedRun(Protocol):
     """A run, as far as claims can be about it."""
 
     @property
@@ -50,7 +50,7 @@ class Curve:
 
     time: Vector
     values: Vector
-    runs: Mapping[str, Source]
+    runs: Mapping[str, ClaimedRun]
 
     def at(self, times: Vector) -> Vector:
         """The values at these times, interpolated where the log has others."""
@@ -62,7 +62,7 @@ class Curve:
 Quantity = float | Curve
 
 
-def metric(label: str, run: Source, about: MetricAbout) -> float:
+def metric(label: str, run: ClaimedRun, about: MetricAbout) -> float:
     """A metric of a run, infinite where its event never happened. Raises CannotTell."""
     name, number = about.name, run.metric(about.name)
     if np.isnan(number):
@@ -73,7 +73,7 @@ def metric(label: str, run: Source, about: MetricAbout) -> float:
     return number
 
 
-def signal(label: str, run: Source, name: str) -> Curve:
+def signal(label: str, run: ClaimedRun, name: str) -> Curve:
     """A signal of a run. Raises CannotTell."""
     values = run.signal(name)
     if not len(values):
@@ -136,7 +136,7 @@ def reduced(
     return float(REDUCERS[name](t, y, *settings))
 
 
-def _thinned(text: str, label: str, run: Source) -> CannotTell:
+def _thinned(text: str, label: str, run: ClaimedRun) -> CannotTell:
     return CannotTell(
         f"{text}: {label} logs only one step in {run.every}, and the signal is unknown in between; "
         "log every step (log.every: 1), or use a metric, which sees every step"

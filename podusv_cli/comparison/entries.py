@@ -30,7 +30,7 @@ CHECKS: dict[str, Callable[[RunAbout, Status | None], bool | None]] = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A run with a log; a `curves.Source`.
+    """A run with a log; a `curves.ClaimedRun`.
 
     `cost` are metrics measured for this comparison; they replace the run's own.
     """
@@ -101,8 +101,8 @@ def metrics_of(entries: Sequence[Entry]) -> dict[str, MetricAbout]:
 
 
 @dataclass(frozen=True)
-class Absent:
-    """A run without a log; `failure` is the error message. A `curves.Source`."""
+class EntryWithoutLog:
+    """A run without a log; `failure` is the error message. A `curves.ClaimedRun`."""
 
     about: RunAbout
     failure: str

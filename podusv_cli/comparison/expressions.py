@@ -20,7 +20,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from podusv_cli.comparison import curves
-from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, Curve, Quantity, Source
+from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, ClaimedRun, Curve, Quantity
 from podusv_cli.comparison.entries import CHECKS
 from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
@@ -97,7 +97,7 @@ class Evaluation(Walk):
     `numbers` are those that were compared, by their text, NaN where missing; `doubts` say why.
     """
 
-    runs: Mapping[str, Source]
+    runs: Mapping[str, ClaimedRun]
     tolerance: float = 0.0
     metrics: Mapping[str, MetricAbout] = field(default_factory=lambda: METRICS)
     numbers: dict[str, float] = field(default_factory=dict)
@@ -227,7 +227,7 @@ class Evaluation(Walk):
             self.doubts.append(str(doubt))
             return math.nan
 
-    def _run(self, label: str) -> Source:
+    def _run(self, label: str) -> ClaimedRun:
         return self.runs[known(label, self.runs, "run")]
 
 

@@ -34,7 +34,7 @@ from podusv_cli.workflows import compare as comparing
 from podusv_cli.workflows import doubt as doubting
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
-from podusv_cli.workflows.gather import Item, from_folder, from_scenario, gathered
+from podusv_cli.workflows.gather import Members, from_folder, from_scenario, gathered
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
 
@@ -307,7 +307,7 @@ def _file(source: Any) -> Path | None:
 
 def _items(
     given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None
-) -> list[Item]:
+) -> list[Members]:
     folders = [file if file and file.is_dir() else None for file in files]
     if changes and all(folders):
         raise UsageError(f"{', '.join(changes)}: only finished runs are given, which do not change")

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.comparison import claims, outputs, table
-from podusv_cli.comparison.curves import Source
+from podusv_cli.comparison.curves import ClaimedRun
 from podusv_cli.comparison.differences import differences
-from podusv_cli.comparison.entries import Absent, Entry, metrics_of
+from podusv_cli.comparison.entries import Entry, EntryWithoutLog, metrics_of
 from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
@@ -36,7 +36,7 @@ from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.doubt import comparison, doubt_of
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
-from podusv_cli.workflows.gather import Gathered, gather
+from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.run import RESULTS, Request, opened
 
@@ -114,7 +114,7 @@ def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
 
 
 def compare_gathered(
-    given: Gathered, items: Sequence[Path], request: Request, progress: Progress | None = None,
+    given: Members, items: Sequence[Path], request: Request, progress: Progress | None = None,
     loaded: Loaded | None = None,
 ) -> Compared:  # fmt: skip
     """The same for what is gathered already; `items` are the files and folders that it is from.
@@ -127,7 +127,7 @@ def compare_gathered(
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     text = "".join(f"{one.label}\n{one.resolved}" for one in given.members)
-    target = request.out or default_folder(RESULTS, given.title, text)
+    target = request.out or default_folder(RESULTS, given.name, text)
     _keep_apart(items, target)
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
         outcomes = make_runs(given.members, writer.folder, request, progress)
@@ -144,7 +144,7 @@ def compare_gathered(
             extras.interrupted = doubted.status == "interrupted"
         origin = provenance.collect(argv, started, datetime.now(UTC), result.plugins)
         outputs.write(writer, result, extras)
-        _add_report(writer, result, given.title, origin, extras, progress, request)
+        _add_report(writer, result, given.name, origin, extras, progress, request)
         writer.add_json("provenance.json", origin)
         writer.add_missing(extras)
         status: Status = "interrupted" if extras.interrupted else "finished"
@@ -254,7 +254,9 @@ def collect(
     entries = related(_with_costs(entries, made, extras), extras)
     scenarios = {label: case.scenario for label, case in made.items()}
     entries = with_margins(entries, scenarios, parsed, extras)
-    sources: dict[str, Source] = {m.label: Absent(m.about, endings[m.label]) for m in members}
+    sources: dict[str, ClaimedRun] = {
+        m.label: EntryWithoutLog(m.about, endings[m.label]) for m in members
+    }
     sources |= {entry.label: entry for entry in entries}
     numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
     numbers |= {entry.label: entry.metrics() for entry in entries}

@@ -21,17 +21,11 @@ from podusv_cli.workflows.run import Request, opened
 
 
 @dataclass(frozen=True)
-class Gathered:
-    """The runs to compare, the claims about them, and a title for the comparison."""
+class Members:
+    """The runs of one argument, or of all: a name, what their claims call them, and these claims.
 
-    members: Sequence[Member]
-    claims: Sequence[ParsedClaim]
-    title: str
-
-
-@dataclass(frozen=True)
-class Item:
-    """One argument: its runs, what its own claims call them, and these claims."""
+    `names` are empty where the claims call them by their labels.
+    """
 
     name: str
     members: Sequence[Member]
@@ -39,7 +33,7 @@ class Item:
     claims: Sequence[ParsedClaim] = ()
 
 
-def gather(items: Sequence[Path], request: Request) -> Gathered:
+def gather(items: Sequence[Path], request: Request) -> Members:
     """Open every argument. Raises UsageError, ScenarioError, StorageError."""
     if request.overrides and all(item.is_dir() for item in items):
         given = ", ".join(request.overrides)
@@ -49,16 +43,16 @@ def gather(items: Sequence[Path], request: Request) -> Gathered:
     return gathered([_opened(item, request, alone=len(items) == 1) for item in items])
 
 
-def gathered(found: Sequence[Item]) -> Gathered:
-    """The runs of several items, each with a label of its own, and the claims about them."""
-    members = distinct(member for item in found for member in item.members)
+def gathered(groups: Sequence[Members]) -> Members:
+    """All of several, each run with a label of its own, and with the claims about them."""
+    members = distinct(member for group in groups for member in group.members)
     labels = iter(member.label for member in members)
-    called = [dict(zip(item.names, labels, strict=False)) for item in found]
-    title = "-".join(dict.fromkeys(item.name for item in found))[:80]
-    return Gathered(members, _labelled(found, called), title)
+    called = [dict(zip(group.names, labels, strict=False)) for group in groups]
+    title = "-".join(dict.fromkeys(group.name for group in groups))[:80]
+    return Members(title, members, claims=_labelled(groups, called))
 
 
-def _opened(path: Path, request: Request, *, alone: bool) -> Item:
+def _opened(path: Path, request: Request, *, alone: bool) -> Members:
     if path.is_dir():
         return from_folder(path, request.plugins)
     fits = limits(request.allow_large, read_back=True)
@@ -66,13 +60,13 @@ def _opened(path: Path, request: Request, *, alone: bool) -> Item:
     return from_scenario(loaded, alone=alone)
 
 
-def from_folder(path: Path, files: Sequence[str] = ()) -> Item:
+def from_folder(path: Path, files: Sequence[str] = ()) -> Members:
     """The finished runs of a folder; `files` are plug-ins. Raises UsageError, StorageError."""
     members = members_of(path, files)
-    return Item(path.resolve().name, members, [member.label for member in members])
+    return Members(path.resolve().name, members, [member.label for member in members])
 
 
-def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
+def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
@@ -84,18 +78,18 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Item:
         )
         for label, case in zip(labels, cases, strict=True)
     ]  # fmt: skip
-    return Item(scenario.name, members, list(singles), parse_claims(loaded))
+    return Members(scenario.name, members, list(singles), parse_claims(loaded))
 
 
-def _labelled(found: Sequence[Item], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:
+def _labelled(groups: Sequence[Members], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:
     """All claims; names that several scenarios use are preceded by the scenario's name."""
-    counts = Counter(claim.name for item in found for claim in item.claims)
+    counts = Counter(claim.name for group in groups for claim in group.claims)
     claims = [
-        replace(claim.with_labels(labels), name=f"{item.name}.{claim.name}")
+        replace(claim.with_labels(labels), name=f"{group.name}.{claim.name}")
         if counts[claim.name] > 1
         else claim.with_labels(labels)
-        for item, labels in zip(found, called, strict=True)
-        for claim in item.claims
+        for group, labels in zip(groups, called, strict=True)
+        for claim in group.claims
     ]
     names = numbered(claim.name for claim in claims)
     return [replace(claim, name=name) for claim, name in zip(claims, names, strict=True)]
