@@ -64,14 +64,18 @@ STATE = (
     Signal("v", "m/s", "sway velocity"),
     Signal("r", "rad/s", "yaw rate"),
 )
+# What a law asks of the actuator, in this order.
+DEMAND = (
+    Signal("tau_u_cmd", "N", "surge force that the law asked for", r"\tau_{u,\mathrm{cmd}}"),
+    Signal("tau_r_cmd", "N m", "yaw moment that the law asked for", r"\tau_{r,\mathrm{cmd}}"),
+)
 LOOP = (
     Signal("time", "s", "time since the start of the run", "t"),
     *STATE,
     Signal("x_d", "m", "target position, north"),
     Signal("y_d", "m", "target position, east"),
     Signal("z_e", "m", "distance to the target (18)"),
-    Signal("tau_u_cmd", "N", "surge force that the law asked for", r"\tau_{u,\mathrm{cmd}}"),
-    Signal("tau_r_cmd", "N m", "yaw moment that the law asked for", r"\tau_{r,\mathrm{cmd}}"),
+    *DEMAND,
     Signal("tau_u", "N", "surge force on the hull", r"\tau_u"),
     Signal("tau_v", "N", "sway force on the hull", r"\tau_v"),
     Signal("tau_r", "N m", "yaw moment on the hull", r"\tau_r"),

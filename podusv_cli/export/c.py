@@ -84,7 +84,7 @@ def _lines(numbers: Vector) -> list[list[str]]:
 
 def _assumed(law: ExportedLaw) -> list[str]:
     """The loads that act where nobody knows them: the demand, cut where the actuator cuts it."""
-    demands = [f"row[{law.layout.demand + i}]" for i in range(2)]
+    demands = [f"row[{law.layout.demand + i}]" for i in range(len(DEMAND_NUMBERS))]
     return [
         demand
         if math.isinf(limit)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
+from podusv_cli.core import signal
 from podusv_cli.core.errors import UsageError, in_a_line
 from podusv_cli.core.kernel import Vector
 from podusv_cli.export.link import shared_library, this_machine
@@ -22,7 +23,7 @@ from podusv_cli.export.objects import PLATFORMS
 from podusv_cli.storage import json_files, manifest
 
 SAMPLES, ABOUT, FMU = "check.csv", "law.json", "law.fmu"
-STATE, TARGET, LOADS, DEMAND = 6, 6, 3, 2
+STATE, TARGET, LOADS, DEMAND = 6, 6, 3, len(signal.DEMAND)
 INPUTS = STATE + TARGET + LOADS
 Step = Callable[[Vector], Sequence[float]]  # from time and inputs of a sample to what comes out
 

@@ -15,7 +15,7 @@ from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
 from podusv_cli.core.kernel import bundle, call, scratch, transplanted
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import logged_rows
 from podusv_cli.metrics.metric import Metric
@@ -122,7 +122,8 @@ def operations(plan: Plan, recording: Recording) -> dict[str, float]:
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
     constants = plan.law_constants
     vectors = {
-        "x": state, "memory": memory, "target": target, "table": plan.law_table, "tau": np.zeros(2),
+        "x": state, "memory": memory, "target": target, "table": plan.law_table,
+        "tau": np.zeros(len(DEMAND)),
         "rate": np.zeros(len(memory)), "signals": np.zeros(len(law.signals)),
         "work": np.zeros(law.workspace()),
     }  # fmt: skip

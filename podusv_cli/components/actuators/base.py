@@ -18,7 +18,7 @@ from podusv_cli.components.actuators.command import (
 )
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import DEMAND, Signal
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
 ROUNDS = 20  # of Newton's method
@@ -79,7 +79,7 @@ class Actuator(Component):
     def drive_with(self) -> Drive:
         """`drive` with command path and failure; `drive` itself where it has neither.
 
-        Its `demand` has a third number, when the present step began [s].
+        Its `demand` has one more number, when the present step began [s].
         """
         drive: Drive = self.drive
         if self.failure:
@@ -155,7 +155,7 @@ class Actuator(Component):
         """
         columns = [
             (self.settled(np.zeros(6), demand) - self.settled(np.zeros(6), -demand)) / (2.0 * SMALL)
-            for demand in SMALL * np.eye(2)
+            for demand in SMALL * np.eye(len(DEMAND))
         ]
         return np.array(columns).T
 

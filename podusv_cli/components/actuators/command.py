@@ -14,7 +14,7 @@ from typing import Any
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import DEMAND, Signal
 
 Drive = Callable[..., None]
 DRIVE = ("t", "x", "state", "demand", "k", "table", "tau", "rate", "signals")  # its arguments
@@ -24,6 +24,9 @@ GIVEN = (
     Signal("tau_u_in", "N", "surge force that the actuator is given", r"\tau_{u,\mathrm{in}}"),
     Signal("tau_r_in", "N m", "yaw moment that the actuator is given", r"\tau_{r,\mathrm{in}}"),
 )
+BEGAN = len(DEMAND)  # behind the demand there is when the present step began [s]
+DRIVEN = BEGAN + 1  # numbers of both
+LOGGED = len(GIVEN)
 WHOLE = 1.5 * 2.0**52  # a number below 2^51 that is added to it, and taken off, is rounded
 LARGEST = 2.0**51
 
@@ -96,12 +99,13 @@ def _commanded(
     tau: Vector, rate: Vector, signals: Vector,
 ) -> None:  # fmt: skip
     """`drive` with the demand rounded and the dead zone taken off; its signals come first."""
-    given = scratch(3)
+    given = scratch(DRIVEN)
+    for i in range(DRIVEN):
+        given[i] = demand[i]
     given[0] = beyond(rounded(demand[0], k.command_resolution_u), k.command_dead_zone_u)
     given[1] = beyond(rounded(demand[1], k.command_resolution_r), k.command_dead_zone_r)
-    given[2] = demand[2]
     signals[0], signals[1] = given[0], given[1]
-    _inner(t, x, state, given, k, table, tau, rate, tail(signals, 2))
+    _inner(t, x, state, given, k, table, tau, rate, tail(signals, LOGGED))
 
 
 def _failing(
@@ -110,7 +114,7 @@ def _failing(
 ) -> None:  # fmt: skip
     """`drive`, and what is left of its loads in steps that begin after the failure."""
     _inner(t, x, state, demand, k, table, tau, rate, signals)
-    if demand[2] >= k.failure_time:
+    if demand[BEGAN] >= k.failure_time:
         _lost(state, k, table, tau, signals)
 
 

@@ -25,7 +25,7 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import LOOP, Signal
 
 STATE = tuple(state.name for state in signal.STATE)
-DEMAND = ("tau_u_cmd", "tau_r_cmd")
+DEMAND = tuple(part.name for part in signal.DEMAND)
 LOADS = ("tau_u", "tau_v", "tau_r", "b_u", "b_v", "b_r")
 
 

@@ -17,7 +17,7 @@ from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import NoKernel, Vector, bundle, call
 from podusv_cli.core.signal import NAME, Signal
-from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
 from podusv_cli.engine.running.thread import Work
@@ -100,7 +100,7 @@ def evaluated(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     """Demand, rates and signals that the law writes at the start of a run, over `before`."""
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
-    tau, rate, signals = (np.full(n, before) for n in (2, len(memory), len(law.signals)))
+    tau, rate, signals = (np.full(n, before) for n in (len(DEMAND), len(memory), len(law.signals)))
     read = {"x": x, "memory": memory, "target": target, "table": table}
     if law.takes_samples():
         call(law.sample, t=0.0, k=k, **read)
@@ -119,7 +119,7 @@ def evaluated(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
 def _ask(plan: Plan) -> None:
     law, (tau, rate, signals) = plan.loop.controller, evaluated(plan, UNWRITTEN)
     slots = [f"the rate of {name}" for name in plan.states["law"]]
-    names = ("tau_u_cmd", "tau_r_cmd", *(part.name for part in law.signals), *slots)
+    names = (*DEMAND, *(part.name for part in law.signals), *slots)
     outputs = zip(names, (*tau, *signals, *rate), strict=True)
     if left := next((name for name, number in outputs if number == UNWRITTEN), ""):
         raise LawError(f"{describe(law)}: it leaves {left} unwritten")

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -43,7 +43,7 @@ def replayer(
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
     constants = plan.law_constants
     p = np.array(list(constants.values()))
-    buffers = (rows.ravel(), p, plan.law_table, np.zeros(2), np.zeros(room))
+    buffers = (rows.ravel(), p, plan.law_table, np.zeros(len(DEMAND)), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compile.routine(
         compile.Piece(rk4.evaluate_all, signatures.EVALUATE_ALL)
@@ -76,7 +76,7 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     The columns are `plan.names` but the time. Control is taken as continuous, also where the run's
     was sampled, and as without delay. The rates of an estimator are left out: they depend on
     measurements, which the loop's state does not hold. As second argument the function takes rows
-    of (tau_u [N], tau_r [N m]) that reach the actuator in place of the law's demands.
+    of demands that reach the actuator in place of the law's.
     """
     layout, vectors = plan.layout._replace(hold_every=0, measured=0), plan.vectors()
     vectors.delay_line[COUNT] = 0.0

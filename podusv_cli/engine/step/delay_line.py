@@ -11,13 +11,17 @@ from __future__ import annotations
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel, shared, tail
+from podusv_cli.core.signal import DEMAND
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.step.grid import TimeGrid
 
 STAGES = 4  # of a step of RK4
 # In the vector: the place of the next demand, how many are under way, what the actuator is given
-# (tau_u [N], tau_r [N m], when the step began [s]), then the demands under way.
-NEXT, COUNT, GIVEN, BEGAN, DEMANDS = 0, 1, 2, 4, 5
+# (a demand, when the step began [s]), then the demands under way.
+NEXT, COUNT, GIVEN = 0, 1, 2
+SIZE = len(DEMAND)
+BEGAN = GIVEN + SIZE
+DEMANDS = BEGAN + 1
 
 
 def delay_line(delay: float, grid: TimeGrid) -> Vector:
@@ -32,7 +36,7 @@ def delay_line(delay: float, grid: TimeGrid) -> Vector:
             f"{grid.step:g} s"
         )
     count = STAGES * min(steps, grid.steps + 1)  # of a later command nothing is seen
-    numbers = np.zeros(DEMANDS + 2 * count)
+    numbers = np.zeros(DEMANDS + SIZE * count)
     numbers[COUNT] = count
     return numbers
 
@@ -49,10 +53,12 @@ def begin_step(k: int, t: float, line: Vector) -> None:
 @kernel
 def pass_on(demand: Vector, line: Vector) -> None:
     """Take this stage's demand, and give the actuator that of the same stage a delay before."""
-    line[GIVEN], line[GIVEN + 1] = demand[0], demand[1]
+    for i in range(SIZE):
+        line[GIVEN + i] = demand[i]
     if shared(line[COUNT]) > 0.0:
         at = int(shared(line[NEXT]))
-        place = tail(line, DEMANDS + 2 * at)
-        line[GIVEN], line[GIVEN + 1] = place[0], place[1]
-        place[0], place[1] = demand[0], demand[1]
+        place = tail(line, DEMANDS + SIZE * at)
+        for i in range(SIZE):
+            line[GIVEN + i] = place[i]
+            place[i] = demand[i]
         line[NEXT] = at + 1

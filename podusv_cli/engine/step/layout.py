@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.signal import DEMAND
 
 Function = Callable[..., None]
 
@@ -114,7 +115,8 @@ class Vectors(NamedTuple):
 
 
 DISTANCE = 6  # where the row has z_e (18), behind the target
-HELD_X, HELD_TARGET, HELD_DEMAND, HELD_SIGNALS = 1, 7, 13, 15
+HELD_X, HELD_TARGET, HELD_DEMAND = 1, 7, 13
+HELD_SIGNALS = HELD_DEMAND + len(DEMAND)
 STOP = 1  # in `under_way`
 
 
