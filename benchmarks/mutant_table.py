@@ -404,7 +404,7 @@ TABLE: dict[str, list[Row]] = {
      "most = most_astern if X >= 0.0 else most_ahead", "test_what_one_pod_can_make_it_makes"),
     ("return demand - zone if demand > 0.0 else demand + zone", "return demand",
      "test_a_dead_zone_leaves_the_known_offset"),
-    ("if demand[2] >= k.failure_time:", "if demand[2] > k.failure_time:",
+    ("if demand[BEGAN] >= k.failure_time:", "if demand[BEGAN] > k.failure_time:",
      "test_a_failure_at_an_instant_costs_no_order"),
     ("sides[i] = -1.0 if (choice >> i) & 1 else 1.0", "sides[i] = 1.0",
      "test_no_other_thrusts_and_angles_cost_less"),
