@@ -155,7 +155,7 @@ TABLE: dict[str, list[Row]] = {
      "test_half_the_failures_make_an_infinite_median"),
 ],
 "findings": [
-    ("z @ (one + z / 4.0) / 3.0", "z @ (one + z / 3.0) / 3.0",
+    ("z @ (unit + z / 4.0) / 3.0", "z @ (unit + z / 3.0) / 3.0",
      "test_the_predicted_growth_converges_to_that_of_the_loop_integrated_by_hand"),
     ("VISIBLE = 0.01 ", "VISIBLE = 0.0 ",
      "test_a_swing_is_told_where_it_is_visible_pure_and_goes_on_by_itself"),

@@ -79,7 +79,7 @@ def is_timed(claim: Claim) -> bool:
 
 def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
     """Signals of which a claim says how large they become: `max(abs(run.signal)) == number`."""
-    found = {}
+    sizes = {}
     for node in (node for parsed in claims for node in ast.walk(parsed.expect)):
         match node:
             case ast.Compare(
@@ -90,8 +90,8 @@ def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
                 ops=[ast.Eq()],
                 comparators=[ast.Constant(value=int() | float() as number)],
             ):
-                found[name] = float(number)
-    return found
+                sizes[name] = float(number)
+    return sizes
 
 
 def judge(

@@ -34,18 +34,18 @@ def differences(
     sections = list(dict.fromkeys(map(_section, keys)))
     wanted = (key for key in keys if not key.endswith(prose))
     ordered = sorted(wanted, key=lambda key: sections.index(_section(key)))
-    found = {key: {label: v.get(key) for label, v in flattened.items()} for key in ordered}
+    by_key = {key: {label: v.get(key) for label, v in flattened.items()} for key in ordered}
     return {
-        key: values for key, values in found.items() if len({repr(v) for v in values.values()}) > 1
+        key: values for key, values in by_key.items() if len({repr(v) for v in values.values()}) > 1
     }
 
 
-def as_text(found: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+def as_text(differing: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
     """Differences as text, without the keys that only exist because kinds differ."""
     return {
         key: {label: value_text(value) for label, value in values.items()}
-        for key, values in found.items()
-        if not _follows_from_kind(key, values, found)
+        for key, values in differing.items()
+        if not _follows_from_kind(key, values, differing)
     }
 
 
@@ -55,7 +55,7 @@ def _each(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         if (
             isinstance(value, (list, tuple))
             and value
-            and all(isinstance(one, Mapping) for one in value)
+            and all(isinstance(item, Mapping) for item in value)
         ):
             for place, entry in enumerate(value):
                 yield from ((f"{key}[{place}].{name}", inner) for name, inner in _each(entry))
@@ -68,7 +68,7 @@ def _section(key: str) -> str:
 
 
 def _follows_from_kind(
-    key: str, values: Mapping[str, Any], found: Mapping[str, Mapping[str, Any]]
+    key: str, values: Mapping[str, Any], differing: Mapping[str, Mapping[str, Any]]
 ) -> bool:  # fmt: skip
     """Whether the key has one value, and is missing only in runs of another kind.
 
@@ -78,5 +78,5 @@ def _follows_from_kind(
     known = {repr(value) for value in values.values() if value is not None}
     lacking = None in values.values() and len(known) == 1
     return lacking and (
-        key.startswith("plugins.") or any(f"{part}.kind" in found for part in above)
+        key.startswith("plugins.") or any(f"{part}.kind" in differing for part in above)
     )

@@ -97,7 +97,9 @@ def metrics_of(entries: Sequence[Entry]) -> dict[str, MetricAbout]:
         known = known | {n: m for n, m in entry.about.metrics.items() if n not in known}
     names = dict.fromkeys(name for entry in entries for name in entry.run.metrics)
     known |= {name: MetricAbout(name, "", UNKNOWN) for name in names if name not in known}
-    return {one.name: one for one in sorted(known.values(), key=lambda one: one.place)}
+    return {
+        metric.name: metric for metric in sorted(known.values(), key=lambda metric: metric.place)
+    }
 
 
 @dataclass(frozen=True)

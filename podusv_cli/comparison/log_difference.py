@@ -211,10 +211,10 @@ def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
 
 def _first(unequal: list[_Pair]) -> Deviation | None:
     """The earliest deviation; at equal times that of the first signal in the log."""
-    found = [(pair, _place_of_maximum(differing(pair.one, pair.other))) for pair in unequal]
-    if not found:
+    places = [(pair, _place_of_maximum(differing(pair.one, pair.other))) for pair in unequal]
+    if not places:
         return None
-    pair, place = min(found, key=lambda item: -1 if item[0].times is None else item[1][0])
+    pair, place = min(places, key=lambda item: -1 if item[0].times is None else item[1][0])
     return _deviation(pair, place)
 
 

@@ -28,7 +28,7 @@ def with_margins(
     wanted = {
         e.label: {n for label, n in named if label == e.label and n in OF_LOOP} for e in entries
     }
-    for run in (one.run for one in entries if wanted[one.label] and one.label not in made):
+    for run in (entry.run for entry in entries if wanted[entry.label] and entry.label not in made):
         why = f"it is finished: podusv margins {run.folder}/resolved.yaml"
         extras.missing.append(Failure(f"margins of {run.folder.name}", why))
     return [
@@ -54,7 +54,7 @@ def _measured(entry: Entry, scenario: Scenario, wanted: set[str], extras: Extras
         return entry
     try:
         with interrupts_enabled():
-            found = loop_margins(
+            margins = loop_margins(
                 scenario.closed_loop(), scenario.time_grid(), compiled=scenario.simulation.compiled
             ).numbers()
     except KeyboardInterrupt:
@@ -62,5 +62,5 @@ def _measured(entry: Entry, scenario: Scenario, wanted: set[str], extras: Extras
     except (LawError, NotConvergedError) as error:
         extras.missing.append(Failure(what, str(error)))
     else:
-        return replace(entry, cost={**entry.cost, **{name: found[name] for name in wanted}})
+        return replace(entry, cost={**entry.cost, **{name: margins[name] for name in wanted}})
     return entry

@@ -20,20 +20,20 @@ def related(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
 
     A run of another task has no ratio; `extras` says what differs.
     """
-    found = list(entries)
+    related_entries = list(entries)
     for metric, ratio in OF_OPTIMUM.items():
         optima = [e for e in entries if e.about.optimum_of == metric]
-        for i, entry in enumerate(found):
+        for i, entry in enumerate(related_entries):
             same = [other for other in optima if not any(_other(entry, other))]
             if same:
                 least = min(other.metric(metric) for other in same)
                 cost = {**entry.cost, ratio.name: entry.metric(metric) / least}
-                found[i] = replace(entry, cost=cost)
+                related_entries[i] = replace(entry, cost=cost)
             elif optima:
                 what = ", ".join(_other(entry, optima[0]))
                 why = f"the optimum {optima[0].label} has another {what}"
                 extras.missing.append(Failure(f"{ratio.name} of {entry.label}", why))
-    return found
+    return related_entries
 
 
 def _other(entry: Entry, other: Entry) -> Iterator[str]:

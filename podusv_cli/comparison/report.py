@@ -68,7 +68,7 @@ def page(story: Story) -> str:
         differing=as_text(story.differences),
         answers=by_answer(story.verdicts),
         standings=standings,
-        ranked=any(one.names or one.more for one in standings.values()),
+        ranked=any(standing.names or standing.more for standing in standings.values()),
         noticed=_by_code(story),
         metrics={row.metric.name: row.metric for row in table},
         many=MANY,
@@ -133,9 +133,9 @@ def laws(
     tables: Sequence[Sequence[SettingAbout]],
 ) -> list[tuple[SettingAbout, list[SettingAbout | None]]]:
     """Every key that a law sets otherwise than by default: what it is, and what each law has."""
-    keyed = [{one.key: one for one in table} for table in tables]
-    about = {key: one for table in reversed(keyed) for key, one in table.items()}
-    keys = dict.fromkeys(one.key for table in tables for one in table if one.changed)
+    keyed = [{setting.key: setting for setting in table} for table in tables]
+    about = {key: setting for table in reversed(keyed) for key, setting in table.items()}
+    keys = dict.fromkeys(setting.key for table in tables for setting in table if setting.changed)
     ordered = sorted(keys, key=lambda key: key != "kind")
     return [(about[key], [table.get(key) for table in keyed]) for key in ordered]
 
@@ -143,13 +143,13 @@ def laws(
 def _parts(story: Story) -> list[tuple[str, str, str]]:
     """A row for each part: its name, the first line of what it says of itself, all its values."""
     (first, *_), law = story.abouts.values(), "controller"
-    found = {name: (said, name, first) for name, said in first.said.items() if name != law}
-    found |= {f"{law} {label}": (one.said[law], law, one) for label, one in story.abouts.items()}
+    parts = {name: (said, name, first) for name, said in first.said.items() if name != law}
+    parts |= {f"{law} {label}": (one.said[law], law, one) for label, one in story.abouts.items()}
     return [
         (
             name,
             said,
             ", ".join(f"{key} {value_text(value)}" for key, value in flat(one.section(at))),
         )
-        for name, (said, at, one) in found.items()
+        for name, (said, at, one) in parts.items()
     ]

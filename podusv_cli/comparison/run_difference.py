@@ -103,8 +103,8 @@ def scenario_changes(one: str, other: str) -> dict[str, Change]:
     Raises StorageError where a text is no scenario.
     """
     trees = {"one": _tree(one), "other": _tree(other)}
-    found = differences(trees, ignored=(), prose=())
-    return {key: (values["one"], values["other"]) for key, values in found.items()}
+    changed = differences(trees, ignored=(), prose=())
+    return {key: (values["one"], values["other"]) for key, values in changed.items()}
 
 
 def _tree(resolved: str) -> dict[str, Any]:

@@ -92,7 +92,7 @@ def numbers(frame: Table) -> dict[str, dict[str, float | None]]:
 def as_csv(frame: Table, known: Mapping[str, MetricAbout] = METRICS) -> str:
     """The table as CSV, in full precision, with ratios last."""
     first = frame.columns[0]
-    heads = [METRIC, "unit", *frame.columns, *(f"{one}/{first}" for one in frame.columns[1:])]
+    heads = [METRIC, "unit", *frame.columns, *(f"{column}/{first}" for column in frame.columns[1:])]
     lines = (
         [name, known[name].unit, *map(_blank, [*row, *(_ratio(x, row[0]) for x in row[1:])])]
         for name, row in frame.rows.items()
@@ -116,7 +116,7 @@ def rows(
 
     `unsettled` are the runs that do not end at their target; they are never the best.
     """
-    found, unranked, finished = [], _unranked(frame, known), frame.finished
+    of_metrics, unranked, finished = [], _unranked(frame, known), frame.finished
     out = [label in unsettled for label in frame.columns]
     for name, numbers in frame.rows.items():
         ranked = [x for x, off in zip(numbers, out, strict=True) if not (off or math.isnan(x))]
@@ -128,8 +128,8 @@ def rows(
             _cell(number, first, math.nan if out[i] else best, i)
             for i, number in enumerate(numbers)
         ]  # fmt: skip
-        found.append(Row(metric, texts))
-    return sorted(found, key=lambda row: not row.metric.headline)
+        of_metrics.append(Row(metric, texts))
+    return sorted(of_metrics, key=lambda row: not row.metric.headline)
 
 
 def cells(
@@ -170,7 +170,7 @@ def leaders(
     Neither do `unsettled` runs, which do not end at their target.
     """
     unranked = _unranked(frame, known)
-    best: dict[str, list[str]] = {one: [] for one in frame.columns if one not in unsettled}
+    best: dict[str, list[str]] = {column: [] for column in frame.columns if column not in unsettled}
     for name, numbers in frame.rows.items():
         paired = zip(frame.columns, numbers, strict=True)
         ranked = {label: x for label, x in paired if label in best and not math.isnan(x)}
@@ -257,8 +257,8 @@ def _cut(text: str, span: int) -> list[str]:
 
 def _parts(number: str) -> tuple[str, str, str]:
     """A number before and from its decimal point, and its power of ten; words are all before."""
-    found = NUMBER.fullmatch(number)
-    if not found:
+    match = NUMBER.fullmatch(number)
+    if not match:
         return number, "", ""
-    whole, point, power = found.groups("")
+    whole, point, power = match.groups("")
     return whole, point, rf"$\times10^{{{int(power)}}}$" if power else ""

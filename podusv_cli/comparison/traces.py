@@ -50,8 +50,8 @@ def traces(runs: Sequence[Shown]) -> dict[str, Any]:
 
 def _scalar(runs: Sequence[Shown]) -> dict[str, None]:
     """The names of what is one number at every instant, in the order of readers' interest."""
-    found = [n for run in runs for n, numbers in run.recording.signals.items() if numbers.ndim == 1]
-    return dict.fromkeys([*FIRST, *(name for name in found if name != "time")])
+    names = [n for run in runs for n, numbers in run.recording.signals.items() if numbers.ndim == 1]
+    return dict.fromkeys([*FIRST, *(name for name in names if name != "time")])
 
 
 def thinned(numbers: Vector) -> tuple[Vector, Vector]:

@@ -27,8 +27,8 @@ def _place(sheet: Sheet) -> tuple[int, str]:
 @cache
 def figures_with(plugins: Plugins) -> dict[str, Sheet]:
     """All figures by name, in order, with those of these plug-ins."""
-    found = registry.named("podusv_cli.figures", Sheet, plugins).values()
-    return {sheet.name: sheet for sheet in sorted(found, key=_place)}
+    sheets = registry.named("podusv_cli.figures", Sheet, plugins).values()
+    return {sheet.name: sheet for sheet in sorted(sheets, key=_place)}
 
 
 FIGURES = figures_with(())
@@ -73,13 +73,13 @@ def draw_in_parallel(
     outcomes = run_shares([partial(job, sheet) for sheet in sheets], progress, workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt
-    found: dict[str, bytes] = {}
+    files_by_name: dict[str, bytes] = {}
     for sheet, outcome in zip(sheets, outcomes, strict=True):
         failed = [Failure(f"figure {sheet.name}", outcome.failure)]
         files, missing = outcome.result or ({}, failed)
-        found |= files
+        files_by_name |= files
         extras.missing += missing
-    return found
+    return files_by_name
 
 
 def check_names(

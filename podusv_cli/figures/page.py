@@ -215,14 +215,14 @@ def _reach(axis: Axis) -> float:
 
 def _texts(axis: Axis) -> list[str]:
     """What stands at the ticks that are seen, and the factor of all numbers."""
-    found: list[str] = []
+    shown: list[str] = []
     for locations, formatter in (
         (axis.get_majorticklocs(), axis.get_major_formatter()),
         (axis.get_minorticklocs(), axis.get_minor_formatter()),
     ):
         texts = formatter.format_ticks(list(locations))
-        found += [t for t, seen in zip(texts, _seen(axis, locations), strict=True) if seen]
-    return [*found, axis.get_major_formatter().get_offset()]  # which depends on the numbers
+        shown += [t for t, seen in zip(texts, _seen(axis, locations), strict=True) if seen]
+    return [*shown, axis.get_major_formatter().get_offset()]  # which depends on the numbers
 
 
 def _seen(axis: Axis, locations: Locations) -> Any:

@@ -84,8 +84,8 @@ class Shown:
     @property
     def signals(self) -> list[str]:
         """The signals over time that the run has, logged and derivable."""
-        found = derived.derived_with(self.plugins)
-        derivable = [name for name in found if self.has(name)]
+        known = derived.derived_with(self.plugins)
+        derivable = [name for name in known if self.has(name)]
         return [*dict.fromkeys([*self.recording.signals, *derivable])]
 
     def signal(self, name: str) -> Vector:

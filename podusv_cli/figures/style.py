@@ -80,15 +80,15 @@ def legend(figure: Page, thin: str = "", held: Mapping[str, str] = MappingProxyT
 
     Below all panels, the `constants` that have no panel.
     """
-    found = {
+    handles = {
         label: handle
         for axes in figure.axes
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
     if thin:
-        found[thin] = Line2D([], [], color="#444444", linewidth=0.5)
-    if found:
-        figure.add_key(list(found.values()), list(found))
+        handles[thin] = Line2D([], [], color="#444444", linewidth=0.5)
+    if handles:
+        figure.add_key(list(handles.values()), list(handles))
     if held:
         figure.add_line(f"constant: {'; '.join(held.values())}")
 

@@ -31,15 +31,15 @@ def finding_kinds(plugins: Plugins = ()) -> dict[str, FindingKind]:
 
     Those of these plug-ins are among them.
     """
-    found: dict[str, FindingKind] = {}
+    by_code: dict[str, FindingKind] = {}
     for package in PACKAGES:
-        found |= registry.named(f"podusv_cli.{package}", FindingKind, plugins)
+        by_code |= registry.named(f"podusv_cli.{package}", FindingKind, plugins)
     sections = list(Scenario.model_fields)
-    for kind in found.values():
+    for kind in by_code.values():
         if kind.about.partition(".")[0] not in sections:
             what = f"finding {kind.name!r} is about {kind.about!r}: "
             raise LawError(what + unknown("section", kind.about.partition(".")[0], sections))
-    ordered = sorted(found.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
+    ordered = sorted(by_code.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
     return {kind.name: kind for kind in ordered}
 
 
@@ -58,7 +58,7 @@ def preflight(scenario: Scenario) -> list[Finding]:
 
     With `controllers` these are the findings for each law, merged.
     """
-    return merged({name: Case.of(one).findings() for name, one in scenario.singles().items()})
+    return merged({name: Case.of(single).findings() for name, single in scenario.singles().items()})
 
 
 def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
@@ -70,7 +70,7 @@ def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
     known = finding_kinds(scenario.plugged).items()
     kinds = [kind for code, kind in known if kind.when == when and code not in scenario.silence]
     with np.errstate(all="ignore"):
-        return [found for kind in kinds for found in kind.findings(scenario.controller, *seen)]
+        return [finding for kind in kinds for finding in kind.findings(scenario.controller, *seen)]
 
 
 @dataclass(frozen=True)

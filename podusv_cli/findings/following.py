@@ -75,8 +75,8 @@ def _unable(scenario: Scenario) -> list[str]:
     facts, law = scenario.facts, scenario.controller
     speed = median(reference(scenario).speed)
     own = [
-        f"{name} = {number:g} where hull and actuator make it {found:.3g}, so {why}: leave it out"
-        for name, (number, found, why) in other_numbers(law, facts).items()
+        f"{name} = {number:g} where hull and actuator make it {rule:.3g}, so {why}: leave it out"
+        for name, (number, rule, why) in other_numbers(law, facts).items()
     ]
     with suppress(SizingError):  # an actuator that cannot be asked
         if speed > facts.U:

@@ -97,10 +97,10 @@ def _margin(case: Case) -> float:
     """The delay [s] that the loop bears; NaN where it has no steady motion, or is unstable."""
     try:
         compiled = case.scenario.simulation.compiled
-        found = loop_margins(case.plan.loop, case.plan.grid, compiled=compiled)
+        margins = loop_margins(case.plan.loop, case.plan.grid, compiled=compiled)
     except (LawError, NotConvergedError):
         return math.nan
-    return found.delay_margin
+    return margins.delay_margin
 
 
 @warn_before_run(

@@ -25,17 +25,17 @@ def other_numbers(law: Controller, facts: Facts) -> dict[str, tuple[float, float
     far: dict[str, tuple[float, float, str]] = {}
     with suppress(SizingError):  # where nothing follows, nothing is far from it
         for name in own:
-            number, found = getattr(law, name), law.by_default(name, facts)
-            if why := _why(name, number, found, facts):
-                far[name] = number, found, why
+            number, rule = getattr(law, name), law.by_default(name, facts)
+            if why := _why(name, number, rule, facts):
+                far[name] = number, rule, why
     return far
 
 
-def _why(name: str, number: float, found: float, facts: Facts) -> str:
+def _why(name: str, number: float, rule: float, facts: Facts) -> str:
     """What comes of a number that is too small or too large; else empty."""
     low, high = USUAL[name]
     if name == "k_psi" and facts.T_r > 0.0:
-        high = BEARABLE * facts.c / facts.T_r / found
+        high = BEARABLE * facts.c / facts.T_r / rule
     consequences = {
         "U": ("the law never asks for the speed that there is", "surge is always limited"),
         "N_m": (
@@ -48,7 +48,7 @@ def _why(name: str, number: float, found: float, facts: Facts) -> str:
         ),
     }
     small, large = consequences[name]
-    return small if number < low * found else large if number > high * found else ""
+    return small if number < low * rule else large if number > high * rule else ""
 
 
 @warn_before_run(
@@ -62,13 +62,13 @@ def _why(name: str, number: float, found: float, facts: Facts) -> str:
 def gains_for_another_hull(case: Case) -> Sentences:
     """Speed, moment or pace are not those of this hull with this actuator."""
     law, asked = case.scenario.controller, float(case.reference.speed.max())
-    for name, (number, found, why) in other_numbers(law, case.facts).items():
-        if name == "U" and AMPLE * asked <= number < found:
+    for name, (number, rule, why) in other_numbers(law, case.facts).items():
+        if name == "U" and AMPLE * asked <= number < rule:
             continue
         unit = unit_of(type(law).model_fields[name])
         yield At(
             f"controller.{name}",
-            f"{number:g} {unit}, while hull and actuator make it {found:.3g} {unit}: {why}; leave "
+            f"{number:g} {unit}, while hull and actuator make it {rule:.3g} {unit}: {why}; leave "
             f"{name} out, or write null",
         )
 

@@ -50,8 +50,8 @@ def _updated_first(loop: Loop, step: float, count: int) -> float:
     """The same where m' = F (e_held, m) comes first, and then e' = -d e + g . (e_held, m)."""
     rates = np.vstack([np.zeros(1 + len(loop.memory)), loop.memory])
     updated = np.linalg.matrix_power(_rk4(rates, step), count)
-    one = _rk4(np.array([[-loop.damping, 1.0], [0.0, 0.0]]), step)
-    through = np.linalg.matrix_power(one, count)
+    of_step = _rk4(np.array([[-loop.damping, 1.0], [0.0, 0.0]]), step)
+    through = np.linalg.matrix_power(of_step, count)
     period = np.eye(len(updated))
     period[0] = through[0, 1] * loop.feedback
     period[0, 0] += through[0, 0]
@@ -96,8 +96,8 @@ def _chebyshev(count: int) -> Vector:
 
 
 def _rk4(matrix: Vector, step: float) -> Vector:
-    one, z = np.eye(len(matrix)), step * matrix
-    return np.asarray(one + z @ (one + z @ (one + z @ (one + z / 4.0) / 3.0) / 2.0))
+    unit, z = np.eye(len(matrix)), step * matrix
+    return np.asarray(unit + z @ (unit + z @ (unit + z @ (unit + z / 4.0) / 3.0) / 2.0))
 
 
 def _radius(matrix: Vector) -> float:
@@ -121,8 +121,8 @@ def axes(scenario: Scenario, nu: Vector) -> tuple[Axis, Axis]:
 
 def loops(scenario: Scenario, nu: Vector, cause: Cause | None = None) -> list[Loop]:
     """The velocity loops of the scenario's law at a velocity; all, or those of one cause."""
-    found = scenario.controller.velocity_loops(axes(scenario, nu), nu)
-    return [loop for loop in found if cause in (None, loop.cause)]
+    every = scenario.controller.velocity_loops(axes(scenario, nu), nu)
+    return [loop for loop in every if cause in (None, loop.cause)]
 
 
 def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
@@ -131,8 +131,12 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
 
     def slowed(key: str) -> float:
         halved = law.model_copy(update={key: 0.5 * getattr(law, key)})
-        alike = (one for one in halved.velocity_loops(about, nu) if one.name == loop.name)
-        return min((one.fastest for one in alike if one.axis == loop.axis), default=np.inf)
+        own = [
+            slower.fastest
+            for slower in halved.velocity_loops(about, nu)
+            if (slower.name, slower.axis) == (loop.name, loop.axis)
+        ]
+        return min(own, default=np.inf)
 
     gains = [key for key in type(law).model_fields if isinstance(getattr(law, key), float)]
     return min(sorted(gains, key=lambda key: key != loop.key), key=slowed, default=loop.key)

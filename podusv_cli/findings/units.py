@@ -74,7 +74,7 @@ def _meant(
     number: float, units: tuple[Unit, ...], ratio: float, limits: tuple[float, float]
 ) -> str:
     """`; in mm it is 4 m?`: the first unit in which the ratio, linear in the number, is usual."""
-    fits = [one for one in units if _within(ratio * one.factor, limits)]
+    fits = [unit for unit in units if _within(ratio * unit.factor, limits)]
     return (
         f"; was it given in {fits[0].name}? then write {number * fits[0].factor:g}" if fits else ""
     )
@@ -89,7 +89,7 @@ def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
         meant = _meant(L, METRES, slender, SLENDER)
         yield "length", f"{L:g} m over a beam of {B:g} m{meant or '; check both, in metres'}"
     elif not _within(bulk, BULK):
-        both = [one for one in METRES if _within(bulk / one.factor**3, BULK)]
+        both = [unit for unit in METRES if _within(bulk / unit.factor**3, BULK)]
         scaled = f"; are length and beam in {both[0].name}? write them in metres" if both else ""
         if meant := _meant(m, KILOGRAMS, bulk, BULK):
             yield "m", f"{m:g} kg for a hull of {L:g} m by {B:g} m{meant} (kg)"

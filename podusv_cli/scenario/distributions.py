@@ -116,7 +116,7 @@ def _corners(name: str, corners: tuple[float, ...]) -> None:
 def _some(name: str, values: tuple[Any, ...]) -> None:
     if not values:
         raise ValueError(f"{name}: is empty; write the values to choose from")
-    if any(isinstance(one, int) and abs(one) >= 2**63 for one in values):
+    if any(isinstance(value, int) and abs(value) >= 2**63 for value in values):
         raise ValueError(f"{name}: whole numbers must lie between -2^63 and 2^63; write 1e20")
 
 

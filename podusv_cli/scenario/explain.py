@@ -76,11 +76,11 @@ def explain(
         NUMBER if str(step).isdecimal() else step for step in with_dotted_key(route(name))
     )
     keys = top.follow(place) if place else []
-    found = _with_contents(keys) or _named(name, top, plugins)
-    if not found:
+    rows = _with_contents(keys) or _named(name, top, plugins)
+    if not rows:
         known = [*names(plugins), *others]
         raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, known)}")
-    return found
+    return rows
 
 
 def kinds(plugins: Plugins = ()) -> dict[str, dict[str, str]]:
@@ -162,8 +162,8 @@ def signals(plugins: Plugins = ()) -> tuple[Signal, ...]:
 
 
 def _signals(name: str, plugins: Plugins) -> list[Row]:
-    found = [signal for signal in signals(plugins) if signal.name == name]
-    return [Row(name, signal.meaning, "signal", signal.unit) for signal in found]
+    named = [signal for signal in signals(plugins) if signal.name == name]
+    return [Row(name, signal.meaning, "signal", signal.unit) for signal in named]
 
 
 def _named(name: str, top: Key, plugins: Plugins) -> list[Row]:
@@ -192,7 +192,7 @@ def _rows(keys: Iterable[Key]) -> list[Row]:
     kinds: dict[Row, list[str]] = {}
     for key in keys:
         kinds.setdefault(_row(key), []).append("" if key.is_kind else key.kind)
-    return [replace(row, kinds=tuple(filter(None, found))) for row, found in kinds.items()]
+    return [replace(row, kinds=tuple(filter(None, of_kinds))) for row, of_kinds in kinds.items()]
 
 
 def _row(key: Key) -> Row:

@@ -97,8 +97,8 @@ class Key:
 
     @property
     def _bounds(self) -> list[tuple[str, str, float]]:
-        found = limits(self.field)
-        return [(*BOUNDS[name], found[name]) for name in BOUNDS if name in found]
+        given = limits(self.field)
+        return [(*BOUNDS[name], given[name]) for name in BOUNDS if name in given]
 
     @property
     def types(self) -> tuple[Any, ...]:
@@ -108,7 +108,7 @@ class Key:
     @property
     def choices(self) -> tuple[str, ...]:
         """The words that the value may be."""
-        literals = [one for one in members(self.annotation) if get_origin(one) is Literal]
+        literals = [member for member in members(self.annotation) if get_origin(member) is Literal]
         return tuple(str(word) for literal in literals for word in get_args(literal))
 
     @property
@@ -176,16 +176,16 @@ class Key:
 
     def follow(self, steps: Route) -> list[Key]:
         """Where the steps lead; a kind may be left out, and then all that fit are found."""
-        found = [self]
+        keys = [self]
         for step in steps:
-            found = [inner for key in found for inner in key.inside(step)]
-        return found
+            keys = [inner for key in keys for inner in key.inside(step)]
+        return keys
 
     def inside(self, step: str | int) -> list[Key]:
         """The kind, the item, or the keys (of several kinds) that a step leads to."""
         inner = (self, *self.kinds.values())
-        found = [key.keys.get(str(step)) or key.item(step) for key in inner]
-        return [key for key in found if key]
+        led_to = [key.keys.get(str(step)) or key.item(step) for key in inner]
+        return [key for key in led_to if key]
 
     def all(self) -> Iterator[Key]:
         """Every key and kind below this one, sections before what is in them."""
@@ -206,8 +206,8 @@ def members(annotation: Any) -> tuple[Any, ...]:
 def limits(field: FieldInfo | None) -> dict[str, Any]:
     """The field's limits by pydantic's names: gt, ge, lt, le, pattern."""
     names, metadata = (*BOUNDS, "pattern"), [*_metadata(field)] if field else ()
-    found = ((name, getattr(data, name, None)) for data in metadata for name in names)
-    return {name: limit for name, limit in found if limit is not None}
+    declared = ((name, getattr(data, name, None)) for data in metadata for name in names)
+    return {name: limit for name, limit in declared if limit is not None}
 
 
 def _metadata(field: FieldInfo) -> Iterator[Any]:

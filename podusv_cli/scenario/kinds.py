@@ -29,7 +29,9 @@ def _kept(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
         if not item or not item.kinds:
             return node
         parts = enumerate(node.content)
-        return replace(node, content=tuple(_kept(one, item, (*at, i), dropped) for i, one in parts))
+        return replace(
+            node, content=tuple(_kept(part, item, (*at, i), dropped) for i, part in parts)
+        )
     section = key.kinds.get(node.word("kind"), key)
     for name, entry in node.mapping.items():
         below = section.keys.get(name) or key.item(name)

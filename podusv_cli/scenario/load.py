@@ -187,7 +187,7 @@ def load_stored(
 
 def _undamaged(faults: list[Fault], source: str) -> None:
     """Raise StorageError with the first fault in the file called `source`."""
-    for fault in _ordered([one for one in faults if one.mark.source == source], source)[:1]:
+    for fault in _ordered([fault for fault in faults if fault.mark.source == source], source)[:1]:
         raise StorageError(f"{fault} (the file is damaged, or podusv did not write it)")
 
 

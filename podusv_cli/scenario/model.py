@@ -165,7 +165,9 @@ class Scenario(Component):
         """The text of each plug-in file, by its name in a run's folder."""
         texts = {plugin.sha256: plugin.text for plugin in self.plugged}
         return {
-            name: texts[one.sha256] for name, one in self.plugins.items() if name.endswith(".py")
+            name: texts[plugin.sha256]
+            for name, plugin in self.plugins.items()
+            if name.endswith(".py")
         }
 
     @property

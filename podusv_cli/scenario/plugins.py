@@ -43,10 +43,10 @@ def on_hand(files: Sequence[str]) -> Plugins:
     Raises ScenarioError for a file that is none.
     """
     faults: list[Fault] = []
-    found = from_files(files, faults)
+    plugins = from_files(files, faults)
     if faults:
         raise ScenarioError(faults)
-    return found
+    return plugins
 
 
 def from_files(files: Sequence[str], faults: list[Fault]) -> Plugins:
@@ -218,7 +218,7 @@ def _components(root: Node) -> Iterator[tuple[str, Node]]:
     for name in BASES:
         node = root.mapping.get(name)
         each = node.content if node and isinstance(node.content, tuple) else (node,)
-        yield from ((name, one) for one in each if one)
+        yield from ((name, content) for content in each if content)
     several = root.mapping.get("controllers")
     yield from (("controller", node) for node in (several.mapping.values() if several else ()))
 

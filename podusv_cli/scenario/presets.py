@@ -37,13 +37,13 @@ Fill = Callable[[Node, str, type[Component], list[Fault]], Node]  # a section wi
 def _preset_files(presets: Presets, plugins: Plugins) -> dict[str, Traversable]:
     """The preset files of podusv and of plug-ins by name; podusv's own come first."""
     room = presets.package.rpartition(".")[2]
-    packages = [presets.package, *(one for plugin in plugins for one in plugin.folders(room))]
-    found: dict[str, Traversable] = {}
+    packages = [presets.package, *(folder for plugin in plugins for folder in plugin.folders(room))]
+    by_name: dict[str, Traversable] = {}
     for package in packages:
         for entry in files(package).iterdir():
             if entry.name.endswith(".yaml"):
-                found.setdefault(entry.name.removesuffix(".yaml"), entry)
-    return {name: found[name] for name in sorted(found)}
+                by_name.setdefault(entry.name.removesuffix(".yaml"), entry)
+    return {name: by_name[name] for name in sorted(by_name)}
 
 
 def preset_names(presets: Presets, plugins: Plugins = ()) -> tuple[str, ...]:
@@ -56,8 +56,8 @@ def preset_file(
 ) -> Node | None:
     """The values of a preset by its name, one of `preset_names`."""
     text = _preset_files(presets, plugins)[name].read_text("utf-8")
-    node, found = _tree(text, f"{presets.file} {name}.yaml")
-    faults += found
+    node, faulty = _tree(text, f"{presets.file} {name}.yaml")
+    faults += faulty
     return node
 
 
@@ -149,8 +149,8 @@ def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
     given = (
         (name, root.mapping[name], key) for name, key in top.keys.items() if name in root.mapping
     )
-    found = ((name, node, key.kinds.get(node.word("kind"))) for name, node, key in given)
-    return [(name, node, key.model) for name, node, key in found if key and node.mapping]
+    with_kinds = ((name, node, key.kinds.get(node.word("kind"))) for name, node, key in given)
+    return [(name, node, key.model) for name, node, key in with_kinds if key and node.mapping]
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:

@@ -63,9 +63,9 @@ def schema_text(codes: Sequence[str], plugins: Plugins = ()) -> str:
 def _whole(items: dict[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
     """Items of a list with the keys that they need, which no other file can give."""
     choices = []
-    for one in items["anyOf"]:
-        needed = definitions[one["$ref"].rpartition("/")[2]].get("required", [])
-        choices.append({"allOf": [one], "required": ["kind", *needed]})
+    for choice in items["anyOf"]:
+        needed = definitions[choice["$ref"].rpartition("/")[2]].get("required", [])
+        choices.append({"allOf": [choice], "required": ["kind", *needed]})
     return {"anyOf": choices}
 
 
@@ -95,7 +95,7 @@ def _converted(schema: dict[str, Any]) -> dict[str, Any]:
         # Without its kind, which the file below may give, a section fits more than one.
         made["anyOf"] = made.pop("oneOf")
     if "anyOf" in made:
-        made["anyOf"] = [one for part in made["anyOf"] for one in _choices(part)]
+        made["anyOf"] = [choice for part in made["anyOf"] for choice in _choices(part)]
     if "$ref" in made and len(made) > 1:
         # Draft-07 ignores whatever stands beside a reference.
         made["allOf"] = [{"$ref": made.pop("$ref")}]

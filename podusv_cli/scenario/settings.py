@@ -101,4 +101,4 @@ def _inside(content: Any) -> dict[str, Component]:
     if isinstance(content, Component):
         return {"": content}
     several = content if isinstance(content, tuple) else ()
-    return {f"{i}.": one for i, one in enumerate(several) if isinstance(one, Component)}
+    return {f"{i}.": item for i, item in enumerate(several) if isinstance(item, Component)}

@@ -58,7 +58,7 @@ class Quantity(Distribution):
 
     @model_validator(mode="after")
     def _of_numbers(self) -> Self:
-        words = [one for one in self.distribution.choice or () if isinstance(one, (str, bool))]
+        words = [word for word in self.distribution.choice or () if isinstance(word, (str, bool))]
         if self.relative and words:
             raise ValueError(f"{self.given[0]}: needs numbers, choice has {words[0]!r}")
         return self

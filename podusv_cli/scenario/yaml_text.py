@@ -95,12 +95,12 @@ def _meant(path: str) -> str:
     folder, name = os.path.split(path)
     near: list[str] = []
     with suppress(OSError):
-        near = [one for one in sorted(os.listdir(folder or ".")) if one.endswith(ENDINGS)]
+        near = [file for file in sorted(os.listdir(folder or ".")) if file.endswith(ENDINGS)]
     whole = [os.path.join(folder, name + end) for end in ENDINGS if name + end in near]
-    shipped = [one for one in names() if one in (PREFIX + path, f"{PREFIX}{path}.yaml")]
+    shipped = [name for name in names() if name in (PREFIX + path, f"{PREFIX}{path}.yaml")]
     if exact := [*whole, *shipped]:
         return f"; did you mean {quoted(exact[0])}?"
-    stems = {os.path.splitext(one)[0]: one for one in near}
+    stems = {os.path.splitext(file)[0]: file for file in near}
     close = get_close_matches(os.path.splitext(name)[0], stems, n=1)
     return f"; did you mean {quoted(os.path.join(folder, stems[close[0]]))}?" if close else ""
 

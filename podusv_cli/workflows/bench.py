@@ -85,15 +85,15 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
                 progress("compiling, once", position / len(scenarios))
         runs = list(_simulated(every, request, progress))
         made = standing.table(runs)
-        found = list(_solved(every, runs, request, progress, extras)) if request.optimum else []
-        made = standing.with_optima(made, found) if found else made
+        solved = list(_solved(every, runs, request, progress, extras)) if request.optimum else []
+        made = standing.with_optima(made, solved) if solved else made
         with interrupts_deferred():
             figures = _drawn(runs, made, extras) if request.figures else []
             plugins = dict.fromkeys(
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
             origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
-            _write(writer, made, figures, origin, found)
+            _write(writer, made, figures, origin, solved)
             writer.add_missing(extras)
             return Benched(writer.finish("finished"), made, tuple(map(str, extras.missing)))
 
@@ -110,8 +110,8 @@ def _simulated(
         if outcome.result:
             yield from outcome.result
         else:  # its process ended: which law was it?
-            for law, one in case.laws.items():
-                (again,) = _run_all([replace(case, laws={law: one})], request)
+            for law, single in case.laws.items():
+                (again,) = _run_all([replace(case, laws={law: single})], request)
                 yield from again.result or [crashed(case, law, again.failure)]
 
 
@@ -127,14 +127,15 @@ def _solved(
         if progress:
             progress("optima", (position + fraction) / len(wanted))
 
-    outcomes = run_all([partial(optima.least, one) for one in wanted], advance, request.workers)
-    for one, outcome in zip(wanted, outcomes, strict=True):
+    jobs = [partial(optima.least, problem) for problem in wanted]
+    outcomes = run_all(jobs, advance, request.workers)
+    for problem, outcome in zip(wanted, outcomes, strict=True):
         if outcome.interrupted:
             raise KeyboardInterrupt("interrupted; nothing was written")
         if outcome.result:
             yield outcome.result
         else:
-            place = ", ".join(one.cases[0].place)
+            place = ", ".join(problem.cases[0].place)
             extras.missing.append(Failure(f"the optimum of {place}", outcome.failure))
 
 
@@ -163,13 +164,13 @@ def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -> list
 
 def _write(
     writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture], origin: dict[str, Any],
-    found: Sequence[Least],
+    solved: Sequence[Least],
 ) -> None:  # fmt: skip
     writer.add(RUNS, _csv(made))
     writer.add(BOARD, page.as_markdown(made).encode())
-    writer.add(REPORT, page.page(made, figures, origin, found).encode())
-    if found:
-        writer.add(OPTIMA, _csv(optima.table(found)))
+    writer.add(REPORT, page.page(made, figures, origin, solved).encode())
+    if solved:
+        writer.add(OPTIMA, _csv(optima.table(solved)))
     writer.add_json(ORIGIN, origin)
     for figure in figures:
         writer.add(f"figures/{figure.name}.png", figure.file)

@@ -126,7 +126,7 @@ def compare_gathered(
     _check_metrics(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
-    text = "".join(f"{one.label}\n{one.resolved}" for one in given.members)
+    text = "".join(f"{member.label}\n{member.resolved}" for member in given.members)
     target = request.out or default_folder(RESULTS, given.name, text)
     _keep_apart(items, target)
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
@@ -197,7 +197,7 @@ def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWri
 
 def sizes(members: Sequence[Member]) -> list[Size]:
     """The sizes of the runs that are to be made."""
-    return [estimate(one.case.scenario, one.case.plan) for one in members if one.case]
+    return [estimate(member.case.scenario, member.case.plan) for member in members if member.case]
 
 
 def make_runs(
@@ -267,7 +267,7 @@ def collect(
         abouts=abouts,
         entries=entries,
         endings=endings,
-        differences=differences({label: one.values for label, one in abouts.items()}),
+        differences=differences({label: about.values for label, about in abouts.items()}),
         table=table.table(numbers, known),
         verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources, known))
         or [],

@@ -25,7 +25,7 @@ class Differences:
     def same(self) -> bool:
         """Whether all are the same in scenario, signals and metrics."""
         alone = self.only_one or self.only_other
-        return not alone and all(found.same for _, _, found in self.pairs.values())
+        return not alone and all(pair.same for _, _, pair in self.pairs.values())
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of them."""
@@ -34,8 +34,8 @@ class Differences:
             "identical": self.same,
             "only": [list(self.only_one), list(self.only_other)],
             "pairs": [
-                {"label": label, "runs": [str(one), str(other)], **found.as_json()}
-                for label, (one, other, found) in self.pairs.items()
+                {"label": label, "runs": [str(one), str(other)], **differing.as_json()}
+                for label, (one, other, differing) in self.pairs.items()
             ],
         }
 

@@ -47,8 +47,8 @@ class Section:
     def line(self, words: Sequence[re.Pattern[str]]) -> str:
         """The first line of its text that has one of the words, else the first one."""
         lines = [line.strip(" |>*-") for line in self.text.splitlines() if line.strip()]
-        found = (line for line in lines if any(word.search(line) for word in words))
-        return _plain(next(found, lines[0] if lines else ""))
+        matching = (line for line in lines if any(word.search(line) for word in words))
+        return _plain(next(matching, lines[0] if lines else ""))
 
 
 @cache
@@ -89,13 +89,13 @@ def search(text: str) -> list[tuple[Section, str]]:
     """
     words = [re.compile(rf"\b{re.escape(word)}", re.IGNORECASE) for word in text.split()]
     scored = [(part.score(words), part) for name in names() for part in sections(name)]
-    found = sorted((one for one in scored if one[0]), key=lambda one: -one[0])
-    if not found or not words:
+    ranked = sorted((section for section in scored if section[0]), key=lambda section: -section[0])
+    if not ranked or not words:
         raise UsageError(
             f"no page is called {text!r} or has all words of it{did_you_mean(text, names())} "
             "(`podusv docs` lists all pages)"
         )
-    return [(part, part.line(words)) for _, part in found]
+    return [(part, part.line(words)) for _, part in ranked]
 
 
 @cache

@@ -86,16 +86,16 @@ class Compared:
 
 def comparison(loaded: Loaded) -> Compared:
     """What there is to judge. Raises UsageError without claims, ScenarioError for a bad hull."""
-    parsed = [one for one in parse_claims(loaded) if not claims.is_timed(one.claim)]
+    parsed = [claim for claim in parse_claims(loaded) if not claims.is_timed(claim.claim)]
     if not parsed:
         raise UsageError(
             f"{loaded.scenario.name} has no claims that runs decide, so no verdict can turn; write "
             "some under `claims`, as podusv docs claims shows"
         )
-    named = {label for one in parsed for label in labels_of(one.claim)}
+    named = {label for claim in parsed for label in labels_of(claim.claim)}
 
     def judged(scenario: Scenario) -> Singles:
-        return {label: one for label, one in scenario.singles().items() if label in named}
+        return {label: single for label, single in scenario.singles().items() if label in named}
 
     hulls = find(loaded.root, ("doubt", "hulls"))
     others = {
@@ -109,14 +109,15 @@ def doubted(
     compared: Compared, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, Extras]:
     """All that is tried, and what it says of every claim."""
-    for one in compared.singles.values():
-        case = Case.of(one)
+    for single in compared.singles.values():
+        case = Case.of(single)
         examined(case)
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
         entries = {
-            label: _entry(label, one, compared.parsed) for label, one in compared.singles.items()
+            label: _entry(label, single, compared.parsed)
+            for label, single in compared.singles.items()
         }
     judge, asked = judging(compared, entries), scenario.doubt or Doubt()
     tried = search(compared.singles, judge, asked, request.workers, progress)
@@ -124,11 +125,14 @@ def doubted(
     extras = Extras(interrupted=(len(tried.alone), len(tried.worlds)) != whole)
     verdicts = [
         RunsVerdict(
-            one.name, one.claim, tried.base.answers[one.name], dict(tried.base.numbers[one.name])
+            claim.name,
+            claim.claim,
+            tried.base.answers[claim.name],
+            dict(tried.base.numbers[claim.name]),
         )
-        for one in compared.parsed
+        for claim in compared.parsed
     ]
-    events = {one.name: nearest_event(one, entries) for one in compared.parsed}
+    events = {claim.name: nearest_event(claim, entries) for claim in compared.parsed}
     return DoubtReport(scenario, answers(verdicts, tried, events), tried), extras
 
 
@@ -137,11 +141,11 @@ def search(
     progress: Progress | None = None,
 ) -> Tried:  # fmt: skip
     """Try every choice alone, and draw all at once; shorter after an interrupt."""
-    base, found = judge({}), choices(singles, doubt)
-    draws = drawn(found, doubt.seed, doubt.draws)
+    base, moving = judge({}), choices(singles, doubt)
+    draws = drawn(moving, doubt.seed, doubt.draws)
     tell = progress or (lambda what, fraction: None)
     alone = _made(
-        [partial(_explored, one, judge, base) for one in found],
+        [partial(_explored, choice, judge, base) for choice in moving],
         partial(tell, "one at a time"), workers,
     )  # fmt: skip
     parts = [range(i, min(i + BATCH, doubt.draws)) for i in range(0, doubt.draws, BATCH)]
@@ -149,7 +153,7 @@ def search(
         [partial(_judged, draws, part, judge) for part in parts],
         partial(tell, "all at once"), workers,
     )  # fmt: skip
-    return Tried(base, alone, draws, [one for part in worlds for one in part])
+    return Tried(base, alone, draws, [world for part in worlds for world in part])
 
 
 def _made(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) -> list[Any]:
@@ -158,7 +162,7 @@ def _made(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) 
     for outcome in outcomes:
         if outcome.failure and not outcome.interrupted:
             raise PodusvError(outcome.failure)
-    ended = next((i for i, one in enumerate(outcomes) if one.result is None), len(outcomes))
+    ended = next((i for i, outcome in enumerate(outcomes) if outcome.result is None), len(outcomes))
     return [outcome.result for outcome in outcomes[:ended]]
 
 
@@ -179,7 +183,7 @@ def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
         labels = dict.fromkeys(label for label, _ in world)
         try:
             moved = {label: _changed(compared, label, world) for label in labels}
-            made = {label: _entry(label, one, compared.parsed) for label, one in moved.items()}
+            made = {label: _entry(label, new, compared.parsed) for label, new in moved.items()}
         except PodusvError as error:
             return Judged({}, {}, str(error))
         every, scenarios = {**entries, **made}, {**compared.singles, **moved}
@@ -192,7 +196,7 @@ def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
 
 
 def _changed(compared: Compared, label: str, world: World) -> Scenario:
-    new = {at: Number("", value) for (one, at), value in world.items() if one == label}
+    new = {at: Number("", value) for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
     single = (compared.hulls[hull.value] if hull else compared.singles)[label]
     return with_values(single, new)
@@ -218,7 +222,7 @@ def _entry(label: str, scenario: Scenario, parsed: Sequence[ParsedClaim]) -> Ent
         raise KeyboardInterrupt
     whole, _ = monitored(case, recording)
     numbers: dict[str, float | None] = {**summary(case, recording, Extras())}
-    if len(recording["time"]) and any(law_operations.name in one.claim.expect for one in parsed):
+    if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)
     run = InMemory(Path(), recording.status, numbers, {}, "", kept=whole)
     return Entry(label, run, about_of(scenario), plugins=scenario.plugged)

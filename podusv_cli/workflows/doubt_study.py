@@ -75,15 +75,15 @@ def doubt_study(
     """
     started, scenario = datetime.now(UTC), loaded.scenario
     folder = request.out or RESULTS / f"{scenario.name}-doubt"
-    studies, found = Studies(config, folder, request), study_choices(scenario)
+    studies, moving = Studies(config, folder, request), study_choices(scenario)
     tell = progress or (lambda what, fraction: None)
     base, verdicts = studies.judged("own", [])
     if base.failed:
         raise PodusvError(base.failed)
     alone = []
     try:
-        for done, choice in enumerate(found):
-            tell("one at a time", done / len(found))
+        for done, choice in enumerate(moving):
+            tell("one at a time", done / len(moving))
             alone.append(Alone(choice, tuple(_trials(studies, choice, loaded))))
     except KeyboardInterrupt as stop:
         again = plugins.continue_with(f"doubt {config} --out", folder)
@@ -103,10 +103,10 @@ def doubt_study(
 
 def _failed(alone: Sequence[Alone]) -> Iterator[Failure]:
     """The values with which there is no study, and why."""
-    for one in alone:
-        for trial in one.trials:
+    for tried in alone:
+        for trial in tried.trials:
             if trial.judged.failed:
-                yield Failure(f"{one.choice.name}: {as_yaml(trial.value)}", trial.judged.failed)
+                yield Failure(f"{tried.choice.name}: {as_yaml(trial.value)}", trial.judged.failed)
 
 
 def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[Trial]:

@@ -265,14 +265,14 @@ def monitored(
 ) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
     plan, scenario = case.plan, case.scenario
-    found = scenario.log.monitor and monitor.monitored(
+    monitored_run = scenario.log.monitor and monitor.monitored(
         plan, recording,
         steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
         allocate=allocate,
     )  # fmt: skip
-    if not found:
+    if not monitored_run:
         return recording, {}
-    return found.recording, theory_report(plan.loop, plan.grid, found)
+    return monitored_run.recording, theory_report(plan.loop, plan.grid, monitored_run)
 
 
 def _logged(

@@ -122,15 +122,15 @@ def _linked(request: Request) -> Mapping[str, objects.Platform]:
             "there is no export for this machine, so no FMU without zig: install it with pip "
             "install 'podusv[export]', or export with --no-fmu"
         )
-    found = {name: objects.PLATFORMS[name] for name in names}
-    if alone := [name for name, platform in found.items() if not platform.library]:
+    platforms = {name: objects.PLATFORMS[name] for name in names}
+    if alone := [name for name, platform in platforms.items() if not platform.library]:
         raise UsageError(
             f"{alone[0]} has no shared libraries, so an FMU cannot hold the law for it; export it "
             "with --no-fmu"
         )
-    for name, platform in found.items():
+    for name, platform in platforms.items():
         linker(name, platform)
-    return found
+    return platforms
 
 
 def _table(law: ExportedLaw, samples: Vector) -> str:

@@ -26,17 +26,17 @@ from podusv_cli.workflows.run import DRAWN
 def scenario_of_draw(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
     """The scenario of one run of a study, under a name of its own."""
     (numbers,) = draws(plan.sweep, draw, 1)
-    one = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
+    single = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
     end = f"-{KeptRun(law, cell, draw, '').name}"
-    return one.model_copy(update={"name": f"{one.name[: LONGEST_NAME - len(end)]}{end}"})
+    return single.model_copy(update={"name": f"{single.name[: LONGEST_NAME - len(end)]}{end}"})
 
 
-def seen_from(place: Path, study: Path, one: Scenario) -> Scenario:
+def seen_from(place: Path, study: Path, scenario: Scenario) -> Scenario:
     """A scenario of a study, with its plug-in files named as in another folder."""
-    kept = one.plugin_files()
+    kept = scenario.plugin_files()
     names = {name: os.path.relpath(study / name, place) for name in kept}
-    plugins = {names.get(name, name): required for name, required in one.plugins.items()}
-    return one.model_copy(update={"plugins": plugins})
+    plugins = {names.get(name, name): required for name, required in scenario.plugins.items()}
+    return scenario.model_copy(update={"plugins": plugins})
 
 
 def keep(
@@ -48,21 +48,21 @@ def keep(
     one run.
     """
     missing = unmade(folder, results)
-    tasks = [_task(folder, plan, one, request) for one in missing]
+    tasks = [_task(folder, plan, run, request) for run in missing]
     with interrupts_enabled():
-        for law, cell in dict.fromkeys((one.law, one.cell) for one in missing):
+        for law, cell in dict.fromkeys((run.law, run.cell) for run in missing):
             warm_up(Case.of(plan.single(law, cell)))
     outcomes = run_all([partial(execute, task) for task in tasks], workers=request.workers)
-    for one, outcome in zip(missing, outcomes, strict=True):
+    for run, outcome in zip(missing, outcomes, strict=True):
         if outcome.failure:
-            extras.missing.append(Failure(f"{LOGS}/{one.name}", outcome.failure))
+            extras.missing.append(Failure(f"{LOGS}/{run.name}", outcome.failure))
     extras.interrupted |= any(outcome.interrupted for outcome in outcomes)
     return found(folder, results, extras)
 
 
-def _task(folder: Path, plan: Plan, one: KeptRun, request: Request) -> Task:
-    scenario = scenario_of_draw(plan, one.law, one.cell, one.draw)
+def _task(folder: Path, plan: Plan, run: KeptRun, request: Request) -> Task:
+    scenario = scenario_of_draw(plan, run.law, run.cell, run.draw)
     return Task(
-        scenario, resolved_yaml(scenario), folder / LOGS / one.name,
-        figures=DRAWN if request.figures else (), argv=request.argv, label=one.law,
+        scenario, resolved_yaml(scenario), folder / LOGS / run.name,
+        figures=DRAWN if request.figures else (), argv=request.argv, label=run.law,
     )  # fmt: skip

@@ -72,13 +72,13 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
         return find()
     _check_formats(request.formats)
     with RunWriter(request.out, force=request.force) as writer:
-        found = find()
+        result = find()
         with interrupts_deferred():
             plugins = loaded.scenario.plugged
             origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
-            _write(writer, found, request.formats)
+            _write(writer, result, request.formats)
             writer.add_json("provenance.json", origin)
-            return replace(found, folder=writer.finish("finished"))
+            return replace(result, folder=writer.finish("finished"))
 
 
 def _found(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> Found:
@@ -100,18 +100,18 @@ def _check_formats(formats: Sequence[str]) -> None:
     check_names((), formats)
 
 
-def _write(writer: RunWriter, found: Found, formats: Sequence[str]) -> None:
+def _write(writer: RunWriter, result: Found, formats: Sequence[str]) -> None:
     """Margins as JSON and CSV, the curves, and the figure in each format."""
     from podusv_cli.figures.margins import sensitivities  # matplotlib is slow to import
     from podusv_cli.figures.style import house_style, image
 
-    writer.add_json("margins.json", found.as_json())
+    writer.add_json("margins.json", result.as_json())
     rows = [
-        [name, OF_LOOP[name].unit, *(law.numbers()[name] for law in found.laws.values())]
+        [name, OF_LOOP[name].unit, *(law.numbers()[name] for law in result.laws.values())]
         for name in OF_LOOP
     ]
-    writer.add("margins.csv", csv_files.lines([["margin", "unit", *found.laws], *rows]).encode())
+    writer.add("margins.csv", csv_files.lines([["margin", "unit", *result.laws], *rows]).encode())
     with house_style():
-        figure = sensitivities(found.laws)
+        figure = sensitivities(result.laws)
         for form in formats:
             writer.add(f"figures/sensitivities.{form}", image(figure, form))

@@ -101,9 +101,9 @@ def runs_of(path: Path) -> list[FinishedRun]:
 def _about_study(path: Path) -> str:
     """What to do instead of taking a study for a run."""
     kept = sorted(run for run in (path / LOGS).glob("*") if (run / LOG).is_file())
-    one = f"name one of the runs that it keeps, such as {kept[0]}, or " if kept else ""
+    hint = f"name one of the runs that it keeps, such as {kept[0]}, or " if kept else ""
     return (
-        f"{path} is a study, not a run; {one}write any of its runs as a scenario: "
+        f"{path} is a study, not a run; {hint}write any of its runs as a scenario: "
         f"podusv sweep draw {path} --law LAW --draw N"
     )
 
@@ -154,7 +154,7 @@ def _told_before(run: FinishedRun, files: Sequence[str]) -> RunAbout:
 
 def _fault(log: Recording) -> str:
     """The first fault of a log, in words; empty if there is none."""
-    wanted = [*NEEDED, *(name for one, rest in BESIDE.items() if one in log for name in rest)]
+    wanted = [*NEEDED, *(name for signal, rest in BESIDE.items() if signal in log for name in rest)]
     lacking = [name for name in wanted if name not in log]
     if lacking:
         return f"it has no {lacking[0]}"
@@ -176,12 +176,12 @@ def numbered(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
 
     Some file systems do not tell upper from lower case, so neither does this.
     """
-    found, used = list[str](), {name.casefold() for name in taken}
+    labels, used = list[str](), {name.casefold() for name in taken}
     for name in names:
         label, count = name, 1
         while label.casefold() in used:
             count += 1
             label = f"{name}_{count}"
         used.add(label.casefold())
-        found.append(label)
-    return found
+        labels.append(label)
+    return labels

@@ -110,7 +110,9 @@ def new(what: str, name: str) -> Written:
         if place.exists():
             raise StorageError(f"{place} exists; take another name, or another folder")
     storage.write_texts(Path(), {str(at): _filled(form, words) for at, form in places.items()})
-    return Written(tuple(places), tuple(one.replace("$name", name) for one in part.commands))
+    return Written(
+        tuple(places), tuple(command.replace("$name", name) for command in part.commands)
+    )
 
 
 def _check_name(what: str, name: str) -> None:

@@ -109,9 +109,9 @@ def _guesses(scenario: Scenario) -> dict[str, Motion]:
     A law that diverges is left out. Raises LawError, and UsageError where all diverge.
     """
     singles = scenario.singles()
-    if not any(one.controller.label == BESIDE.label for one in singles.values()):
+    if not any(single.controller.label == BESIDE.label for single in singles.values()):
         singles[BESIDE.label] = scenario.alone().model_copy(update={"controller": BESIDE})
-    runs = {label: _run(one) for label, one in singles.items()}
+    runs = {label: _run(single) for label, single in singles.items()}
     ended = {label: run for label, run in runs.items() if run.status == "finished"}
     if not ended:
         label, run = next(iter(runs.items()))

@@ -85,7 +85,7 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     belongs to a finished folder; StorageError.
     """
     out = request.out or Path()
-    members = _labelled(one for path in runs for one in from_folder(path, request.plugins))
+    members = _labelled(run for path in runs for run in from_folder(path, request.plugins))
     members = _named(members, choice.labels)
     known = figures_of(member.plugins for member in members)
     check_names(request.names, request.formats, known)

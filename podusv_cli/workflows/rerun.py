@@ -167,7 +167,7 @@ def _passing(request: Request) -> Iterator[Path]:
 
 def _repeated(original: FinishedRun, done: Finished) -> Repeated:
     """A run that was made once more, held against the original."""
-    found = difference(original, run_folder.open_run(done.folder))
+    differing = difference(original, run_folder.open_run(done.folder))
     return Repeated(
-        original.folder, original.status, done.status, found, done.missing, done.message
+        original.folder, original.status, done.status, differing, done.missing, done.message
     )

@@ -94,14 +94,14 @@ def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[Found]:
     for condition in where:
         every = _holding(every, condition)
     if not sort:
-        return sorted(every, key=lambda one: one.started, reverse=True)
-    known = dict.fromkeys(name for one in every for name in one.metrics)
+        return sorted(every, key=lambda run: run.started, reverse=True)
+    known = dict.fromkeys(name for run in every for name in run.metrics)
     if not known:
         raise UsageError(f"--sort {sort}: there is no run below {root}, and only runs have metrics")
     if sort not in known:
         raise UsageError(unknown(f"metric {sort!r}", sort, known, "podusv list metrics"))
-    measured = (one for one in every if one.kind == "run")
-    return sorted(measured, key=lambda one: one.metrics.get(sort, math.inf))
+    measured = (run for run in every if run.kind == "run")
+    return sorted(measured, key=lambda run: run.metrics.get(sort, math.inf))
 
 
 def _below(root: Path) -> Iterator[Found]:
@@ -131,7 +131,7 @@ def _read(folder: Path, mark: str) -> Found:
     return Found(
         folder, kind, told.name or (named[1] if named else folder.name),
         [*told.laws] or [*filter(None, [told.controller])], ending.status, sessions[0].started,
-        sum(one.duration_s for one in sessions),
+        sum(session.duration_s for session in sessions),
         {name: math.nan if x is None else x for name, x in metrics.items()}, scenario,
     )  # fmt: skip
 
@@ -146,22 +146,22 @@ def _holding(every: Sequence[Found], condition: str) -> list[Found]:
     wanted = read(text, condition, [], placed=False) if equals and text else None
     if wanted is None:
         raise UsageError(f"--where {condition}: write key=value, as --where controller.kind=pid")
-    trees = {one.folder: tree for one in every if (tree := _tree(one))}
+    trees = {run.folder: tree for run in every if (tree := _tree(run))}
     values = {folder: find(tree, route(key)) for folder, tree in trees.items()}
     if trees and not any(values.values()):
         known = dict.fromkeys(name for tree in trees.values() for name in _keys(tree))
         wrong = unknown(f"key {key!r}", key, known, "podusv explain")
         raise UsageError(f"--where {condition}: {wrong}")
     return [
-        one for one in every if (node := values.get(one.folder)) and plain(node) == plain(wanted)
+        run for run in every if (node := values.get(run.folder)) and plain(node) == plain(wanted)
     ]
 
 
-def _tree(one: Found) -> Node | None:
+def _tree(run: Found) -> Node | None:
     """Its scenario; None where there is none, or none that can be read."""
     with suppress(StorageError):
-        if one.scenario:
-            return read(files.read_text(one.folder / one.scenario), str(one.folder), [])
+        if run.scenario:
+            return read(files.read_text(run.folder / run.scenario), str(run.folder), [])
     return None
 
 

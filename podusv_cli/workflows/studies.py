@@ -124,14 +124,14 @@ def draw(
     if number >= made.sweep.draws:
         last = made.sweep.draws - 1
         raise UsageError(f"--draw {number}: there is no such draw; they are numbered 0 to {last}")
-    one = scenario_of_draw(made, law, cell, number)
-    path = out or Path(f"{one.name}.yaml")
-    one = seen_from(path.parent, study, one)
+    single = scenario_of_draw(made, law, cell, number)
+    path = out or Path(f"{single.name}.yaml")
+    single = seen_from(path.parent, study, single)
     if path.exists():
         raise UsageError(f"{path} exists already; name another file with --out")
     at = f", cell {cell} ({made.cells[cell].label})" if len(made.cells) > 1 else ""
     head = f"# Draw {number} of the study {visible(study)}, law {law}{visible(at)}.\n"
-    files.write_bytes(path, f"{head}{resolved_yaml(one)}".encode())
+    files.write_bytes(path, f"{head}{resolved_yaml(single)}".encode())
     return path
 
 

@@ -71,7 +71,7 @@ class Swept:
         told = self.results.as_json() if self.results else {}
         status = "finished" if self.results else "unfinished"
         counts = {"wanted": self.tally.wanted, "made": self.tally.made}
-        missing = [str(one) for one in self.missing]
+        missing = [str(failure) for failure in self.missing]
         return {
             "format": 1, "status": status, "folder": str(self.folder), **counts, **told,
             "missing": missing, "missing_runs": self.missing_runs, "refused": self.refused,

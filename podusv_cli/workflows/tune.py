@@ -70,7 +70,7 @@ class Tuned:
             "format": 1, "status": "finished", "folder": str(self.folder),
             "laws": results.laws.to_dict("records"),
             "gains": {law: dict(results.winner(law).gains) for law in results.winners},
-            "remarks": remarks(results), "missing": [str(one) for one in self.missing],
+            "remarks": remarks(results), "missing": [str(failure) for failure in self.missing],
             "refused": self.refused,
         }  # fmt: skip
 
@@ -141,8 +141,8 @@ def _simulated(
         _prepare(plan, request)
         dispatch(searches, executor, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
-        trials = {law: found for law, found in trials.items() if found}
-        winners = {law: [best(one) for one in found] for law, found in trials.items()}
+        trials = {law: repeats for law, repeats in trials.items() if repeats}
+        winners = {law: [best(repeat) for repeat in repeats] for law, repeats in trials.items()}
         stamp = started.isoformat(timespec="seconds")
         return SearchResults(
             plan, trials, winners, validate(plan, winners, folder, stamp, executor, validated)
@@ -187,13 +187,13 @@ def _searches(plan: TunePlan, folder: Path) -> list[Search]:
 
 def _leaders(searches: Sequence[Search]) -> str:
     """The best objective so far of every law, in words."""
-    found: dict[str, float] = {}
+    best_values: dict[str, float] = {}
     for search in searches:
         if search.trials:
             value = best(search.trials).value
-            found[search.law] = min(value, found.get(search.law, value))
-    leaders = ", ".join(f"{law} {value:.4g}" for law, value in found.items())
-    return f"best on the training draws: {leaders}" if found else "no gains are tried yet"
+            best_values[search.law] = min(value, best_values.get(search.law, value))
+    leaders = ", ".join(f"{law} {value:.4g}" for law, value in best_values.items())
+    return f"best on the training draws: {leaders}" if best_values else "no gains are tried yet"
 
 
 def _written(results: SearchResults, folder: Path, request: Request) -> Tuned:
