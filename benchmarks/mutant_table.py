@@ -98,7 +98,7 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_curves_of_different_logs_meet_at_the_same_times"),
 ],
 "study": [
-    ("    for key, told in of_numbers(made):\n", "    for key, told in ():\n",
+    ("    for key, fault in of_numbers(made):\n", "    for key, fault in ():\n",
      "test_a_draw_is_refused_where_loading_the_scenario_with_it_is"),
     ("TRIED = np.array([0.000871, 0.381966, 0.998713])", "TRIED = np.array([0.0, 0.5, 1.0])",
      "test_a_drawn_time_has_to_fit_the_steps_as_a_given_one"),
@@ -237,7 +237,7 @@ TABLE: dict[str, list[Row]] = {
     ("[*reversed(layers), top]", "[*layers, top]", "test_a_child_changes_single_keys_of_its_base"),
     ("np.clip(self.whole(low + u * (high - low)), *self.within)",
      "np.clip(self.whole(u), *self.within)", "test_frequencies_pass_the_kolmogorov_smirnov_test"),
-    ('f"unknown key{told}"', '"unknown key"', "test_a_wrong_value_is_one_sentence_at_its_place"),
+    ('f"unknown key{hints}"', '"unknown key"', "test_a_wrong_value_is_one_sentence_at_its_place"),
     ("            if key in entries:\n", "            if False:\n",
      "test_a_fault_is_one_sentence_at_its_place"),
     ("    if NOT_FINITE.fullmatch(text):\n", "    if False:\n",

@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 Offered = list[tuple[str, str]]
 
 
-def kept(known: Callable[[Plugins], Mapping[str, str]]) -> Callable[[typer.Context, str], Offered]:
+def cached(
+    known: Callable[[Plugins], Mapping[str, str]],
+) -> Callable[[typer.Context, str], Offered]:
     """What completes words that are known with these plug-ins, and what each means.
 
-    All of them are kept on disk, but for those of files after `--plugin`.
+    All of them are cached on disk, but for those of files after `--plugin`.
     """
 
     @wraps(known, assigned=("__name__", "__doc__"), updated=())
@@ -85,7 +87,7 @@ def _state() -> str:
     return hashlib.sha256(repr((sorted(times), plugins)).encode()).hexdigest()
 
 
-@kept
+@cached
 def starting_points(plugins: Plugins) -> Mapping[str, str]:
     """Names that `podusv init` takes."""
     from podusv_cli.workflows.init import starting_points
@@ -133,7 +135,7 @@ def _keys_in(name: str, plugins: Plugins) -> Mapping[str, str]:
     return assignments_in(load(name, plugged=without_own(plugins)).scenario)
 
 
-@kept
+@cached
 def all_keys(plugins: Plugins) -> Mapping[str, str]:
     """The same for any scenario."""
     from podusv_cli.scenario.explain import assignments
@@ -157,7 +159,7 @@ def laws(context: typer.Context, incomplete: str) -> Offered:
         return []  # no study, or none that can be read: there is no place for a message
 
 
-@kept
+@cached
 def figures(plugins: Plugins) -> Mapping[str, str]:
     """Names of figures."""
     from podusv_cli.figures.drawing import figures_with
@@ -165,7 +167,7 @@ def figures(plugins: Plugins) -> Mapping[str, str]:
     return {name: sheet.caption for name, sheet in figures_with(plugins).items()}
 
 
-@kept
+@cached
 def metrics(plugins: Plugins) -> Mapping[str, str]:
     """Names of metrics."""
     from podusv_cli.metrics.table import metrics_with
@@ -173,7 +175,7 @@ def metrics(plugins: Plugins) -> Mapping[str, str]:
     return {name: metric.meaning for name, metric in metrics_with(plugins).items()}
 
 
-@kept
+@cached
 def names(plugins: Plugins) -> Mapping[str, str]:
     """What `podusv explain` explains: keys, kinds, signals, presets, metrics, findings."""
     from podusv_cli.findings.finding import finding_kinds

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from podusv_cli.cli.completion import kept
+from podusv_cli.cli.completion import cached
 from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_entry
 
@@ -33,7 +33,7 @@ THEN = {
 }  # by section
 
 
-@kept
+@cached
 def listed(plugins: Known) -> Mapping[str, str]:
     """Words for a part of the list."""
     return dict.fromkeys((word for part in parts(plugins) for word in part.words), "")

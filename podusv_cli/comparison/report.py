@@ -101,15 +101,15 @@ class Standing(NamedTuple):
 def _standings(story: Story, rows: Sequence[Row]) -> dict[str, Standing]:
     """Every run that finished, by label; the rows are those that a reader sees first."""
     best = leaders(story.table, story.metrics, story.unsettled)
-    told = {}
+    standings = {}
     for label in itertools.compress(story.table.columns, story.table.finished):
         own = story.table.of(label)
         numbers = ((metric, own[metric.name]) for metric, _ in rows[:FACTS])
         facts = [_fact(metric, number) for metric, number in numbers if metric.name not in CLOCKED]
         names = best.get(label, [])
         first = [name for name in names if story.metrics[name].headline]
-        told[label] = Standing([*filter(None, facts)], first, len(names) - len(first))
-    return told
+        standings[label] = Standing([*filter(None, facts)], first, len(names) - len(first))
+    return standings
 
 
 def _fact(metric: MetricAbout, number: float) -> str:
@@ -122,11 +122,11 @@ def _fact(metric: MetricAbout, number: float) -> str:
 
 def _by_code(story: Story) -> dict[str, tuple[str, list[Finding]]]:
     """The findings of each code, and what the code means."""
-    told = dict[str, tuple[str, list[Finding]]]()
+    by_code = dict[str, tuple[str, list[Finding]]]()
     for finding in story.noticed:
         meaning = story.meanings.get(finding.code, "")
-        told.setdefault(finding.code, (meaning, []))[1].append(finding)
-    return told
+        by_code.setdefault(finding.code, (meaning, []))[1].append(finding)
+    return by_code
 
 
 def laws(

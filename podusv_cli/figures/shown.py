@@ -129,8 +129,8 @@ def constants(runs: Sequence[Shown], names: Iterable[str]) -> dict[str, str]:
         values = {run.name: run.signal(name) for run in runs if run.has(name)}
         if all(np.ptp(value) == 0.0 for value in values.values()):
             levels = {label: f"{value.flat[0]:.4g}" for label, value in values.items()}
-            told = ", ".join(f"{level} ({label})" for label, level in levels.items())
-            level = told if len({*levels.values()}) > 1 else next(iter(levels.values()))
+            levels_in_words = ", ".join(f"{level} ({label})" for label, level in levels.items())
+            level = levels_in_words if len({*levels.values()}) > 1 else next(iter(levels.values()))
             held[name] = f"${about(runs, name).symbol}$ = {level} {unit(about(runs, name))}"
     return held if len(held) < len(names) else {}
 

@@ -83,7 +83,7 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
 def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
     """The bound of V in each part of every run, drawn or, where it is far off, told in words."""
     largest = max(float(np.max(run.signal("V"))) for run in scaling(runs))
-    told, top = [], largest
+    lines, top = [], largest
     for run in runs:
         for start, end, bound in _bounds(run):
             if bound <= FAR * largest:
@@ -91,11 +91,11 @@ def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
                 top = max(top, bound)
             else:
                 size = f"{bound:.2g}, not drawn" if math.isfinite(bound) else "none"
-                told.append(f"bound of {run.name} from {start:g} s on: {size}")
+                lines.append(f"bound of {run.name} from {start:g} s on: {size}")
     axes.set_ylim(top=2.0 * top)
     axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
-    if told:
-        axes.set_title("\n".join(told), fontsize="x-small", loc="right")
+    if lines:
+        axes.set_title("\n".join(lines), fontsize="x-small", loc="right")
 
 
 def _thin(run: Shown) -> dict[str, Any]:

@@ -45,9 +45,9 @@ def late_load(case: Case) -> Sentences:
 def load_between_steps(case: Case) -> Sentences:
     """RK4 is of first order in the step in which the load jumps."""
     for key, part in case.scenario.disturbances().items():
-        told = misfit(part.jumps(), case.scenario.simulation.step) if part.jumps() > 0.0 else ""
-        if told:
-            yield At(f"{key}.time", f"{told}; the method is of first order at such a jump")
+        fault = misfit(part.jumps(), case.scenario.simulation.step) if part.jumps() > 0.0 else ""
+        if fault:
+            yield At(f"{key}.time", f"{fault}; the method is of first order at such a jump")
 
 
 @warn_before_run(

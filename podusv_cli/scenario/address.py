@@ -114,9 +114,9 @@ def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
         made = made.in_numbers()
     except SizingError as error:
         raise ValueRefused(str(error)) from error
-    for key, told in of_numbers(made):
+    for key, fault in of_numbers(made):
         raise ValueRefused(
-            f"{new[steps].source if (steps := steps_at(key)) in new else ''}{key}: {told}"
+            f"{new[steps].source if (steps := steps_at(key)) in new else ''}{key}: {fault}"
         )
     return made
 

@@ -52,8 +52,8 @@ def _defaults(scenario: Scenario) -> Conflicts:
         "estimator": scenario.estimator, **scenario.disturbances(),
     }  # fmt: skip
     for key, part in {**others, **scenario.laws()}.items():
-        if told := wrong_default(part):
-            yield key, f"{describe(part)}: {told}"
+        if fault := wrong_default(part):
+            yield key, f"{describe(part)}: {fault}"
 
 
 def _summands(scenario: Scenario) -> Conflicts:
@@ -97,8 +97,8 @@ def _times(scenario: Scenario, of_laws: Mapping[str, float]) -> Conflicts:
         yield key, f"{count}; no more than {MOST_INSTANTS:.2g} have times of their own"
         return
     for key, time in times.items():
-        if time and (told := misfit(time, step)):
-            yield key, told
+        if time and (fault := misfit(time, step)):
+            yield key, fault
 
 
 def _samples(period: float, sampled: Mapping[str, float]) -> Conflicts:
@@ -119,8 +119,8 @@ def _seeing(scenario: Scenario) -> Conflicts:
     if scenario.measurement.is_exact and scenario.estimator != NO_ESTIMATOR:
         text = "has nothing to estimate where the law sees the true state"
         yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
-    if told := scenario.estimator.lacking(scenario.measurement.measured()):
-        yield "estimator", told
+    if lacking := scenario.estimator.lacking(scenario.measurement.measured()):
+        yield "estimator", lacking
 
 
 def _names(scenario: Scenario) -> Conflicts:

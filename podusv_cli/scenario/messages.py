@@ -86,8 +86,8 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     node = follow(root, route)[-1]
     hint = _joined(section, name) or _elsewhere(section, name) or did_you_mean(name, section.keys)
     several = _several(section, follow(root, section.path)[-1])
-    told = several or f"{hint} (allowed: {', '.join(section.keys)})"
-    yield Fault(node.key_mark or node.mark, dotted(route), f"unknown key{told}")
+    hints = several or f"{hint} (allowed: {', '.join(section.keys)})"
+    yield Fault(node.key_mark or node.mark, dotted(route), f"unknown key{hints}")
 
 
 def _joined(section: Key, name: str) -> str:

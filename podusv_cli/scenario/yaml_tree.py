@@ -223,9 +223,9 @@ def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) 
 def entries_of(key: str, kinds: Sequence[Any]) -> str:
     """What a list has, by the kinds of its entries, which may be None."""
     last = len(kinds) - 1
-    told = ", ".join(kind for kind in kinds if isinstance(kind, str))
+    kinds_there = ", ".join(kind for kind in kinds if isinstance(kind, str))
     to = f" to {key}[{last}]" if last else ""
-    kinds_told = f" ({told})" if told else ""
+    kinds_told = f" ({kinds_there})" if kinds_there else ""
     count = f"{len(kinds)} entries" if last else "1 entry"
     return f"the list has {count}, {key}[0]{to}{kinds_told}; name one of these"
 

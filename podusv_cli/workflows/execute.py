@@ -156,14 +156,14 @@ def execute(
         warnings, told_of = (*task.noticed, *(noticed or ())), partial(about_of, task.scenario)
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
-            told = extras.made(f"{folder.ABOUT}, which figures need,", told_of)
-            if told:
-                facts = told.model_dump(exclude_defaults=True)
+            about = extras.made(f"{folder.ABOUT}, which figures need,", told_of)
+            if about:
+                facts = about.model_dump(exclude_defaults=True)
                 writer.add_json(folder.ABOUT, {"format": 1, **facts})
             if theory:
                 writer.add_json("theory.json", theory)
         with watch.part("figures"):
-            figures = extras.attempt("figures", lambda: _drawn(task, whole, told, extras)) or {}
+            figures = extras.attempt("figures", lambda: _drawn(task, whole, about, extras)) or {}
             for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
@@ -301,17 +301,17 @@ def _write(
     for name, text in task.scenario.plugin_files().items():
         writer.add(name, text.encode())
     status = {"status": recording.status, "controller": recording.controller}
-    told = [finding.as_json() for finding in warnings]
-    writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": told})
+    findings = [finding.as_json() for finding in warnings]
+    writer.add_json("metrics.json", {**status, "metrics": metrics, "warnings": findings})
     known = task.scenario.known_metrics()
     rows = [(name, metrics[name], m.unit) for name, m in known.items() if name in metrics]
     writer.add("metrics.csv", csv_files.lines([("metric", "value", "unit"), *rows]).encode())
 
 
 def _drawn(
-    task: Task, recording: Recording, told: RunAbout | None, extras: Extras
+    task: Task, recording: Recording, about: RunAbout | None, extras: Extras
 ) -> dict[str, bytes]:
-    if not (task.figures and told):
+    if not (task.figures and about):
         return {}
     from podusv_cli.figures.drawing import (  # matplotlib is slow to import
         draw_in_parallel,
@@ -320,7 +320,7 @@ def _drawn(
     from podusv_cli.figures.shown import dressed
 
     plugins = task.scenario.plugged
-    shown = dressed([(task.label or recording.controller, recording, told, plugins)])
+    shown = dressed([(task.label or recording.controller, recording, about, plugins)])
     known = figures_of([plugins])
     fitting = [known[name] for name in task.figures if known[name].fits(shown)]
     return draw_in_parallel(shown, fitting, ("png",), extras)

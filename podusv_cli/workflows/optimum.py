@@ -136,8 +136,8 @@ def _run(scenario: Scenario) -> Recording:
 def _repeating(scenario: Scenario, wanted: Problem, motion: Motion) -> Scenario:
     """The scenario with the optimum in place of its law, which acts continuously."""
     law = Schedule(rows=schedule(wanted, motion), minimises=wanted.minimised)
-    told = f"A motion of least {wanted.minimised}, found by podusv optimum."
-    changes = {"controller": law, "control": Control(), "description": told}
+    description = f"A motion of least {wanted.minimised}, found by podusv optimum."
+    changes = {"controller": law, "control": Control(), "description": description}
     return scenario.alone().model_copy(update=changes)
 
 

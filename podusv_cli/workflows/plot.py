@@ -91,7 +91,7 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     check_names(request.names, request.formats, known)
     whole = [(m.label, m.run.recording, m.about, m.plugins) for m in members if m.run]
     empty = _empty(members, dressed(whole))
-    shown = dressed([(label, _during(log, choice), told, own) for label, log, told, own in whole])
+    shown = dressed([(label, _during(log, choice), about, own) for label, log, about, own in whole])
     if not shown:
         ends = ", ".join(f"{label} ends at {log['time'][-1]:g} s" for label, log, *_ in whole)
         raise UsageError(
@@ -171,8 +171,8 @@ def _empty(members: Sequence[Member], shown: Sequence[Shown]) -> dict[str, str]:
         if member.run and visible(member.label) not in drawable
     }
     if not shown:
-        told = "; ".join(f"{label}: {ending}" for label, ending in endings.items())
-        raise UsageError(f"there is nothing to draw: {told}")
+        endings_in_words = "; ".join(f"{label}: {ending}" for label, ending in endings.items())
+        raise UsageError(f"there is nothing to draw: {endings_in_words}")
     return endings
 
 

@@ -117,7 +117,7 @@ def _below(root: Path) -> Iterator[Found]:
 def _read(folder: Path, mark: str) -> Found:
     kind, scenario, model = KINDS[mark]
     try:
-        told = json_files.read_as(folder / mark, model) if model else _Told()
+        about = json_files.read_as(folder / mark, model) if model else _Told()
         ending, origin = (
             _if_there(folder / MANIFEST, _Ending),
             _if_there(folder / PROVENANCE, _Origin),
@@ -127,10 +127,10 @@ def _read(folder: Path, mark: str) -> Found:
         return Found(folder, kind, status=DAMAGED)
     sessions = [*origin.sittings, origin]
     named = NAME.search(text)
-    metrics = told.metrics if isinstance(told, _OfRun) else {}
+    metrics = about.metrics if isinstance(about, _OfRun) else {}
     return Found(
-        folder, kind, told.name or (named[1] if named else folder.name),
-        [*told.laws] or [*filter(None, [told.controller])], ending.status, sessions[0].started,
+        folder, kind, about.name or (named[1] if named else folder.name),
+        [*about.laws] or [*filter(None, [about.controller])], ending.status, sessions[0].started,
         sum(session.duration_s for session in sessions),
         {name: math.nan if x is None else x for name, x in metrics.items()}, scenario,
     )  # fmt: skip

@@ -88,11 +88,11 @@ def planned(study: Path, *, trusted: bool) -> Plan:
     """
     check_study(study)
     made = plan(kept_scenario(study, plugged=partial(plugins.loaded, trusted=trusted)))
-    told, ours = record.begun(study).identity, json_files.plain(made.identity)
-    if keys := [key for key in differing(told, ours) if not key.endswith(KERNELS)]:
+    noted, ours = record.begun(study).identity, json_files.plain(made.identity)
+    if keys := [key for key in differing(noted, ours) if not key.endswith(KERNELS)]:
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
-            f"{disagreements(ours, told, keys)}; restore the file, or use the podusv that "
+            f"{disagreements(ours, noted, keys)}; restore the file, or use the podusv that "
             "made them"
         )
     return made

@@ -68,12 +68,12 @@ class Swept:
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
-        told = self.results.as_json() if self.results else {}
+        answer = self.results.as_json() if self.results else {}
         status = "finished" if self.results else "unfinished"
         counts = {"wanted": self.tally.wanted, "made": self.tally.made}
         missing = [str(failure) for failure in self.missing]
         return {
-            "format": 1, "status": status, "folder": str(self.folder), **counts, **told,
+            "format": 1, "status": status, "folder": str(self.folder), **counts, **answer,
             "missing": missing, "missing_runs": self.missing_runs, "refused": self.refused,
         }  # fmt: skip
 

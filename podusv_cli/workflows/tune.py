@@ -94,8 +94,8 @@ def _tuned(
 ) -> Tuned:  # fmt: skip
     """Search what is not there yet, or all anew; no other process writes into the folder."""
     plan, texts = TunePlan(loaded.scenario), scenario_texts(loaded)
-    told = None if request.force else place.known(folder, plan)
-    plan = replace(plan, idle=told.idle if told else _idle(plan, request))
+    noted = None if request.force else place.known(folder, plan)
+    plan = replace(plan, idle=noted.idle if noted else _idle(plan, request))
     if not any(plan.gains.values()):
         raise UsageError(
             f"{plan.scenario.name}: nothing to search: no number of {', '.join(plan.laws)} "
@@ -104,7 +104,7 @@ def _tuned(
     stamp = started.isoformat(timespec="seconds")
     if request.force:  # by now, nothing that is asked for is wrong
         place.clear(folder)
-    place.write(folder, plan, told, stamp, texts)
+    place.write(folder, plan, noted, stamp, texts)
     request.begin(f"{plan.size}; in {folder}")
     with executor_for(request, folder, plan.scenario, digest(plan.base.identity)) as executor:
         results = _simulated(plan, folder, request, started, executor, tell)
@@ -159,12 +159,12 @@ def _prepare(plan: TunePlan, request: Request) -> None:
     Raises LawError.
     """
     for law, gains in plan.gains.items():
-        runs, told = sum(plan.runs_wanted()[law]), compiling(request, law)
+        runs, report = sum(plan.runs_wanted()[law]), compiling(request, law)
         options = [{gain.key: word} for gain in gains for word in gain.words]
         for new in options or [{}] if gains else []:
             if with_gains(plan.laws[law], new):
                 variant = plan.variant({law: (law, new)}, TRAIN, 1)
-                if why := prepare(variant, law, 0, runs, told):
+                if why := prepare(variant, law, 0, runs, report):
                     request.warn(one_by_one(law, why))
 
 
