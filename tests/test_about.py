@@ -29,7 +29,7 @@ def test_what_is_written_is_read(name, tmp_path):
 
 
 def test_the_numbers_are_those_of_the_scenario():
-    """CyberShip II is 1.255 m long and 0.29 m wide (Skjetne, 2005, table C.1)."""
+    """CyberShip II is 1.255 m long and 0.29 m wide (Skjetne, Smogeli, Fossen 2004)."""
     told = about("metrics.steady_fraction=0.25", "log.every=7", "simulation.step=0.02")
     assert (told.length, told.beam) == (1.255, 0.29)
     assert (told.duration, told.step, told.every) == (4.0, 0.02, 7)
