@@ -184,10 +184,12 @@ def simulate_many(
     0      50.0  finished
     1      60.0  finished
     """
-    scenario, given = _single(loaded(source)), columns(parameters)
+    base = loaded(source)
+    scenario, given = _single(base), columns(parameters)
     if workers < 0:
         raise ParameterError(f"workers = {workers}: must be 0 (one a core) or more")
-    plan, probe = scenario.plan(), scenario.probe()
+    plan = base.plan(scenario)
+    probe = scenario.metrics_of(plan)
     loops = [one.closed_loop() for one in scenarios(scenario, given)]
     check_law(plan)
     check_words(scenario, loops, given)

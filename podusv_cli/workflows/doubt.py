@@ -109,16 +109,13 @@ def doubted(
     compared: Compared, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, Extras]:
     """All that is tried, and what it says of every claim."""
-    for single in compared.singles.values():
-        case = Case.of(single)
+    cases = {label: Case.of(single) for label, single in compared.singles.items()}
+    for case in cases.values():
         examined(case)
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
-        entries = {
-            label: _entry(label, single, compared.parsed)
-            for label, single in compared.singles.items()
-        }
+        entries = {label: _entry(label, case, compared.parsed) for label, case in cases.items()}
     judge, asked = judging(compared, entries), scenario.doubt or Doubt()
     tried = search(compared.singles, judge, asked, request.workers, progress)
     whole = len(choices(compared.singles, asked)), asked.draws
@@ -183,7 +180,9 @@ def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
         labels = dict.fromkeys(label for label, _ in world)
         try:
             moved = {label: _changed(compared, label, world) for label in labels}
-            made = {label: _entry(label, new, compared.parsed) for label, new in moved.items()}
+            made = {
+                label: _entry(label, Case.of(new), compared.parsed) for label, new in moved.items()
+            }
         except PodusvError as error:
             return Judged({}, {}, str(error))
         every, scenarios = {**entries, **made}, {**compared.singles, **moved}
@@ -214,9 +213,8 @@ class InMemory(FinishedRun):
         return self.kept
 
 
-def _entry(label: str, scenario: Scenario, parsed: Sequence[ParsedClaim]) -> Entry:
+def _entry(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> Entry:
     """A run in memory, with what a comparison adds to it that these claims name."""
-    case = Case.of(scenario)
     recording = simulated(case, Stopwatch())
     if recording.status == "interrupted":
         raise KeyboardInterrupt
@@ -225,4 +223,4 @@ def _entry(label: str, scenario: Scenario, parsed: Sequence[ParsedClaim]) -> Ent
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)
     run = InMemory(Path(), recording.status, numbers, {}, "", kept=whole)
-    return Entry(label, run, about_of(scenario), plugins=scenario.plugged)
+    return Entry(label, run, about_of(case.scenario), plugins=case.scenario.plugged)
