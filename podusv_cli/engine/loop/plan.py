@@ -261,6 +261,11 @@ class Plan:
         law, start, estimator = loop.controller, np.array(loop.start), loop.estimator
         sea, end = loop.disturbance, grid.steps * grid.step
         numbers = {part: _numbers(constants) for part, constants in self.constants.items()}
+        begun = {
+            "vessel": start, "actuator": recall(loop.actuator.rest),
+            "estimator": estimator.start(start, loop.nominal) if loop.measured else np.zeros(0),
+            "path": np.zeros(len(loop.path.places)), "law": self.first_memory,
+        }  # fmt: skip
         return Vectors(
             **numbers, path_table=self.path_table,
             disturbance_table=recall(sea.table_for, loop.vessel, end),
@@ -268,11 +273,7 @@ class Plan:
             actuator_table=recall(loop.actuator.table),
             measurement_table=recall(loop.measurement.table_for, grid.step, grid.steps),
             estimator_table=recall(estimator.table),
-            s=np.concatenate(
-                [start, recall(loop.actuator.rest),
-                 estimator.start(start, loop.nominal) if loop.measured else np.zeros(0),
-                 np.zeros(len(loop.path.places)), self.first_memory]
-            ),
+            s=np.concatenate([begun[part] for part in self.states]),
             row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
             sensed=loop.measurement.first(start, grid.step),
             delay_line=delay_line(loop.actuator.delay(), grid),
