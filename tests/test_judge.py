@@ -79,7 +79,12 @@ def told(judge, runs):
         for law, sizes in runs.items()
     }  # fmt: skip
     sweep = SimpleNamespace(level=0.95, seed=3)
-    plan = SimpleNamespace(base=SimpleNamespace(sweep=sweep), metrics={}, inequalities=())
+    plan = SimpleNamespace(
+        tune=SimpleNamespace(training_sets=1),
+        base=SimpleNamespace(sweep=sweep),
+        metrics={},
+        inequalities=(),
+    )
     verdict = judge.Verdict(plan, outcomes)
     pairs = verdict.pairs()
     return verdict.laws(pairs).set_index("law").assign(first_pair=[*pairs.ratio, np.nan][0])

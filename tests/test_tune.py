@@ -97,6 +97,21 @@ def test_repeats_differ(done):
     assert [t.gains for t in first[1:]] != [t.gains for t in second[1:]]
 
 
+def test_searches_take_the_training_sets_in_turn_and_the_first_set_is_that_of_a_single_one(
+    optuna, tmp_path
+):
+    """The scenario's own gains, which every search tries first, tell the sets apart."""
+    changes = ("tune.repeats=2", "tune.budget=32", "tune.objective=median(iae)")
+    single, several = tmp_path / "single", tmp_path / "several"
+    alone = searched(single, *changes)
+    sets = searched(several, *changes, "tune.training_sets=3")
+    own = [search.trials[0].value for search in sets]
+    assert own[:3] == own[3:]
+    assert len(set(own)) == 3
+    assert sets[0].trials == alone[0].trials
+    assert [trial.gains for trial in sets[3].trials] != [trial.gains for trial in sets[0].trials]
+
+
 def test_a_law_without_gains_is_kept_and_reported(done):
     (row,) = done.results.laws[done.results.laws.law == "bare"].to_dict("records")
     assert row["objective_before"] == row["objective_after"]
@@ -245,8 +260,15 @@ def test_the_best_trial_holds_inequalities_first_and_is_finished():
     ]  # fmt: skip
     assert best(found).number == 3
     assert best(found[1:2]).number == 1, "where none holds them, the nearest"
+
+
+def test_the_gains_that_are_taken_gained_most_beside_the_scenarios_own_on_the_same_draws():
+    own = made_up(0, 9.0)
     winners = [made_up(7, 5.0), made_up(7, 0.5, excess=0.1), made_up(3, 4.0), made_up(2, 4.5)]
-    assert chosen(winners) == 2, "of the winners of all repeats, by their places"
+    assert chosen([[own, trial] for trial in winners]) == 2
+    easy = [made_up(0, 4.5), made_up(3, 4.0)]  # another training set
+    assert chosen([easy, [own, made_up(7, 5.0)]]) == 1
+    assert chosen([[made_up(0, math.inf), made_up(7, 5.0)], easy]) == 1, "by value where own fail"
 
 
 def test_a_trial_is_far_worse_by_more_than_half():

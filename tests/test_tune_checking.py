@@ -142,7 +142,9 @@ def test_a_law_without_numbers_has_no_gains(tmp_path):
     assert made.gains["bare"] == ()
     lines = list(made.in_words())
     assert "bare has no gains and is kept as it is" in lines
-    assert lines[-1].startswith("runs of the search: 128 (budget 64 for each law, repeats: 2)")
+    assert lines[-1].startswith(
+        "runs of the search: 128 (budget 64 for each law, repeats: 2, training"
+    )
     assert made.runs_wanted() == {"toy": (128, 36), "bare": (0, 12)}
 
 

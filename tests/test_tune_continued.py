@@ -111,7 +111,7 @@ def validation(folder, gain):
     """The store of the fresh draws for a gain that was found."""
     found = Trial(0, 0, {"gain": gain}, 4, FINISHED, 1.0, (), 1.0, 0.0)
     plan = planned(folder)
-    made = plan.variant(contestants(plan, {"toy": [found]}), VALIDATE, 12)
+    made = plan.variant(contestants(plan, {"toy": [[found]]}), VALIDATE, 12)
     return Store(folder / FOLDER, about(made))
 
 

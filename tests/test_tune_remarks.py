@@ -1,5 +1,6 @@
 """Sentences about a finished search: who is best, and what a reader has to beware of."""
 
+import math
 from types import SimpleNamespace
 
 import pandas as pd
@@ -40,10 +41,11 @@ def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(rati
 
 
 def test_a_repeat_that_is_better_on_fresh_draws_than_the_one_taken_is_told():
-    results = SimpleNamespace(winners={"pid": [], "li": []})
-    results.spread = {"pid": [3.0, 2.0], "li": [2.0, 2.01]}.get
+    results = SimpleNamespace(winners={"pid": [1, 2], "li": [1, 2]})
+    results.spread = {"pid": [2.0, 3.0], "li": [2.0, 2.01]}.get
+    results.winner = {"pid": 2, "li": 2}.get
     (text,) = remarks._overfitted(results)
-    assert text.startswith("pid: the repeat that is best on the training draws has 3 on the fresh")
+    assert text.startswith("pid: the search that gained most on its training draws has 3 on the fr")
 
 
 def test_a_search_with_fewer_than_ten_whole_trials_for_each_gain_is_told():
@@ -73,10 +75,22 @@ def test_an_inequality_that_holds_in_training_only_is_told():
 
 
 def test_one_search_a_law_is_told_to_be_chance():
-    plan = SimpleNamespace(tune=SimpleNamespace(repeats=5), laws={"pid": 0, "li": 0})
+    tune = SimpleNamespace(searches=5, training_sets=5)
+    plan = SimpleNamespace(tune=tune, laws={"pid": 0, "li": 0})
     assert "no order of laws follows" in next(remarks._once(SimpleNamespace(plan=plan)))
-    plan.tune.repeats = 6
+    tune.searches, tune.training_sets = 20, 4
+    assert "give tune.training_sets 5" in next(remarks._once(SimpleNamespace(plan=plan)))
+    tune.training_sets = 5
     assert list(remarks._once(SimpleNamespace(plan=plan))) == []
+
+
+def test_the_power_of_a_table_is_said_where_every_pair_has_an_interval():
+    results = SimpleNamespace(compared=SimpleNamespace(omnibus=0.3, power=lambda better: better))
+    (text,) = remarks._power(results)
+    assert "had a probability of 0.3; a law that is 20% better" in text
+    assert text.endswith("in 80% of all such tables")
+    results.compared.omnibus = math.nan
+    assert list(remarks._power(results)) == []
 
 
 def test_a_gain_at_the_end_of_its_range_keeps_the_table_from_being_final():

@@ -56,6 +56,61 @@ def test_a_law_that_fails_in_every_other_draw_has_no_interval_and_one_that_alway
     assert searches.places(table, ["half", "whole", "lost"])["lost"] == (2, 3)
 
 
+def scattered(random, laws, sets, repeats, *, of_set, of_search, best=1.0):
+    """One number a search, which a law's own effect of the training set is in."""
+    which = np.arange(sets * repeats) % sets
+    return {
+        f"law {i}": (best if i == 0 else 1.0)
+        * np.exp(random.normal(0, of_set, sets)[which] + random.normal(0, of_search, len(which)))[
+            :, None
+        ]
+        for i in range(laws)
+    }
+
+
+def test_what_all_laws_share_of_a_training_set_is_in_no_interval():
+    shared = np.exp(np.array([0.0, 0.5, -0.4, 0.2, 0.9]))[np.arange(20) % 5][:, None]
+    found = searches.ratios({"a": 0.8 * shared, "b": shared}, 0.95, 1, sets=5)
+    ends = row(found, "a", "b")
+    assert [ends[end] for end in ("ratio_low", "ratio_high")] == pytest.approx([0.8, 0.8])
+    asif = row(searches.ratios({"a": 0.8 * shared, "b": shared}, 0.95, 1), "a", "b")
+    assert asif["ratio_low"] < 0.6, "searches that are drawn apart for each law"
+
+
+def test_a_training_set_on_which_one_law_is_lucky_widens_its_interval():
+    lucky = np.array([0.6, 1.0, 1.0, 1.0, 1.4])[np.arange(20) % 5][:, None]
+    runs = {"a": lucky, "b": np.ones((20, 1))}
+    clustered, alone = (searches.compared(runs, 0.95, 1, sets=sets) for sets in (5, 1))
+    assert clustered.samples.std() > 1.5 * alone.samples.std()
+
+
+def test_the_omnibus_probability_and_the_power_follow_the_size_of_a_difference():
+    random = np.random.default_rng(7)
+    equal = searches.compared(
+        scattered(random, 6, 5, 4, of_set=0.03, of_search=0.03), 0.95, 1, sets=5
+    )
+    apart = {**scattered(random, 6, 5, 4, of_set=0.03, of_search=0.03, best=0.5)}
+    assert equal.omnibus > 0.05
+    assert searches.compared(apart, 0.95, 1, sets=5).omnibus < 0.01
+    assert equal.power(0.999) < 0.05 < equal.power(0.85) < equal.power(0.7)
+    assert equal.power(0.5) == 1.0
+    assert np.isnan(
+        searches.compared({"a": np.ones((1, 3)), "b": np.full((1, 3), np.inf)}, 0.95, 1).omnibus
+    )
+
+
+@pytest.mark.slow
+def test_the_power_is_how_often_a_better_law_has_the_first_place_in_tables_made_anew(monkeypatch):
+    monkeypatch.setattr(searches, "SAMPLES", 400)
+    random, first, said = np.random.default_rng(11), 0, []
+    for trial in range(100):
+        runs = scattered(random, 8, 5, 4, of_set=0.04, of_search=0.04, best=0.8)
+        found = searches.compared(runs, 0.95, trial, sets=5)
+        first += searches.places(found.table(), list(runs))["law 0"] == (1, 1)
+        said.append(found.power(0.8))
+    assert first / 100 == pytest.approx(np.mean(said), abs=0.15)
+
+
 @pytest.mark.slow
 def test_of_equal_laws_hardly_any_table_tells_one_apart_and_a_better_one_is_told(monkeypatch):
     """Ten laws with six searches that scatter by 5 %; one that is 30 % better than nine others."""

@@ -140,7 +140,7 @@ def searched(folder, *changes, engine=None):
     """The trials of the toy law's searches, by the driver alone."""
     plan = planned(folder, *changes)
     (folder / trials.FOLDER).mkdir(exist_ok=True)
-    found = [Search(plan, "toy", repeat, folder) for repeat in range(plan.tune.repeats)]
+    found = [Search(plan, "toy", number, folder) for number in range(plan.tune.searches)]
     prepare(plan.base, "toy", 0)  # before the fork
     dispatch(found, engine or Processes(1), lambda tally, searches: None)
     return found

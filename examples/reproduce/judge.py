@@ -93,7 +93,8 @@ class Verdict:
     def pairs(self) -> pd.DataFrame:
         """Every pair of laws over all of their searches and draws."""
         after = {law: errors(met[1:]) for law, met in self.runs.items()}
-        return searches.ratios(after, self.sweep.level, self.sweep.seed)
+        level, seed, sets = self.sweep.level, self.sweep.seed, self.plan.tune.training_sets
+        return searches.ratios(after, level, seed, sets=sets)
 
     def laws(self, pairs: pd.DataFrame) -> pd.DataFrame:
         """A row a law, the least median of its searches first."""

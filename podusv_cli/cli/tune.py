@@ -70,7 +70,7 @@ def _report(done: Tuned) -> None:
         for row in results.laws.sort_values("rank_after").to_dict("records")
     ]  # fmt: skip
     ratios = "ratio, after / before"
-    head = ["law", "rank", "better than", "before", "after", ratios, "failed", "repeats"]
+    head = ["law", "rank", "better than", "before", "after", ratios, "failed", "searches"]
     echo(f"{results.plan.tune.objective} on {results.plan.tune.validate} fresh draws:")
     echo_table(head, rows)
     for text in remarks(results):

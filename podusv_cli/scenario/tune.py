@@ -60,7 +60,7 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
         """The same number of simulated runs for every law, to find its gains."""
 
         budget: int = value(
-            2000, "", "simulated runs for each law and repeat, pruned ones included", ge=1, le=10**7
+            2000, "", "simulated runs for each search, pruned ones included", ge=1, le=10**7
         )
         train: int = value(
             16, "", "draws that gains are judged by; a sweep never has them", ge=1, le=10**5
@@ -81,8 +81,22 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
         )
         batch: int = value(8, "", "gains that are tried at a time; part of the result", ge=1, le=64)
         repeats: int = value(
-            3, "", "searches of each law that differ in the tuner's random numbers", ge=1, le=100
+            3,
+            "",
+            "searches of each law, on each training set, that differ in the tuner's random numbers",
+            ge=1,
+            le=100,
         )
+
+        training_sets: int = value(
+            1, "", "sets of `train` draws; every law is searched `repeats` times on each", ge=1,
+            le=100,
+        )  # fmt: skip
+
+        @property
+        def searches(self) -> int:
+            """The searches of each law; the n-th is on the training set n modulo their number."""
+            return self.repeats * self.training_sets
 
         @model_validator(mode="after")
         def _sound(self) -> Self:

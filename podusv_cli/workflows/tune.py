@@ -141,11 +141,10 @@ def _simulated(
         _prepare(plan, request)
         dispatch(searches, executor, searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
-        trials = {law: repeats for law, repeats in trials.items() if repeats}
-        winners = {law: [best(repeat) for repeat in repeats] for law, repeats in trials.items()}
+        trials = {law: of_law for law, of_law in trials.items() if of_law}
         stamp = started.isoformat(timespec="seconds")
         return SearchResults(
-            plan, trials, winners, validate(plan, winners, folder, stamp, executor, validated)
+            plan, trials, validate(plan, trials, folder, stamp, executor, validated)
         )
     except KeyboardInterrupt as stop:
         raise interrupted("all batches that were finished", "tune", folder) from stop
@@ -176,10 +175,10 @@ def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
 
 
 def _searches(plan: TunePlan, folder: Path) -> list[Search]:
-    """One for each law with gains and each repeat, all laws in turn."""
+    """All of each law with gains, the laws in turn."""
     return [
-        Search(plan, law, repeat, folder)
-        for repeat in range(plan.tune.repeats)
+        Search(plan, law, number, folder)
+        for number in range(plan.tune.searches)
         for law, gains in plan.gains.items()
         if gains
     ]

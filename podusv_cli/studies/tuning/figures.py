@@ -62,7 +62,7 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
 
     yield Sketch(
         "history",
-        f"best {objective} on the training draws so far, a curve for each repeat: the curves begin "
+        f"best {objective} on the training draws so far, a curve for each search: the curves begin "
         "with the scenario's gains; one rises where a trial holds the inequalities better",
         partial(history, results.history, results.label),
     )
@@ -79,7 +79,7 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
         yield Sketch(
             "importance",
             "importance of each gain: the share of the variation between good trials and all that "
-            "it explains (PED-ANOVA); the lines go from the least to the most of all repeats and "
+            "it explains (PED-ANOVA); the lines go from the least to the most of all searches and "
             "parts of the trials",
             partial(importance, results.importance),
         )
@@ -98,7 +98,7 @@ def _slices(results: SearchResults, law: str, objective: str) -> Sketch:
     return Sketch(
         f"slices-{law}",
         f"every trial of {law} by each of its gains: {objective} over the draws that the trial "
-        "met, a colour for each repeat, hollow where the trial was pruned or cut; the full line is "
+        "met, a colour for each search, hollow where the trial was pruned or cut; the full line is "
         "the gain that was found, the broken one the scenario's",
         partial(
             slices, tried, results.plan.gains[law], results.winner(law).gains,

@@ -91,7 +91,7 @@ class TunePlan:
         """For every law, the runs of the search and those on the draws for validation."""
         tune = self.tune
         return {
-            law: (tune.repeats * tune.budget, (1 + tune.repeats) * tune.validate)
+            law: (tune.searches * tune.budget, (1 + tune.searches) * tune.validate)
             if of_law else (0, tune.validate)
             for law, of_law in self.gains.items()
         }  # fmt: skip
@@ -120,13 +120,19 @@ class TunePlan:
         tune = self.tune
         return (
             f"runs of the search: {search:,} (budget {tune.budget:,} for each law, repeats: "
-            f"{tune.repeats}); on draws for validation: {other:,}"
+            f"{tune.repeats}, training sets: {tune.training_sets}); on draws for validation: "
+            f"{other:,}"
         )
 
     @cached_property
     def base(self) -> study.Plan:
         """The scenario's own study, which all others are variants of."""
         return study.Plan(self.scenario, (Cell(0, (), self.scenario),))
+
+    def stream(self, search: int) -> str:
+        """The stream of the draws that a search is trained on."""
+        training_set = search % self.tune.training_sets
+        return f"{TRAIN} {training_set}" if training_set else TRAIN
 
     def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> study.Plan:
         """The study of laws by their new names, on draws of a stream."""

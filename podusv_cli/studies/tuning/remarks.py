@@ -12,13 +12,15 @@ from podusv_cli.studies.tuning.results import MARGIN, SearchResults
 from podusv_cli.studies.tuning.trials import FINISHED
 
 ENOUGH_SEARCHES = 6  # with three, of 14 equal laws some are told apart in 40 % of all tables
+ENOUGH_SETS = 5  # of training draws
+BETTER = 0.8  # of the others' error: a law that ought to be noticed
 
 
 def remarks(results: SearchResults) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
-        *_answer(results), *_unsettled(results), *_once(results), *_bounds(results),
-        *_kept(results), *_idle(results), *_unsound(results), *_few(results),
+        *_answer(results), *_power(results), *_unsettled(results), *_once(results),
+        *_bounds(results), *_kept(results), *_idle(results), *_unsound(results), *_few(results),
         *_overfitted(results), *_beyond(results),
     ]  # fmt: skip
 
@@ -42,6 +44,17 @@ def _answer(results: SearchResults) -> Iterator[str]:
             )
 
 
+def _power(results: SearchResults) -> Iterator[str]:
+    """Whether the laws differ at all, and what difference would have been noticed."""
+    found = results.compared
+    if math.isfinite(found.omnibus):
+        yield (
+            f"if all laws were equal, a largest difference like this had a probability of "
+            f"{found.omnibus:.2g}; a law that is {1.0 - BETTER:.0%} better than all others would "
+            f"have the first place for itself in {found.power(BETTER):.0%} of all such tables"
+        )
+
+
 def _unsettled(results: SearchResults) -> Iterator[str]:
     laws = results.laws[results.laws.rank_after.isna()].law
     if len(laws):
@@ -52,12 +65,19 @@ def _unsettled(results: SearchResults) -> Iterator[str]:
 
 
 def _once(results: SearchResults) -> Iterator[str]:
-    repeats = results.plan.tune.repeats
-    if repeats < ENOUGH_SEARCHES and len(results.plan.laws) > 1:
+    tune = results.plan.tune
+    if len(results.plan.laws) < 2:
+        return
+    if tune.searches < ENOUGH_SEARCHES:
         yield (
-            f"searches of each law: {repeats}; so few do not tell how far another seed of the "
-            f"tuner would get, so no order of laws follows; give tune.repeats {ENOUGH_SEARCHES} or "
-            "more"
+            f"searches of each law: {tune.searches}; so few do not tell how far another seed of "
+            "the tuner would get, so no order of laws follows; give tune.repeats "
+            f"{ENOUGH_SEARCHES} or more"
+        )
+    if tune.training_sets < ENOUGH_SETS:
+        yield (
+            f"training sets: {tune.training_sets}; other draws to train on may order the laws "
+            f"otherwise; give tune.training_sets {ENOUGH_SETS} or more"
         )
 
 
@@ -111,11 +131,13 @@ def _few(results: SearchResults) -> Iterator[str]:
 
 def _overfitted(results: SearchResults) -> Iterator[str]:
     for law in results.winners:
-        taken, *others = results.spread(law)
-        if others and taken > (1.0 + MARGIN) * min(others):
+        reached = results.spread(law)
+        taken = reached[results.winners[law].index(results.winner(law))]
+        if taken > (1.0 + MARGIN) * min(reached):
             yield (
-                f"{law}: the repeat that is best on the training draws has {digits(taken, '.4g')} "
-                f"on the fresh ones, another {digits(min(others), '.4g')}; more draws for training "
+                f"{law}: the search that gained most on its training draws has "
+                f"{digits(taken, '.4g')} on the fresh ones, another {digits(min(reached), '.4g')}; "
+                "more draws for training "
                 "(tune.train) may help"
             )
 

@@ -93,7 +93,7 @@ def ratio(row: Any) -> str:
 
 
 def spread(row: Any) -> str:
-    """The median, the least and the largest objective of the repeats' winners."""
+    """The median, the least and the largest objective of the searches' winners."""
     middle, low, high = (row[f"repeats_{end}"] for end in ("median", "low", "high"))
     if math.isnan(low) or low == high:
         return "-"

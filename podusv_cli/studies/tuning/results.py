@@ -17,7 +17,6 @@ from podusv_cli.studies.counting import statistics
 from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.counting.statistics import Interval
 from podusv_cli.studies.telling import summary
-from podusv_cli.studies.tuning import searches
 from podusv_cli.studies.tuning.objective import (
     Inequality,
     OfGains,
@@ -30,9 +29,10 @@ from podusv_cli.studies.tuning.objective import (
 )
 from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.sampler import importances
+from podusv_cli.studies.tuning.searches import Compared, compared, places
 from podusv_cli.studies.tuning.space import Gain
-from podusv_cli.studies.tuning.trials import FINISHED, Trial
-from podusv_cli.studies.tuning.validation import chosen, repeated, tuned
+from podusv_cli.studies.tuning.trials import FINISHED, Trial, best
+from podusv_cli.studies.tuning.validation import chosen, searched, tuned
 
 ALWAYS = (
     "iae",
@@ -47,11 +47,10 @@ FEWEST = 24  # trials that importances are computed from
 
 @dataclass(frozen=True)
 class SearchResults:
-    """A finished search: its trials by law, a list for each repeat, and the runs on fresh draws."""
+    """A finished search: its trials by law, a list for each search, and the runs on fresh draws."""
 
     plan: TunePlan
     trials: Mapping[str, Sequence[Sequence[Trial]]]
-    winners: Mapping[str, Sequence[Trial]]
     runs: Table
 
     @property
@@ -69,6 +68,11 @@ class SearchResults:
         }
 
     @cached_property
+    def winners(self) -> dict[str, list[Trial]]:
+        """The best trial of every search by law; none of a law that is kept as it is."""
+        return {law: [best(one) for one in found] for law, found in self.trials.items()}
+
+    @cached_property
     def shown(self) -> list[str]:
         """The metrics of the tables."""
         trees = [self.plan.objective, *(inequality.tree for inequality in self.plan.inequalities)]
@@ -81,7 +85,7 @@ class SearchResults:
 
     def winner(self, law: str) -> Trial:
         """The trial whose gains are taken."""
-        return self.winners[law][chosen(self.winners[law])]
+        return self.winners[law][chosen(self.trials[law])]
 
     def met(self, name: str) -> Outcomes:
         """The fresh runs of a law by the name of the table."""
@@ -103,13 +107,13 @@ class SearchResults:
             ]
             table[f"rank_{when}"] = pd.Series(objectives).rank(method="min").astype("Int64")
             table[f"better_than_{when}"] = [self._better_than(law, when) for law in table.law]
-        places: dict[str, tuple[float, float]] = {}
-        if self.plan.tune.repeats > 1:
+        ranges: dict[str, tuple[float, float]] = {}
+        if self.plan.tune.searches > 1:
             ranked = table.law[table.rank_after.notna()].tolist()
             pairs = self.searches
-            places |= searches.places(pairs[pairs.a.isin(ranked) & pairs.b.isin(ranked)], ranked)
+            ranges |= places(pairs[pairs.a.isin(ranked) & pairs.b.isin(ranked)], ranked)
         table["place_low"], table["place_high"] = zip(
-            *(places.get(law, (math.nan, math.nan)) for law in table.law), strict=True
+            *(ranges.get(law, (math.nan, math.nan)) for law in table.law), strict=True
         )
         return table
 
@@ -125,6 +129,11 @@ class SearchResults:
 
     @cached_property
     def searches(self) -> pd.DataFrame:
+        """The table of `compared`."""
+        return self.compared.table()
+
+    @cached_property
+    def compared(self) -> Compared:
         """Every pair of laws over all of their searches and the fresh draws."""
         metric = self.shown[0]
         runs = {}
@@ -132,13 +141,12 @@ class SearchResults:
             met = [self.met(name) for name in self._searched(law)]
             runs[law] = np.array([worst_where_unknown(of_law, metric).ravel() for of_law in met])
         assert self.plan.scenario.sweep
-        return searches.ratios(runs, self.level, self.plan.scenario.sweep.seed)
+        seed, sets = self.plan.scenario.sweep.seed, self.plan.tune.training_sets
+        return compared(runs, self.level, seed, sets=sets)
 
     def _searched(self, law: str) -> list[str]:
         """The names of a law with the gains of each of its searches; its own where it has none."""
-        own = [repeated(law, repeat) for repeat in range(len(self.winners.get(law, ())))]
-        searched = [name for name in (tuned(law), *own) if name in set(self.runs.laws)]
-        return searched or [law]
+        return searched(law, self.trials[law]) if law in self.trials else [law]
 
     def _better_than(self, law: str, when: str) -> int:
         """How many laws this one is better than in the typical draw, the whole interval of it."""
@@ -197,7 +205,7 @@ class SearchResults:
         return {**self.objective(runs, inequality.tree).columns("value"), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
-        """The objective on the fresh draws of every repeat's winner, or of a law that is kept."""
+        """The objective on the fresh draws of every search's winner, or of a law that is kept."""
         return [
             evaluate(self.plan.objective, self.met(name), self.plan.metrics)
             for name in self._searched(law)
@@ -234,7 +242,7 @@ class SearchResults:
 
     @cached_property
     def gains(self) -> pd.DataFrame:
-        """Every gain: its range, the scenario's value, the found one, and those of all repeats."""
+        """Every gain: its range, the scenario's value, the found one, and those of all searches."""
         return pd.DataFrame(
             [
                 {
@@ -258,7 +266,7 @@ class SearchResults:
 
     @cached_property
     def importance(self) -> pd.DataFrame:
-        """How much each gain matters, with the least and the most of repeats and of parts."""
+        """How much each gain matters, with the least and the most of searches and of parts."""
         rows = [
             {"law": law, "gain": gain.key, **_range([part.get(gain.key, 0.0) for part in parts])}
             for law in self.trials for parts in [list(self._importances(law))] if parts
@@ -267,7 +275,7 @@ class SearchResults:
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
 
     def _importances(self, law: str) -> Iterator[dict[str, float]]:
-        """Of each repeat's trials without one part of them after the other."""
+        """Of each search's trials without one part of them after the other."""
         for trials in self.trials[law]:
             for part in range(PARTS):
                 kept = [trial for place, trial in enumerate(trials) if place % PARTS != part]

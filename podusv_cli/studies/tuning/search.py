@@ -18,7 +18,7 @@ from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
 from podusv_cli.studies.making import plan as study
 from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.objective import Outcomes, evaluate, excess
-from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
+from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.sampler import Sampler
 from podusv_cli.studies.tuning.space import with_gains
 from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial
@@ -48,11 +48,11 @@ class Attempt:
 class Search:
     """The search for the gains of a law with one of the tuner's seeds."""
 
-    def __init__(self, plan: TunePlan, law: str, repeat: int, folder: Path) -> None:
+    def __init__(self, plan: TunePlan, law: str, number: int, folder: Path) -> None:
         """Nothing is asked yet. `folder` holds the trials of an earlier session, if any."""
-        self.plan, self.law, self.repeat, self._folder = plan, law, repeat, folder
+        self.plan, self.law, self.number, self._folder = plan, law, number, folder
         assert plan.scenario.sweep
-        seed = [plan.scenario.sweep.seed, repeat, law]
+        seed = [plan.scenario.sweep.seed, number, law]
         self._sampler = Sampler(plan.gains[law], seed)
         self.trials: list[Trial] = []
         self._kept = trials.read(folder, self.name)
@@ -63,7 +63,7 @@ class Search:
     @property
     def name(self) -> str:
         """The name of its file."""
-        return f"{self.law}-{self.repeat}"
+        return f"{self.law}-{self.number}"
 
     @property
     def spent(self) -> int:
@@ -109,8 +109,9 @@ class Search:
 
     def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
         taken = with_gains(self.plan.laws[self.law], gains)
-        made = self.plan.variant({self.law: (self.law, gains)}, TRAIN, draws) if taken else None
-        return Attempt(gains, draws, made, [])
+        named = {self.law: (self.law, gains)}
+        stream = self.plan.stream(self.number)
+        return Attempt(gains, draws, self.plan.variant(named, stream, draws) if taken else None, [])
 
     def _known(self) -> list[Trial] | None:
         """The trials of this batch in the file; none for a batch that a smaller budget cut.

@@ -1,9 +1,10 @@
 """What laws reach over all of their searches: the result of a search is a random number, too.
 
-Repeats of a search differ in the tuner's random numbers alone. A search counts by the median of a
-metric over the fresh draws, a law by the median of its searches. The intervals of the ratios of
-all pairs hold together: searches and draws are drawn with replacement, the draws for all laws
-alike, and the largest deviation of all pairs, in standard deviations, sets their width (B. Efron
+A search counts by the median of a metric over the fresh draws, a law by the median of its searches.
+Searches differ in the tuner's random numbers and in the draws that they were trained on. The
+intervals of the ratios of all pairs hold together: training sets are drawn with replacement, for
+all laws alike, then the searches of each, for every law anew, and the fresh draws, for all laws
+alike; the largest deviation of all pairs, in standard deviations, sets their width (B. Efron
 and R. Tibshirani, "An Introduction to the Bootstrap", Chapman and Hall 1993, chapter 8; J. Romano
 and M. Wolf, Econometrica 73 (2005), for the largest deviation).
 """
@@ -11,6 +12,8 @@ and M. Wolf, Econometrica 73 (2005), for the largest deviation).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -21,42 +24,118 @@ from podusv_cli.core.kernel import Vector
 
 SAMPLES = 2000
 COLUMNS = ["a", "b", "ratio", "ratio_low", "ratio_high"]
+Indices = npt.NDArray[np.int64]
 
 
-def ratios(runs: Mapping[str, Vector], level: float, seed: int) -> pd.DataFrame:
-    """Every pair of laws: the ratio a/b of what they reach, with intervals that hold together.
+@dataclass(frozen=True)
+class Compared:
+    """All pairs of laws: the logarithms of their ratios a/b, and of those in every sample."""
 
-    `runs` are numbers of each law, shape (search, draw), infinite for a run that failed. A pair of
-    which a sample is not finite has no interval, unless all samples are infinite on one side.
+    pairs: tuple[tuple[str, str], ...]
+    ratios: Vector  # (pair,)
+    samples: Vector  # (pair, sample)
+    level: float
+
+    @cached_property
+    def _off(self) -> Vector:
+        """How far the samples of a pair are off, in standard deviations, of pairs that have any."""
+        with np.errstate(invalid="ignore"):
+            off = self.samples - self.ratios[:, None]
+        sure = [one / one.std() for one in off if np.isfinite(one).all() and one.std() > 0.0]
+        return np.asarray(sure)
+
+    @cached_property
+    def _width(self) -> float:
+        """How many standard deviations the largest deviation of all pairs stays within."""
+        largest = np.abs(self._off).max(axis=0, initial=0.0)
+        return float(np.quantile(largest, self.level)) if len(self._off) else 0.0
+
+    def table(self) -> pd.DataFrame:
+        """The ratio of every pair with an interval; all intervals hold together."""
+        rows = [
+            (*pair, np.exp(ratio) if np.isfinite(ratio) else _sided(ratio),
+             *_ends(ratio, each, self._width))
+            for pair, ratio, each in zip(self.pairs, self.ratios, self.samples, strict=True)
+        ]  # fmt: skip
+        return pd.DataFrame(rows, columns=COLUMNS)
+
+    @property
+    def omnibus(self) -> float:
+        """The probability of a largest difference like this, or larger, where all laws are equal.
+
+        NaN where a pair has no interval.
+        """
+        if len(self._off) < len(self.pairs) or not self.pairs:
+            return float("nan")
+        largest = np.max(np.abs(self.ratios) / self.samples.std(axis=1))
+        return float(np.mean(np.abs(self._off).max(axis=0) >= largest))
+
+    def power(self, better: float) -> float:
+        """How often a law that is so much better than all others would have the first place.
+
+        `better` is the ratio, such as 0.8. The mean over laws, where the others are equal and
+        scatter as they do here; NaN where a pair has no interval.
+        """
+        if len(self._off) < len(self.pairs) or not self.pairs:
+            return float("nan")
+        laws = dict.fromkeys(law for pair in self.pairs for law in pair)
+        needed = -np.log(better) / self.samples.std(axis=1) - self._width
+        return float(np.mean([np.mean(self._first(law, needed)) for law in laws]))
+
+    def _first(self, law: str, needed: Vector) -> npt.NDArray[np.bool_]:
+        """In which samples a law is ahead of all others, with a lead of `needed` by pair."""
+        sides = [(place, -1 if pair[0] == law else 1) for place, pair in enumerate(self.pairs)]
+        own = [(place, side) for place, side in sides if law in self.pairs[place]]
+        ahead = [side * self._off[place] > -needed[place] for place, side in own]
+        return np.asarray(np.all(ahead, axis=0))
+
+
+def compared(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1) -> Compared:
+    """All pairs of laws over their searches.
+
+    `runs` are numbers of each law, shape (search, draw), infinite for a run that failed. Of `sets`
+    training sets, the n-th search of a law is on set n modulo `sets`. A law that was not searched
+    has a single row.
     """
     random = np.random.default_rng(seed)
     draws = next(iter(runs.values())).shape[1] if runs else 1
     met = random.integers(draws, size=(SAMPLES, draws))
+    trained = random.integers(sets, size=(SAMPLES, 1, sets))
+    samples = {law: _sampled(table, met, trained, random) for law, table in runs.items()}
+    pairs = tuple(combinations(runs, 2))
     reached = {law: float(np.median(np.median(table, axis=1))) for law, table in runs.items()}
-    samples = {law: _sampled(table, met, random) for law, table in runs.items()}
-    pairs = list(combinations(runs, 2))
     with np.errstate(invalid="ignore", divide="ignore"):
-        logs = [np.log(reached[a]) - np.log(reached[b]) for a, b in pairs]
-        spread = [np.log(samples[a]) - np.log(samples[b]) for a, b in pairs]
-        width = _width([s - f for s, f in zip(spread, logs, strict=True)], level)
-    rows = [
-        (*pair, np.exp(ratio) if np.isfinite(ratio) else _sided(ratio), *_ends(ratio, each, width))
-        for pair, ratio, each in zip(pairs, logs, spread, strict=True)
-    ]
-    return pd.DataFrame(rows, columns=COLUMNS)
+        ratios = np.array([np.log(reached[a]) - np.log(reached[b]) for a, b in pairs])
+        spread = np.array([np.log(samples[a]) - np.log(samples[b]) for a, b in pairs])
+        spread = spread.reshape(len(pairs), SAMPLES)
+        # Drawn with replacement, few training sets scatter less than sets do.
+        few = np.sqrt(sets / (sets - 1)) if sets > 1 else 1.0
+        centre = np.where(np.isfinite(ratios), ratios, 0.0)[:, None]
+        spread = centre + few * (spread - centre)
+    return Compared(pairs, ratios, spread, level)
 
 
-def _sampled(table: Vector, met: npt.NDArray[np.int64], random: np.random.Generator) -> Vector:
-    """What a law reaches in each sample of its searches and of the draws."""
-    searches = random.integers(len(table), size=(SAMPLES, len(table)))
-    by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
+def ratios(
+    runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1
+) -> pd.DataFrame:  # fmt: skip
+    """The table of `compared`.
+
+    A pair of which a sample is not finite has no interval, unless all samples are infinite on one
+    side.
+    """
+    return compared(runs, level, seed, sets=sets).table()
+
+
+def _sampled(table: Vector, met: Indices, trained: Indices, random: np.random.Generator) -> Vector:
+    """What a law reaches in each sample of training sets, of its searches, and of the draws."""
+    by_search = np.stack([np.median(one[met], axis=1) for one in table], axis=1)
+    if len(table) == 1:
+        return by_search[:, 0]
+    sets = trained.shape[-1]
+    repeats = len(table) // sets
+    which = random.integers(repeats, size=(SAMPLES, repeats, sets)) * sets + trained
+    searches = which.reshape(SAMPLES, repeats * sets)
     return np.asarray(np.median(np.take_along_axis(by_search, searches, axis=1), axis=1))
-
-
-def _width(off: list[Vector], level: float) -> float:
-    """How many standard deviations the largest deviation of all pairs stays within."""
-    sure = [one / one.std() for one in off if np.isfinite(one).all() and one.std() > 0.0]
-    return float(np.quantile(np.max(np.abs(sure), axis=0), level)) if sure else 0.0
 
 
 def _sided(ratio: float) -> float:

@@ -1,4 +1,4 @@
-"""Trials of a search, and the file that keeps those of one law and repeat."""
+"""Trials of a search, and the file that keeps those of one search."""
 
 from __future__ import annotations
 

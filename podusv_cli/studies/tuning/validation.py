@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +18,7 @@ from podusv_cli.studies.tuning.plan import VALIDATE, Contestant, TunePlan
 from podusv_cli.studies.tuning.trials import Trial, best
 
 FOLDER = "validation"
-Winners = Mapping[str, Sequence[Trial]]  # by law, one for each repeat
+Searched = Mapping[str, Sequence[Sequence[Trial]]]  # the trials by law, a list for each search
 
 
 def tuned(law: str) -> str:
@@ -25,37 +26,48 @@ def tuned(law: str) -> str:
     return f"{law} tuned"
 
 
-def repeated(law: str, repeat: int) -> str:
-    """The name of a law with the gains that a repeat found."""
-    return f"{law} repeat {repeat + 1}"
+def searched(law: str, searches: Sequence[Sequence[Trial]]) -> list[str]:
+    """The names of a law with the gains that each of its searches found."""
+    names = [f"{law} repeat {number + 1}" for number in range(len(searches))]
+    names[chosen(searches)] = tuned(law)
+    return names
 
 
-def chosen(winners: Sequence[Trial]) -> int:
-    """Which repeat found the gains that are taken: the best on the draws for training."""
-    return best([replace(trial, number=place) for place, trial in enumerate(winners)]).number
+def chosen(searches: Sequence[Sequence[Trial]]) -> int:
+    """Which search found the gains that are taken: it gained most on its training draws.
+
+    That is beside the scenario's own gains on the same draws, its first trial, since searches on
+    other draws have other values. Where those fail, the best value counts.
+    """
+    own = [trials[0].value for trials in searches]
+    known = all(map(math.isfinite, own))
+    winners = [
+        replace(won := best(trials), number=place, value=won.value - (own[place] if known else 0.0))
+        for place, trials in enumerate(searches)
+    ]
+    return best(winners).number
 
 
-def contestants(plan: TunePlan, winners: Winners) -> dict[str, Contestant]:
-    """All laws that meet the fresh draws, by name: before, after, and those of other repeats."""
-    laws: dict[str, Contestant] = {}
+def contestants(plan: TunePlan, trials: Searched) -> dict[str, Contestant]:
+    """All laws that meet the fresh draws, by name: before, after, and those of other searches."""
+    found: dict[str, Contestant] = {}
     for law in plan.laws:
-        laws[law] = law, {}
-        if law in winners:
-            first = chosen(winners[law])
-            for repeat, trial in enumerate(winners[law]):
-                laws[tuned(law) if repeat == first else repeated(law, repeat)] = law, trial.gains
-    return laws
+        found[law] = law, {}
+        searches = trials.get(law, ())
+        names = searched(law, searches) if searches else ()
+        found |= {name: (law, best(one).gains) for name, one in zip(names, searches, strict=True)}
+    return found
 
 
 def validate(
-    plan: TunePlan, winners: Winners, folder: Path, started: str, executor: Executor,
+    plan: TunePlan, trials: Searched, folder: Path, started: str, executor: Executor,
     tell: Callable[[Tally], None],
 ) -> Table:  # fmt: skip
     """Simulate what is missing of the validation; its runs.
 
     Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.
     """
-    made = plan.variant(contestants(plan, winners), VALIDATE, plan.tune.validate)
+    made = plan.variant(contestants(plan, trials), VALIDATE, plan.tune.validate)
     store = Store(folder / FOLDER, record.about(made))
     _clear(store)
     store.open(started)
