@@ -213,7 +213,7 @@ TABLE: dict[str, list[Row]] = {
      "test_the_gaps_and_the_cost_of_a_segment_are_of_the_fifth_order_along_a_known_motion"),
     ("h * weight + B_h.T", "weight + B_h.T",
      "test_the_gains_are_those_of_the_linear_quadratic_regulator"),
-    ("cost = h * one", "cost = 2.0 * h * one",
+    ("cost = h * unit", "cost = 2.0 * h * unit",
      "test_the_gains_are_those_of_the_linear_quadratic_regulator"),
     ("BANDWIDTH**4", "BANDWIDTH**2", "test_the_gains_are_those_of_the_linear_quadratic_regulator"),
 ],

@@ -120,8 +120,8 @@ def unknown() -> pd.DataFrame:
     keys += ["simulation.step=0.002", "log.every=5", "log.monitor=false"]
     runs = {
         (name, label): run
-        for label, one in laws(READINGS["C"], *keys).items()
-        for name, run in mismatched(one)
+        for label, single in laws(READINGS["C"], *keys).items()
+        for name, run in mismatched(single)
     }
     found = pd.DataFrame(parallel(errors, list(runs.values())))
     found.index = pd.MultiIndex.from_tuples(runs, names=["case", "law"])
@@ -161,7 +161,7 @@ def predicted(scenario: Scenario) -> float:
     first = scenario.time_grid().update_first
     unstable = (
         n for n in counts
-        if any(sampled_growth(one, STEP, n, update_first=first) > GROWS for one in found)
+        if any(sampled_growth(loop, STEP, n, update_first=first) > GROWS for loop in found)
     )  # fmt: skip
     return (next(unstable, LONGEST + 1) - 1) * STEP
 
@@ -180,11 +180,11 @@ def longest(config: str, label: str, update: str) -> float:
 def discrete() -> pd.DataFrame:
     """Settled cycle, energy and IAE of every law and reading over the control period."""
     cases = {
-        (reading, label, update, count * STEP): one
+        (reading, label, update, count * STEP): single
         for reading, config in READINGS.items()
         for update in UPDATES
         for count in (0, *PERIODS)
-        for label, one in sampled(config, count, update).items()
+        for label, single in sampled(config, count, update).items()
     }
     index = pd.MultiIndex.from_tuples(cases, names=["reading", "law", "update", "period_s"])
     return pd.DataFrame(parallel(cycle, list(cases.values())), index=index)
@@ -199,9 +199,9 @@ def limits() -> pd.DataFrame:
 
     def both(case: tuple[str, str, str]) -> dict[str, float]:
         reading, label, update = case
-        one = sampled(READINGS[reading], 0, update)[label]
+        single = sampled(READINGS[reading], 0, update)[label]
         found = longest(READINGS[reading], label, update)
-        return {"predicted_s": predicted(one), "found_s": found}
+        return {"predicted_s": predicted(single), "found_s": found}
 
     index = pd.MultiIndex.from_tuples(cases, names=["reading", "law", "update"])
     return pd.DataFrame(parallel(both, cases), index=index)
@@ -211,10 +211,10 @@ def learnt() -> pd.DataFrame:
     """What the networks learn: the settled rms of f_hat less f, and less f + b/m."""
     rows = {}
     for reading, config in READINGS.items():
-        one = laws(config)["adaptive_neural"]
-        _, log = made(one)
-        loop = one.closed_loop()
-        unloaded = unloaded_accelerations(loop, rates_replay(one.plan())(log))
+        single = laws(config)["adaptive_neural"]
+        _, log = made(single)
+        loop = single.closed_loop()
+        unloaded = unloaded_accelerations(loop, rates_replay(single.plan())(log))
         for axis, f, m in zip("ur", unloaded, (loop.vessel.m11, loop.vessel.m33), strict=True):
             f_hat, lump = log[f"f_hat_{axis}"], f + log[f"b_{axis}"] / m
             found = {
@@ -233,9 +233,9 @@ def gains() -> pd.DataFrame:
     told = [f"controllers.{name}={law}" for name, law in keys.items()]
     told += ["simulation.step=0.002", "log.every=5", "log.monitor=false"]
     runs = {
-        (reading, label): one
+        (reading, label): single
         for reading, config in READINGS.items()
-        for label, one in laws(config, *told).items()
+        for label, single in laws(config, *told).items()
         if label in keys or label == "adaptive_neural"
     }
     index = pd.MultiIndex.from_tuples(runs, names=["reading", "law"])

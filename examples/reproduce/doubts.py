@@ -52,7 +52,7 @@ KEPT = (
 def rows(folder: Path) -> Iterator[dict[str, Any]]:
     """The claims of an answer, with the paper and the scenario that they are of."""
     claims = {
-        one["claim"]: one for one in json.loads((folder / "doubt.json").read_text())["claims"]
+        claim["claim"]: claim for claim in json.loads((folder / "doubt.json").read_text())["claims"]
     }
     with (folder / "doubt.csv").open(newline="") as file:
         for row in csv.DictReader(file):

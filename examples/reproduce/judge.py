@@ -47,13 +47,13 @@ def sets_of_gains(gains: pd.DataFrame, law: Controller) -> list[Numbers]:
     columns = []
     for name, before, found in zip(gains.gain, gains.before, gains.repeats, strict=True):
         factor = getattr(law, name) / float(before)
-        columns.append([(name, float(one) * factor) for one in str(found).split()])
+        columns.append([(name, float(number) * factor) for number in str(found).split()])
     return [{}, *(map(dict, zip(*columns, strict=True)) if columns else [{}])]
 
 
 def simulated(plan: TunePlan, sets: Mapping[str, list[Numbers]]) -> dict[str, list[Outcomes]]:
     """The runs of every law with each of its sets of gains; equal sets are simulated once."""
-    keys = {law: [(law, tuple(one.items())) for one in each] for law, each in sets.items()}
+    keys = {law: [(law, tuple(numbers.items())) for numbers in each] for law, each in sets.items()}
     every = dict.fromkeys(key for each in keys.values() for key in each)
     names = {key: f"{key[0]} {number}" for number, key in enumerate(every)}
     laws = {name: (law, dict(new)) for (law, new), name in names.items()}
@@ -75,7 +75,7 @@ def all_made(study: Plan, names: Sequence[str]) -> list[UnitResult]:
 
 def errors(met: Sequence[Outcomes]) -> Vector:
     """The metric by set of gains and draw, infinite for a run that failed."""
-    return np.array([worst_where_unknown(one, METRIC) for one in met])
+    return np.array([worst_where_unknown(runs, METRIC) for runs in met])
 
 
 @dataclass(frozen=True)
@@ -108,10 +108,10 @@ class Verdict:
         before, *after = self.runs[law]
         own, found = errors([before]), errors(after)
         medians = statistics.quantile(found, 0.5, self.sweep.level).estimate
-        held = [self._holds(one) for one in (before, *after)]
+        held = [self._holds(runs) for runs in (before, *after)]
         return {
             "searches": len(after), "draws": own.size, "failed_before": before.failed.mean(),
-            **over_searches("failed_after", [one.failed.mean() for one in after]),
+            **over_searches("failed_after", [runs.failed.mean() for runs in after]),
             **statistics.quantile(own[0], 0.5, self.sweep.level).columns("before"),
             **over_searches("after", medians), **dict(self._ratio(own, found)),
             "held_before": held[0], "held_after": sum(held[1:]),

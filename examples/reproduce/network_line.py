@@ -45,8 +45,8 @@ def sensitivities(axes: Axes) -> None:
     """|S| of the surge loop."""
     for place, (label, overrides) in enumerate(LAWS.items()):
         color, linestyle, _ = nth_style(place)
-        one = load(CORRECTED, overrides).scenario
-        loop = loop_margins(one.closed_loop(), one.time_grid()).loops["surge"]
+        scenario = load(CORRECTED, overrides).scenario
+        loop = loop_margins(scenario.closed_loop(), scenario.time_grid()).loops["surge"]
         axes.loglog(loop.omega, loop.S, color=color, linestyle=linestyle, label=label)
     axes.axhline(1.0, zorder=0, **TARGET_LOOK)
     axes.set(xlabel="angular frequency [rad/s]", ylabel="|S|", ylim=(1e-4, 20), xlim=(1e-2, 1e4))

@@ -53,13 +53,13 @@ def runs(
         echo(f"no run or study below {folder}")
 
 
-def _row(one: Found, metric: str) -> list[str]:
+def _row(run: Found, metric: str) -> list[str]:
     from podusv_cli.core.quantities import time_in_words
 
-    law = one.laws[0] if len(one.laws) == 1 else f"{len(one.laws)} laws"
-    number = one.metrics.get(metric, math.nan)
+    law = run.laws[0] if len(run.laws) == 1 else f"{len(run.laws)} laws"
+    number = run.metrics.get(metric, math.nan)
     return [
-        one.started[:16].replace("T", " ") or "-", one.kind, one.name, law if one.laws else "-",
-        one.status, time_in_words(one.seconds) if one.seconds > 0 else "-",
-        "-" if math.isnan(number) else f"{number:.5g}", str(one.folder),
+        run.started[:16].replace("T", " ") or "-", run.kind, run.name, law if run.laws else "-",
+        run.status, time_in_words(run.seconds) if run.seconds > 0 else "-",
+        "-" if math.isnan(number) else f"{number:.5g}", str(run.folder),
     ]  # fmt: skip

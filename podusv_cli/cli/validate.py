@@ -50,7 +50,9 @@ def validate(
     scenario = loaded.scenario
     laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
-    cases = {label: Case(one, loaded.plans[label]) for label, one in scenario.singles().items()}
+    cases = {
+        label: Case(single, loaded.plans[label]) for label, single in scenario.singles().items()
+    }
     findings = merged({label: examined(case) for label, case in cases.items()})
     for case in cases.values():
         warm_up(case)

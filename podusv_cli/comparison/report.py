@@ -80,7 +80,7 @@ def page(story: Story) -> str:
         beside=figures[:BESIDE],
         figures=figures,
         changed=about.settings,
-        laws=laws([one.law for one in story.abouts.values()]),
+        laws=laws([about.law for about in story.abouts.values()]),
         parts=parts,
         cited=any(EQUATION.search(said) for _, said, _ in parts),
         provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
@@ -144,12 +144,14 @@ def _parts(story: Story) -> list[tuple[str, str, str]]:
     """A row for each part: its name, the first line of what it says of itself, all its values."""
     (first, *_), law = story.abouts.values(), "controller"
     parts = {name: (said, name, first) for name, said in first.said.items() if name != law}
-    parts |= {f"{law} {label}": (one.said[law], law, one) for label, one in story.abouts.items()}
+    parts |= {
+        f"{law} {label}": (about.said[law], law, about) for label, about in story.abouts.items()
+    }
     return [
         (
             name,
             said,
-            ", ".join(f"{key} {value_text(value)}" for key, value in flat(one.section(at))),
+            ", ".join(f"{key} {value_text(value)}" for key, value in flat(about.section(at))),
         )
-        for name, (said, at, one) in parts.items()
+        for name, (said, at, about) in parts.items()
     ]

@@ -106,13 +106,13 @@ def ranges(answer: Answer, rows: Sequence[Alone]) -> Figure:
     }
     figure = new_figure(COLUMNS, 0.7 + ROW * len(rows))
     axes = figure.add_subplot()
-    for row, one in enumerate(rows):
+    for row, shown in enumerate(rows):
         axes.plot([-1.0, 1.0], [row, row], color=RANGE, lw=3.0, solid_capstyle="butt")
-        for end in ends(one.choice):
-            side = math.copysign(1.0, end - one.choice.own)
-            turn = turns.get((one.choice.name, end > one.choice.own))
+        for end in ends(shown.choice):
+            side = math.copysign(1.0, end - shown.choice.own)
+            turn = turns.get((shown.choice.name, end > shown.choice.own))
             if turn:
-                at = side * turn.distance / abs(end - one.choice.own)
+                at = side * turn.distance / abs(end - shown.choice.own)
                 axes.plot([at, side], [row, row], color=TURNED, lw=3.0, solid_capstyle="butt")
                 axes.annotate(
                     escaping.figure(place(turn)), (side, row), (4 * side, 0), fontsize=5.5,

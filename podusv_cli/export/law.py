@@ -243,7 +243,7 @@ class ExportedLaw:
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
             x = np.array([log[number.name][row] for number in self._given])
-            place = np.array([log[one.name][row] for one in path.places])
+            place = np.array([log[signal.name][row] for signal in path.places])
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target
             )

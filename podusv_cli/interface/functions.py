@@ -83,9 +83,9 @@ def run(
     ('finished', ['about.json', 'log.h5', 'manifest.json'])
     """
     given = loaded(source, changes)
-    one = _single(given)
+    single = _single(given)
     done = running.run_loaded(given, request(out, force, figures))
-    return replace(open_run(done.folder), given=one)
+    return replace(open_run(done.folder), given=single)
 
 
 def open_run(folder: str | os.PathLike[str]) -> Run:
@@ -129,7 +129,7 @@ def compare(
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
     claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
     failed = {label: text for label, text in done.result.endings.items() if text}
-    scenarios = {one.label: one.case.scenario for one in runs.members if one.case}
+    scenarios = {member.label: member.case.scenario for member in runs.members if member.case}
     compared = _compared(done, scenarios)
     return Comparison(done.folder, compared, done.result.table.frame(), claims, failed)
 
@@ -190,7 +190,7 @@ def simulate_many(
         raise ParameterError(f"workers = {workers}: must be 0 (one a core) or more")
     plan = base.plan(scenario)
     probe = scenario.metrics_of(plan)
-    loops = [one.closed_loop() for one in scenarios(scenario, given)]
+    loops = [drawn.closed_loop() for drawn in scenarios(scenario, given)]
     check_law(plan)
     check_words(scenario, loops, given)
     done = batch.simulate_many(
@@ -217,8 +217,8 @@ def verify(
     done = verification.verify(loaded(source, changes).scenario, tolerance)
     rows = {
         (label, name): (e.values[0], e.order, e.relative, e.converged(tolerance))
-        for label, one in done.runs.items()
-        for name, e in one.estimates.items()
+        for label, run in done.runs.items()
+        for name, e in run.estimates.items()
     }
     columns = ["value", "order", "relative_error", "converged"]
     frame = pd.DataFrame.from_dict(rows, orient="index", columns=columns)

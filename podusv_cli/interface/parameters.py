@@ -58,8 +58,8 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
     made = []
     for row, new in enumerate(zip(*given.values(), strict=True)):
         numbers = {
-            steps[key]: Number("", int(one) if key in whole and _is_integer(one) else one)
-            for key, one in zip(given, new, strict=True)
+            steps[key]: Number("", int(value) if key in whole and _is_integer(value) else value)
+            for key, value in zip(given, new, strict=True)
         }
         try:
             made.append(with_values(scenario, numbers))

@@ -46,13 +46,13 @@ def _gains(problem: Problem, motion: Motion) -> Vector:
     """
     vessel, h = problem.loop.vessel, float(motion.times[1] - motion.times[0])
     weight = np.diag([vessel.m11**-2, vessel.m33**-2]) / BANDWIDTH**4
-    one = np.eye(STATES)
-    cost, gains = one, np.zeros((len(motion.times), 2, STATES))
+    unit = np.eye(STATES)
+    cost, gains = unit, np.zeros((len(motion.times), 2, STATES))
     for i, (A, B) in reversed(list(enumerate(zip(*_slopes(problem, motion), strict=True)))):
-        left = np.linalg.inv(one - 0.5 * h * A)
-        A_h, B_h = left @ (one + 0.5 * h * A), left @ (h * B)
+        left = np.linalg.inv(unit - 0.5 * h * A)
+        A_h, B_h = left @ (unit + 0.5 * h * A), left @ (h * B)
         gains[i] = np.linalg.solve(h * weight + B_h.T @ cost @ B_h, B_h.T @ cost @ A_h)
-        cost = h * one + A_h.T @ cost @ (A_h - B_h @ gains[i])
+        cost = h * unit + A_h.T @ cost @ (A_h - B_h @ gains[i])
     return gains
 
 

@@ -81,9 +81,9 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
     """For every law and cell: how many runs failed, the share's interval, and medians."""
     for at, rows in results.summary.groupby(["law", "cell"], sort=False):
         law, cell = map(str, at)
-        one, medians = rows.iloc[0], rows.set_index("metric").q50
-        failed = f"{round(one.failed * one.n)} of {one.n}"
-        share = Interval.of(one, "failed").ends(".3g%")
+        first, medians = rows.iloc[0], rows.set_index("metric").q50
+        failed = f"{round(first.failed * first.n)} of {first.n}"
+        share = Interval.of(first, "failed").ends(".3g%")
         numbers = [
             digits(medians.get(name, np.nan), infinite=results.known[name].infinite)
             for name in results.shown

@@ -167,9 +167,9 @@ def history(trials: pd.DataFrame, label: str) -> Figure:
     axes = figure.add_subplot()
     for place, (law, rows) in enumerate(trials.groupby("law", sort=False)):
         colour, style, _ = nth_style(place)
-        for i, (_, one) in enumerate(rows.groupby("repeat")):
+        for i, (_, repeat) in enumerate(rows.groupby("repeat")):
             axes.step(
-                one.spent, one.best.replace(np.inf, np.nan), where="post", color=colour,
+                repeat.spent, repeat.best.replace(np.inf, np.nan), where="post", color=colour,
                 linestyle=style, linewidth=0.9, label=escaping.figure(str(law)) if not i else None,
             )  # fmt: skip
     axes.set(xlabel="simulated runs of a search", ylabel=f"best {escaping.figure(label)} so far")

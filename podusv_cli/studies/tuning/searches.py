@@ -41,7 +41,7 @@ class Compared:
         """How far the samples of a pair are off, in standard deviations, of pairs that have any."""
         with np.errstate(invalid="ignore"):
             off = self.samples - self.ratios[:, None]
-        sure = [one / one.std() for one in off if np.isfinite(one).all() and one.std() > 0.0]
+        sure = [gaps / gaps.std() for gaps in off if np.isfinite(gaps).all() and gaps.std() > 0.0]
         return np.asarray(sure)
 
     @cached_property
@@ -128,7 +128,7 @@ def ratios(
 
 def _sampled(table: Vector, met: Indices, trained: Indices, random: np.random.Generator) -> Vector:
     """What a law reaches in each sample of training sets, of its searches, and of the draws."""
-    by_search = np.stack([np.median(one[met], axis=1) for one in table], axis=1)
+    by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
     if len(table) == 1:
         return by_search[:, 0]
     sets = trained.shape[-1]

@@ -46,7 +46,7 @@ class Function:
     @property
     def values(self) -> dict[str, Instruction]:
         """The instruction behind every name."""
-        return {one.name: one for row in self.blocks for one in row if one.name}
+        return {value.name: value for row in self.blocks for value in row if value.name}
 
 
 def prepared(module: Any, name: str, machine: Any) -> Any:
