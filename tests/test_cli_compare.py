@@ -65,21 +65,21 @@ def test_runs_that_differ_in_more_are_warned_of_by_key(podusv):
 def test_json_has_the_documented_shape(podusv):
     config = write("two.yaml", TWO + claim("C1", "stiff.iae <= soft.iae"))
     said = podusv(config, "--out", "x", "--json")
-    found = json.loads(said.out)
-    assert list(found) == [
+    answer = json.loads(said.out)
+    assert list(answer) == [
         "format", "status", "folder", "runs", "comparison", "failed", "differences", "claims",
         "missing",
     ]  # fmt: skip
-    assert (found["format"], found["status"], found["folder"]) == (1, "finished", "x")
-    for run, label in zip(found["runs"], ("stiff", "soft"), strict=True):
+    assert (answer["format"], answer["status"], answer["folder"]) == (1, "finished", "x")
+    for run, label in zip(answer["runs"], ("stiff", "soft"), strict=True):
         keys = ["format", "status", "run", "controller", "metrics", "timing", "warnings"]
         assert list(run) == keys
         assert (run["status"], run["run"], run["controller"]) == ("finished", f"x/{label}", "pid")
         parts = {"compile_s", "engine_s", "write_s", "figures_s", "total_s"}
         assert parts <= set(run["timing"])
-        iae = found["comparison"]["iae"][label]
+        iae = answer["comparison"]["iae"][label]
         assert iae == run["metrics"]["iae"] > 0
-    assert found["claims"][0]["verdict"] == "reproduced"
+    assert answer["claims"][0]["verdict"] == "reproduced"
 
 
 def test_quiet_is_the_folder_alone(podusv):
@@ -90,11 +90,11 @@ def test_quiet_is_the_folder_alone(podusv):
 def test_finished_folders_and_a_scenario_mix(podusv):
     podusv(write("two.yaml", TWO), "--out", "x")
     said = podusv("x", "x/soft", write("one.yaml", BASE), "--out", "y", "--json")
-    found = json.loads(said.out)
+    answer = json.loads(said.out)
     assert said.code == 0
-    where = [run["run"] for run in found["runs"]]
+    where = [run["run"] for run in answer["runs"]]
     assert where == ["x/stiff", "x/soft", "x/soft", "y/one"]
-    assert list(found["comparison"]["iae"]) == ["stiff", "soft", "soft_2", "one"]
+    assert list(answer["comparison"]["iae"]) == ["stiff", "soft", "soft_2", "one"]
 
 
 # --- claims of several scenarios
@@ -107,38 +107,38 @@ def test_claims_speak_of_their_own_scenarios_runs(podusv):
     write("a.yaml", TWO + claim("C1", "stiff.peak_tau_u > soft.peak_tau_u"))
     expect = "stiff.peak_tau_u > soft.peak_tau_u and finished(stiff)"
     write("b.yaml", swapped + claim("C2", expect))
-    found = claims_of(podusv("a.yaml", "b.yaml", "--out", "x", "--json"))
-    assert found["C1"]["verdict"] == "reproduced"
-    assert found["C2"]["verdict"] == "not reproduced"
-    assert list(found["C2"]["numbers"]) == [
+    verdicts = claims_of(podusv("a.yaml", "b.yaml", "--out", "x", "--json"))
+    assert verdicts["C1"]["verdict"] == "reproduced"
+    assert verdicts["C2"]["verdict"] == "not reproduced"
+    assert list(verdicts["C2"]["numbers"]) == [
         "stiff_2.peak_tau_u", "soft_2.peak_tau_u", "finished(stiff_2)",
     ]  # fmt: skip
-    assert found["C2"]["expect"].startswith("stiff_2.peak_tau_u > soft_2.peak_tau_u")
+    assert verdicts["C2"]["expect"].startswith("stiff_2.peak_tau_u > soft_2.peak_tau_u")
 
 
 def test_claims_reach_runs_that_are_named_after_their_scenario(podusv):
     write("my-a.yaml", BASE + claim("C1", "pid.peak_tau_u > 1 and max(pid.u, 0, 1) > 0"))
     write("my-b.yaml", BASE)
-    found = claims_of(podusv("my-a.yaml", "my-b.yaml", "--out", "x", "--json"))
-    assert found["C1"]["verdict"] == "reproduced"
-    assert list(found["C1"]["numbers"]) == ["my-a.peak_tau_u", "max(my-a.u, 0, 1)"]
+    verdicts = claims_of(podusv("my-a.yaml", "my-b.yaml", "--out", "x", "--json"))
+    assert verdicts["C1"]["verdict"] == "reproduced"
+    assert list(verdicts["C1"]["numbers"]) == ["my-a.peak_tau_u", "max(my-a.u, 0, 1)"]
 
 
 @pytest.mark.slow
 def test_claims_are_not_about_finished_runs_of_the_same_name(podusv):
     config = write("two.yaml", TWO + claim("C1", "soft.peak_tau_u < 100"))
     podusv(config, "--out", "old", "--set", "controllers.soft.K_Pu=900")
-    found = claims_of(podusv("old/soft", config, "--out", "x", "--json"))
-    assert found["C1"]["verdict"] == "reproduced"
-    assert list(found["C1"]["numbers"]) == ["soft_2.peak_tau_u"]
+    verdicts = claims_of(podusv("old/soft", config, "--out", "x", "--json"))
+    assert verdicts["C1"]["verdict"] == "reproduced"
+    assert list(verdicts["C1"]["numbers"]) == ["soft_2.peak_tau_u"]
 
 
 @pytest.mark.slow
 def test_claims_of_the_same_name_keep_apart(podusv):
     write("a.yaml", TWO + claim("C1", "finished(soft)"))
     write("b.yaml", TWO + claim("C1", "not finished(soft)"))
-    found = claims_of(podusv("a.yaml", "b.yaml", "a.yaml", "--out", "x", "--json"))
-    assert {name: verdict["verdict"] for name, verdict in found.items()} == {
+    verdicts = claims_of(podusv("a.yaml", "b.yaml", "a.yaml", "--out", "x", "--json"))
+    assert {name: verdict["verdict"] for name, verdict in verdicts.items()} == {
         "a.C1": "reproduced", "b.C1": "not reproduced", "a.C1_2": "reproduced",
     }  # fmt: skip
 

@@ -40,9 +40,9 @@ def row(frame, name, **more):
 def test_the_numbers_that_matter_most_come_first_and_nothing_is_lost():
     names = [name for name in METRICS if name != "law_ns"]
     frame = table.table({"a": dict.fromkeys(names, 1.0)})
-    found = [cells[-1] for cells in table.cells(frame)]
+    written = [cells[-1] for cells in table.cells(frame)]
     first = [name for name in names if METRICS[name].headline]
-    assert found == [*first, *(name for name in names if not METRICS[name].headline)]
+    assert written == [*first, *(name for name in names if not METRICS[name].headline)]
     assert {"iae_e", "settling_time", "e_steady", "energy", "saturated_fraction"} <= set(first)
 
 
@@ -127,17 +127,17 @@ def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     runs = {"a": numbers | {"path_time": 7.5}, "b": {"effort_r": 3.25e12, "ise": 4e-2}, "c": lost}
     text = table.as_latex(table.table(runs))
     rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines()]
-    found = {row[0]: row[1:] for row in rows[5:-2]}
-    assert found[r"$\int z_e^2\,\mathrm{d}t$"] == [
+    by_row = {row[0]: row[1:] for row in rows[5:-2]}
+    assert by_row[r"$\int z_e^2\,\mathrm{d}t$"] == [
         "m$^2$ s", r"\textbf{\boldmath 2}", r"\textbf{\boldmath $\times10^{-9}$}",
         "0", ".04", r"(2$\times10^{7}$)", "1", "", r"(5$\times10^{8}$)",
     ]  # fmt: skip
-    assert found[r"$\int\tau_r^2\,\mathrm{d}t$"][3:6] == [
+    assert by_row[r"$\int\tau_r^2\,\mathrm{d}t$"][3:6] == [
         "3", r".25$\times10^{12}$", r"(2.5$\times10^{5}$)",
     ]  # fmt: skip
     words = METRICS["saturated_fraction"].row
-    assert found[words] == ["1", r"\textbf{0}", r"\textbf{.5}", "-", "", "", "-", "", ""]
-    assert found[METRICS["path_time"].row][-3:] == ["never", "", ""]
+    assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.5}", "-", "", "", "-", "", ""]
+    assert by_row[METRICS["path_time"].row][-3:] == ["never", "", ""]
     columns = text.splitlines()[1].partition("{tabular}")[2].replace("@{}", "").replace("@{ }", "")
     assert {len(row) for row in rows[5:-2]} == {len(columns) - 2}
     assert "booktabs" in text.splitlines()[0]
@@ -156,10 +156,10 @@ def test_every_symbol_of_a_metric_can_be_set():
 @pytest.mark.parametrize("key", OTHERWISE)
 def test_a_difference_in_any_section_is_found(key):
     other = scenario(f"{key}={OTHERWISE[key]}")
-    found = differences({"a": scenario().model_dump(), "b": other.model_dump()})
+    differing = differences({"a": scenario().model_dump(), "b": other.model_dump()})
     also = {"vessel.m": ["nominal.m"]}.get(key, [])  # the law is told about the vessel as it is
-    assert list(found) == [key, *also]
-    assert found[key]["b"] == float(OTHERWISE[key]) != found[key]["a"]
+    assert list(differing) == [key, *also]
+    assert differing[key]["b"] == float(OTHERWISE[key]) != differing[key]["a"]
 
 
 def test_every_section_of_a_scenario_is_looked_at():
@@ -173,9 +173,9 @@ def test_every_section_of_a_scenario_is_looked_at():
 
 def test_sensors_and_an_estimator_are_a_difference():
     seeing = scenario("measurement={kind: sensors}", "estimator={kind: ekf}")
-    found = differences({"a": scenario().model_dump(), "b": seeing.model_dump()})
-    assert found["measurement.kind"] == {"a": "exact", "b": "sensors"}
-    assert found["estimator.kind"] == {"a": "none", "b": "ekf"}
+    differing = differences({"a": scenario().model_dump(), "b": seeing.model_dump()})
+    assert differing["measurement.kind"] == {"a": "exact", "b": "sensors"}
+    assert differing["estimator.kind"] == {"a": "none", "b": "ekf"}
 
 
 @pytest.mark.parametrize("key", ["name=b", "description=b", "controller.K_Pu=3"])
@@ -185,9 +185,9 @@ def test_names_and_laws_are_no_difference(key):
 
 def test_a_key_that_a_run_lacks_is_a_difference():
     other = scenario("disturbance.kind=none").model_dump()
-    found = differences({"a": scenario().model_dump(), "b": other})
-    assert found["disturbance.kind"] == {"a": "harmonic", "b": "none"}
-    assert found["disturbance.b_u.mean"]["b"] is None
+    differing = differences({"a": scenario().model_dump(), "b": other})
+    assert differing["disturbance.kind"] == {"a": "harmonic", "b": "none"}
+    assert differing["disturbance.b_u.mean"]["b"] is None
 
 
 def test_where_kinds_differ_only_the_kind_and_what_both_have_is_shown():
@@ -248,15 +248,15 @@ def test_whether_an_interrupted_run_would_have_finished_cannot_be_told():
 
 
 def test_verdicts_have_numbers_reasons_and_the_labels_of_the_comparison():
-    found = {verdict.name: verdict.as_json() for verdict in verdicts()}
-    assert [v["verdict"] for v in found.values()] == [
+    by_name = {verdict.name: verdict.as_json() for verdict in verdicts()}
+    assert [v["verdict"] for v in by_name.values()] == [
         "reproduced", "not reproduced", "cannot tell", "not reproduced",
     ]  # fmt: skip
-    assert found["C1"]["expect"] == "a.iae == 3"
-    assert found["C1"]["numbers"] == {"a.iae": 3.0}
-    assert found["C1"]["reason"] == ""
-    assert found["C3"]["numbers"] == {"lost.iae": None, "a.iae": 3.0}
-    assert found["C3"]["reason"] == "lost.iae: lost has no log: killed"
+    assert by_name["C1"]["expect"] == "a.iae == 3"
+    assert by_name["C1"]["numbers"] == {"a.iae": 3.0}
+    assert by_name["C1"]["reason"] == ""
+    assert by_name["C3"]["numbers"] == {"lost.iae": None, "a.iae": 3.0}
+    assert by_name["C3"]["reason"] == "lost.iae: lost has no log: killed"
     assert verdicts()[2].evidence() == "a.iae = 3; lost.iae: lost has no log: killed"
 
 

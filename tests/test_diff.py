@@ -52,11 +52,11 @@ def test_wrapped_angles_are_the_shorter_way_round_apart(name):
     one, other = np.array(angle), np.array(angle)
     one[10], other[10] = 3.13, -3.12  # across the seam
     one[20], other[20] = 0.3, 0.2
-    found = compare(changed(**{name: one}), changed(**{name: other}))
-    (largest,) = found.largest
+    difference = compare(changed(**{name: one}), changed(**{name: other}))
+    (largest,) = difference.largest
     assert (largest.time, largest.gap) == (0.2, pytest.approx(0.1))
-    assert found.first is not None
-    assert found.first.gap == pytest.approx(2.0 * math.pi - 6.25)
+    assert difference.first is not None
+    assert difference.first.gap == pytest.approx(2.0 * math.pi - 6.25)
     assert compare(changed(psi=one), changed(psi=other)).largest[0].gap == pytest.approx(6.25)
 
 
@@ -102,10 +102,10 @@ def test_signals_of_others_have_their_own_unit_and_period():
 def test_any_flipped_bit_of_any_signal_is_found(name, row, bit):
     array = np.array(recording()[name])
     array.view(np.int64)[row] ^= 1 << bit
-    found = compare(recording(), changed(**{name: array}))
-    assert not found.same
-    assert found.first is not None
-    assert (found.first.signal, found.first.time) == (name, recording()["time"][row])
+    difference = compare(recording(), changed(**{name: array}))
+    assert not difference.same
+    assert difference.first is not None
+    assert (difference.first.signal, difference.first.time) == (name, recording()["time"][row])
 
 
 def test_the_first_difference_is_the_earliest_and_the_largest_the_widest():
@@ -113,11 +113,11 @@ def test_the_first_difference_is_the_earliest_and_the_largest_the_widest():
         x=bumped("x", 30, 5.0), W_hat_u=bumped("W_hat_u", (12, 3), 1e-9),
         z_e=bumped("z_e", [20, 40], [1.0, -2.0]),
     )  # fmt: skip
-    found = compare(recording(), other)
-    assert found.first
-    assert (found.first.signal, found.first.time) == ("W_hat_u[3]", 0.12)
-    assert found.first.one == recording()["W_hat_u"][12, 3]
-    largest = {d.signal: (d.time, d.gap) for d in found.largest}
+    difference = compare(recording(), other)
+    assert difference.first
+    assert (difference.first.signal, difference.first.time) == ("W_hat_u[3]", 0.12)
+    assert difference.first.one == recording()["W_hat_u"][12, 3]
+    largest = {d.signal: (d.time, d.gap) for d in difference.largest}
     assert largest == {
         "x": (0.30, pytest.approx(5.0)),
         "W_hat_u[3]": (0.12, pytest.approx(1e-9)),
@@ -130,9 +130,9 @@ def test_logs_of_one_length_are_compared_at_the_times_that_both_have():
     base = recording()
     t, rows = base["time"], len(base["time"])
     twice = changed(time=2.0 * t)
-    found = compare(base, twice)
-    assert found.rows == (rows, rows, rows // 2)
-    assert "time" not in {d.signal for d in found.largest}
+    difference = compare(base, twice)
+    assert difference.rows == (rows, rows, rows // 2)
+    assert "time" not in {d.signal for d in difference.largest}
     for apart, shared in ((rows // 2, rows), (rows // 2 + 1, rows // 2 - 1)):
         moved = np.array(t)
         moved[rows - apart :] += 0.5 * t[1]
@@ -152,18 +152,18 @@ def test_what_does_not_run_over_time_comes_first():
 def test_logs_of_other_steps_are_compared_at_the_times_of_both():
     base = recording()
     thin = replace(base, signals={name: array[::2] for name, array in base.signals.items()})
-    found = compare(base, thin)
-    assert found.rows == (50, 25, 25)
-    assert not found.largest
-    assert not found.same
+    difference = compare(base, thin)
+    assert difference.rows == (50, 25, 25)
+    assert not difference.largest
+    assert not difference.same
     shorter = replace(base, signals={name: array[:7] for name, array in base.signals.items()})
     assert compare(shorter, base).rows == (7, 50, 7)
 
 
 def test_one_wrong_time_does_not_set_the_rows_adrift():
-    found = compare(recording(), changed(time=bumped("time", 9, 1e-6)))
-    assert found.rows == (50, 50, 50)
-    assert [d.signal for d in found.largest] == ["time"]
+    difference = compare(recording(), changed(time=bumped("time", 9, 1e-6)))
+    assert difference.rows == (50, 50, 50)
+    assert [d.signal for d in difference.largest] == ["time"]
 
 
 def test_signals_of_another_size_or_of_one_log_alone_are_named():
@@ -171,16 +171,16 @@ def test_signals_of_another_size_or_of_one_log_alone_are_named():
     other = replace(
         base, signals={k: v for k, v in changed(u=base["x"]).signals.items() if k != "z_e"}
     )
-    found = compare(base, other)
-    assert (found.only_one, found.only_other) == (("z_e",), ("u",))
+    difference = compare(base, other)
+    assert (difference.only_one, difference.only_other) == (("z_e",), ("u",))
     assert compare(base, recording(nodes=4)).reshaped == ("W_hat_u", "rbf_center")
-    assert not found.same
+    assert not difference.same
 
 
 def test_how_a_run_ended_counts():
-    found = compare(recording(), recording(status="diverged", message="at t = 1"))
-    assert found.endings == {"status": ("finished", "diverged"), "message": ("", "at t = 1")}
-    assert not found.same
+    difference = compare(recording(), recording(status="diverged", message="at t = 1"))
+    assert difference.endings == {"status": ("finished", "diverged"), "message": ("", "at t = 1")}
+    assert not difference.same
 
 
 # --- causes

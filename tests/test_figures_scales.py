@@ -64,27 +64,27 @@ def free(log):
 
 
 def controls(*runs, columns=2):
-    found = drawn("controls", shown(*runs), columns).axes
-    return dict(zip(("early", "whole", "settled"), found, strict=False)), found
+    axes = drawn("controls", shown(*runs), columns).axes
+    return dict(zip(("early", "whole", "settled"), axes, strict=False)), axes
 
 
 def test_controls_show_the_peak_the_whole_run_and_the_settled_part():
     log = recording(period=0.01)
-    _, found = controls(("a", log))
+    _, drawn_axes = controls(("a", log))
     names = ["tau_u", "tau_u_cmd", "tau_r", "tau_r_cmd"]
     limits = [(0.0, 0.5), (0.0, 100.0), (75.0, 100.0)] * 4
-    for axes, span, name in zip(found, limits, np.repeat(names, 3), strict=True):
+    for axes, span, name in zip(drawn_axes, limits, np.repeat(names, 3), strict=True):
         assert axes.get_xlim() == pytest.approx(span)
         curve = line(axes, "a")
         rows = np.searchsorted(log["time"], curve.get_xdata())
         assert np.array_equal(curve.get_ydata(), log[name][rows])
         assert curve.get_xdata()[[0, -1]] == pytest.approx(span)
-    assert [axes.get_title() for axes in found] == ["early", "whole run", "settled"] + [""] * 9
-    assert [axes.get_ylabel() for axes in found[::3]] == [
+    assert [axes.get_title() for axes in drawn_axes] == ["early", "whole run", "settled"] + [""] * 9
+    assert [axes.get_ylabel() for axes in drawn_axes[::3]] == [
         r"$\tau_u$ [N]", r"$\tau_{u,\mathrm{cmd}}$ [N]",
         r"$\tau_r$ [N m]", r"$\tau_{r,\mathrm{cmd}}$ [N m]",
     ]  # fmt: skip
-    assert [axes.get_xlabel() for axes in found] == [""] * 9 + ["time [s]"] * 3
+    assert [axes.get_xlabel() for axes in drawn_axes] == [""] * 9 + ["time [s]"] * 3
 
 
 def test_controls_without_limits_are_logarithmic_where_the_peak_is():
@@ -133,15 +133,15 @@ def test_the_actuator_s_limits_are_drawn_ahead_and_astern(given, force, moment):
 
 def test_what_a_diverging_run_asks_for_does_not_set_the_scale():
     wild = recording(end=60.0, status="diverged", tau_u_cmd=lambda t: np.where(t < 50.0, 0.0, 1e9))
-    _, found = controls(("good", recording()), ("bad", wild))
-    assert found[4].get_ylim()[1] < 1e3
+    _, drawn_axes = controls(("good", recording()), ("bad", wild))
+    assert drawn_axes[4].get_ylim()[1] < 1e3
 
 
 def test_filters_show_virtual_control_and_output_together_and_their_difference():
     log, plain = recording(), recording(shift=0.4, without=("beta_u", "beta_r"))
     figure = drawn("filters", shown(("filtered", log), ("plain", plain)))
-    found = panels(figure)
-    assert list(found) == [
+    by_label = panels(figure)
+    assert list(by_label) == [
         r"$\alpha_u, \beta_u$ [m/s]",
         r"$\alpha_r, \beta_r$ [rad/s]",
         "$y_u$ [m/s]",
@@ -249,9 +249,9 @@ def test_wind_that_all_runs_share_is_drawn_once_and_waves_that_each_meets_for_ea
 
 def test_estimates_stand_beside_truth_and_deliveries_and_their_errors():
     log = recording(**ESTIMATED)
-    found = panels(drawn("estimates", shown(("a", log))))
-    assert len(found) == 12
-    value, error = found["$x$ [m]"], found["error of $x$ [m]"]
+    by_label = panels(drawn("estimates", shown(("a", log))))
+    assert len(by_label) == 12
+    value, error = by_label["$x$ [m]"], by_label["error of $x$ [m]"]
     assert np.array_equal(line(value, "_true").get_ydata(), log["x"])
     assert np.array_equal(line(value, "a").get_ydata(), log["x_est"])
     assert np.array_equal(line(error, "a").get_ydata(), log["x_est"] - log["x"])
@@ -280,10 +280,10 @@ def test_a_run_draws_estimates_by_default_if_it_has_any(tmp_path, measurement, m
     brief = "simulation: {step: 0.01, duration: 0.1, compiled: false}\n"
     config.write_text(f"{SOUND}{brief}measurement: {{kind: {measurement}}}\n")
     done = run.run(config, run.Request((), tmp_path / "run"))
-    found = {path.stem for path in (done.folder / "figures").iterdir()}
-    assert ("estimates" in found) == (measurement == "sensors")
-    assert "sea" not in found
-    assert found >= {"errors", "trajectory", "controls"}
+    names = {path.stem for path in (done.folder / "figures").iterdir()}
+    assert ("estimates" in names) == (measurement == "sensors")
+    assert "sea" not in names
+    assert names >= {"errors", "trajectory", "controls"}
     assert not done.missing
 
 

@@ -23,8 +23,8 @@ from podusv_cli.scenario.model import Scenario
 
 def told(code: str, *overrides: str) -> list[str]:
     """Texts of that code about the run of a scenario."""
-    found = postflight(scene(*overrides).alone(), log(*overrides))
-    return [finding.text for finding in found if finding.code == code]
+    findings = postflight(scene(*overrides).alone(), log(*overrides))
+    return [finding.text for finding in findings if finding.code == code]
 
 
 def changed(out: Recording, **signals: Any) -> Recording:
@@ -116,8 +116,8 @@ def moving(u, v, r, **water):
     out = log()
     under_way = (out["time"] >= 2.0) & (out["time"] <= 3.0)
     signals = {name: under_way * value for name, value in {"u": u, "v": v, "r": r, **water}.items()}
-    found = postflight(scene().alone(), changed(out, psi=0.0 * out["psi"], **signals))
-    return [finding.text for finding in found if finding.code == "outside-envelope"]
+    findings = postflight(scene().alone(), changed(out, psi=0.0 * out["psi"], **signals))
+    return [finding.text for finding in findings if finding.code == "outside-envelope"]
 
 
 @pytest.mark.parametrize(
@@ -134,9 +134,9 @@ def moving(u, v, r, **water):
     ],
 )  # fmt: skip
 def test_motion_beyond_what_was_measured_is_told(velocities, says):
-    found = moving(*velocities)
-    assert len(found) == len(says)
-    for text, part in zip(found, says, strict=True):
+    texts = moving(*velocities)
+    assert len(texts) == len(says)
+    for text, part in zip(texts, says, strict=True):
         assert part in text
         assert "from 2 s to 3 s" in text
 
@@ -309,23 +309,23 @@ def test_nothing_is_told_about_a_run_without_rows():
 
 
 def test_the_shipped_corrected_scenario_has_only_the_findings_that_are_true_of_it():
-    found = preflight(load(CONFIGS / "corrected.yaml").scenario)
-    assert [f.code for f in found] == ["path-bend"]
+    findings = preflight(load(CONFIGS / "corrected.yaml").scenario)
+    assert [f.code for f in findings] == ["path-bend"]
 
 
 def test_the_printed_scenario_is_told_why_it_cannot_track():
-    found = {f.code: f.text for f in preflight(load(CONFIGS / "printed.yaml").scenario)}
-    assert set(found) == {
+    texts = {f.code: f.text for f in preflight(load(CONFIGS / "printed.yaml").scenario)}
+    assert set(texts) == {
         "path-jump", "sway-drift", "sway-unstable", "coupling-saddle"
     }  # fmt: skip
-    assert "0.56 m/s" in found["sway-drift"]
-    assert "2.58 kg/s exceeds the sway damping 0.89 kg/s" in found["sway-unstable"]
+    assert "0.56 m/s" in texts["sway-drift"]
+    assert "2.58 kg/s exceeds the sway damping 0.89 kg/s" in texts["sway-unstable"]
 
 
 def test_what_laws_share_is_told_once_and_names_them():
-    found = preflight(load(CONFIGS / "figures_compare.yaml").scenario)
-    assert len(found) == len(set(found))
-    kicks = [(f.runs, f.where) for f in found if f.code == "start-kick"]
+    findings = preflight(load(CONFIGS / "figures_compare.yaml").scenario)
+    assert len(findings) == len(set(findings))
+    kicks = [(f.runs, f.where) for f in findings if f.code == "start-kick"]
     assert kicks == [(("adaptive_neural", "dsc"), "controller.first_difference")]
 
 

@@ -215,9 +215,9 @@ def compared(name: str) -> Any:
 
 @pytest.mark.parametrize("name", COMPARISONS)
 def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None:
-    found = compared(name).claims
-    assert len(found)
-    for claim, row in found.iterrows():
+    verdicts = compared(name).claims
+    assert len(verdicts)
+    for claim, row in verdicts.iterrows():
         assert VERDICTS[str(claim)] == in_words(row), claim
 
 
@@ -264,15 +264,15 @@ def test_a_row_of_the_table_of_what_could_not_be_read(name: str) -> None:
 
 @pytest.mark.parametrize("name", [*CHANGES][1:5])
 def test_verdicts_that_do_not_hang_on_what_could_not_be_read(name: str) -> None:
-    found = podusv.compare(CONFIGS / "course.yaml", CHANGES[name][0], figures=False).claims
+    verdicts = podusv.compare(CONFIGS / "course.yaml", CHANGES[name][0], figures=False).claims
     for claim in ("F1", "F2", "F3", "F5", "F6", "F6b"):
-        assert in_words(found.loc[claim]) == VERDICTS[claim], claim
+        assert in_words(verdicts.loc[claim]) == VERDICTS[claim], claim
 
 
 @pytest.mark.parametrize("name", ["claims", "sensitivities"])
 def test_the_verdicts_on_the_page_are_those_of_the_studies(name: str) -> None:
-    found = json.loads((RESULTS / "fossen_2003" / f"{name}.json").read_text())["claims"]
-    told = {claim["claim"]: in_words(claim) for claim in found}
+    verdicts = json.loads((RESULTS / "fossen_2003" / f"{name}.json").read_text())["claims"]
+    told = {claim["claim"]: in_words(claim) for claim in verdicts}
     assert set(told) == {"claims": {"G1", "G2", "G3", "G4"}, "sensitivities": {"F8"}}[name]
     assert told.items() <= VERDICTS.items()
 

@@ -309,9 +309,9 @@ def test_trials_that_have_not_ended_keep_others_away(optuna):
 
 def test_trials_read_back_with_infinite_numbers(tmp_path):
     (tmp_path / trials.FOLDER).mkdir()
-    found = [
+    written = [
         Trial(0, 0, {"a": 0.1 + 0.2, "b": "word", "n": 3}, 4, FINISHED, math.inf, (), 1.0, 1.0)
     ]
-    trials.write(tmp_path, "pid-0", found)
-    assert trials.read(tmp_path, "pid-0") == found
+    trials.write(tmp_path, "pid-0", written)
+    assert trials.read(tmp_path, "pid-0") == written
     assert trials.read(tmp_path, "pid-1") == []

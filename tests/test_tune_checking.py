@@ -84,10 +84,10 @@ def test_a_gain_that_is_a_time_has_to_fit_the_steps():
     ],
 )  # fmt: skip
 def test_a_mistake_is_told_once_at_its_place(change, told):
-    found = faults(TUNED, change)
-    assert len(found) == 1 or change.startswith("tune.space.hold_below"), found
-    assert told in found[0]
-    assert found[0].startswith(f"--set {change}") or found[0].startswith("a.yaml:")
+    sentences = faults(TUNED, change)
+    assert len(sentences) == 1 or change.startswith("tune.space.hold_below"), sentences
+    assert told in sentences[0]
+    assert sentences[0].startswith(f"--set {change}") or sentences[0].startswith("a.yaml:")
 
 
 def test_a_sound_search_has_no_faults_and_reads_back():
@@ -110,30 +110,30 @@ class Bounded(Component):
 
 
 def test_around_covers_every_gain_and_stays_in_its_range():
-    found = {gain.key: gain for gain in plan().gains["pid"]}
-    assert {"K_Pu", "K_Ir", "T_d", "k_ze", "standoff"} <= set(found)
-    assert not {"difference_step", "hold_below", "kind", "reference"} & set(found)
-    assert (found["K_Pu"].low, found["K_Pu"].high) == (110.0, 11000.0)
-    assert all(gain.log and gain.low < gain.own < gain.high for gain in found.values())
+    by_key = {gain.key: gain for gain in plan().gains["pid"]}
+    assert {"K_Pu", "K_Ir", "T_d", "k_ze", "standoff"} <= set(by_key)
+    assert not {"difference_step", "hold_below", "kind", "reference"} & set(by_key)
+    assert (by_key["K_Pu"].low, by_key["K_Pu"].high) == (110.0, 11000.0)
+    assert all(gain.log and gain.low < gain.own < gain.high for gain in by_key.values())
     field = Bounded.model_fields["gain"]
     cut = [(gain.low, gain.high) for gain in (_around(f, "gain", 1.0, field) for f in (10.0, 1.5))]
     assert cut == [(0.5, 4.0), (1.0 / 1.5, 1.5)]
 
 
 def test_a_key_may_be_kept_or_be_of_one_law():
-    found = plan("tune.space.standoff.keep=true", "tune.space.pid.k_ze.log=[0.01, 1]").gains
-    assert "standoff" not in {gain.key for gain in found["pid"]}
-    (ours,) = [gain for gain in found["pid"] if gain.key == "k_ze"]
-    (theirs,) = [gain for gain in found["li"] if gain.key == "k_ze"]
+    by_law = plan("tune.space.standoff.keep=true", "tune.space.pid.k_ze.log=[0.01, 1]").gains
+    assert "standoff" not in {gain.key for gain in by_law["pid"]}
+    (ours,) = [gain for gain in by_law["pid"] if gain.key == "k_ze"]
+    (theirs,) = [gain for gain in by_law["li"] if gain.key == "k_ze"]
     assert (ours.low, ours.high) == (0.01, 1.0)
     assert (theirs.low, theirs.high) == (pytest.approx(0.01), pytest.approx(1.0))
 
 
 def test_without_around_only_named_keys_are_searched(tmp_path):
     text = TUNED.replace("{around: 10.0}", "{K_Pu: {log: [100, 1000]}}")
-    found = TunePlan(load_text(text, "a.yaml", (), [tune_faults]).scenario).gains
-    assert [gain.key for gain in found["pid"]] == ["K_Pu"]
-    assert found["li"] == ()
+    by_law = TunePlan(load_text(text, "a.yaml", (), [tune_faults]).scenario).gains
+    assert [gain.key for gain in by_law["pid"]] == ["K_Pu"]
+    assert by_law["li"] == ()
 
 
 def test_a_law_without_numbers_has_no_gains(tmp_path):
@@ -209,8 +209,8 @@ def test_what_nobody_knows_is_the_worst():
     ],
 )
 def test_an_inequality_says_by_how_much_it_does_not_hold(text, over):
-    found = parse_inequality(text, METRICS)
-    assert excess(found, RUNS, METRICS) == pytest.approx(over)
+    inequality = parse_inequality(text, METRICS)
+    assert excess(inequality, RUNS, METRICS) == pytest.approx(over)
 
 
 def test_training_validation_and_sweep_share_no_word():

@@ -101,8 +101,8 @@ def test_machine_code_and_plain_python_agree_to_the_last_bit(part):
     for hold_every in (0, 5) if "controller" in PARTS[part] else (0,):
         compiled, plain = both(loop, hold_every)
         assert compiled.status == "finished"
-        found = compare(compiled, plain)
-        assert found.same, found.first
+        difference = compare(compiled, plain)
+        assert difference.same, difference.first
         assert compiled.seen.tobytes() == plain.seen.tobytes()
 
 
@@ -175,9 +175,9 @@ def test_a_c_library_that_rounds_otherwise_changes_no_number_of_a_run(name, word
     for folder, settings in (("here", {}), ("there", WITHOUT_FMA)):
         python("-c", ELSEWHERE, config, str(tmp_path / folder), "-", *words, **settings)
     here, there = tmp_path / "here", tmp_path / "there"
-    found = compare(read_log(here / "log.h5"), read_log(there / "log.h5"))
-    assert {deviation.signal for deviation in found.largest} <= {"V_dot"}
-    assert not found.endings
+    difference = compare(read_log(here / "log.h5"), read_log(there / "log.h5"))
+    assert {deviation.signal for deviation in difference.largest} <= {"V_dot"}
+    assert not difference.endings
     assert repeatable(here)["metrics"] == repeatable(there)["metrics"]
 
 

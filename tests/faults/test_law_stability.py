@@ -72,11 +72,11 @@ def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0) 
     """Of (x, memory) in the frame of the target: its position, its course, its turn [rad/s]."""
     x, memory, out = s[:6], s[6:], np.zeros(6)
     target = np.array([0.0, 0.0, SPEED, 0.0, 0.0, SPEED * turn])
-    found = ask(law, x, memory, target, told)
-    tau = np.array([found.tau[0], 0.0, found.tau[1]])
+    answer = ask(law, x, memory, target, told)
+    tau = np.array([answer.tau[0], 0.0, answer.tau[1]])
     plant(x, tau, LOAD, bundle(vessel.constants()), out)
     out[:3] -= SPEED - turn * x[1], turn * x[0], turn
-    all_rates = np.concatenate([out, found.rate])
+    all_rates = np.concatenate([out, answer.rate])
     all_rates[places(law, "psi_f")] -= turn  # a heading
     return all_rates
 
@@ -134,9 +134,9 @@ def test_on_the_circle_to_starboard_its_own_model_does_not_help_a_hull_of_lighte
 def test_hulls_of_heavier_sway_hardly_grow_on_the_circle():
     random = np.random.default_rng(5)
     vessels = [drawn(random) for _ in range(count(100, 2500))]
-    found = [growth(VelocityVector(), v, NONLINEAR, TURN) for v in vessels if v.m11 < v.m22]
-    assert max(found) < 0.05
-    assert np.mean(np.array(found) > 0.0) < 0.02
+    growths = [growth(VelocityVector(), v, NONLINEAR, TURN) for v in vessels if v.m11 < v.m22]
+    assert max(growths) < 0.05
+    assert np.mean(np.array(growths) > 0.0) < 0.02
 
 
 def test_momentum_vector_told_its_own_hull_is_stable_on_lines_and_circles():
@@ -180,8 +180,8 @@ def test_adrc_is_not_stable_on_all_of_them():
 )  # fmt: skip
 def test_the_eigenvalues_are_those_of_the_table(law, vessel, told, line, starboard, port):
     """theory.md: on the line and on the paper's circle to either side."""
-    found = [growth(law, vessel, told, turn) for turn in (0.0, TURN, -TURN)]
-    assert found == pytest.approx([line, starboard, port], abs=6e-4)
+    growths = [growth(law, vessel, told, turn) for turn in (0.0, TURN, -TURN)]
+    assert growths == pytest.approx([line, starboard, port], abs=6e-4)
 
 
 @pytest.mark.parametrize(
