@@ -26,7 +26,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.counting import statistics
 from podusv_cli.studies.making.check import sweep_faults
-from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.plan import StudyPlan
 from podusv_cli.studies.making.unit import Unit, UnitResult, make, prepare
 from podusv_cli.studies.tuning import searches
 from podusv_cli.studies.tuning.check import tune_faults
@@ -64,7 +64,7 @@ def simulated(plan: TunePlan, sets: Mapping[str, list[Numbers]]) -> dict[str, li
     return {law: [plan.runs([met[key]]) for key in each] for law, each in keys.items()}
 
 
-def all_made(study: Plan, names: Sequence[str]) -> list[UnitResult]:
+def all_made(study: StudyPlan, names: Sequence[str]) -> list[UnitResult]:
     """All draws of every law by name, in as many processes as there are cores."""
     units = [Unit(name, 0, 0, study.sweep.draws) for name in names]
     outcomes = run_all([partial(make, study, unit) for unit in units])

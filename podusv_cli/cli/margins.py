@@ -15,7 +15,7 @@ from podusv_cli.cli.terminal import Warnings, echo, echo_entry, echo_json, echo_
 
 if TYPE_CHECKING:
     from podusv_cli.theory.loop_margins import LoopMargins
-    from podusv_cli.workflows.margins import Found
+    from podusv_cli.workflows.margins import MarginsOfLaws
 
 SOME_FAILED = 3
 STILL = 1e-12  # m/s, rad/s; what is slower is rounding
@@ -75,7 +75,7 @@ def margins(
     raise typer.Exit(SOME_FAILED if result.failed else 0)
 
 
-def _report(result: Found) -> None:
+def _report(result: MarginsOfLaws) -> None:
     for label, law in result.laws.items():
         echo_entry(label, _motion(law), *_remarks(law), f"poles [1/s]: {_poles(law)}")
     echo_table(HEAD, [row for label, law in result.laws.items() for row in _rows(label, law)])

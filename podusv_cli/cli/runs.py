@@ -12,7 +12,7 @@ from podusv_cli.cli import completion, options
 from podusv_cli.cli.terminal import echo, echo_json, echo_table
 
 if TYPE_CHECKING:
-    from podusv_cli.workflows.runs import Found
+    from podusv_cli.workflows.runs import ListedRun
 
 USUAL = "iae"
 
@@ -53,7 +53,7 @@ def runs(
         echo(f"no run or study below {folder}")
 
 
-def _row(run: Found, metric: str) -> list[str]:
+def _row(run: ListedRun, metric: str) -> list[str]:
     from podusv_cli.core.quantities import time_in_words
 
     law = run.laws[0] if len(run.laws) == 1 else f"{len(run.laws)} laws"

@@ -15,7 +15,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
 from podusv_cli.studies.making.draws import drawn, draws
-from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.plan import StudyPlan
 from podusv_cli.studies.telling.keep import Kept, KeptRun, found, unmade
 from podusv_cli.studies.telling.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
@@ -23,7 +23,7 @@ from podusv_cli.workflows.many_runs import Request
 from podusv_cli.workflows.run import DRAWN
 
 
-def scenario_of_draw(plan: Plan, law: str, cell: int, draw: int) -> Scenario:
+def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenario:
     """The scenario of one run of a study, under a name of its own."""
     (numbers,) = draws(plan.sweep, draw, 1)
     single = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
@@ -40,7 +40,7 @@ def seen_from(place: Path, study: Path, scenario: Scenario) -> Scenario:
 
 
 def keep(
-    folder: Path, plan: Plan, results: Results, extras: Extras, request: Request
+    folder: Path, plan: StudyPlan, results: Results, extras: Extras, request: Request
 ) -> list[Kept]:
     """Make those kept runs that are not there yet; all of them, compared with the table.
 
@@ -60,7 +60,7 @@ def keep(
     return found(folder, results, extras)
 
 
-def _task(folder: Path, plan: Plan, run: KeptRun, request: Request) -> Task:
+def _task(folder: Path, plan: StudyPlan, run: KeptRun, request: Request) -> Task:
     scenario = scenario_of_draw(plan, run.law, run.cell, run.draw)
     return Task(
         scenario, resolved_yaml(scenario), folder / LOGS / run.name,

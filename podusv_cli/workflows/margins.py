@@ -22,7 +22,7 @@ from podusv_cli.workflows.run import Request, opened, single
 
 
 @dataclass(frozen=True)
-class Found:
+class MarginsOfLaws:
     """Margins of each law by its label, and why there are none for the others."""
 
     laws: Mapping[str, LoopMargins]
@@ -50,7 +50,7 @@ def _as_json(law: LoopMargins) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def margins(config: Path, request: Request, at: float | None = None) -> Found:
+def margins(config: Path, request: Request, at: float | None = None) -> MarginsOfLaws:
     """The margins of all laws of a scenario, or of `request.controller`, written to `request.out`.
 
     Nothing is written without a place. `at` [s] is when the steady motion begins. Raises
@@ -67,7 +67,7 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
     if at is not None and at > duration:
         raise UsageError(f"--at {at:g}: the run ends at {duration:g} s; give an earlier time")
     plans = {label: loaded.plan(single(loaded, label))} if label else loaded.plans
-    find = partial(_found, plans, at, compiled=loaded.scenario.simulation.compiled)
+    find = partial(_of_laws, plans, at, compiled=loaded.scenario.simulation.compiled)
     if request.out is None:
         return find()
     _check_formats(request.formats)
@@ -81,7 +81,7 @@ def margins(config: Path, request: Request, at: float | None = None) -> Found:
             return replace(result, folder=writer.finish("finished"))
 
 
-def _found(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> Found:
+def _of_laws(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> MarginsOfLaws:
     laws: dict[str, LoopMargins] = {}
     failed: dict[str, LawError | NotConvergedError] = {}
     for label, plan in plans.items():
@@ -91,7 +91,7 @@ def _found(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> Fo
             failed[label] = error
     if not laws:
         raise next(iter(failed.values()))
-    return Found(laws, {label: str(error) for label, error in failed.items()})
+    return MarginsOfLaws(laws, {label: str(error) for label, error in failed.items()})
 
 
 def _check_formats(formats: Sequence[str]) -> None:
@@ -100,7 +100,7 @@ def _check_formats(formats: Sequence[str]) -> None:
     check_names((), formats)
 
 
-def _write(writer: RunWriter, result: Found, formats: Sequence[str]) -> None:
+def _write(writer: RunWriter, result: MarginsOfLaws, formats: Sequence[str]) -> None:
     """Margins as JSON and CSV, the curves, and the figure in each format."""
     from podusv_cli.figures.margins import sensitivities  # matplotlib is slow to import
     from podusv_cli.figures.style import house_style, image

@@ -58,7 +58,7 @@ KINDS = {
 
 
 @dataclass(frozen=True)
-class Found:
+class ListedRun:
     """A run, study, search or bench as its files tell of it."""
 
     folder: Path
@@ -80,7 +80,7 @@ class Found:
         }  # fmt: skip
 
 
-def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[Found]:
+def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRun]:
     """What is below a folder: the latest first, or by a metric, the smallest first.
 
     `where` are `key=value` of scenarios, all of which have to hold. Raises UsageError for a folder
@@ -104,7 +104,7 @@ def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[Found]:
     return sorted(measured, key=lambda run: run.metrics.get(sort, math.inf))
 
 
-def _below(root: Path) -> Iterator[Found]:
+def _below(root: Path) -> Iterator[ListedRun]:
     """Folders of results; links and hidden folders are not followed."""
     for place, inside, names in os.walk(root):
         inside[:] = sorted(name for name in inside if not name.startswith("."))
@@ -114,7 +114,7 @@ def _below(root: Path) -> Iterator[Found]:
             yield _read(Path(place), mark)
 
 
-def _read(folder: Path, mark: str) -> Found:
+def _read(folder: Path, mark: str) -> ListedRun:
     kind, scenario, model = KINDS[mark]
     try:
         about = json_files.read_as(folder / mark, model) if model else _Told()
@@ -124,11 +124,11 @@ def _read(folder: Path, mark: str) -> Found:
         )
         text = files.read_text(folder / scenario) if scenario else ""
     except StorageError:
-        return Found(folder, kind, status=DAMAGED)
+        return ListedRun(folder, kind, status=DAMAGED)
     sessions = [*origin.sittings, origin]
     named = NAME.search(text)
     metrics = about.metrics if isinstance(about, _OfRun) else {}
-    return Found(
+    return ListedRun(
         folder, kind, about.name or (named[1] if named else folder.name),
         [*about.laws] or [*filter(None, [about.controller])], ending.status, sessions[0].started,
         sum(session.duration_s for session in sessions),
@@ -140,7 +140,7 @@ def _if_there(path: Path, model: type[json_files.Model]) -> json_files.Model:
     return json_files.read_as(path, model) if path.exists() else model()
 
 
-def _holding(every: Sequence[Found], condition: str) -> list[Found]:
+def _holding(every: Sequence[ListedRun], condition: str) -> list[ListedRun]:
     """Those whose scenario has this value. Raises UsageError where none has the key."""
     key, equals, text = condition.partition("=")
     wanted = read(text, condition, [], placed=False) if equals and text else None
@@ -157,7 +157,7 @@ def _holding(every: Sequence[Found], condition: str) -> list[Found]:
     ]
 
 
-def _tree(run: Found) -> Node | None:
+def _tree(run: ListedRun) -> Node | None:
     """Its scenario; None where there is none, or none that can be read."""
     with suppress(StorageError):
         if run.scenario:

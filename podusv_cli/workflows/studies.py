@@ -19,7 +19,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making import before, record
-from podusv_cli.studies.making.plan import KERNELS, Plan, differing, disagreements, plan
+from podusv_cli.studies.making.plan import KERNELS, StudyPlan, differing, disagreements, plan
 from podusv_cli.studies.making.store import RUNS, SCENARIO, Store
 from podusv_cli.studies.telling import outputs
 from podusv_cli.workflows.keep import scenario_of_draw, seen_from
@@ -79,7 +79,7 @@ def _of_before(study: Path) -> Scenario:
         ) from error
 
 
-def planned(study: Path, *, trusted: bool) -> Plan:
+def planned(study: Path, *, trusted: bool) -> StudyPlan:
     """The plan of a study's folder, whose plug-in files are executed if they are `trusted`.
 
     Runs of other kernels than those of this podusv are no fault. Raises UsageError where the folder

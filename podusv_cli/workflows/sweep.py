@@ -24,7 +24,7 @@ from podusv_cli.studies.making.dispatch import Executor, Gaps, Tally, Tell, disp
 from podusv_cli.studies.making.estimate import check_fits
 from podusv_cli.studies.making.invalid import check_draws
 from podusv_cli.studies.making.joining import mixture
-from podusv_cli.studies.making.plan import Plan, plan
+from podusv_cli.studies.making.plan import StudyPlan, plan
 from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.store import Store
 from podusv_cli.studies.telling import outputs
@@ -98,7 +98,7 @@ def run(config: Config, request: Request, tell: Tell) -> Swept:
         return _run(store, made, request, started, tell)
 
 
-def _run(store: Store, made: Plan, request: Request, started: datetime, tell: Tell) -> Swept:
+def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tell: Tell) -> Swept:
     """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
     with executor_for(request, store.folder, made.scenario, store.seal) as executor:
         tally, whole = _marched(store, made, request, started, executor, tell)
@@ -114,8 +114,9 @@ def _run(store: Store, made: Plan, request: Request, started: datetime, tell: Te
 
 
 def _marched(
-    store: Store, made: Plan, request: Request, started: datetime, executor: Executor, tell: Tell
-) -> tuple[Tally, bool]:
+    store: Store, made: StudyPlan, request: Request, started: datetime, executor: Executor,
+    tell: Tell,
+) -> tuple[Tally, bool]:  # fmt: skip
     """Simulate what is missing, and note the session; how far it is, and if it is whole."""
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
     seen = Tally(0)
@@ -141,7 +142,7 @@ def _marched(
 
 
 def _announce(
-    folder: Path, made: Plan, request: Request, missing: Gaps, alone: Mapping[str, str]
+    folder: Path, made: StudyPlan, request: Request, missing: Gaps, alone: Mapping[str, str]
 ) -> None:
     """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one."""
     if missing and (mixed := mixture(folder)):
@@ -158,7 +159,7 @@ def _is_whole(store: Store) -> bool:
     return tally.made == tally.wanted
 
 
-def _planned(config: Config, request: Request) -> tuple[Plan, Path, dict[str, str]]:
+def _planned(config: Config, request: Request) -> tuple[StudyPlan, Path, dict[str, str]]:
     """A new study, or one that is to be continued: plan, folder, scenario and plug-ins."""
     if there := folder_of(config):
         check_study(there)
@@ -174,7 +175,7 @@ def default_folder(scenario: Scenario) -> Path:
     return RESULTS / f"{scenario.name}-sweep"
 
 
-def answered(store: Store, runs: Table, request: Request, made: Plan | None = None) -> Swept:
+def answered(store: Store, runs: Table, request: Request, made: StudyPlan | None = None) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
     With the plan of the study, the logs that it is to keep are made, too.

@@ -17,7 +17,7 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Job, Outcome, available_workers, run_each
 from podusv_cli.studies.counting.runs import STATUSES, Mask, Unit, UnitResult
 from podusv_cli.studies.counting.runs_file import stretches
-from podusv_cli.studies.making.plan import LawInCell, Plan
+from podusv_cli.studies.making.plan import LawInCell, StudyPlan
 from podusv_cli.studies.making.store import Store
 from podusv_cli.studies.making.unit import crashed, make, prepare
 
@@ -71,7 +71,7 @@ class Tally:
 Tell = Callable[[Tally], None]
 Gaps = dict[LawInCell, int]  # how many runs, by law and cell
 # Numbered, with the study that each is of; after the last, there may be more.
-Units = Iterator[tuple[int, Plan, Unit]]
+Units = Iterator[tuple[int, StudyPlan, Unit]]
 Done = Callable[[int, Outcome], None]
 
 
@@ -109,7 +109,7 @@ class Processes:
         """As asked for, or one a core."""
         return self.count or available_workers()
 
-    def _job(self, numbered: tuple[int, Plan, Unit]) -> tuple[int, Job]:
+    def _job(self, numbered: tuple[int, StudyPlan, Unit]) -> tuple[int, Job]:
         number, plan, unit = numbered
         return number, partial(timed, plan, unit)
 
@@ -121,7 +121,9 @@ class Processes:
 class Driver:
     """Hands out units, keeps what comes back, and finds the run that ends its process."""
 
-    def __init__(self, store: Store, plan: Plan, tell: Tell, until: float, part: Shard) -> None:
+    def __init__(
+        self, store: Store, plan: StudyPlan, tell: Tell, until: float, part: Shard
+    ) -> None:
         """Units of this part are handed out until the monotonic time `until` [s]."""
         self.store, self.plan, self._tell, self._until = store, plan, tell, until
         there, inside = store.covered(), np.zeros(self.plan.sweep.draws, bool)
@@ -137,7 +139,7 @@ class Driver:
         """The units; more may come while some are under way."""
         return self
 
-    def __next__(self) -> tuple[int, Plan, Unit]:
+    def __next__(self) -> tuple[int, StudyPlan, Unit]:
         """The next unit, with its number."""
         unit = self._next()
         if unit is None:
@@ -193,7 +195,9 @@ class Driver:
         self._tell(self.tally)
 
 
-def timed(plan: Plan, unit: Unit, progress: Callable[[float], None]) -> tuple[UnitResult, float]:
+def timed(
+    plan: StudyPlan, unit: Unit, progress: Callable[[float], None]
+) -> tuple[UnitResult, float]:
     """A unit, and the processor time that it took [s]."""
     began = time.process_time()
     result = make(plan, unit)
@@ -206,7 +210,7 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def dispatch(
-    store: Store, plan: Plan, tell: Tell, executor: Executor, *, seconds: float = math.inf,
+    store: Store, plan: StudyPlan, tell: Tell, executor: Executor, *, seconds: float = math.inf,
     part: Shard = (1, 1),
     begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
 ) -> tuple[Tally, bool]:  # fmt: skip

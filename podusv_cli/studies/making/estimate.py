@@ -10,12 +10,12 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.storage.run_folder import check_free_space
 from podusv_cli.studies.making import runs_writer
-from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.plan import StudyPlan
 
 HELD_BYTES = 32  # of a run in memory while tables are made: four numbers
 
 
-def check_fits(plan: Plan, folder: Path, parts: int = 1) -> None:
+def check_fits(plan: StudyPlan, folder: Path, parts: int = 1) -> None:
     """Raise StorageError where the runs of one of so many parts surely do not fit.
 
     They need their table on the disk, and a few numbers a run in memory.

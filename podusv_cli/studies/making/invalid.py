@@ -11,7 +11,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.making.check import singles
 from podusv_cli.studies.making.draws import drawn, draws
-from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.plan import StudyPlan
 
 MOST_TRIED = 2000  # runs, about a second
 
@@ -34,7 +34,7 @@ class Invalid:
         return f"invalid runs: {self.count:,} of {self.tried:,} tried ({share:.2%}){more}{first}"
 
 
-def check_draws(made: Plan) -> Invalid:
+def check_draws(made: StudyPlan) -> Invalid:
     """The first draws of a study, each in as many laws and cells as there is time for."""
     runs = [single for cell in made.cells for single in singles(cell.scenario).values()]
     return invalid_runs(runs, made.sweep)

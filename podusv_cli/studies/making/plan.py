@@ -45,7 +45,7 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class Plan:
+class StudyPlan:
     """A scenario with its key `sweep`, in cells."""
 
     scenario: Scenario
@@ -101,7 +101,7 @@ class Plan:
                 facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
         return facts
 
-    def varied(self, variant: Variant) -> Plan:
+    def varied(self, variant: Variant) -> StudyPlan:
         """The variant of this study, which has no grid. Raises ValidationError."""
         own = self.scenario.singles()
         laws = {name: changed(own[law].controller, dict(new)) for name, law, new in variant.laws}
@@ -112,7 +112,7 @@ class Plan:
                 "tune": None, "sweep": self.sweep.model_copy(update=plain),
             }
         )  # fmt: skip
-        return Plan(scenario, (Cell(0, (), scenario),), variant)
+        return StudyPlan(scenario, (Cell(0, (), scenario),), variant)
 
 
 def changed(law: Controller, new: Mapping[str, Any]) -> Controller:
@@ -120,9 +120,9 @@ def changed(law: Controller, new: Mapping[str, Any]) -> Controller:
     return law.changed(new)
 
 
-def plan(loaded: Loaded) -> Plan:
+def plan(loaded: Loaded) -> StudyPlan:
     """The plan of a scenario with a key `sweep`. Raises ScenarioError with all that is wrong."""
-    return Plan(loaded.scenario, cells(loaded, sweep_faults))
+    return StudyPlan(loaded.scenario, cells(loaded, sweep_faults))
 
 
 def kernels(scenario: Scenario) -> str:

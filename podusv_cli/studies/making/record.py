@@ -17,13 +17,13 @@ from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making.draws import SWEEP
-from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.plan import StudyPlan
 from podusv_cli.studies.making.words import in_words
 
 FORMAT = 2
 
 
-def about(plan: Plan) -> StudyAbout:
+def about(plan: StudyPlan) -> StudyAbout:
     """What a plan's study says about itself."""
     known = {n: m.about for n, m in plan.scenario.known_metrics().items() if m.accumulator}
     cells = tuple(cell.label for cell in plan.cells)

@@ -20,7 +20,7 @@ from podusv_cli.scenario.load import load_text
 from podusv_cli.storage.provenance import processor
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making.dispatch import timed
-from podusv_cli.studies.making.plan import Plan, Variant, digest, plan
+from podusv_cli.studies.making.plan import StudyPlan, Variant, digest, plan
 
 PLANS = 2  # plans that a worker keeps
 PACKAGES = ("numpy", "numba", "llvmlite")
@@ -37,7 +37,7 @@ class StudyText:
 
 
 @lru_cache(PLANS)
-def _placed(recipe: StudyText) -> tuple[Plan, TemporaryDirectory[str]]:
+def _placed(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
     """The plan, and the folder that its plug-ins were read from; gone when it is forgotten."""
     folder = TemporaryDirectory(prefix="podusv-")
     for name, text in recipe.plugins:
@@ -47,12 +47,12 @@ def _placed(recipe: StudyText) -> tuple[Plan, TemporaryDirectory[str]]:
     return plan(load_text(recipe.text, str(Path(folder.name, "scenario.yaml")))), folder
 
 
-def _plan(recipe: StudyText) -> Plan:
+def _plan(recipe: StudyText) -> StudyPlan:
     return _placed(recipe)[0]
 
 
 @lru_cache(PLANS)
-def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> Plan:
+def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> StudyPlan:
     return _plan(recipe).varied(Variant(*variant))
 
 

@@ -13,11 +13,11 @@ from podusv_cli.engine.running.simulate import ready
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
 from podusv_cli.studies.making.draws import drawn, draws
-from podusv_cli.studies.making.plan import Plan
+from podusv_cli.studies.making.plan import StudyPlan
 
 
 def prepare(
-    plan: Plan, law: str, cell: int, runs: int = 0,
+    plan: StudyPlan, law: str, cell: int, runs: int = 0,
     compiling: Callable[[float], None] | None = None,
 ) -> str:  # fmt: skip
     """Check a law, and have its march compiled and loaded; why its runs march one by one.
@@ -35,7 +35,7 @@ def prepare(
 
 
 def make(
-    plan: Plan, unit: Unit, progress: Callable[[float], None] | None = None,
+    plan: StudyPlan, unit: Unit, progress: Callable[[float], None] | None = None,
     grid: TimeGrid | None = None,
 ) -> UnitResult:  # fmt: skip
     """Simulate a unit, run after run, over the scenario's instants or those of another grid.

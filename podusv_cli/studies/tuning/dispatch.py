@@ -11,13 +11,13 @@ from collections.abc import Callable, Sequence
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.process.workers import Outcome
 from podusv_cli.studies.counting.runs import Unit, UnitResult
-from podusv_cli.studies.making import plan as study
 from podusv_cli.studies.making.dispatch import Executor, Tally
+from podusv_cli.studies.making.plan import StudyPlan
 from podusv_cli.studies.making.unit import crashed
 from podusv_cli.studies.tuning.search import Search
 
 Tell = Callable[[Tally, Sequence[Search]], None]
-TrialUnit = tuple[int, study.Plan, Unit]  # a trial's place in its batch, and what to simulate
+TrialUnit = tuple[int, StudyPlan, Unit]  # a trial's place in its batch, and what to simulate
 
 
 class Driver:
@@ -40,7 +40,7 @@ class Driver:
         """The units; more may come while some are under way."""
         return self
 
-    def __next__(self) -> tuple[int, study.Plan, Unit]:
+    def __next__(self) -> tuple[int, StudyPlan, Unit]:
         """The next unit, with its number and its study."""
         if self.failure or not self._waiting:
             raise StopIteration

@@ -14,9 +14,9 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.studies.counting.expressions import parse_success, succeeded
 from podusv_cli.studies.counting.runs import STATUSES, UnitResult
-from podusv_cli.studies.making import plan as study
 from podusv_cli.studies.making.cells import Cell
 from podusv_cli.studies.making.check import singles
+from podusv_cli.studies.making.plan import StudyPlan, Variant
 from podusv_cli.studies.tuning.objective import (
     Inequality,
     Outcomes,
@@ -125,19 +125,19 @@ class TunePlan:
         )
 
     @cached_property
-    def base(self) -> study.Plan:
+    def base(self) -> StudyPlan:
         """The scenario's own study, which all others are variants of."""
-        return study.Plan(self.scenario, (Cell(0, (), self.scenario),))
+        return StudyPlan(self.scenario, (Cell(0, (), self.scenario),))
 
     def stream(self, search: int) -> str:
         """The stream of the draws that a search is trained on."""
         training_set = search % self.tune.training_sets
         return f"{TRAIN} {training_set}" if training_set else TRAIN
 
-    def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> study.Plan:
+    def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> StudyPlan:
         """The study of laws by their new names, on draws of a stream."""
         renamed = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
-        return self.base.varied(study.Variant(stream, draws, renamed))
+        return self.base.varied(Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
         """The runs of some units, in their order; failed is what the study calls no success."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
-from podusv_cli.studies.making import plan as study
+from podusv_cli.studies.making.plan import StudyPlan
 from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.objective import Outcomes, evaluate, excess
 from podusv_cli.studies.tuning.plan import TunePlan
@@ -36,7 +36,7 @@ class Attempt:
 
     gains: dict[str, object]
     draws: int
-    plan: study.Plan | None
+    plan: StudyPlan | None
     results: list[UnitResult]
 
     @property
@@ -75,7 +75,7 @@ class Search:
         """After how many draws a trial is judged."""
         return max(1, self.plan.tune.train // FIRST)
 
-    def begin(self) -> list[tuple[int, study.Plan, Unit]]:
+    def begin(self) -> list[tuple[int, StudyPlan, Unit]]:
         """The first units of the next batch that has to be simulated; none when the budget is used.
 
         Batches that an earlier session has finished are told to the sampler.
@@ -89,7 +89,7 @@ class Search:
                 return units
         return []
 
-    def _first_units(self) -> list[tuple[int, study.Plan, Unit]]:
+    def _first_units(self) -> list[tuple[int, StudyPlan, Unit]]:
         """The first units of a batch; none where the law refuses all gains, and the batch ends."""
         draws = self._attempts[0].draws
         units = self._units(min(self.first, draws)) or self._units(draws)
@@ -130,7 +130,7 @@ class Search:
             )
         return kept
 
-    def _units(self, until: int) -> list[tuple[int, study.Plan, Unit]]:
+    def _units(self, until: int) -> list[tuple[int, StudyPlan, Unit]]:
         """The units that take every attempt to so many draws; those refused fail at once."""
         units = []
         for place, attempt in enumerate(self._attempts):
@@ -149,13 +149,13 @@ class Search:
         status = np.full(unit.count, STATUSES.index("invalid"), np.uint8)
         return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
 
-    def done(self, place: int, result: UnitResult) -> list[tuple[int, study.Plan, Unit]]:
+    def done(self, place: int, result: UnitResult) -> list[tuple[int, StudyPlan, Unit]]:
         """Take in a unit; the units that follow once all of its step are there."""
         self._attempts[place].results.append(result)
         self._waiting -= 1
         return [] if self._waiting else self._next()
 
-    def _next(self) -> list[tuple[int, study.Plan, Unit]]:
+    def _next(self) -> list[tuple[int, StudyPlan, Unit]]:
         more = self._units(self._attempts[0].draws)
         if more:
             return more
