@@ -125,9 +125,8 @@ TABLE: dict[str, list[Row]] = {
      "test_holm_by_hand"),
 ],
 "tuning": [
-    ("return best([replace(trial, number=place) for place, trial in enumerate(winners)])",
-     "return best([replace(winners[0], number=0)])",
-     "test_the_best_trial_holds_inequalities_first_and_is_finished"),
+    ("return best(winners).number", "return winners[0].number",
+     "test_the_gains_that_are_taken_gained_most_beside_the_scenarios_own_on_the_same_draws"),
     ("constant_liar=True", "constant_liar=False",
      "test_trials_that_have_not_ended_keep_others_away"),
     ('    high = min(high, ends.get("le", high), ends.get("lt", high))\n', "",
