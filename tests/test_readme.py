@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from command_samples import ROOT, Command, commanded
 
-from podusv_cli.engine.running import watch as march
+from podusv_cli.engine.running import thread as march
 from podusv_cli.storage.run_folder import open_run
 
 PAGES = ("README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md")

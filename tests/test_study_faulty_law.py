@@ -6,7 +6,7 @@ from html_tree import tree
 from plugin_samples import LAW
 from small_study import TEXT
 
-from podusv_cli.engine.running import watch as march
+from podusv_cli.engine.running import thread as march
 from podusv_cli.studies.counting.runs import STATUSES
 from podusv_cli.studies.making.sessions import sessions
 from podusv_cli.workflows import sweep

@@ -16,7 +16,7 @@ from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running import watch as march
+from podusv_cli.engine.running import thread as march
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.step.grid import TimeGrid
