@@ -14,7 +14,7 @@ from plugin_samples import LAW
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.load import load_text
-from podusv_cli.studies.bench.cases import AXES, Case, Selection, cases, shipped_bench
+from podusv_cli.studies.bench.cases import AXES, BenchCase, Selection, cases, shipped_bench
 from podusv_cli.studies.bench.optima import Least, wanted
 from podusv_cli.studies.bench.page import as_markdown, page
 from podusv_cli.studies.bench.runs import FAILED, BenchRun, play
@@ -194,7 +194,7 @@ def test_a_law_that_fails_is_a_row_and_costs_no_other(bench):
         "wild": load_text(text, "x", wild).scenario.singles()["pid"],
         "good": load_text(text, "x", ["disturbance={kind: none}"]).scenario.singles()["pid"],
     }
-    found = {run.law: run for run in play(Case("ship", "line", "calm", laws))}
+    found = {run.law: run for run in play(BenchCase("ship", "line", "calm", laws))}
     assert {law: run.status for law, run in found.items()} == {
         "far": FAILED, "wild": "diverged", "good": "finished",
     }  # fmt: skip

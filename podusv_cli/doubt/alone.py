@@ -20,7 +20,7 @@ EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
 
 
 @dataclass(frozen=True)
-class Trial:
+class TriedValue:
     """A value of one choice, and what the claims say there."""
 
     value: Any
@@ -56,11 +56,11 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Alone:
+class TriedChoice:
     """All that was tried of one choice."""
 
     choice: Choice
-    trials: tuple[Trial, ...]
+    trials: tuple[TriedValue, ...]
 
     @property
     def possible(self) -> bool:
@@ -84,7 +84,7 @@ class Alone:
         sides = ([t for t in turned if (t.value > self.choice.own) == up] for up in (True, False))
         return [self._nearest(side) for side in sides if side]
 
-    def _nearest(self, turned: Sequence[Trial]) -> Turn:
+    def _nearest(self, turned: Sequence[TriedValue]) -> Turn:
         own = self.choice.own
         first = min(turned, key=lambda t: abs(t.value - own))
         inside = [
@@ -96,10 +96,12 @@ class Alone:
         return Turn(self.choice, first.value, held, abs(first.value - own))
 
 
-def explored(choice: Choice, judge: Judge, base: Judged) -> Alone:
+def explored(choice: Choice, judge: Judge, base: Judged) -> TriedChoice:
     """Try the values of a choice, and find where verdicts turn."""
     if not choice.range:
-        return Alone(choice, tuple(Trial(v, judge(moved(choice, v))) for v in choice.values))
+        return TriedChoice(
+            choice, tuple(TriedValue(v, judge(moved(choice, v))) for v in choice.values)
+        )
     trials = {end: judge(moved(choice, end)) for end in ends(choice)}
     acting = [
         claim for claim in base.answers if any(_acts(j, claim, base) for j in trials.values())
@@ -107,7 +109,7 @@ def explored(choice: Choice, judge: Judge, base: Judged) -> Alone:
     if acting:
         for end in list(trials):
             _searched(choice, end, judge, base, trials)
-    return Alone(choice, tuple(Trial(*trial) for trial in trials.items()))
+    return TriedChoice(choice, tuple(TriedValue(*trial) for trial in trials.items()))
 
 
 def _acts(judged: Judged, claim: str, base: Judged) -> bool:

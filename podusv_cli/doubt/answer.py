@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from podusv_cli.core.phrases import as_yaml
-from podusv_cli.doubt.alone import Alone, Turn
+from podusv_cli.doubt.alone import TriedChoice, Turn
 from podusv_cli.doubt.events import Event
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import Draws, Explained, counted, explained
@@ -31,7 +31,7 @@ WORDS = (
 Spread = tuple[float, float, float]  # 5, 50 and 95 %; NaN where no draw has the number
 
 
-class Compared(NamedTuple):
+class ClaimNumber(NamedTuple):
     """A number of a claim, and where a comparison of it turns.
 
     It is compared with a limit; against another number it is the ratio of the two. `edges` are the
@@ -67,14 +67,14 @@ class Compared(NamedTuple):
         return away / (0.5 * (high - low)) if high > low else math.inf
 
 
-def compared(expect: str, tolerance: float = 0.0) -> list[Compared]:
+def compared(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
     """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
     tree = ast.parse(expect, mode="eval").body
     links = []
     for node in (node for node in ast.walk(tree) if isinstance(node, ast.Compare)):
         sides = pairwise([node.left, *node.comparators])
         links += [_link(*pair, sign, tolerance) for pair, sign in zip(sides, node.ops, strict=True)]
-    return links or [Compared(ast.unparse(tree), "", (0.5,))]
+    return links or [ClaimNumber(ast.unparse(tree), "", (0.5,))]
 
 
 # By how many tolerances the right side may be larger or smaller where a comparison turns.
@@ -83,17 +83,17 @@ SIDES: dict[type[ast.cmpop], tuple[float, ...]] = {
 }  # fmt: skip
 
 
-def _link(left: ast.expr, right: ast.expr, sign: ast.cmpop, tolerance: float) -> Compared:
+def _link(left: ast.expr, right: ast.expr, sign: ast.cmpop, tolerance: float) -> ClaimNumber:
     """The tolerance is that of the right side, as `docs/claims.md` has it."""
     factors = tuple(1.0 + side * tolerance for side in SIDES.get(type(sign), (0.0,)))
     with suppress(ValueError):  # not a plain number
         limit = float(ast.literal_eval(right))
         edges = (limit + (factor - 1.0) * abs(limit) for factor in factors)
-        return Compared(ast.unparse(left), "", tuple(edges))
+        return ClaimNumber(ast.unparse(left), "", tuple(edges))
     with suppress(ValueError):
         limit = float(ast.literal_eval(left))
-        return Compared(ast.unparse(right), "", tuple(limit / factor for factor in factors))
-    return Compared(ast.unparse(left), ast.unparse(right), factors)
+        return ClaimNumber(ast.unparse(right), "", tuple(limit / factor for factor in factors))
+    return ClaimNumber(ast.unparse(left), ast.unparse(right), factors)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Answer:
     acted: int  # of which so many change a number of the claim
     silent: int  # of which so many have a value at which nobody can tell
     numbers: Mapping[str, float]  # of the claim, by their text
-    number: Compared  # which of its numbers is nearest to its limit
+    number: ClaimNumber  # which of its numbers is nearest to its limit
     spread: Spread  # of this number over the draws
     event: Event | None = None  # nearest to a window of the claim, in the scenario itself
 
@@ -165,7 +165,7 @@ class Tried:
     """What was tried: the scenario itself, each choice alone, and all choices at once."""
 
     base: Judged
-    alone: Sequence[Alone]
+    alone: Sequence[TriedChoice]
     draws: Draws
     worlds: Sequence[Judged]
 
@@ -219,7 +219,9 @@ def _answer(verdict: Verdict, tried: Tried) -> Answer:
     )  # fmt: skip
 
 
-def _nearest(verdict: Verdict, base: Judged, worlds: Sequence[Judged]) -> tuple[Compared, Spread]:
+def _nearest(
+    verdict: Verdict, base: Judged, worlds: Sequence[Judged]
+) -> tuple[ClaimNumber, Spread]:
     """The number of a claim that is nearest to its limit, in half-widths of its draws."""
     numbers = compared(verdict.claim.expect, verdict.claim.tolerance)
     spreads = {n: n.spread(verdict.name, worlds) for n in numbers}

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.doubt.alone import Alone, ends
+from podusv_cli.doubt.alone import TriedChoice, ends
 from podusv_cli.doubt.answer import Answer, DoubtReport, place
 from podusv_cli.doubt.together import counted
 from podusv_cli.figures.looks import nth_style
@@ -51,7 +51,7 @@ def sketches(report: DoubtReport) -> Iterator[Sketch]:
             )
 
 
-def specification(report: DoubtReport, answer: Answer, acting: Sequence[Alone]) -> Figure:
+def specification(report: DoubtReport, answer: Answer, acting: Sequence[TriedChoice]) -> Figure:
     """A claim's number over the draws, sorted, with what was drawn below."""
     tried, name = report.tried, answer.verdict.name
     number = answer.number
@@ -99,7 +99,7 @@ def _lanes(
     return list(dict.fromkeys([*first, *sorted(others, key=follows)]))[:LANES]
 
 
-def ranges(answer: Answer, rows: Sequence[Alone]) -> Figure:
+def ranges(answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
     """The range of each choice, from its own value to both ends, and where the verdict turns."""
     turns = {
         (t.choice.name, t.value > t.choice.own): t for t in (*answer.turns, *answer.neighbours)

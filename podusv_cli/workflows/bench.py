@@ -19,7 +19,7 @@ from podusv_cli.process.workers import Outcome, Report, run_all
 from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.studies.bench import optima, page, standing
-from podusv_cli.studies.bench.cases import Case, Selection, cases
+from podusv_cli.studies.bench.cases import BenchCase, Selection, cases
 from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.runs import BenchRun, crashed, play
 
@@ -99,7 +99,7 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
 
 
 def _simulated(
-    every: Sequence[Case], request: Request, progress: Progress | None
+    every: Sequence[BenchCase], request: Request, progress: Progress | None
 ) -> Iterator[BenchRun]:
     def advance(position: int, fraction: float) -> None:
         if progress:
@@ -116,8 +116,8 @@ def _simulated(
 
 
 def _solved(
-    every: Sequence[Case], runs: Sequence[BenchRun], request: Request, progress: Progress | None,
-    extras: Extras,
+    every: Sequence[BenchCase], runs: Sequence[BenchRun], request: Request,
+    progress: Progress | None, extras: Extras,
 ) -> Iterator[Least]:  # fmt: skip
     """The optima of all cases; what has none is added to `extras`."""
     wanted, refused = optima.wanted(every, runs)
@@ -140,7 +140,7 @@ def _solved(
 
 
 def _run_all(
-    every: Sequence[Case], request: Request, advance: Report = lambda position, fraction: None
+    every: Sequence[BenchCase], request: Request, advance: Report = lambda position, fraction: None
 ) -> list[Outcome]:
     """Play cases in processes of their own. Raises KeyboardInterrupt."""
     outcomes = run_all([partial(_play, case) for case in every], advance, request.workers)
@@ -149,7 +149,7 @@ def _run_all(
     return outcomes
 
 
-def _play(case: Case, tell: Callable[[float], None]) -> list[BenchRun]:
+def _play(case: BenchCase, tell: Callable[[float], None]) -> list[BenchRun]:
     runs = play(case)
     tell(1.0)
     return runs

@@ -17,7 +17,7 @@ from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.doubt import outputs
-from podusv_cli.doubt.alone import Alone, explored
+from podusv_cli.doubt.alone import TriedChoice, explored
 from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import HULL, Choice, Singles, choices
@@ -76,7 +76,7 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
 
 
 @dataclass(frozen=True)
-class Compared:
+class Subject:
     """The claims of a scenario that runs decide, the laws in them, and the same on other hulls."""
 
     parsed: Sequence[ParsedClaim]
@@ -84,7 +84,7 @@ class Compared:
     hulls: Mapping[str, Singles]
 
 
-def comparison(loaded: Loaded) -> Compared:
+def comparison(loaded: Loaded) -> Subject:
     """What there is to judge. Raises UsageError without claims, ScenarioError for a bad hull."""
     parsed = [claim for claim in parse_claims(loaded) if not claims.is_timed(claim.claim)]
     if not parsed:
@@ -102,23 +102,23 @@ def comparison(loaded: Loaded) -> Compared:
         node.content: judged(loaded.changed(placed("vessel.preset", node, loaded.root)))
         for node in (hulls.content if hulls else ())
     }
-    return Compared(parsed, judged(loaded.scenario), others)
+    return Subject(parsed, judged(loaded.scenario), others)
 
 
 def doubted(
-    compared: Compared, scenario: Scenario, request: Request, progress: Progress | None
+    subject: Subject, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, Extras]:
     """All that is tried, and what it says of every claim."""
-    cases = {label: Case.of(single) for label, single in compared.singles.items()}
+    cases = {label: Case.of(single) for label, single in subject.singles.items()}
     for case in cases.values():
         examined(case)
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
-        entries = {label: _entry(label, case, compared.parsed) for label, case in cases.items()}
-    judge, asked = judging(compared, entries), scenario.doubt or Doubt()
-    tried = search(compared.singles, judge, asked, request.workers, progress)
-    whole = len(choices(compared.singles, asked)), asked.draws
+        entries = {label: _entry(label, case, subject.parsed) for label, case in cases.items()}
+    judge, asked = judging(subject, entries), scenario.doubt or Doubt()
+    tried = search(subject.singles, judge, asked, request.workers, progress)
+    whole = len(choices(subject.singles, asked)), asked.draws
     extras = Extras(interrupted=(len(tried.alone), len(tried.worlds)) != whole)
     verdicts = [
         RunsVerdict(
@@ -127,9 +127,9 @@ def doubted(
             tried.base.answers[claim.name],
             dict(tried.base.numbers[claim.name]),
         )
-        for claim in compared.parsed
+        for claim in subject.parsed
     ]
-    events = {claim.name: nearest_event(claim, entries) for claim in compared.parsed}
+    events = {claim.name: nearest_event(claim, entries) for claim in subject.parsed}
     return DoubtReport(scenario, answers(verdicts, tried, events), tried), extras
 
 
@@ -163,7 +163,9 @@ def _made(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) 
     return [outcome.result for outcome in outcomes[:ended]]
 
 
-def _explored(choice: Choice, judge: Judge, base: Judged, tell: Callable[[float], None]) -> Alone:
+def _explored(
+    choice: Choice, judge: Judge, base: Judged, tell: Callable[[float], None]
+) -> TriedChoice:
     with interrupts_enabled():
         return explored(choice, judge, base)
 
@@ -173,31 +175,31 @@ def _judged(draws: Draws, part: range, judge: Judge, tell: Callable[[float], Non
         return [judge(draws.world(i)) for i in part]
 
 
-def judging(compared: Compared, entries: Mapping[str, Entry]) -> Judge:
+def judging(subject: Subject, entries: Mapping[str, Entry]) -> Judge:
     """What judges the claims in a world; `entries` are the runs that a world does not move."""
 
     def judge(world: World) -> Judged:
         labels = dict.fromkeys(label for label, _ in world)
         try:
-            moved = {label: _changed(compared, label, world) for label in labels}
+            moved = {label: _changed(subject, label, world) for label in labels}
             made = {
-                label: _entry(label, Case.of(new), compared.parsed) for label, new in moved.items()
+                label: _entry(label, Case.of(new), subject.parsed) for label, new in moved.items()
             }
         except PodusvError as error:
             return Judged({}, {}, str(error))
-        every, scenarios = {**entries, **made}, {**compared.singles, **moved}
-        measured = with_margins([*every.values()], scenarios, compared.parsed, Extras())
+        every, scenarios = {**entries, **made}, {**subject.singles, **moved}
+        measured = with_margins([*every.values()], scenarios, subject.parsed, Extras())
         metrics = metrics_of(measured)
-        verdicts = claims.judge(compared.parsed, {e.label: e for e in measured}, metrics)
+        verdicts = claims.judge(subject.parsed, {e.label: e for e in measured}, metrics)
         return Judged({v.name: v.answer for v in verdicts}, {v.name: v.numbers for v in verdicts})
 
     return judge
 
 
-def _changed(compared: Compared, label: str, world: World) -> Scenario:
+def _changed(subject: Subject, label: str, world: World) -> Scenario:
     new = {at: Number("", value) for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
-    single = (compared.hulls[hull.value] if hull else compared.singles)[label]
+    single = (subject.hulls[hull.value] if hull else subject.singles)[label]
     return with_values(single, new)
 
 

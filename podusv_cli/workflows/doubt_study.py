@@ -13,7 +13,7 @@ import numpy as np
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.doubt import outputs
-from podusv_cli.doubt.alone import Alone, Trial
+from podusv_cli.doubt.alone import TriedChoice, TriedValue
 from podusv_cli.doubt.answer import DoubtReport, Tried, answers
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judged
@@ -84,7 +84,7 @@ def doubt_study(
     try:
         for done, choice in enumerate(moving):
             tell("one at a time", done / len(moving))
-            alone.append(Alone(choice, tuple(_trials(studies, choice, loaded))))
+            alone.append(TriedChoice(choice, tuple(_trials(studies, choice, loaded))))
     except KeyboardInterrupt as stop:
         again = plugins.continue_with(f"doubt {config} --out", folder)
         raise KeyboardInterrupt(
@@ -101,7 +101,7 @@ def doubt_study(
         return outputs.Doubted(at, report.answers, "finished", missing)
 
 
-def _failed(alone: Sequence[Alone]) -> Iterator[Failure]:
+def _failed(alone: Sequence[TriedChoice]) -> Iterator[Failure]:
     """The values with which there is no study, and why."""
     for tried in alone:
         for trial in tried.trials:
@@ -109,9 +109,11 @@ def _failed(alone: Sequence[Alone]) -> Iterator[Failure]:
                 yield Failure(f"{tried.choice.name}: {as_yaml(trial.value)}", trial.judged.failed)
 
 
-def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[Trial]:
+def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[TriedValue]:
     return [
-        Trial(value, studies.judged(_name(choice, i), overrides(choice, value, loaded.scenario))[0])
+        TriedValue(
+            value, studies.judged(_name(choice, i), overrides(choice, value, loaded.scenario))[0]
+        )
         for i, value in enumerate(choice.values, 1)
     ]
 

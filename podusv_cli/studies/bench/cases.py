@@ -40,7 +40,7 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Case:
+class BenchCase:
     """A task with a vessel in a condition, and a scenario for each law by its label."""
 
     vessel: str
@@ -59,7 +59,7 @@ def shipped_bench() -> Path:
     return shipped.folder() / "bench"
 
 
-def cases(wanted: Selection) -> Iterator[Case]:
+def cases(wanted: Selection) -> Iterator[BenchCase]:
     """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
     for path in wanted.laws:
         _check_laws(path)
@@ -80,7 +80,7 @@ def cases(wanted: Selection) -> Iterator[Case]:
         loaded = load_text(
             text, str(wanted.folder / f"{task}, {condition}, {vessel}"), wanted.overrides
         )
-        yield Case(vessel, task, condition, loaded.scenario.singles())
+        yield BenchCase(vessel, task, condition, loaded.scenario.singles())
 
 
 def _check_laws(path: Path) -> None:

@@ -18,7 +18,7 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
 from podusv_cli.optimum.problem import Motion, Problem, problem
-from podusv_cli.studies.bench.cases import Case
+from podusv_cli.studies.bench.cases import BenchCase
 from podusv_cli.studies.bench.runs import BenchRun
 
 STEPS = (0.4, 0.2)  # s, of the finest of three grids; the next where IPOPT finds nothing
@@ -46,13 +46,13 @@ class Least:
 class Task:
     """Cases with one optimum, and the laws whose runs the search begins from."""
 
-    cases: Sequence[Case]
+    cases: Sequence[BenchCase]
     laws: Sequence[str]
 
 
-def wanted(every: Iterable[Case], runs: Sequence[BenchRun]) -> tuple[list[Task], list[str]]:
+def wanted(every: Iterable[BenchCase], runs: Sequence[BenchRun]) -> tuple[list[Task], list[str]]:
     """What is to be solved, and a sentence for each actuator or load that cannot be."""
-    tasks: dict[str, list[Case]] = {}
+    tasks: dict[str, list[BenchCase]] = {}
     refused: dict[str, None] = {}
     for case in every:
         first = next(iter(case.laws.values()))
@@ -65,7 +65,7 @@ def wanted(every: Iterable[Case], runs: Sequence[BenchRun]) -> tuple[list[Task],
     return [Task(cases, _best(cases, runs)) for cases in tasks.values()], list(refused)
 
 
-def _best(cases: Sequence[Case], runs: Sequence[BenchRun]) -> list[str]:
+def _best(cases: Sequence[BenchCase], runs: Sequence[BenchRun]) -> list[str]:
     """Laws that reached the target in the first of the cases, by IAE."""
     done = [run for run in runs if run.place == cases[0].place and run.good]
     return [run.law for run in sorted(done, key=lambda run: run.metrics["iae"])[:BEGINNINGS]]

@@ -12,7 +12,7 @@ from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.studies.bench.cases import Case
+from podusv_cli.studies.bench.cases import BenchCase
 
 POINTS = 150  # of a track
 FAILED = "not at its target"
@@ -44,12 +44,12 @@ class BenchRun:
         return self.status == "finished"
 
 
-def play(case: Case) -> list[BenchRun]:
+def play(case: BenchCase) -> list[BenchRun]:
     """Simulate every law of a case; a law that fails costs no other."""
     return list(_played(case))
 
 
-def _played(case: Case) -> Iterator[BenchRun]:
+def _played(case: BenchCase) -> Iterator[BenchRun]:
     for law, scenario in case.laws.items():
         try:
             yield _run(case, law, scenario)
@@ -57,12 +57,12 @@ def _played(case: Case) -> Iterator[BenchRun]:
             yield crashed(case, law, in_a_line(error))
 
 
-def crashed(case: Case, law: str, cause: str) -> BenchRun:
+def crashed(case: BenchCase, law: str, cause: str) -> BenchRun:
     """A run of which there is nothing."""
     return BenchRun(case.place, law, "crashed", cause, {}, np.empty((0, 4)))
 
 
-def _run(case: Case, law: str, scenario: Scenario) -> BenchRun:
+def _run(case: BenchCase, law: str, scenario: Scenario) -> BenchRun:
     probe, grid = scenario.probe(), _thinned(scenario).time_grid()
     recording = simulate(
         scenario.closed_loop(), grid, probe=probe, compiled=scenario.simulation.compiled
