@@ -72,7 +72,7 @@ class Share(Sample):
 
 
 @dataclass(frozen=True)
-class Alone(Sample):
+class Discordant(Sample):
     """Two conditions in the same draws: the first alone, of the draws in which one is alone.
 
     Below one half where the first has the smaller share. Under equal shares the number is
@@ -148,16 +148,16 @@ def _share(call: ast.Call, walk: OverLaws) -> Sampler:
     return sample
 
 
-def _alone(call: ast.Call, walk: OverLaws) -> Sampler:
+def _discordant(call: ast.Call, walk: OverLaws) -> Sampler:
     first, second = (_condition(share, walk) for share in call.args if isinstance(share, ast.Call))
 
-    def sample(label: str, cell: int, used: Mask) -> Alone:
+    def sample(label: str, cell: int, used: Mask) -> Discordant:
         def count(where: Mask) -> int:
             return int(np.sum(where[cell] & used))
 
         decided = (first.yes | first.no) & (second.yes | second.no)
         alone, other = count(first.yes & second.no), count(first.no & second.yes)
-        return Alone(label, int(used.sum()), count(~decided), alone, differ=alone + other)
+        return Discordant(label, int(used.sum()), count(~decided), alone, differ=alone + other)
 
     return sample
 
@@ -208,4 +208,4 @@ def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
 STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
     SHARE: _share, FAILURES: _share, QUANTILE: _quantile, MEDIAN: _quantile,
 }  # fmt: skip
-SAMPLERS = STATISTICS | {ALONE: _alone}
+SAMPLERS = STATISTICS | {ALONE: _discordant}
