@@ -73,7 +73,7 @@ def laws(config: str, *overrides: str) -> dict[str, Scenario]:
 
 def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     """Metrics and log of a run."""
-    case = finding.Case(scenario)
+    case = finding.Case.of(scenario)
     recording = simulated(case, Stopwatch())
     seen = recording.seen
     assert seen is not None  # it was observed
