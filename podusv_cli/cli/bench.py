@@ -67,8 +67,8 @@ def bench(
 
 
 def _report(done: Benched) -> None:
-    from podusv_cli.studies.bench.page import headings, told
+    from podusv_cli.studies.bench.page import cells_of, headings
 
     board = done.board
-    echo_table(headings(board), [[str(law), *told(row)] for law, row in board.iterrows()])
+    echo_table(headings(board), [[str(law), *cells_of(row)] for law, row in board.iterrows()])
     echo(f"{len(done.runs)} runs: {done.folder / 'report.html'}")

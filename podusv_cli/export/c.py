@@ -33,7 +33,7 @@ ASSUMED = {
 
 def sources(law: ExportedLaw) -> dict[str, str]:
     """The text of law.h and law.c."""
-    about = told(law)
+    about = template_values(law)
     return {name: rendered(name, about) for name in ("law.h", "law.c")}
 
 
@@ -49,7 +49,7 @@ def rendered(name: str, about: Mapping[str, Any]) -> str:
     return environment.get_template(f"{name}.j2").render(about)
 
 
-def told(law: ExportedLaw) -> dict[str, Any]:
+def template_values(law: ExportedLaw) -> dict[str, Any]:
     """What templates show of a law."""
     vectors, layout = law.vectors, law.layout
     of_path = ("path", "path_table") if layout.shown else ()  # which shows the law another target

@@ -58,7 +58,7 @@ def fmu(
     sources = c.sources(law)
     content = "".join([text, *sources.values(), *starts])
     about = {
-        **c.told(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
+        **c.template_values(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
         "variables": shown, "starts": starts, "loads": law.needs_loads,
         "outputs": [i for i, variable in enumerate(shown, 1) if variable.causality == "output"],
         "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),

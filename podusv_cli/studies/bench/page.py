@@ -43,7 +43,7 @@ def page(
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
     return environment("podusv_cli.studies.bench").get_template("bench.html.j2").render(
         title=f"Bench of {len(board)} laws",
-        board=[(str(law), told(row), number(row.settled)) for law, row in board.iterrows()],
+        board=[(str(law), cells_of(row), number(row.settled)) for law, row in board.iterrows()],
         headings=headings(board),
         counts=counts | {"cases": len(made) // len(board), "runs": len(made)},
         heat=list(_heat(made, list(board.index))),
@@ -59,7 +59,7 @@ def as_markdown(made: pd.DataFrame) -> str:
     """The leaderboard as a table."""
     board = leaderboard(made)
     head = headings(board)
-    rows = ([markdown(str(law)), *told(row)] for law, row in board.iterrows())
+    rows = ([markdown(str(law)), *cells_of(row)] for law, row in board.iterrows())
     lines = [" | ".join(row) for row in (head, *rows)]
     return f"| {lines[0]} |\n|{'---|' * len(head)}\n" + "".join(f"| {row} |\n" for row in lines[1:])
 
@@ -79,7 +79,7 @@ def headings(board: pd.DataFrame) -> list[str]:
     return [*HEADINGS, *vessels, *(["median of IAE / optimum"] if "of_optimum" in board else [])]
 
 
-def told(row: Any) -> list[str]:
+def cells_of(row: Any) -> list[str]:
     """A law's row of the leaderboard below these headings, but for the law's name."""
     texts = [
         f"{row.mean_rank:.2f}", f"{row.failed:.0f} of {row.cases:.0f}", number(row.median_ratio),
