@@ -76,7 +76,7 @@ def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     case = finding.Case.of(scenario)
     recording = simulated(case, Stopwatch())
     seen = recording.seen
-    assert seen is not None  # it was observed
+    assert seen is not None  # the probe saw it
     return case.plan.probe.summary(seen), recording
 
 
