@@ -14,6 +14,7 @@ from plugin_samples import LAW
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.load import load_text
+from podusv_cli.studies.bench import standing
 from podusv_cli.studies.bench.cases import AXES, BenchCase, Selection, cases, shipped_bench
 from podusv_cli.studies.bench.optima import Least, wanted
 from podusv_cli.studies.bench.page import as_markdown, page
@@ -73,6 +74,23 @@ def test_the_leaderboard_counts_what_the_table_has():
     assert board.mean_rank.tolist() == pytest.approx([4.5 / 3, 5.5 / 3, 8.0 / 3])
     assert board.median_ratio.tolist() == [1.0, 1.0, math.inf]
     assert board.close.tolist() == pytest.approx([2 / 3, 2 / 3, 1 / 3])
+
+
+def test_a_column_of_the_leaderboard_is_one_value(monkeypatch):
+    worst = standing.Column(
+        "worst",
+        lambda rows: rows.z_e_steady.max(),
+        "worst [m]",
+        lambda law: f"{law.worst:.1f}",
+        "The largest.",
+    )
+    monkeypatch.setattr(standing, "BOARD", (*standing.BOARD, worst))
+    made = table(RUNS)
+    assert leaderboard(made).worst.notna().any()
+    assert "worst [m]" in as_markdown(made).splitlines()[0]
+    shown = " ".join(page(made, [], {}).split())
+    assert "<b>worst [m]</b>: The largest." in shown
+    assert "<b>cases</b>" not in shown
 
 
 def test_a_case_that_no_law_does_has_no_best_law():

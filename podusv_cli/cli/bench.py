@@ -67,8 +67,8 @@ def bench(
 
 
 def _report(done: Benched) -> None:
-    from podusv_cli.studies.bench.page import cells_of, headings
+    from podusv_cli.studies.bench.standing import written
 
-    board = done.board
-    echo_table(headings(board), [[str(law), *cells_of(row)] for law, row in board.iterrows()])
+    head, *rows = written(done.runs)
+    echo_table(head, rows)
     echo(f"{len(done.runs)} runs: {done.folder / 'report.html'}")

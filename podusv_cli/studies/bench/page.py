@@ -12,16 +12,11 @@ from podusv_cli.core.escaping import markdown
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.studies.bench.optima import Least
-from podusv_cli.studies.bench.standing import PLACE, leaderboard
+from podusv_cli.studies.bench.standing import CROSS, PLACE, columns, digits, leaderboard, written
 
 FIRST = 60  # failures that the page lists
 DARKEST = 10.0  # times the best law's IAE
 PALE, DARK = (236, 244, 250), (8, 64, 112)  # red, green, blue
-CROSS = "✗"
-HEADINGS = (
-    "law", "mean rank", "failed", "median of IAE / best", "beyond the standoff", "variation",
-    "within 10 % of the best",
-)  # fmt: skip
 
 
 class Cell(NamedTuple):
@@ -43,8 +38,8 @@ def page(
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
     return environment("podusv_cli.studies.bench").get_template("bench.html.j2").render(
         title=f"Bench of {len(board)} laws",
-        board=[(str(law), cells_of(row), number(row.settled)) for law, row in board.iterrows()],
-        headings=headings(board),
+        board=written(made),
+        columns=columns(made),
         counts=counts | {"cases": len(made) // len(board), "runs": len(made)},
         heat=list(_heat(made, list(board.index))),
         failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
@@ -57,11 +52,10 @@ def page(
 
 def as_markdown(made: pd.DataFrame) -> str:
     """The leaderboard as a table."""
-    board = leaderboard(made)
-    head = headings(board)
-    rows = ([markdown(str(law)), *cells_of(row)] for law, row in board.iterrows())
-    lines = [" | ".join(row) for row in (head, *rows)]
-    return f"| {lines[0]} |\n|{'---|' * len(head)}\n" + "".join(f"| {row} |\n" for row in lines[1:])
+    head, *rows = written(made)
+    lines = [head, *([markdown(law), *texts] for law, *texts in rows)]
+    joined = [f"| {' | '.join(line)} |\n" for line in lines]
+    return f"{joined[0]}|{'---|' * len(head)}\n{''.join(joined[1:])}"
 
 
 def _grids(optima: Sequence[Least]) -> dict[str, Any]:
@@ -71,27 +65,6 @@ def _grids(optima: Sequence[Least]) -> dict[str, Any]:
         "lowered": f"{max(abs(optimum.lowered) for optimum in optima):.1g}",
         "count": sum(len(optimum.places) for optimum in optima),
     }
-
-
-def headings(board: pd.DataFrame) -> list[str]:
-    """Of the leaderboard: a rank for each vessel, and the last where optima were found."""
-    vessels = [f"rank {name}" for name in board if str(name).startswith("on ")]
-    return [*HEADINGS, *vessels, *(["median of IAE / optimum"] if "of_optimum" in board else [])]
-
-
-def cells_of(row: Any) -> list[str]:
-    """A law's row of the leaderboard below these headings, but for the law's name."""
-    texts = [
-        f"{row.mean_rank:.2f}", f"{row.failed:.0f} of {row.cases:.0f}", number(row.median_ratio),
-        number(row.median_ratio_e), number(row.variation), f"{100 * row.close:.0f} %",
-        *(f"{row[name]:.2f}" for name in row.index if str(name).startswith("on ")),
-    ]  # fmt: skip
-    return [*texts, *([number(row.of_optimum)] if "of_optimum" in row else [])]
-
-
-def number(ratio: float) -> str:
-    """A ratio in three digits; a cross for a failure."""
-    return f"{ratio:.3g}" if math.isfinite(ratio) else CROSS
 
 
 def _heat(made: pd.DataFrame, laws: Sequence[str]) -> Iterator[tuple[str, list[Any]]]:
@@ -114,7 +87,7 @@ def _cell(ratio: float, why: str) -> Cell:
         return Cell(CROSS, "#f6d5c3", "#7a2b00", why)
     depth = min(math.log(ratio) / math.log(DARKEST), 1.0)
     mixed = (round(p + depth * (d - p)) for p, d in zip(PALE, DARK, strict=True))
-    return Cell(number(ratio), f"rgb{tuple(mixed)}", "#fff" if depth > 0.45 else "#1b1f24", "")
+    return Cell(digits(ratio), f"rgb{tuple(mixed)}", "#fff" if depth > 0.45 else "#1b1f24", "")
 
 
 def _least(case: pd.DataFrame) -> list[str]:

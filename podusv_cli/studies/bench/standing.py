@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -22,6 +24,7 @@ FOLLOWED = {
     "e_steady": "e_ct_steady", "settling_time": "path_time",
 }  # fmt: skip
 RATIOS = {"ratio": "iae", "ratio_e": "iae_e", "variation": "tv_tau_u"}
+CROSS = "✗"
 CLOSE = 1.1  # times the best law's IAE counts as close
 
 
@@ -64,32 +67,105 @@ def with_optima(made: pd.DataFrame, optima: Sequence[Least]) -> pd.DataFrame:
     return made.assign(optimum=least, of_optimum=counted / least)
 
 
-def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
-    """A row for each law, the best first: by mean rank over all cases.
+class Column(NamedTuple):
+    """A column of the leaderboard: a number of all rows of a law, and how a table writes it.
 
-    `close` is the share of cases in which the law's IAE is within 10 % of the best. `median_ratio`
-    and `settled`, the distance over the steady window [m], are medians, with a run that failed or
-    ended early as inf; so are `median_ratio_e` and `variation` (see `table`), and `of_optimum`, if
-    the table has it, over cases with an optimum. `on` and a vessel's name: its mean rank there.
+    A column without a heading is in `--json` alone. `text` takes the law's row of the leaderboard.
+    `meaning` says below the table what the heading does not.
     """
-    laws = made.groupby("law", sort=False)
-    board = pd.DataFrame(
-        {
-            "cases": laws.size(),
-            "failed": laws.status.agg(lambda status: int((status != "finished").sum())),
-            "mean_rank": laws["rank"].mean(),
-            "median_ratio": laws.ratio.agg(middle),
-            "median_ratio_e": laws.ratio_e.agg(middle),
-            "variation": laws.variation.agg(middle),
-            "close": laws.ratio.agg(lambda ratio: float((ratio <= CLOSE).mean())),
-            "settled": laws.z_e_steady.agg(lambda z_e: middle(z_e.fillna(np.inf))),
-        }
-    )
-    for vessel, rows in made.groupby("vessel", sort=False):
-        board[f"on {vessel}"] = rows.groupby("law", sort=False)["rank"].mean()
-    if "of_optimum" in made:
-        board["of_optimum"] = laws.of_optimum.agg(lambda ratio: middle(ratio.dropna()))
+
+    name: str
+    of: Callable[[pd.DataFrame], float]
+    heading: str = ""
+    text: Callable[[pd.Series], str] = str
+    meaning: str = ""
+
+
+def digits(ratio: float) -> str:
+    """A ratio in three digits; a cross for a failure."""
+    return f"{ratio:.3g}" if math.isfinite(ratio) else CROSS
+
+
+BOARD = (
+    Column("cases", len),
+    Column(
+        "mean_rank", lambda rows: rows["rank"].mean(),
+        "mean rank", lambda law: f"{law.mean_rank:.2f}",
+        "By IAE, the integral of the distance from the vessel's origin to the target. Failed runs "
+        "share the mean of the last ranks of their case. A rank depends on which laws take part.",
+    ),
+    Column(
+        "failed", lambda rows: int((rows.status != "finished").sum()),
+        "failed", lambda law: f"{law.failed:.0f} of {law.cases:.0f}",
+        "A run has failed where it does not reach its end, or is further off its standoff than "
+        "metrics.settling_radius on average over the last part of the run, half of the hull's "
+        "length and a fifth in podusv's own bench.",
+    ),
+    Column(
+        "median_ratio", lambda rows: middle(rows.ratio),
+        "median of IAE / best", lambda law: digits(law.median_ratio),
+        "A law that keeps a standoff on purpose pays for it here. A cross: it failed in half of "
+        "the cases or more.",
+    ),
+    Column(
+        "median_ratio_e", lambda rows: middle(rows.ratio_e),
+        "beyond the standoff", lambda law: digits(law.median_ratio_e),
+        "The median of the same ratio of the error |z_e - standoff|.",
+    ),
+    Column(
+        "variation", lambda rows: middle(rows.variation),
+        "variation", lambda law: digits(law.variation),
+        "The median of the total variation of the surge demand over the least of the laws at their "
+        "target.",
+    ),
+    Column(
+        "close", lambda rows: float((rows.ratio <= CLOSE).mean()),
+        "within 10 % of the best", lambda law: f"{100 * law.close:.0f} %",
+        "The share of cases in which the IAE is.",
+    ),
+    Column(
+        "settled", lambda rows: middle(rows.z_e_steady.fillna(np.inf)),
+        "settled [m]", lambda law: digits(law.settled),
+        "The median of the mean distance over the last part of the run.",
+    ),
+)  # fmt: skip
+OF_OPTIMUM = Column(
+    "of_optimum", lambda rows: middle(rows.of_optimum.dropna()),
+    "median of IAE / optimum", lambda law: digits(law.of_optimum),
+    "Over the cases that have an optimum.",
+)  # fmt: skip
+
+
+def columns(made: pd.DataFrame) -> list[Column]:
+    """Of the leaderboard of a table: a rank for each vessel, and one of optima where it has any."""
+    vessels = [_rank_on(str(vessel)) for vessel in made.vessel.unique()]
+    return [*BOARD, *vessels, *([OF_OPTIMUM] if "of_optimum" in made else [])]
+
+
+def _rank_on(vessel: str) -> Column:
+    name = f"on {vessel}"
+    return Column(
+        name, lambda rows: rows["rank"][rows.vessel == vessel].mean(),
+        f"rank {name}", lambda law: f"{law[name]:.2f}",
+    )  # fmt: skip
+
+
+def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
+    """A row for each law, the best first by mean rank, with the numbers of `columns`."""
+    shown = columns(made)
+    rows = {
+        law: {column.name: column.of(of_law) for column in shown}
+        for law, of_law in made.groupby("law", sort=False)
+    }
+    board = pd.DataFrame.from_dict(rows, orient="index").rename_axis("law")
     return board.sort_values("mean_rank", kind="stable")
+
+
+def written(made: pd.DataFrame) -> list[list[str]]:
+    """The leaderboard in words: its headings, then a row a law."""
+    board, shown = leaderboard(made), [column for column in columns(made) if column.heading]
+    rows = [[str(law), *(column.text(row) for column in shown)] for law, row in board.iterrows()]
+    return [["law", *(column.heading for column in shown)], *rows]
 
 
 def middle(numbers: Iterable[float]) -> float:
