@@ -76,6 +76,14 @@ def test_the_leaderboard_counts_what_the_table_has():
     assert board.close.tolist() == pytest.approx([2 / 3, 2 / 3, 1 / 3])
 
 
+def test_the_interval_of_a_mean_rank_is_over_tasks_and_not_over_their_cases():
+    """By hand: means of tasks 1, 2, 6; Student's 0.975 quantile with two degrees is 4.303."""
+    rows = pd.DataFrame({"task": [*"aaabbbccc"], "rank": [1, 1, 1, 1, 2, 3, 6, 6, 6]})
+    half = 4.303 * math.sqrt(7.0 / 3.0)
+    assert standing.over_tasks(rows) == pytest.approx((3.0 - half, 3.0 + half), rel=1e-3)
+    assert all(map(math.isnan, standing.over_tasks(rows[rows.task != "c"])))
+
+
 def test_a_column_of_the_leaderboard_is_one_value(monkeypatch):
     worst = standing.Column(
         "worst",

@@ -25,6 +25,7 @@ FOLLOWED = {
 }  # fmt: skip
 RATIOS = {"ratio": "iae", "ratio_e": "iae_e", "variation": "tv_tau_u"}
 CROSS = "✗"
+FEWEST_TASKS = 3  # that an interval over tasks is computed from
 CLOSE = 1.1  # times the best law's IAE counts as close
 
 
@@ -86,13 +87,34 @@ def digits(ratio: float) -> str:
     return f"{ratio:.3g}" if math.isfinite(ratio) else CROSS
 
 
+def over_tasks(rows: pd.DataFrame) -> tuple[float, float]:
+    """The 95 % interval of a law's mean rank if other tasks like these were taken.
+
+    Student's, of the means by task; NaN with fewer than three tasks.
+    """
+    means = rows.groupby("task")["rank"].mean()
+    if len(means) < FEWEST_TASKS:
+        return math.nan, math.nan
+    from scipy.stats import t  # slow to import
+
+    half = float(t.ppf(0.975, len(means) - 1) * means.std() / math.sqrt(len(means)))
+    return float(means.mean()) - half, float(means.mean()) + half
+
+
+def _interval(number: float, low: float, high: float) -> str:
+    return f"{number:.2f}" + (f" [{low:.2f}, {high:.2f}]" if math.isfinite(high - low) else "")
+
+
 BOARD = (
     Column("cases", len),
+    Column("rank_low", lambda rows: over_tasks(rows)[0]),
+    Column("rank_high", lambda rows: over_tasks(rows)[1]),
     Column(
         "mean_rank", lambda rows: rows["rank"].mean(),
-        "mean rank", lambda law: f"{law.mean_rank:.2f}",
-        "By IAE, the integral of the distance from the vessel's origin to the target. Failed runs "
-        "share the mean of the last ranks of their case. A rank depends on which laws take part.",
+        "mean rank", lambda law: _interval(law.mean_rank, law.rank_low, law.rank_high),
+        "By IAE, the integral of the distance from the vessel's origin to the target; 95 % "
+        "intervals over tasks, the vessels and conditions being given. Failed runs share the mean "
+        "of the last ranks of their case. A rank depends on which laws take part.",
     ),
     Column(
         "failed", lambda rows: int((rows.status != "finished").sum()),
