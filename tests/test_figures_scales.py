@@ -274,17 +274,25 @@ def test_outages_are_shaded_for_the_quantities_of_the_sensor():
 
 
 @pytest.mark.parametrize("measurement", ["exact", "sensors"])
-def test_a_run_draws_estimates_by_default_if_it_has_any(tmp_path, measurement, monkeypatch):
+def test_a_run_draws_trajectory_and_errors_unless_others_are_asked_for(
+    tmp_path, measurement, monkeypatch
+):
     draw_quickly(monkeypatch)
     config = tmp_path / "a.yaml"
     brief = "simulation: {step: 0.01, duration: 0.1, compiled: false}\n"
     config.write_text(f"{SOUND}{brief}measurement: {{kind: {measurement}}}\n")
-    done = run.run(config, run.Request((), tmp_path / "run"))
-    names = {path.stem for path in (done.folder / "figures").iterdir()}
-    assert ("estimates" in names) == (measurement == "sensors")
-    assert "sea" not in names
-    assert names >= {"errors", "trajectory", "controls"}
-    assert not done.missing
+    drawn = {}
+    for asked in ((), ("all",), ("all", "errors"), ("velocities",)):
+        request = run.Request(out=tmp_path / "run", force=True, names=asked)
+        done = run.run(config, request)
+        assert not done.missing
+        drawn[asked] = {path.stem for path in (done.folder / "figures").iterdir()}
+    assert drawn[()] == {"errors", "trajectory"}
+    assert drawn["velocities",] == {"velocities"}
+    assert drawn["all",] == drawn["all", "errors"]
+    assert drawn["all",] >= {"errors", "trajectory", "controls", "velocities"}
+    assert ("estimates" in drawn["all",]) == (measurement == "sensors")
+    assert "sea" not in drawn["all",]
 
 
 def test_signals_that_never_change_are_a_line_of_text_with_each_run_s_value():

@@ -13,7 +13,7 @@ kept=results/$folder/$name made=results/.runs/$folder/$name log=results/$folder.
 printf '  %-26s' "$name"
 SECONDS=0
 echo "== $name" >>"$log"
-"${PODUSV:-podusv}" "$verb" "configs/$folder/$name.yaml" --out "$made" --force -q >>"$log" 2>&1
+"${PODUSV:-podusv}" "$verb" "configs/$folder/$name.yaml" --figure all --out "$made" --force -q >>"$log" 2>&1
 code=$?
 if test "$code" -ne "$wanted"; then
     echo "exit code $code in place of $wanted, after $SECONDS s; from $log:"

@@ -16,6 +16,7 @@ from podusv_cli.cli.terminal import (
     Warnings,
     echo,
     echo_entry,
+    echo_how_to_draw,
     echo_result,
     echo_table,
     warn_of_differences,
@@ -36,12 +37,7 @@ def compare(
     out: options.Out = None,
     force: options.Force = False,
     figures: options.Figures = True,
-    figure: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="What to draw; repeatable, all by default.", autocompletion=completion.figures
-        ),
-    ] = None,
+    figure: options.Figure = None,
     form: Annotated[
         str, typer.Option("--format", help="Of figures: png, pdf, svg; several with commas.")
     ] = "png",
@@ -67,7 +63,8 @@ def compare(
     """Simulate scenarios, and compare them with finished runs: table, claims, figures, report.
 
     One scenario with `controllers`, several scenarios, finished runs, or any mixture. Exit code 3
-    when a run failed or diverged; the others are compared all the same.
+    when a run failed or diverged; the others are compared all the same. Draws trajectory and
+    errors, with `--figure all` every figure that the runs have signals for.
     """
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
@@ -95,6 +92,8 @@ def compare(
         raise typer.Exit(INTERRUPTED)
     if done.result.entries and not quiet:
         echo(_advice(items, assign or (), plugin or ()), err=True)
+    if not (figure or quiet or as_json):
+        echo_how_to_draw(done.folder, done.places())
     page = done.folder / "report.html"
     if page.exists() and not (as_json or quiet):
         echo(f"report: {page}")

@@ -34,6 +34,15 @@ Out = Annotated[
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace finished results.")]
 Figures = Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the results.")]
+Figure = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="What to draw, or `all`; repeatable.",
+        show_default="trajectory, errors",
+        autocompletion=completion.figures,
+    ),
+]
 Workers = Annotated[
     int, typer.Option(min=0, help="Processes at a time.", show_default="one a core")
 ]

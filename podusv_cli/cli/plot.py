@@ -19,7 +19,12 @@ def plot(
     runs: Annotated[list[str], typer.Argument(metavar="RUN...", help="Finished run folders.")],
     figure: Annotated[
         list[str] | None,
-        typer.Option(help="What to draw; repeatable, all by default.", autocompletion=figures),
+        typer.Option(
+            metavar="NAME",
+            help="What to draw; repeatable.",
+            show_default="all",
+            autocompletion=figures,
+        ),
     ] = None,
     signal: Annotated[
         list[str] | None,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli import options
-from podusv_cli.cli.terminal import Warnings, echo, echo_result
+from podusv_cli.cli.terminal import Warnings, echo, echo_how_to_draw, echo_result
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.execute import Finished
@@ -25,6 +25,7 @@ def run(
     out: options.Out = None,
     force: options.Force = False,
     figures: options.Figures = True,
+    figure: options.Figure = None,
     as_json: options.AsJson = False,
     allow_large: options.AllowLarge = False,
     quiet: options.Quiet = False,
@@ -37,7 +38,8 @@ def run(
 ) -> None:
     """Simulate a scenario and write a run folder: log, metrics, figures.
 
-    Draws trajectory, errors and controls; `podusv plot RUN` draws all that the run has signals for.
+    Draws trajectory and errors; `--figure all` and `podusv plot RUN` draw every figure that it has
+    signals for.
     """
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
@@ -46,7 +48,7 @@ def run(
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         request = workflow.Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            controller=controller, trust=trust, compiling=compiling(bars),
+            figure or (), controller=controller, trust=trust, compiling=compiling(bars),
         )  # fmt: skip
         done = workflow.run(Path(config), request, partial(bars, str(config)) if bars else None)
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
@@ -56,6 +58,8 @@ def run(
         echo(f"{config}: {done.message}", err=True)
     for part in done.missing:
         echo(f"{config}: {part.traced}", err=True)
+    if not (figure or quiet or as_json):
+        echo_how_to_draw(done.folder, [done.folder])
     if done.others:
         names = ", ".join(done.others)
         echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)

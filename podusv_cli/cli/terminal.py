@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -135,6 +136,13 @@ def warn_of_differences(differences: Mapping[str, Mapping[str, Any]]) -> None:
     for key, values in as_text(differences).items():
         shown = ", ".join(f"{label} {value}" for label, value in values.items())
         echo(f"  {key}: {shown}", err=True)
+
+
+def echo_how_to_draw(folder: Path, runs: Sequence[Path]) -> None:
+    """Say on stderr how to draw all figures of runs, if the folder has some."""
+    if (folder / "figures").is_dir():
+        command = shlex.join(["podusv", "plot", *map(str, runs)])
+        echo(f"to draw every figure: {command}", err=True)
 
 
 class Warnings:

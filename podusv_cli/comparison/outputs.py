@@ -15,7 +15,7 @@ from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures.shown import dressed
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture
-from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.process.extras import Extras
 from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import RunWriter
 
@@ -105,23 +105,17 @@ def drawn(
 ) -> dict[str, bytes]:  # fmt: skip
     """The figures of all runs together by file name: as asked, and as PNG for the report.
 
-    Without `names` these are all that fit. `workers` processes draw at a time (0: one a core). A
-    figure that was asked for and that no run has signals for is missing among the `extras`.
+    `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
     """
     # matplotlib is slow to import
-    from podusv_cli.figures.drawing import draw_in_parallel, figures_of
+    from podusv_cli.figures.drawing import chosen, draw_in_parallel
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
     shown = dressed(
         [(e.label, e.recording, e.about, e.plugins) for e in result.entries], result.peaks
     )
-    known = figures_of(run.plugins for run in shown)
-    for name in names:
-        if not known[name].fits(shown):
-            wanted = ", ".join(known[name].signals)
-            extras.missing.append(Failure(f"figure {name}", f"no run logged any of {wanted}"))
-    sheets = [known[name] for name in dict.fromkeys(names)] or list(known.values())
+    sheets = chosen(names, shown, extras)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT)))
     return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
 

@@ -32,12 +32,29 @@ def figures_with(plugins: Plugins) -> dict[str, Sheet]:
 
 
 FIGURES = figures_with(())
+USUAL = ("trajectory", "errors", "path")  # a run has `errors`, or `path` on one that is followed
+ALL = "all"  # in place of names
 SCREEN = Look()
 
 
 def figures_of(plugins: Iterable[Plugins]) -> dict[str, Sheet]:
     """All figures by name, in order, with those of the plug-ins of several runs."""
     return figures_with(tuple(dict.fromkeys(p for several in plugins for p in several)))
+
+
+def chosen(names: Sequence[str], runs: Sequence[Shown], extras: Extras) -> list[Sheet]:
+    """The figures of these names or `ALL` that fit; without names, the `USUAL` and plug-ins' own.
+
+    One that is named and that no run has signals for is missing among the `extras`.
+    """
+    known = figures_of(run.plugins for run in runs)
+    fitting = {name: sheet for name, sheet in known.items() if sheet.fits(runs)}
+    for name in (name for name in names if name not in (ALL, *fitting)):
+        wanted = ", ".join(known[name].signals)
+        extras.missing.append(Failure(f"figure {name}", f"no run logged any of {wanted}"))
+    usual = [*USUAL, *(name for name in known if name not in FIGURES)]
+    asked = fitting if ALL in names else names or usual
+    return [fitting[name] for name in dict.fromkeys(asked) if name in fitting]
 
 
 def draw(
@@ -86,7 +103,8 @@ def check_names(
     figures: Sequence[str], formats: Sequence[str], sheets: Iterable[str] = FIGURES
 ) -> None:
     """UsageError for a figure, of all `sheets`, or format that there is not."""
-    for what, names, known in (("figure", figures, tuple(sheets)), ("format", formats, FORMATS)):
+    named = (*sheets, ALL)
+    for what, names, known in (("figure", figures, named), ("format", formats, FORMATS)):
         for name in names:
             if name not in known:
                 raise UsageError(unknown(f"{what} {name!r}", name, known, "podusv list"))

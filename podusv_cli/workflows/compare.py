@@ -38,7 +38,7 @@ from podusv_cli.workflows.doubt import comparison, doubt_of
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
-from podusv_cli.workflows.run import RESULTS, Request, opened
+from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened
 
 Progress = Callable[[str, float], None]
 UNMEASURED = dict.fromkeys(CLOCKED, math.nan)
@@ -70,17 +70,25 @@ class Compared:
             **({"doubt": self.doubted.as_json()["claims"]} if self.doubted else {}),
         }
 
+    def places(self) -> list[Path]:
+        """The fewest folders that have all of its runs."""
+        places = [self._place(entry) for entry in self.result.entries]
+        return [self.folder] if {place.parent for place in places} == {self.folder} else places
+
+    def _place(self, entry: Entry) -> Path:
+        here = entry.label in self.result.timings
+        return self.folder / entry.label if here else entry.run.folder
+
     def warnings(self) -> list[Finding]:
         """The findings about the runs made for this comparison, before and after them."""
         return merged(self.result.warnings)
 
     def _run_as_json(self, entry: Entry) -> dict[str, Any]:
         """As `podusv run --json`, without what is missing; timing only of runs made now."""
-        here = entry.label in self.result.timings
         return {
             "format": 1,
             "status": entry.recording.status,
-            "run": str(self.folder / entry.label if here else entry.run.folder),
+            "run": str(self._place(entry)),
             "controller": entry.recording.controller,
             "metrics": dict(entry.run.metrics),
             "timing": dict(self.result.timings.get(entry.label, {})),
@@ -122,7 +130,7 @@ def compare_gathered(
     `loaded` is the scenario whose verdicts are doubted, if any.
     """
     started, argv = datetime.now(UTC), list(request.argv)
-    _check_figures(request, given.members)
+    check_asked(request, [member.plugins for member in given.members])
     _check_metrics(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
         request.warn(finding)
@@ -150,20 +158,6 @@ def compare_gathered(
         status: Status = "interrupted" if extras.interrupted else "finished"
         folder = writer.finish(status, lost)
         return Compared(folder, result, status, tuple(extras.missing), doubted)
-
-
-def _check_figures(request: Request, members: Sequence[Member]) -> None:
-    """UsageError for a figure or format that there is not, and for figures that are not wanted."""
-    if request.names and not request.figures:
-        raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
-    if request.names or set(request.formats) != {"png"}:
-        from podusv_cli.figures.drawing import (  # matplotlib is slow to import
-            check_names,
-            figures_of,
-        )
-
-        sheets = figures_of(member.plugins for member in members)
-        check_names(request.names, request.formats, sheets)
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:

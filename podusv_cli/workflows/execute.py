@@ -78,7 +78,8 @@ class Task:
     target: Path
     force: bool = False
     named: bool = True
-    figures: Sequence[str] = ()
+    figures: bool = False
+    names: Sequence[str] = ()  # of figures, as `figures.drawing.chosen` has them
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
     noticed: Sequence[Finding] = ()
@@ -313,14 +314,9 @@ def _drawn(
 ) -> dict[str, bytes]:
     if not (task.figures and about):
         return {}
-    from podusv_cli.figures.drawing import (  # matplotlib is slow to import
-        draw_in_parallel,
-        figures_of,
-    )
+    from podusv_cli.figures.drawing import chosen, draw_in_parallel  # matplotlib is slow to import
     from podusv_cli.figures.shown import dressed
 
     plugins = task.scenario.plugged
     shown = dressed([(task.label or recording.controller, recording, about, plugins)])
-    known = figures_of([plugins])
-    fitting = [known[name] for name in task.figures if known[name].fits(shown)]
-    return draw_in_parallel(shown, fitting, ("png",), extras)
+    return draw_in_parallel(shown, chosen(task.names, shown, extras), ("png",), extras)

@@ -20,7 +20,6 @@ from podusv_cli.studies.telling.keep import Kept, KeptRun, found, unmade
 from podusv_cli.studies.telling.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
 from podusv_cli.workflows.many_runs import Request
-from podusv_cli.workflows.run import DRAWN
 
 
 def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenario:
@@ -64,5 +63,5 @@ def _task(folder: Path, plan: StudyPlan, run: KeptRun, request: Request) -> Task
     scenario = scenario_of_draw(plan, run.law, run.cell, run.draw)
     return Task(
         scenario, resolved_yaml(scenario), folder / LOGS / run.name,
-        figures=DRAWN if request.figures else (), argv=request.argv, label=run.law,
+        figures=request.figures, argv=request.argv, label=run.law,
     )  # fmt: skip

@@ -25,7 +25,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
 from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
-from podusv_cli.workflows.run import DRAWN, RESULTS, Request, opened, single
+from podusv_cli.workflows.run import RESULTS, Request, opened, single
 
 BESIDE = VelocityVector()  # a law from which the search begins, too: it turns the bow into the load
 Progress = Callable[[str, float], None]
@@ -97,7 +97,7 @@ def optimum_of(
     repeated = _repeating(scenario, wanted, motion)
     task = Task(
         repeated, resolved_yaml(repeated), target, request.force, request.out is not None,
-        DRAWN if request.figures else (), request.argv, "optimum", preflight(repeated),
+        request.figures, argv=request.argv, label="optimum", noticed=preflight(repeated),
     )  # fmt: skip
     done = execute(task, progress and (lambda fraction: progress("repeating", fraction)))
     return Optimum(minimised, stages, done, _departures(done.folder, motion))

@@ -21,7 +21,7 @@ from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures import panels
 from podusv_cli.figures.animation import animate, file_name
-from podusv_cli.figures.drawing import SCREEN, check_names, draw_in_parallel, figures_of
+from podusv_cli.figures.drawing import ALL, SCREEN, check_names, draw_in_parallel, figures_of
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown, dressed
 from podusv_cli.figures.style import STYLES, Look
@@ -191,6 +191,7 @@ def _chosen(
     Raises UsageError for one that they have no signals for.
     """
     fitting = {name: sheet for name, sheet in known.items() if sheet.fits(shown)}
+    asked = [*fitting] if ALL in asked else asked
     for name in asked:
         if name not in fitting:
             raise UsageError(

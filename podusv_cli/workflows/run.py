@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.phrases import unknown
+from podusv_cli.core.plugins import Plugins
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Check, Loaded, load, resolved_yaml
@@ -17,9 +18,6 @@ from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
 
 RESULTS = Path("results")
-# The figures that take longest first; `sea` and `estimates` for runs that have waves, wind, current
-# or sensors
-DRAWN = ("estimates", "controls", "sea", "trajectory", "errors", "path")
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Request:
     warn: Callable[[object], None] = lambda finding: None  # called before any simulation
     allow_large: bool = False
     plugins: Sequence[str] = ()  # files beside those that a scenario names
-    names: Sequence[str] = ()  # of figures of a comparison; all that fit where empty
+    names: Sequence[str] = ()  # of figures, as `figures.drawing.chosen` has them
     formats: Sequence[str] = ("png",)  # of figures of a comparison
     workers: int = 0  # processes at a time; 0: one a core
     controller: str = ""  # which of `controllers` to run
@@ -67,6 +65,7 @@ def run_loaded(
     watch = watch or Stopwatch()
     with watch.part("load"):
         scenario = single(loaded, request.controller)
+        check_asked(request, [scenario.plugged])
         case = Case(scenario, loaded.plan(scenario))
         target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with watch.part("preflight"):
@@ -75,10 +74,23 @@ def run_loaded(
         request.warn(finding)
     task = Task(
         scenario, loaded.text, target, force=request.force, named=request.out is not None,
-        figures=DRAWN if request.figures else (), argv=request.argv, noticed=noticed,
+        figures=request.figures, names=request.names, argv=request.argv, noticed=noticed,
         compiling=request.compiling,
     )  # fmt: skip
     return replace(execute(task, progress, watch, case), others=others(loaded, request.controller))
+
+
+def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
+    """UsageError for a figure or format that there is not, and for figures that are not wanted."""
+    if request.names and not request.figures:
+        raise UsageError(f"--figure {request.names[0]} and --no-figures contradict each other")
+    if request.names or set(request.formats) != {"png"}:
+        from podusv_cli.figures.drawing import (  # matplotlib is slow to import
+            check_names,
+            figures_of,
+        )
+
+        check_names(request.names, request.formats, figures_of(plugins))
 
 
 def others(loaded: Loaded, label: str = "") -> tuple[str, ...]:

@@ -83,7 +83,7 @@ def test_one_figure_that_fails_costs_no_other(podusv, monkeypatch):
     said = podusv("run", write("a.yaml", ADAPTIVE), "--out", "x", "-q")
     assert said.code == 0
     assert said.err.startswith(f"a.yaml: figure errors {BUG}")
-    assert {path.name for path in Path("x/figures").iterdir()} == {"controls.png", "trajectory.png"}
+    assert [path.name for path in Path("x/figures").iterdir()] == ["trajectory.png"]
     assert podusv("plot", "x", "--figure", "errors", "--figure", "loads").code == 3
     assert [path.name for path in Path("figures").iterdir()] == ["loads.png"]
     assert podusv("plot", "x", "--figure", "errors", "--out", "none").code == 3
