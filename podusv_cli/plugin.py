@@ -31,7 +31,7 @@ from podusv_cli.metrics.metric import Accumulator, Metric, add, gathered, ratio
 
 FIGURES = {
     "figure": "sheet", "signals_over_time": "panels",
-    "Shown": "shown", "axis_label": "style", "legend": "style", "new_figure": "style",
+    "Shown": "shown", "axis_label": "shown", "legend": "style", "new_figure": "style",
 }  # fmt: skip
 RENAMED = {"before": "warn_before_run", "after": "warn_after_run"}
 

@@ -459,3 +459,8 @@ def test_python_knows_them() -> None:
     many = podusv_python.simulate_many("a.yaml", {"controller.gain": [0.5, 1.0]})
     assert many["largest_east"].notna().all()
     assert f"{run.metrics['largest_east']:.5g} m" in run._repr_html_()
+
+
+def test_every_name_that_plugins_are_promised_is_there():
+    for name in (*plugin.__all__, *plugin.FIGURES):
+        assert getattr(plugin, name) is not None

@@ -10,13 +10,13 @@ from html import escape
 
 import numpy as np
 import pytest
-from comparison_samples import FRAME
-from drawn_samples import recording, scenario, shown
+from comparison_samples import FRAME, about
+from drawn_samples import recording, shown
 from html_tree import tree
 from PIL import Image
 from test_comparison_page import ERRORS, page, theory
 
-from podusv_cli.comparison import chase
+from podusv_cli.comparison import chase, table
 from podusv_cli.scenario.load import load_text
 
 NO_STANDOFF = """
@@ -209,12 +209,13 @@ def picture() -> bytes:
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    wide = {f"a_long_label_of_a_run_{i}": FRAME["a"] for i in range(8)}
+    every = {label: FRAME.of(label) for label in FRAME.columns}
+    wide = table.table(every | {f"a_long_label_of_a_run_{i}": FRAME.of("a") for i in range(8)})
     html = page(
         chase=chase.chase(runs()), theories={"a": theory(2.5, True)},
-        table=FRAME.assign(**wide), figures=[ERRORS._replace(file=picture())] * 4,
+        table=wide, figures=[ERRORS._replace(file=picture())] * 4,
         provenance={"argv": ["podusv", "x" * 300]}, title="long" * 60,
-        scenario=scenario().model_copy(update={"description": "word/" * 90}),
+        abouts={"a": about("description=" + "word/" * 90)},
     )  # fmt: skip
     return browsed(tmp_path_factory.mktemp("browser"), html)
 
