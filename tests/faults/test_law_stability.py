@@ -8,7 +8,7 @@ import pytest
 from conftest import NONLINEAR, VESSELS, ask, corrected, run
 from counts import count
 from law_samples import STEADY
-from line_loops import moving_eigenvalues, places
+from line_loops import furthest, moving_eigenvalues, places
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adrc import Adrc
@@ -20,6 +20,7 @@ from podusv_cli.components.vessels.plant import plant, surge_force, sway_force, 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.theory.lateral import momentum_vector_gains, momentum_vector_polynomial
 from podusv_cli.theory.loop_margins import loop_margins
 
 SPEED, LOAD = 0.5, np.array([0.5, 0.5, 0.5])  # m/s; N and N m
@@ -42,22 +43,24 @@ def drawn(random: Any, spread: float = 0.3) -> Vessel:
     return v.model_copy(update=changes)
 
 
-def steady_velocity(k: Any, turn: float = 0.0) -> tuple[float, float]:
+def steady_velocity(k: Any, turn: float = 0.0, loads: Vector = LOAD) -> tuple[float, float]:
     """(u, v) in balance across the bow, at the target's speed and turn; v by bisection."""
     low, high = -0.9 * SPEED, SPEED
     for _ in range(60):
         v = 0.5 * (low + high)
         u = np.sqrt(SPEED**2 - v * v)
-        low, high = (v, high) if sway_force(u, v, turn, k) + LOAD[1] > 0 else (low, v)
+        low, high = (v, high) if sway_force(u, v, turn, k) + loads[1] > 0 else (low, v)
     return float(np.sqrt(SPEED**2 - low * low)), low
 
 
-def at_rest(law: Any, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector:
+def at_rest(
+    law: Any, vessel: Vessel, told: Vessel, turn: float = 0.0, loads: Vector = LOAD
+) -> Vector:  # fmt: skip
     """(x, memory) on the target, which goes north: in its frame nothing changes."""
     true, k = bundle(vessel.constants()), bundle(told.constants())
-    u, v = steady_velocity(true, turn)
+    u, v = steady_velocity(true, turn, loads)
     forces = surge_force, sway_force, yaw_moment
-    tau = [-(f(u, v, turn, true) + b) for f, b in zip(forces, LOAD, strict=True)]
+    tau = [-(f(u, v, turn, true) + b) for f, b in zip(forces, loads, strict=True)]
     tau[1] = 0.0
     observed = [-(f(u, v, turn, k) + t) for f, t in zip(forces, tau, strict=True)]
     x = np.array([0.0, 0.0, -np.arctan2(v, u), u, v, turn])
@@ -68,13 +71,15 @@ def at_rest(law: Any, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector
     return s
 
 
-def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0) -> Vector:
+def rates(
+    law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0, loads: Vector = LOAD
+) -> Vector:  # fmt: skip
     """Of (x, memory) in the frame of the target: its position, its course, its turn [rad/s]."""
     x, memory, out = s[:6], s[6:], np.zeros(6)
     target = np.array([0.0, 0.0, SPEED, 0.0, 0.0, SPEED * turn])
     answer = ask(law, x, memory, target, told)
     tau = np.array([answer.tau[0], 0.0, answer.tau[1]])
-    plant(x, tau, LOAD, bundle(vessel.constants()), out)
+    plant(x, tau, loads, bundle(vessel.constants()), out)
     out[:3] -= SPEED - turn * x[1], turn * x[0], turn
     all_rates = np.concatenate([out, answer.rate])
     all_rates[places(law, "psi_f")] -= turn  # a heading
@@ -83,13 +88,18 @@ def rates(law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0) 
 
 def growth(law: Any, vessel: Vessel, told: Vessel = NONLINEAR, turn: float = 0.0) -> float:
     """Largest real part of the eigenvalues [1/s]; checks that the state is one of rest."""
-    s, small = at_rest(law, vessel, told, turn), 1e-6
-    assert abs(rates(law, s, vessel, told, turn)).max() < 1e-9
+    loop = linearised(law, at_rest(law, vessel, told, turn), vessel, told, turn)
+    return float(moving_eigenvalues(law, loop).real.max())
+
+
+def linearised(law: Any, s: Vector, *terms: Any, **loads: Vector) -> Vector:
+    """The matrix of the loop about a state of rest, by central differences."""
+    assert abs(rates(law, s, *terms, **loads)).max() < 1e-9
     columns = [
-        (rates(law, s + d, vessel, told, turn) - rates(law, s - d, vessel, told, turn)) / 2e-6
-        for d in small * np.eye(len(s))
+        (rates(law, s + d, *terms, **loads) - rates(law, s - d, *terms, **loads)) / 2e-6
+        for d in 1e-6 * np.eye(len(s))
     ]
-    return float(moving_eigenvalues(law, np.transpose(columns)).real.max())
+    return np.transpose(columns)
 
 
 def unstable(law: Any, count: int, heavier_sway: bool) -> tuple[int, int]:
@@ -182,6 +192,15 @@ def test_the_eigenvalues_are_those_of_the_table(law, vessel, told, line, starboa
     """theory.md: on the line and on the paper's circle to either side."""
     growths = [growth(law, vessel, told, turn) for turn in (0.0, TURN, -TURN)]
     assert growths == pytest.approx([line, starboard, port], abs=6e-4)
+
+
+@pytest.mark.parametrize(("vessel", "off"), [(NONLINEAR, 0.159), (CYBERSHIP, 0.225)])
+def test_a_load_across_the_path_takes_the_loop_off_the_polynomial_of_calm_water(vessel, off):
+    law, across = MomentumVector(), np.array([0.0, 0.5, 0.0])
+    s = at_rest(law, vessel, vessel, loads=across)
+    loop = linearised(law, s, vessel, vessel, loads=across)
+    roots = np.roots(momentum_vector_polynomial(*momentum_vector_gains(law, vessel, SPEED)))
+    assert furthest(roots, moving_eigenvalues(law, loop)) == pytest.approx(off, abs=2e-3)
 
 
 @pytest.mark.parametrize(
