@@ -163,11 +163,10 @@ def test_a_loop_of_another_structure_is_invalid(other: ClosedLoop) -> None:
 
 
 def test_no_runs_are_an_empty_batch() -> None:
-    batch = simulate_many([], GRID)
-    assert (len(batch.status), batch.seen.shape) == (0, (0, 1))
-    assert metrics_probe(Plan(corrected(), GRID), **SETTINGS).summaries(batch.seen)[
-        "iae"
-    ].shape == (0,)
+    probe = metrics_probe(Plan(corrected(), GRID), **SETTINGS)
+    batch = simulate_many([], GRID, probe=probe)
+    assert (len(batch.status), batch.seen.shape) == (0, (0, probe.size))
+    assert probe.summaries(batch.seen)["iae"].shape == (0,)
 
 
 class Faulty(Lost):

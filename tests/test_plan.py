@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 
@@ -53,8 +54,8 @@ def counting(monkeypatch):
     ("config", "controller", "of_law", "loops"),
     [
         ("fossen_2003/cybership2.yaml", "paper", 1, 4),  # whose laws are all checked
-        ("own_vessel.yaml", "", 3, 1),  # two of them by the law itself, for its memory
-        ("mu_2017/corrected.yaml", "", 3, 1),  # which has the stability monitor
+        ("own_vessel.yaml", "", 2, 1),  # once by the law itself, for its memory
+        ("mu_2017/corrected.yaml", "", 2, 1),  # which has the stability monitor
     ],
 )
 def test_a_run_plans_each_loop_once(config, controller, of_law, loops, tmp_path, counting):
@@ -101,3 +102,29 @@ def test_every_kind_of_part_is_known_to_loop_plan_and_plugins():
         assert name in plan.constants
         assert {name, f"{name}_table"} <= set(Vectors._fields)
         assert name in {function.owner for function in plan.functions}
+
+
+@pytest.mark.parametrize(
+    ("part", "other"),
+    [
+        ("controller", ["controller.kind=pid"]),
+        ("controller", ["controller.standoff_reference=crab"]),
+        ("path", ["path={kind: waypoints, points: [[0, 0], [9, 0], [9, 9]], speed: 0.2}"]),
+        ("disturbance", ["disturbance={kind: current, speed: 0.1}"]),
+        ("actuator", ["actuator.command.delay=0.1"]),
+        ("measurement", ["measurement.kind=exact", "estimator.kind=none"]),
+        ("estimator", ["estimator={kind: passive_observer}"]),
+    ],
+)
+def test_a_plan_like_another_sees_every_part_of_another_structure(part, other):
+    """What is taken from a plan whose parts are the same objects follows from those alone."""
+    config = ROOT / "sea/sensors.yaml"
+    usual = load(config, ["controller.kind=adaptive_neural", *SHORT]).scenario.alone()
+    changed = load(config, ["controller.kind=adaptive_neural", *other, *SHORT]).scenario
+    loops = [usual.closed_loop()]
+    loops += [replace(loops[0], **{part: getattr(changed.closed_loop(), part)})]
+    plan = Plan(loops[0], usual.time_grid())
+    again = replace(loops[0], start=(1.0,) * 6)
+    assert plan.like(again).structure == Plan(again, plan.grid).structure
+    with pytest.raises(ValueError, match="another structure than the batch"):
+        plan.like(loops[1])

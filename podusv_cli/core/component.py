@@ -106,7 +106,7 @@ class Component(BaseModel):
 
     def changed(self, new: Mapping[str, Any]) -> Self:
         """With other values, checked. Raises ValidationError."""
-        checked = type(self).model_validate(self.model_dump() | dict(new))
+        checked = type(self).model_validate({**vars(self), **new})
         return checked._with({}, self.model_fields_set | new.keys()) if self.rules else checked
 
     def _with(self, new: Mapping[str, Any], given: set[str]) -> Self:
@@ -119,7 +119,19 @@ class Component(BaseModel):
         A choice of words becomes its index among the choices, an absent number becomes NaN, and a
         nested component's names get its field's name in front.
         """
-        return dict(_numbers(self))
+        numbers: dict[str, float] = {}
+        for name, choices, may_be_absent in _fields(type(self)):
+            content = getattr(self, name)
+            if isinstance(content, (bool, int, float)):
+                numbers[name] = float(content)
+            elif isinstance(content, Component):
+                for inner, number in content.constants().items():
+                    numbers[f"{name}_{inner}"] = number
+            elif choices and name != "kind":
+                numbers[name] = float(choices.index(content))
+            elif may_be_absent:
+                numbers[name] = math.nan
+        return numbers
 
     def choices(self) -> frozenset[str]:
         """Names of those constants that are choices or whole numbers."""
@@ -148,21 +160,6 @@ def _fields(kind: type[Component]) -> tuple[_Field, ...]:
         )
         for name, field in kind.model_fields.items()
     )
-
-
-def _numbers(component: Component) -> Iterator[tuple[str, float]]:
-    for name, choices, may_be_absent in _fields(type(component)):
-        content = getattr(component, name)
-        if isinstance(content, (bool, int, float)):
-            yield name, float(content)
-        elif isinstance(content, Component):
-            yield from (
-                (f"{name}_{inner}", number) for inner, number in content.constants().items()
-            )
-        elif choices and name != "kind":
-            yield name, float(choices.index(content))
-        elif may_be_absent:
-            yield name, math.nan
 
 
 def _choices(component: Component) -> Iterator[str]:

@@ -62,7 +62,7 @@ def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
     return whole
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Accumulator:
     """Numbers gathered at every step, logged or not, from which metrics are computed.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any
@@ -110,24 +110,14 @@ class Metrics(Probe):
 
         A metric that raises is left out where `failed` is told; else it raises LawError.
         """
-        if not seen.any():  # no instant at all
-            seen = np.full_like(seen, np.nan)
-        ends = np.cumsum([size for _, size in self.parts])[:-1]
-        own = {
-            part: close_integrals(numbers, part.integrals, self.step)
-            for (part, _), numbers in zip(self.parts, np.split(seen, ends), strict=True)
-        }
         numbers: dict[str, float] = {}
-        for metric in self.known.values():
-            if metric.accumulator in own:
-                try:
-                    number = float(metric.result(own[metric.accumulator], self.step))
-                except Exception as error:  # a plug-in's function may raise anything
-                    if not failed:
-                        raise LawError(f"metric {metric.name}: {in_a_line(error)}") from error
-                    failed(f"metric {metric.name}", error)
-                else:
-                    numbers[metric.name] = number
+        for metric, runs in self._closed(seen[np.newaxis]):
+            try:
+                numbers[metric.name] = float(metric.result(runs[0], self.step))
+            except Exception as error:  # a plug-in's function may raise anything
+                if not failed:
+                    raise _fault(metric, error) from error
+                failed(f"metric {metric.name}", error)
         return numbers
 
     def one(self, name: str, seen: Vector) -> Vector:
@@ -143,11 +133,34 @@ class Metrics(Probe):
     def summaries(self, seen: Vector) -> dict[str, Vector]:
         """Metrics by name, with one number per run, from rows of gathered numbers (`Batch.seen`).
 
-        NaN where a run ended before a metric is defined; all NaN for a run that never began.
+        NaN where a run ended before a metric is defined; all NaN for a run that never began. Raises
+        LawError for a metric that raises.
         """
-        each = [self.summary(row) for row in seen]
-        names = self.summary(np.full(self.size, np.nan))
-        return {name: np.array([metrics[name] for metrics in each]) for name in names}
+        numbers: dict[str, Vector] = {}
+        for metric, runs in self._closed(seen):
+            try:
+                each = [float(metric.result(run, self.step)) for run in runs]
+            except Exception as error:  # a plug-in's function may raise anything
+                raise _fault(metric, error) from error
+            numbers[metric.name] = np.array(each, dtype=float)
+        return numbers
+
+    def _closed(self, seen: Vector) -> Iterator[tuple[Metric, Vector]]:
+        """Each metric with the gathered numbers of its accumulator, integrals closed, a row a run.
+
+        `seen` has a row a run, too.
+        """
+        seen = np.where(seen.any(axis=1, keepdims=True), seen, np.nan)  # no instant at all: NaN
+        ends = np.cumsum([size for _, size in self.parts])[:-1]
+        own = {
+            part: np.ascontiguousarray(close_integrals(numbers, part.integrals, self.step).T)
+            for (part, _), numbers in zip(self.parts, np.split(seen.T, ends), strict=True)
+        }
+        return ((m, own[m.accumulator]) for m in self.known.values() if m.accumulator in own)
+
+
+def _fault(metric: Metric, error: Exception) -> LawError:
+    return LawError(f"metric {metric.name}: {in_a_line(error)}")
 
 
 def metrics_probe(

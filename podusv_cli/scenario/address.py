@@ -134,11 +134,14 @@ def _section(scenario: Scenario, section: str, new: Mapping[Route, Number]) -> A
 
 
 def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Number]) -> Component:
-    data: Any = old.model_dump()
-    for place, number in new.items():
-        data = _with(data, place, number.value)
+    data: dict[str, Any] = {}
+    for (first, *rest), number in new.items():
+        name = str(first)
+        if rest and name not in data:
+            data[name] = old.model_dump(include={name})[name]
+        data[name] = _with(data[name], tuple(rest), number.value) if rest else number.value
     try:
-        return old.changed({str(place[0]): data[place[0]] for place in new})
+        return old.changed(data)
     except ValidationError as error:
         raise ValueRefused(_sentence(scenario, at, new, error)) from error
 

@@ -23,7 +23,6 @@ from podusv_cli.components.controllers.tracking import (
     track,
 )
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel, scratch
 from podusv_cli.core.signal import Signal
@@ -90,12 +89,11 @@ class Pid(TrackingController):
         """Held direction, integrals and lagged errors."""
         return HELD + each(MEMORY) + self.swaying()
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+    def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
         """Integrals at zero, lagged errors at zero or at the error."""
-        memory = super().start(x, target, nominal)
+        memory = super().begin(x, target, k)
         if self.lag_start == "error":
-            e, k = self.first_errors(x, memory, target, nominal)
-            u_d, r_d = reference(e, target, k)
+            u_d, r_d = reference(self.first_errors(x, memory, target, k), target, k)
             memory[[LAG_U, LAG_R]] = u_d - x[3], r_d - x[5]
         return memory
 

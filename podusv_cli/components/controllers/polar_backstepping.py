@@ -29,7 +29,6 @@ from podusv_cli.components.controllers.tracking import (
     track,
 )
 from podusv_cli.components.controllers.velocity_loop import AdaptedBound, Axis, Loop
-from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
 from podusv_cli.core.kernel import Vector, absent, kernel, scratch, tail
@@ -241,9 +240,9 @@ class PolarBackstepping(TrackingController):
         """Centres, shape (node, 3), and widths, shape (3,), of the networks."""
         return {CENTER: self.network.center_array(), WIDTH: self.network.width_array()}
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+    def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
         """Bounds and weights at what leakage pulls them to."""
-        memory = super().start(x, target, nominal)
+        memory = super().begin(x, target, k)
         memory[B_HAT_U], memory[B_HAT_R] = self.b_hat_u0, self.b_hat_r0
         memory[WEIGHTS : WEIGHTS + 2 * self.network.count] = self.network.initial_weight
         return memory
@@ -260,11 +259,11 @@ class FilteredBackstepping(PolarBackstepping):
         """(beta_u, beta_r)."""
         return each(FILTERED)
 
-    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+    def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
         """The filter at zero or settled on the virtual control."""
-        memory = super().start(x, target, nominal)
+        memory = super().begin(x, target, k)
         if self.filter_start == "alpha":
-            e, _ = self.first_errors(x, memory, target, nominal)
+            e = self.first_errors(x, memory, target, k)
             at = WEIGHTS + 2 * self.network.count
             memory[at : at + 2] = e.alpha_u, e.alpha_r
         return memory

@@ -230,25 +230,24 @@ class TrackingController(Controller):
         aim = take_aim(x, memory, target, k, scratch(6))
         hold(t, x, memory, aim, k)
 
-    def start(self, x: Vector, target: Vector, nominal: Any) -> Vector:
-        """All zero but the held direction: to the target, or its course where it is right here."""
-        memory, k = np.zeros(sum(size for _, size in self.slots())), self.constants_with(nominal)
+    def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
+        """The memory that `begin` gives for the law's constants."""
+        return self.begin(x, target, bundle(self.constants_with(nominal)))
+
+    def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
+        """The memory at t = 0 for the constants `k`, which are asked for once a start.
+
+        All zero but the held direction: to the target, or its course where it is right here.
+        """
+        memory = np.zeros(sum(size for _, size in self.slots()))
         if self.swaying():
-            memory[int(k["crab_at"])] = x[4]
-        x_e, y_e = self.aim(x, memory, target, k)[:2] - x[:2]
+            memory[int(k.crab_at)] = x[4]
+        x_e, y_e = take_aim(x, memory, target, k, np.zeros(6))[:2] - x[:2]
         memory[PSI_D_HELD] = direction(x_e, y_e) if x_e or y_e else direction(*target[2:4])
         return memory
 
-    def first_errors(
-        self, x: Vector, memory: Vector, target: Vector, nominal: Vessel
-    ) -> tuple[Tracking, Any]:
-        """The errors at the start, with this memory once it has taken a sample; the constants."""
-        constants, seen = self.constants_with(nominal), np.array(memory)
-        k = bundle(constants)
+    def first_errors(self, x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
+        """The errors at the start, with this memory once it has taken a sample."""
+        seen = np.array(memory)
         call(self.sample, t=0.0, x=x, memory=seen, target=target, k=k, table=self.table())
-        return track(x, seen, self.aim(x, memory, target, constants), k), k
-
-    @staticmethod
-    def aim(x: Vector, memory: Vector, target: Vector, k: dict[str, float]) -> Vector:
-        """What the law points at, as `take_aim` has it."""
-        return take_aim(x, memory, target, bundle(k), np.zeros(6))
+        return track(x, seen, take_aim(x, memory, target, k, np.zeros(6)), k)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -41,6 +41,14 @@ OWNERS = {
     "locate": "path", "sample": "law", "after_saturation": "law", "correct": "estimator",
     "follow": "estimator",
 }  # fmt: skip
+
+
+# What follows from these parts of a loop alone, and not from start or vessels.
+FOLLOWS: dict[str, tuple[str, ...]] = {
+    "states": ("controller", "actuator", "measurement", "estimator", "path"),
+    "row": ("path", "controller", "disturbance", "actuator", "measurement"),
+}
+FOLLOWS["layout"] = tuple(dict.fromkeys(FOLLOWS["states"] + FOLLOWS["row"]))
 
 
 class Function(NamedTuple):
@@ -84,7 +92,10 @@ class Plan:
         Raises ValueError for a loop of another structure, LawError for parts that do not fit.
         """
         loop.check_fit(self.grid.step)
-        plan = replace(self, loop=loop, probe_for=lambda plan: self.probe)
+        plan = Plan(loop, self.grid, lambda plan: self.probe, self.recall)
+        for name, parts in FOLLOWS.items():
+            if all(getattr(loop, part) is getattr(self.loop, part) for part in parts):
+                vars(plan)[name] = getattr(self, name)
         if plan.structure != self.structure:
             raise ValueError(
                 f"it has another structure than the batch: {_kinds(loop)} with {plan.layout}, "

@@ -7,7 +7,7 @@ draws there are, or on who asks for which of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 from warnings import catch_warnings
 
@@ -85,15 +85,34 @@ def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vecto
 
 
 def drawn(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) -> Scenario:
-    """The scenario of one law with the numbers of a draw.
+    """The scenario of one law with the numbers of a draw; see `drawing`."""
+    return drawing(scenario, {name: vary[name] for name in draw})(draw)
 
-    `vessel.m` does not change `nominal`, which the law is told. Raises ValueRefused where a number
-    is out of range.
+
+def drawing(scenario: Scenario, vary: Mapping[str, Quantity]) -> Callable[[Draw], Scenario]:
+    """What makes of a draw the scenario of one law with the numbers of the draw in it.
+
+    `vessel.m` does not change `nominal`, which the law is told. The function raises ValueRefused
+    where a number is out of range. It looks up places and the scenario's own values only once.
     """
-    new: dict[Route, Number] = {}
-    for name, number in draw.items():
-        for key in vary[name].targets(name):
-            steps = steps_at(key)
-            own = content(scenario, steps) if vary[name].relative else None
-            new[steps] = Number(f"sweep.vary.{name}: ", vary[name].value(own, number))
-    return with_values(scenario, new)
+    targets = [
+        (steps, f"sweep.vary.{name}: ", name, quantity, _own(scenario, quantity, steps))
+        for name, quantity in vary.items()
+        for steps in map(steps_at, quantity.targets(name))
+    ]
+
+    def scenario_of(draw: Draw) -> Scenario:
+        return with_values(
+            scenario,
+            {
+                steps: Number(source, quantity.value(own, draw[name]))
+                for steps, source, name, quantity, own in targets
+            },
+        )
+
+    return scenario_of
+
+
+def _own(scenario: Scenario, quantity: Quantity, steps: Route) -> Any:
+    """What the scenario has at a key, where the quantity changes that."""
+    return content(scenario, steps) if quantity.relative else None

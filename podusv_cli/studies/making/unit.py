@@ -12,7 +12,7 @@ from podusv_cli.engine.running.batch import Lazily, simulate_many
 from podusv_cli.engine.running.simulate import ready
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import drawing, draws
 from podusv_cli.studies.making.plan import StudyPlan
 
 
@@ -44,10 +44,11 @@ def make(
     """
     scenario = plan.single(unit.law, unit.cell)
     grid, probe = grid or scenario.time_grid(), scenario.probe()
-    numbers, vary = list(draws(plan.sweep, unit.first, unit.count, plan.stream)), plan.sweep.vary
+    numbers = list(draws(plan.sweep, unit.first, unit.count, plan.stream))
+    drawn = drawing(scenario, plan.sweep.vary)
 
     def loop(position: int) -> ClosedLoop:
-        return drawn(scenario, vary, numbers[position]).closed_loop()
+        return drawn(numbers[position]).closed_loop()
 
     done = simulate_many(
         Lazily(unit.count, loop),
