@@ -9,12 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_samples import recording, shown
+from drawn_samples import drawn, panels, recording, shown
 from html_tree import tree
+from known_signals import ABOUT
 from test_comparison_page import page
 from test_report_chase import browsed, needs_browser
 
 from podusv_cli.comparison import traces
+from podusv_cli.core.quantities import lettered
+from podusv_cli.theory.derived import DERIVED
 
 ODD = "</script><script>alert(1)</script><!--"
 
@@ -48,10 +51,9 @@ def test_the_page_puts_a_spike_at_its_time():
     curve = traces.encoded(*traces.thinned(numbers))
     template = Path(traces.__file__).parent / "templates" / "curves.js"
     (function,) = re.findall(r"^  const decoded = .*?^  };$", template.read_text(), re.M | re.S)
-    script = f"""const chosen = {{ selectedIndex: 0 }};
-      {function}
+    script = f"""{function}
       const run = {{ start: 100.0, end: 410.0, curves: [{json.dumps(curve)}] }};
-      console.log(curve(run).find((point) => point.y === 7.5).t);"""
+      console.log(curve(run, 0).find((point) => point.y === 7.5).t);"""
     found = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
     piece = 310.0 / traces.PIECES
     assert float(found.stdout) == pytest.approx(
@@ -74,17 +76,88 @@ def test_what_comes_out_of_base_64_is_what_went_in_and_beyond_numbers_there_is_n
     assert where.tolist() == [0, 255, 3, 4]
 
 
-def test_only_what_all_runs_have_is_shown_in_words_and_nothing_but_scalars():
+def test_all_scalars_are_shown_in_words_symbols_and_units_and_one_that_a_run_lacks_is_null():
     both = traces.traces(shown(("a", recording()), ("b", recording(without=("alpha_u",)))))
     names = [signal["name"] for signal in both["signals"]]
-    assert names[0] == "z_e"
-    assert "tau_u" in names
-    assert "alpha_u" not in names
-    assert "time" not in names
+    assert names[: both["first"]] == ["z_e", "psi_e", "tau_u", "tau_r"]
+    assert {"x_e", "y_e", "alpha_u", "u"} <= set(names)
+    assert not {"time", "W_hat_u"} & set(names)
     assert not [s["meaning"] for s in both["signals"] if re.search(r"\(\d+\)", s["meaning"])]
     assert {len(run["curves"]) for run in both["runs"]} == {len(names)}
+    lacking = [run["curves"][names.index("alpha_u")] is None for run in both["runs"]]
+    assert lacking == [False, True]
+    force = both["signals"][names.index("tau_u_cmd")]
+    assert (force["symbol"], force["unit"]) == ([("τ", "u,cmd")], "N")
     numbers, _ = decoded(both["runs"][0]["curves"][names.index("tau_u")])
     assert numbers.max() == pytest.approx(recording()["tau_u"].max(), rel=1e-6)
+
+
+def test_of_many_runs_there_are_fewer_signals():
+    runs = shown(*[(f"run {i}", recording()) for i in range(30)])
+    assert len(traces.traces(runs)["signals"]) == traces.MOST
+
+
+PEAKS = {
+    "u": lambda t: 0.3 * np.cos(t) - 900.0 * (t == 2.0),
+    "v": lambda t: 1e-6 * np.cos(t) + 900.0 * (t == 2.0),
+}
+
+
+def test_an_axis_is_logarithmic_where_the_figure_s_is_and_from_the_same_size_on():
+    runs = shown(("a", recording(**PEAKS, saturated=lambda t: t == 2.0)))
+    about = {signal["name"]: signal for signal in traces.traces(runs)["signals"]}
+    assert (about["u"]["linear"], about["u"]["floor"]) == (1.0, False)  # above 0.3
+    panel = panels(drawn("velocities", runs))["$u$ [m/s]"]
+    assert panel.get_yaxis().get_transform().linthresh == 1.0
+    assert about["v"]["linear"] == 0.1, "four decades below the peak"
+    assert about["tau_r"]["linear"] is None, "no peak"
+    assert about["saturated"]["linear"] is None, "a state, no size"
+    z_e = panels(drawn("errors", runs))["$z_e$ [m]"]
+    assert about["z_e"]["floor"]
+    assert about["z_e"]["linear"] <= z_e.get_ylim()[0]
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="runs the page's script with Node.js")
+@pytest.mark.parametrize(
+    ("floor", "numbers", "places"),
+    [
+        (False, [-1000.0, -0.1, -0.05, 0.0, 0.05, 10.0], [-5.0, -1.0, -0.5, 0.0, 0.5, 3.0]),
+        (True, [-3.0, 0.0, 0.05, 0.1, 1.0], [2.477121255, 1.0, 1.0, 1.0, 2.0]),
+    ],
+)
+def test_numbers_that_are_no_powers_have_a_place_on_a_logarithmic_axis(floor, numbers, places):
+    template = Path(traces.__file__).parent / "templates" / "curves.js"
+    (function,) = re.findall(r"^  const warped = .*?^  };$", template.read_text(), re.M | re.S)
+    (inverse,) = re.findall(r"^  const number = .*$", template.read_text(), re.M)
+    script = f"""{function}{inverse}
+      const scale = {{ linear: 0.1, floor: {json.dumps(floor)} }};
+      const places = {json.dumps(numbers)}.map((y) => warped(scale, y));
+      console.log(JSON.stringify([places, places.map((w) => number(scale, w))]));"""
+    found = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
+    at, back = json.loads(found.stdout)
+    assert at == pytest.approx(places)
+    sizes = np.maximum(np.abs(numbers), 0.1) if floor else numbers
+    assert back == pytest.approx(sizes)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "pieces"),
+    [
+        ("x", [("x", "")]),
+        (r"V_{\psi_e}", [("V", "ψe")]),
+        (r"|\hat W_r|", [("|W\u0302", "r"), ("|", "")]),
+        (r"\dot\psi_d^-", [("ψ\u0307", "d"), ("\u207b", "")]),
+        (r"\max\Phi", [("maxΦ", "")]),
+        (r"n_\mathrm{cmd}", [("n", "cmd")]),
+    ],
+)
+def test_a_symbol_is_text_on_the_line_and_below(symbol, pieces):
+    assert lettered(symbol) == pieces
+
+
+def test_every_symbol_of_podusv_becomes_text_without_latex():
+    for signal in {**ABOUT, **{d.signal.name: d.signal for d in DERIVED.values()}}.values():
+        assert not re.search(r"[\\{}_^$]", "".join(map("".join, lettered(signal.symbol))))
 
 
 def test_no_text_of_a_user_reaches_the_script():
@@ -106,18 +179,23 @@ addEventListener("load", () => {
       name, { clientX: box.left + x, clientY: box.top + 50, pointerId: 1 }));
     const texts = () => [...plot.querySelectorAll("text")].map((e) => e.textContent);
     const ends = () => texts().filter((text) => text.endsWith(" s"));
+    const paths = () => plot.querySelectorAll("g path").length;
+    const change = (box) => box.click();
     plot.setPointerCapture = () => {};
-    const told = { whole: ends(), paths: plot.querySelectorAll("g path:not(.cursor)").length };
+    const told = { whole: ends(), paths: paths(), bent: texts() };
+    told.labels = [...plot.querySelectorAll(".label")].map((e) => e.textContent);
+    change(one("#plot input.log"));
+    told.straight = texts();
+    change(one("#plot input.log"));
     at("pointermove", box.width / 2);
     told.time = one("#plot output").textContent;
     told.values = [...page.querySelectorAll("#plot .key small")].map((e) => e.textContent);
     at("pointerdown", 100); at("pointermove", 160); at("pointerup", 160);
     told.zoomed = ends();
-    page.querySelectorAll("#plot input")[0].click();
-    told.off = plot.querySelectorAll("g path:not(.cursor)").length;
-    const choice = one("#plot select");
-    choice.selectedIndex = 1;
-    choice.dispatchEvent(new frame.contentWindow.Event("change"));
+    change(one("#plot .key input"));
+    told.off = paths();
+    for (const box of [...page.querySelectorAll("#plot .choice input")].slice(1, 4)) change(box);
+    told.alone = paths();
     one("#plot button").click();
     told.back = ends();
     told.bad = /NaN|undefined|Infinity/.test(plot.outerHTML);
@@ -137,15 +215,22 @@ addEventListener("load", () => {
 @pytest.mark.browser
 def test_curves_zoom_tell_values_and_can_be_taken_out(tmp_path):
     gap = recording(z_e=lambda t: np.where(t < 30.0, np.nan, 1.0))
-    both = shown(("whole", recording()), ("gap", gap))
+    tall = recording(tau_u=lambda t: np.sin(t) + 1000.0 * (t == 1.0) - 50.0 * (t == 2.0))
+    both = shown(("whole", tall), ("gap", gap))
     html = page(traces=traces.traces(both))
     said, console = browsed(tmp_path, html, probe=PROBE)
     assert not console
     for width, told in said.items():
-        assert told["paths"] == len(both), width
-        assert told["off"] == len(both) - 1
+        assert told["paths"] == 4 * len(both), width
+        assert told["off"] == 4 * (len(both) - 1)
+        assert told["alone"] == len(both) - 1
+        labels = [text.replace("\u200b", "") for text in told["labels"]]
+        assert labels == ["ze [m]", "ψe [rad]", "τu [N]", "τr [N m]"]
+        assert {"1000", "-10", "0", "distance to the target"} <= set(told["bent"])
+        assert "1000" in told["straight"]
+        assert "-10" not in told["straight"]
         time = float(re.fullmatch(r"t = ([\d.]+) s", told["time"])[1])
-        shown_value = float(told["values"][0].removesuffix(" m"))
+        shown_value = float(re.match(r"z_e (\S+) m, psi_e ", told["values"][0])[1])
         assert shown_value == pytest.approx(1.5 + 0.5 * np.cos(time), abs=0.1)
         assert told["zoomed"] != told["whole"] == told["back"]
         assert not told["bad"]

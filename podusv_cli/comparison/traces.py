@@ -10,30 +10,32 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.shown import Shown
+from podusv_cli.core.quantities import lettered
+from podusv_cli.figures.scales import linear_up_to, resolved, scaling
+from podusv_cli.figures.shown import Shown, about
+from podusv_cli.pages.page import raised
 
 PIECES = 300  # of a run; a curve keeps the least and the largest number of each
-MOST = 20  # signals
+MOST, CURVES = 20, 200  # signals of many runs, and curves of all signals of a few
 NUMBERED = re.compile(r" \(\d+\)")  # equations of the first paper, which few readers have at hand
-FIRST = ("z_e", "e_ct", "psi_e", "tau_u", "tau_r")  # which readers look at first
+DISTANCE = "z_e"
+FIRST = (DISTANCE, "e_ct", "psi_e", "tau_u", "tau_r")  # which readers look at first
+NEXT = ("x_e", "y_e")  # which follow from the log
 
 
 def traces(runs: Sequence[Shown]) -> dict[str, Any]:
-    """The scalar signals that all runs have, with meaning and unit; {} where there is none.
+    """The scalar signals that a run has, with meaning, symbol, unit and scale; {} where is none.
 
-    Every curve is over the whole run, thinned by `thinned` and encoded by `encoded`.
+    Every curve is over the whole run, thinned by `thinned` and encoded by `encoded`; null where a
+    run lacks the signal. `first` is how many signals readers look at first.
     """
     runs = [run for run in runs if len(run.recording["time"])]
-    names = [name for name in _scalar(runs) if all(run.has(name) for run in runs)][:MOST]
-    about = {name: signal for run in runs for name, signal in run.recording.about.items()}
-    shown = [name for name in names if name in about]
+    shown = _scalar(runs)[: max(MOST, CURVES // max(1, len(runs)))]
     if not shown:
         return {}
     return {
-        "signals": [
-            {"name": n, "meaning": NUMBERED.sub("", about[n].meaning), "unit": about[n].unit}
-            for n in shown
-        ],
+        "signals": [_described(runs, name) for name in shown],
+        "first": sum(name in FIRST for name in shown) or 1,
         "runs": [
             {
                 "label": run.label,
@@ -41,17 +43,40 @@ def traces(runs: Sequence[Shown]) -> dict[str, Any]:
                 "dash": [] if run.linestyle == "-" else list(run.linestyle[1]),
                 "start": float(run.recording["time"][0]),
                 "end": run.end,
-                "curves": [encoded(*thinned(run.signal(name))) for name in shown],
+                "whole": run.whole,
+                "curves": [
+                    encoded(*thinned(run.signal(name))) if run.has(name) else None for name in shown
+                ],
             }
             for run in runs
         ],
     }  # fmt: skip
 
 
-def _scalar(runs: Sequence[Shown]) -> dict[str, None]:
+def _scalar(runs: Sequence[Shown]) -> list[str]:
     """The names of what is one number at every instant, in the order of readers' interest."""
     names = [n for run in runs for n, numbers in run.recording.signals.items() if numbers.ndim == 1]
-    return dict.fromkeys([*FIRST, *(name for name in names if name != "time")])
+    first = [name for name in (*FIRST, *NEXT) if any(run.has(name) for run in runs)]
+    return [name for name in dict.fromkeys([*first, *names]) if name != "time"]
+
+
+def _described(runs: Sequence[Shown], name: str) -> dict[str, Any]:
+    signal = about(runs, name)
+    return {
+        "name": name, "meaning": NUMBERED.sub("", signal.meaning), "unit": raised(signal.unit),
+        "symbol": lettered(signal.symbol),
+    } | _scale([run for run in runs if run.has(name)], name)  # fmt: skip
+
+
+def _scale(runs: Sequence[Shown], name: str) -> dict[str, Any]:
+    """Where the axis is logarithmic, as in figures: beyond `linear`, of a `floor` only there."""
+    if name == DISTANCE:
+        return {"linear": resolved(runs), "floor": True}
+    numbers = np.concatenate([run.signal(name) for run in scaling(runs)], dtype=float)
+    finite = numbers[np.isfinite(numbers)]
+    counts = np.array_equal(finite, np.rint(finite))  # such as 0 or 1, or the number of a leg
+    peak = float(np.max(np.abs(finite), initial=0.0))
+    return {"linear": None if counts else linear_up_to(runs, name, peak), "floor": False}
 
 
 def thinned(numbers: Vector) -> tuple[Vector, Vector]:

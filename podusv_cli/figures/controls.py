@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from podusv_cli.figures.curves import Span, compress, differ, draw_curve, draw_signal
+from podusv_cli.figures.curves import compress, differ, draw_curve, draw_signal
 from podusv_cli.figures.panels import PEAKS, TIME
+from podusv_cli.figures.scales import Span
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, axis_label
 from podusv_cli.figures.style import legend, new_figure

@@ -1,4 +1,4 @@
-"""Curves over time: which runs set a panel's scale, and how peaks leave the rest readable."""
+"""Curves over time, and how peaks leave the rest readable."""
 
 from __future__ import annotations
 
@@ -10,20 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.recording import largest
+from podusv_cli.figures.scales import Span, linear_up_to, scaling
 from podusv_cli.figures.shown import Shown
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
 MARK: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "white", "markeredgewidth": 0.7}
 COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}
 CUT: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.2, "zorder": 5.0}
-TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
 DENSE = 60.0  # ranges that a curve runs through; from there it hides what is below it
 FINE = 0.5  # points, of such a curve
 APART = 1.5  # a curve that goes this many times as far up and down lies below the calmer one
-DECADES = 4  # at most, on the logarithmic axis of runs that finished
-
-Span = tuple[float, float]
 
 
 def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
@@ -36,16 +32,6 @@ def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
     ends = [0, whole + int(np.argmin(y[whole:])), whole + int(np.argmax(y[whole:])), len(t) - 1]
     chosen = np.unique(np.concatenate([starts + bins.argmin(1), starts + bins.argmax(1), ends]))
     return t[chosen], y[chosen]
-
-
-def scaling(runs: Sequence[Shown], span: Span | None = None) -> list[Shown]:
-    """The runs that the scale has to fit: those that finished, or go on after the span [s].
-
-    A run that diverges leaves every scale; drawn to fit, it would hide all others. Where there is
-    no other run, it sets the scale.
-    """
-    kept = [run for run in runs if run.whole or (span is not None and run.end > span[1])]
-    return kept or list(runs)
 
 
 def draw_signal(
@@ -151,20 +137,7 @@ def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look
 
 def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
     """Make the axis logarithmic beyond a signal's usual values where its peaks dwarf them."""
-    kept = scaling([run for run in runs if run.has(name)])
-    peak = max(abs(limit) for limit in axes.dataLim.intervaly)
-    usual = max(_usual(run, name) for run in kept)
-    if any(run.whole for run in kept):
-        usual = max(usual, peak * 10.0**-DECADES)
-    if peak > TALL * usual > 0.0:
-        axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(usual)))
+    linear = linear_up_to(runs, name, max(abs(limit) for limit in axes.dataLim.intervaly))
+    if linear:
+        axes.set_yscale("symlog", linthresh=linear)
         axes.autoscale_view(scalex=False)  # margins in the new scale
-
-
-def _usual(run: Shown, name: str) -> float:
-    """The largest settled value; of a run that did not get there, the median."""
-    values = run.signal(name)
-    settled = values[np.searchsorted(run.recording["time"], run.steady_from) :]
-    if run.whole and len(settled):
-        return largest(len(settled), lambda rows: settled[rows])
-    return float(np.median(np.abs(values)))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
-from podusv_cli.figures.curves import draw_curve, draw_run, scaling, thinned
+from podusv_cli.figures.curves import draw_curve, draw_run, thinned
 from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, about, unit
 from podusv_cli.figures.style import legend, new_figure

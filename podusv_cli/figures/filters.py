@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.curves import compress, draw_run, draw_signal, scaling
+from podusv_cli.figures.curves import compress, draw_run, draw_signal
 from podusv_cli.figures.panels import PEAKS, grid
+from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, about, axis_label, unit
 from podusv_cli.figures.style import legend

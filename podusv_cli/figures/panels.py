@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import compress, draw_signal
 from podusv_cli.figures.page import Page
+from podusv_cli.figures.scales import resolved
 from podusv_cli.figures.sheet import Family, Sheet, figure
 from podusv_cli.figures.shown import Shown, axis_label, constants
 from podusv_cli.figures.style import legend, new_figure
@@ -22,8 +22,6 @@ Scale = Callable[[Axes, Sequence[Shown]], None]
 PANEL_HEIGHT = 1.45  # inches
 TIME = "time [s]"
 
-SAMPLES = 1000  # of a signal, about, for what is usual in it
-DIP = 0.02  # of the run; a distance that is smaller for less than this is a passage
 STANDOFF: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": (0, (1, 2))}
 PEAKS = "; where peaks dwarf the settled values the axis is logarithmic beyond these"
 
@@ -80,23 +78,12 @@ def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
 def distance_axis(axes: Axes, runs: Sequence[Shown]) -> None:
     """A logarithmic axis for z_e, not below what the runs resolve, with a line at each standoff."""
     axes.set_yscale("log")
-    bottom, floor = axes.get_ylim()[0], min(map(_resolved, runs))
+    bottom, floor = axes.get_ylim()[0], resolved(runs)
     axes.set_ylim(bottom=max(bottom, floor))
     kept = sorted({run.about.standoff for run in runs} - {0.0})
     for standoff in kept:
         label = f"standoff {kept[0]:g} m" if len(kept) == 1 else "standoffs"
         axes.axhline(standoff, label=label, **STANDOFF)
-
-
-def _resolved(run: Shown) -> float:
-    """The smallest distance [m] worth showing: a step's way, or less where the vessel stays nearer.
-
-    How near a vessel comes in passing depends on where the steps happen to fall.
-    """
-    stride = -(-len(run.recording["time"]) // SAMPLES)
-    z_e, u = (np.abs(run.signal(name)[::stride]) for name in ("z_e", "u"))
-    way = run.about.step * float(np.median(u))
-    return min(way, float(np.quantile(z_e, DIP)))
 
 
 def _sheet(

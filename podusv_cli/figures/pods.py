@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import THIN, draw_curve, draw_run, scaling
+from podusv_cli.figures.curves import THIN, draw_curve, draw_run
+from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, axis_label, constants
 from podusv_cli.figures.style import legend, new_figure

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import Span, draw_shared, draw_signal
+from podusv_cli.figures.curves import draw_shared, draw_signal
 from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.scales import Span
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, about, axis_label, constants
 from podusv_cli.figures.style import legend, new_figure

@@ -14,8 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import Locator
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import draw_run, scaling, thinned
+from podusv_cli.figures.curves import draw_run, thinned
 from podusv_cli.figures.panels import TIME
+from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown
 from podusv_cli.figures.style import legend, new_figure

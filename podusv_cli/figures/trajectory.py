@@ -13,8 +13,9 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import CUT, Span, draw_run, scaling
+from podusv_cli.figures.curves import CUT, draw_run
 from podusv_cli.figures.page import Page
+from podusv_cli.figures.scales import Span, scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, shortened
 from podusv_cli.figures.style import WIDTHS, legend, new_figure, remark

@@ -50,7 +50,7 @@ def environment(package: str) -> Environment:
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     made.filters |= {
-        "sentence": sentence, "raised": _raised, "number": _number, "label": _label
+        "sentence": sentence, "raised": raised, "number": _number, "label": _label
     }  # fmt: skip
     return made
 
@@ -67,7 +67,7 @@ def sentence(text: str) -> str:
     return f"{start}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 
-def _raised(unit: str) -> str:
+def raised(unit: str) -> str:
     """The unit with its powers raised."""
     return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(quantities.RAISED), unit)
 

@@ -1,17 +1,20 @@
 (() => {
   const { signals, runs } = JSON.parse(document.getElementById("curves-data").textContent);
-  const card = document.getElementById("plot"), plot = card.querySelector(".curves");
-  const chosen = card.querySelector("select"), whole = card.querySelector("button"), output = card.querySelector("output");
+  const card = document.getElementById("plot"), plot = card.querySelector(".curves"), output = card.querySelector("output");
+  const [whole, log] = [card.querySelector("button"), card.querySelector("input.log")];
+  const choice = [...card.querySelectorAll(".choice input")];
   const boxes = [...card.querySelectorAll(".key input")], values = [...card.querySelectorAll(".key small")];
-  const LEFT = 62, RIGHT = 12, TOP = 10, BASE = 24, NEAR = 6; // pixels
+  const LEFT = 72, RIGHT = 14, TOP = 20, BASE = 26, LOW = 110, NEAR = 6; // pixels
+  const PAPER = 720; // pixels, the width on a printed page
   const START = Math.min(...runs.map((run) => run.start)), END = Math.max(...runs.map((run) => run.end));
-  let from = START, to = END, width = 0, height = 0, low = 0, high = 1, pressed = null, now = null, cursor, picked;
+  let from = START, to = END, width = 0, height = 0, panels = [], pressed = null, now = null, cursor, picked;
 
   const decoded = new Map();
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  // A run's chosen signal as times and numbers, decoded when it is first looked at.
-  const curve = (run) => {
-    const coded = run.curves[chosen.selectedIndex];
+  // A signal of a run as times and numbers, decoded when it is first looked at.
+  const curve = (run, place) => {
+    const coded = run.curves[place];
+    if (!coded) return [];
     if (!decoded.has(coded)) {
       const view = new DataView(bytes(coded.numbers).buffer), places = bytes(coded.places), count = view.byteLength / 4;
       const part = (i) => (places.length ? ((i >> 1) + places[i] / 256) / (count / 2) : i / Math.max(1, count - 1));
@@ -20,53 +23,86 @@
     return decoded.get(coded);
   };
   // The number nearest to a time; NaN beyond the run.
-  const value = (run, t) => {
-    if (t < run.start || t > run.end) return NaN;
-    return curve(run).reduce((best, one) => (Math.abs(one.t - t) < Math.abs(best.t - t) ? one : best)).y;
+  const value = (run, place, t) => {
+    const points = t < run.start || t > run.end ? [] : curve(run, place);
+    return points.reduce((best, one) => (Math.abs(one.t - t) < Math.abs(best.t - t) ? one : best), { t: Infinity, y: NaN }).y;
   };
+  // A place on an axis that is linear up to a size and logarithmic beyond, and the number at a place.
+  const warped = ({ linear, floor }, y) => {
+    const size = Math.max(Math.abs(y), floor ? linear : 0) / linear;
+    return (floor || y >= 0 ? 1 : -1) * (size < 1 ? size : 1 + Math.log10(size));
+  };
+  const number = ({ linear }, w) => Math.sign(w) * linear * (Math.abs(w) < 1 ? Math.abs(w) : 10 ** (Math.abs(w) - 1));
+  const bent = (signal) => signal.linear && log.checked;
+  const on = (signal, y) => (bent(signal) ? warped(signal, y) : y);
+
   const across = (t) => LEFT + (width - LEFT - RIGHT) * (t - from) / (to - from);
   const back = (x) => Math.min(to, Math.max(from, from + (to - from) * (x - LEFT) / (width - LEFT - RIGHT)));
-  const up = (y) => TOP + (height - TOP - BASE) * (high - y) / (high - low);
+  const up = ({ signal, top, tall, low, high }, y) => top + tall * (high - on(signal, y)) / (high - low);
   const inView = () => runs.filter((_, place) => boxes[place].checked);
   const ticks = (first, last, count) => {
     const step = round((last - first) / count), found = [];
     for (let i = Math.ceil(first / step - 1e-9); i * step <= last * (1 + 1e-12) + 1e-12 && found.length < 50; i++) found.push(+(i * step).toPrecision(9));
     return found;
   };
-
-  const fit = () => {
-    [low, high] = [Infinity, -Infinity];
-    for (const run of inView()) curve(run).forEach(({ t, y }) => {
-      if (t >= from && t <= to && !Number.isNaN(y)) [low, high] = [Math.min(low, y), Math.max(high, y)];
+  // The numbers at an axis: some decades and 0, or evenly spaced ones where there are not two of these.
+  const marks = ({ signal, tall, low, high }) => {
+    if (!bent(signal)) return ticks(low, high, tall / 30);
+    const stride = Math.ceil((high - low) / (tall / 18)), found = signal.floor ? [] : [0];
+    for (let power = Math.ceil(Math.log10(signal.linear) - 1e-9), i = 0; i < 60; i++, power += stride) found.push(10 ** power, -(10 ** power));
+    const seen = found.filter((y) => on(signal, y) >= low && on(signal, y) <= high && !(signal.floor && y < 0));
+    return seen.length > 1 ? seen : ticks(number(signal, low), number(signal, high), tall / 30);
+  };
+  // A panel's signal and limits; runs that did not finish set these only where no other is in view.
+  const panel = (place, row, tall) => {
+    const signal = signals[place], having = inView().filter((run) => run.curves[place]), ended = having.filter((run) => run.whole);
+    let [low, high] = [Infinity, -Infinity];
+    for (const run of ended.length ? ended : having) curve(run, place).forEach(({ t, y }) => {
+      if (t >= from && t <= to && !Number.isNaN(y)) [low, high] = [Math.min(low, on(signal, y)), Math.max(high, on(signal, y))];
     });
     if (low > high) [low, high] = [0, 1];
     const room = 0.05 * (high - low) || 0.05 * Math.abs(high) || 1;
-    [low, high] = [low - room, high + room];
+    return { place, signal, tall, top: TOP + row * (tall + TOP), low: low - room, high: high + room };
   };
-  const draw = () => {
-    width = Math.max(200, plot.clientWidth);
-    height = Math.round(Math.min(360, Math.max(220, 0.4 * width)));
-    set(plot, "viewBox", `0 0 ${width} ${height}`);
-    plot.replaceChildren();
-    fit();
-    for (const y of ticks(low, high, 5)) {
-      make(plot, "path", { d: `M${LEFT} ${up(y)}H${width - RIGHT}`, class: "rule" });
-      make(plot, "text", { x: LEFT - 6, y: up(y) + 4, "text-anchor": "end" }, `${+y.toPrecision(6)}`);
+  // Text with what stands below the line in it, in turns.
+  const formula = (text, pieces) => pieces.forEach(([plain, below]) => {
+    make(text, "tspan", {}, plain);
+    if (below) { make(text, "tspan", { dy: 3, "font-size": "8px" }, below); make(text, "tspan", { dy: -3 }, "\u200b"); }
+  });
+  const drawPanel = (one, times) => {
+    const { place, signal, top, tall } = one, middle = top + tall / 2;
+    for (const t of times) make(plot, "path", { d: `M${across(t)} ${top}v${tall}`, class: "rule" });
+    for (const y of marks(one)) {
+      make(plot, "path", { d: `M${LEFT} ${up(one, y)}H${width - RIGHT}`, class: "rule" });
+      make(plot, "text", { x: LEFT - 6, y: up(one, y) + 4, "text-anchor": "end" }, `${+y.toPrecision(6)}`);
     }
-    for (const t of ticks(from, to, Math.max(2, width / 110))) make(plot, "text", { x: across(t), y: height - 6, "text-anchor": "middle" }, `${t} s`);
-    const clip = make(make(plot, "clipPath", { id: "plotted" }), "rect", { x: LEFT, y: TOP, width: width - LEFT - RIGHT, height: height - TOP - BASE });
-    const inside = make(plot, "g", { "clip-path": "url(#plotted)", fill: "none" });
+    make(plot, "text", { x: LEFT, y: top - 6, class: "title" }, signal.meaning);
+    formula(make(plot, "text", { transform: `rotate(-90 12 ${middle})`, x: 12, y: middle, "text-anchor": "middle", class: "label" }), [...signal.symbol, [` [${signal.unit}]`, ""]]);
+    const clip = make(make(plot, "clipPath", { id: `plotted-${place}` }), "rect", { x: LEFT, y: top, width: width - LEFT - RIGHT, height: tall });
+    const inside = make(plot, "g", { "clip-path": `url(#plotted-${place})`, fill: "none" });
     for (const run of inView()) {
       let pen = "M", d = "";
-      curve(run).forEach(({ t, y }) => {
+      curve(run, place).forEach(({ t, y }) => {
         if (Number.isNaN(y)) { pen = "M"; return; }
-        d += `${pen}${across(t).toFixed(1)} ${up(y).toFixed(1)}`;
+        d += `${pen}${across(t).toFixed(1)} ${up(one, y).toFixed(1)}`;
         pen = "L";
       });
       make(inside, "path", { ...line(run, 1.4), d });
     }
-    picked = make(inside, "rect", { y: TOP, height: height - TOP - BASE, class: "picked" });
-    cursor = make(inside, "path", { class: "cursor" });
+  };
+  const draw = (wide = plot.clientWidth) => {
+    const chosen = signals.map((_, place) => place).filter((place) => choice[place].checked);
+    width = Math.max(200, wide);
+    const tall = chosen.length > 1 ? LOW : Math.round(Math.min(330, Math.max(190, 0.4 * width)));
+    height = TOP + chosen.length * (tall + TOP) - TOP + BASE;
+    set(plot, "viewBox", `0 0 ${width} ${height}`);
+    plot.replaceChildren();
+    panels = chosen.map((place, row) => panel(place, row, tall));
+    const times = ticks(from, to, Math.max(2, width / 110));
+    for (const one of panels) drawPanel(one, times);
+    for (const t of times) make(plot, "text", { x: across(t), y: height - 8, "text-anchor": "middle" }, `${t} s`);
+    picked = make(plot, "rect", { y: TOP, height: height - TOP - BASE, class: "picked" });
+    cursor = make(plot, "path", { class: "cursor" });
     whole.disabled = from === START && to === END;
     point(now);
   };
@@ -75,10 +111,8 @@
     now = t;
     set(cursor, "d", t === null ? "" : `M${across(t)} ${TOP}V${height - BASE}`);
     output.textContent = t === null ? "" : `t = ${t.toFixed(END < 20 ? 3 : 1)} s`;
-    runs.forEach((run, place) => {
-      const y = t === null ? NaN : value(run, t);
-      values[place].textContent = Number.isNaN(y) ? "" : `${+y.toPrecision(4)} ${signals[chosen.selectedIndex].unit}`;
-    });
+    const shown = (run) => panels.map(({ place, signal }) => [signal, t === null ? NaN : value(run, place, t)]).filter(([, y]) => !Number.isNaN(y));
+    runs.forEach((run, row) => { values[row].textContent = shown(run).map(([{ name, unit }, y]) => `${name} ${+y.toPrecision(4)} ${unit}`).join(", "); });
   };
   const zoom = (first, last) => { [from, to] = [Math.max(START, first), Math.min(END, last)]; draw(); };
   const at = (event) => event.clientX - plot.getBoundingClientRect().left;
@@ -109,8 +143,9 @@
     event.preventDefault();
   });
   whole.addEventListener("click", () => zoom(START, END));
-  chosen.addEventListener("change", draw);
-  for (const box of boxes) box.addEventListener("change", draw);
-  addEventListener("resize", draw);
+  for (const box of [log, ...choice, ...boxes]) box.addEventListener("change", () => draw());
+  addEventListener("resize", () => draw());
+  addEventListener("beforeprint", () => draw(PAPER));
+  addEventListener("afterprint", () => draw());
   draw();
 })();

@@ -1,0 +1,60 @@
+"""The scale of a signal: which runs it has to fit, and from where on it is logarithmic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from podusv_cli.core.recording import largest
+from podusv_cli.figures.shown import Shown
+
+TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
+DECADES = 4  # at most, on the logarithmic axis of runs that finished
+SAMPLES = 1000  # of a signal, about, for what is usual in it
+DIP = 0.02  # of the run; a distance that is smaller for less than this is a passage
+
+Span = tuple[float, float]
+
+
+def scaling(runs: Sequence[Shown], span: Span | None = None) -> list[Shown]:
+    """The runs that the scale has to fit: those that finished, or go on after the span [s].
+
+    A run that diverges leaves every scale; drawn to fit, it would hide all others. Where there is
+    no other run, it sets the scale.
+    """
+    kept = [run for run in runs if run.whole or (span is not None and run.end > span[1])]
+    return kept or list(runs)
+
+
+def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
+    """The size beyond which an axis is logarithmic, as the peak dwarfs what is usual, or None."""
+    kept = scaling([run for run in runs if run.has(name)])
+    usual = max(_usual(run, name) for run in kept)
+    if any(run.whole for run in kept):
+        usual = max(usual, peak * 10.0**-DECADES)
+    return float(10.0 ** np.ceil(np.log10(usual))) if peak > TALL * usual > 0.0 else None
+
+
+def _usual(run: Shown, name: str) -> float:
+    """The largest settled value; of a run that did not get there, the median."""
+    values = run.signal(name)
+    settled = values[np.searchsorted(run.recording["time"], run.steady_from) :]
+    if run.whole and len(settled):
+        return largest(len(settled), lambda rows: settled[rows])
+    return float(np.median(np.abs(values)))
+
+
+def resolved(runs: Sequence[Shown]) -> float:
+    """The smallest distance [m] worth showing: a step's way, or less where a vessel stays nearer.
+
+    How near a vessel comes in passing depends on where the steps happen to fall.
+    """
+    return min(map(_resolved, runs))
+
+
+def _resolved(run: Shown) -> float:
+    stride = -(-len(run.recording["time"]) // SAMPLES)
+    z_e, u = (np.abs(run.signal(name)[::stride]) for name in ("z_e", "u"))
+    way = run.about.step * float(np.median(u))
+    return min(way, float(np.quantile(z_e, DIP)))
