@@ -21,7 +21,8 @@ from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text
-from podusv_cli.scenario.model import PER_RUN
+from podusv_cli.scenario.model import PER_RUN, scenario_class
+from podusv_cli.scenario.plugins import kinds_of
 
 PAGES = [
     path.relative_to(ROOT).as_posix()
@@ -134,6 +135,20 @@ def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
     assert list(documented) == list(FIGURES)
     for name, sheet in FIGURES.items():
         assert documented[name] == ", ".join(f"`{signal}`" for signal in sheet.signals)
+
+
+@pytest.mark.parametrize(
+    ("section", "pages"),
+    [
+        ("controller", "*"), ("path", "*"), ("disturbance", "sea"), ("actuator", "actuators"),
+        ("estimator", "estimators"), ("measurement", "measurements"),
+    ],
+)  # fmt: skip
+def test_every_kind_has_its_place_on_a_page(section: str, pages: str) -> None:
+    text = "".join(page.read_text() for page in (ROOT / "docs").glob(f"{pages}.md"))
+    kinds = kinds_of(scenario_class(()), section)
+    missing = [kind for kind in kinds if not re.search(rf"(`|kind: ){kind}\b", text)]
+    assert not missing
 
 
 def test_the_citation_names_this_version() -> None:
