@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import weakref
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -30,7 +32,7 @@ from podusv_cli.core.registry import kinds
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.machine import compile
+from podusv_cli.engine.machine import compile, signatures
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
 from podusv_cli.engine.machine.wide import object_code
 from podusv_cli.engine.running import lanes
@@ -374,6 +376,16 @@ def test_runs_that_hang_side_by_side_are_made_again_one_by_one(
     alone = simulate_many(loops, grid, side_by_side=False)
     monkeypatch.setattr(Work, "hangs", wide)
     same(simulate_many(loops, grid, side_by_side=True), alone)
+
+
+@pytest.mark.parametrize("kind", [signatures.VECTOR, signatures.LANE_VECTOR])
+def test_a_march_that_is_abandoned_writes_to_memory_that_nobody_else_has(kind: Any) -> None:
+    vector = np.zeros(LANES)
+    kept, places = weakref.ref(vector), signatures.pointers([vector], kind)
+    del vector
+    gc.collect()
+    assert kept() is not None
+    assert len(places) == 1
 
 
 def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(

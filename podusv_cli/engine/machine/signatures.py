@@ -51,16 +51,21 @@ def bind(part: str, inner: Any, names: tuple[str, ...], alike: Set[str] = frozen
     return taking(inner, SIGNATURES[part], unpacker(names, alike))
 
 
-def pointer(vector: Vector) -> Any:
+def pointer(vector: Vector, kind: Any = VECTOR) -> Any:
     """Where the numbers of a vector begin. TypeError unless they are float64, one by the other."""
     if vector.dtype != np.float64 or not vector.flags.c_contiguous:
         raise TypeError(f"machine code takes contiguous float64, not {vector.dtype}")
-    return vector.ctypes.data_as(VECTOR)
+    return vector.ctypes.data_as(kind)
 
 
-def pointers(vectors: Sequence[Vector]) -> Any:
-    """Where each of these vectors begins; they have to outlive its use."""
-    return (VECTOR * len(vectors))(*map(pointer, vectors))
+def pointers(vectors: Sequence[Vector], kind: Any = VECTOR) -> Any:
+    """Where each of these vectors begins.
+
+    It keeps them: a march that hangs is abandoned, and writes to them until it sees its stop flag.
+    """
+    places = (kind * len(vectors))(*(pointer(vector, kind) for vector in vectors))
+    places.vectors = vectors
+    return places
 
 
 def whole_numbers(numbers: Sequence[int]) -> Any:

@@ -63,9 +63,7 @@ def marcher(
 
     def ready(lanes: Lanes, h: float) -> March:
         vectors = lanes.vectors
-        pointers = (signatures.LANE_VECTOR * len(vectors))(
-            *(vector.ctypes.data_as(signatures.LANE_VECTOR) for vector in vectors)
-        )
+        pointers = signatures.pointers(vectors, signatures.LANE_VECTOR)
         sizes = signatures.whole_numbers(lanes.layout)
         given = (
             pointers, sizes, len(vectors[Vectors._fields.index("seen")]) // LANES,

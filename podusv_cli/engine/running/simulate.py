@@ -84,7 +84,7 @@ def marcher(
 ) -> Marcher:
     """What makes the march of loops like the plan's over such vectors, with a step [s].
 
-    It is compiled if need be. The vectors have to outlive the march.
+    It is compiled if need be. A march keeps its vectors.
     """
     if not compiled:
         p = Parts(*(signatures.bind(*part) for part in plan.functions))
