@@ -17,7 +17,7 @@ NEWEST := .venv-newest
 define SEPARATE
 $(PYTHON) -m venv --clear $(1) && \
 $(1)/bin/pip install --quiet --disable-pip-version-check --editable . $(2) $(TESTED_WITH) && \
-OPENBLAS_NUM_THREADS=1 $(1)/bin/pytest --numprocesses auto --dist loadfile
+OPENBLAS_NUM_THREADS=1 $(1)/bin/pytest --numprocesses auto --dist loadfile -m "not slow and not benchmark and not browser"
 endef
 TESTED_WITH := pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 import-linter fmpy optuna casadi gymnasium safetensors
 PODS := kept dropped ideal no_anti_windup single
@@ -34,7 +34,7 @@ COMPARISONS := printed_compare figures_compare figures_compare_standoff correcte
 DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN))
 
 .DEFAULT_GOAL := help
-.PHONY: help reproduce claim pod sea doubt sweep tune bench-laws docs test test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest dist bench lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -123,10 +123,16 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 	done
 	@echo "what was found: results/tuning.md; every table and figure: results/.tuning/*/report.html"
 
-test: lint types contracts ## lint, types, import contracts, all tests but the slow ones
+quick: $(VENV)/dev.done ## the test files nearest to what has changed since main
+	@$(BIN)/python tests/quick.py --files $(or $(FILES),25) --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+test: lint types contracts ## lint, types, import contracts, all tests but papers and slow ones
 	@$(PYTEST)
 
-test-all: lint types contracts ## as test, with the slow tests
+test-papers: $(VENV)/dev.done ## whole papers are computed again: the committed verdicts come out
+	@$(PYTEST) -m "papers and not slow"
+
+test-all: lint types contracts ## as test, with the papers and the slow tests
 	@$(PYTEST) -m "not benchmark"
 
 test-faults: $(VENV)/dev.done ## the fault tests with their full counts

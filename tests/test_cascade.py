@@ -165,6 +165,7 @@ def test_on_the_virtual_ship_the_demand_keeps_it_there_while_the_target_changes_
 ROWS = re.findall(r"^\| (L\d+\w?) \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M)
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize("name", ["circle", "line", "port", "load", "damping"])
 def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None:
     found = podusv.compare(CONFIGS / f"{name}.yaml", figures=False).claims
@@ -194,6 +195,7 @@ def whole_loop() -> Any:
     ])  # fmt: skip
 
 
+@pytest.mark.papers
 def test_the_rate_of_decay_is_that_of_the_loop_by_hand(tmp_path: Path) -> None:
     rate = -np.linalg.eigvals(whole_loop()).real.max()
     assert rate == pytest.approx(0.0357, abs=5e-5)

@@ -213,6 +213,7 @@ def compared(name: str) -> Any:
     return podusv.compare(CONFIGS / f"{name}.yaml", figures=False)
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize("name", COMPARISONS)
 def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None:
     verdicts = compared(name).claims
@@ -221,6 +222,7 @@ def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None
         assert VERDICTS[str(claim)] == in_words(row), claim
 
 
+@pytest.mark.papers
 def test_the_numbers_on_the_page_are_those_of_the_comparisons() -> None:
     course, load, beside = (compared(name).table for name in ("course", "load", "beside"))
     told = {claim: found for claim, _, _, found in ROWS}
@@ -249,6 +251,7 @@ CHANGES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 }
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize("name", CHANGES)
 def test_a_row_of_the_table_of_what_could_not_be_read(name: str) -> None:
     (row,) = re.findall(rf"^\| {re.escape(name)} \| (.+) \|$", PAGE, re.M)
@@ -262,6 +265,7 @@ def test_a_row_of_the_table_of_what_could_not_be_read(name: str) -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize("name", [*CHANGES][1:5])
 def test_verdicts_that_do_not_hang_on_what_could_not_be_read(name: str) -> None:
     verdicts = podusv.compare(CONFIGS / "course.yaml", CHANGES[name][0], figures=False).claims
@@ -297,6 +301,7 @@ def test_the_table_of_starts_is_that_of_the_study() -> None:
         ]  # fmt: skip
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(
     ("n", "acceptance", "w", "done"),
     [

@@ -26,7 +26,7 @@ ROOT = Path(__file__).parent.parent
 FULL = "full_backstepping"
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
 LETTERS = dict(zip("PFSC", NAMES, strict=True))  # as results/README.md calls them
-SOON = ("corrected_compare",)  # in `make test` already
+SOON = ("corrected_compare",)  # in `make test-papers` already
 SIGNS = {"reproduced": "+", "not reproduced": "-", "cannot tell": "?"}
 README = (ROOT / "results/README.md").read_text()
 # Sits on the singularity and chatters; the last bit of the start decides its settled numbers.
@@ -51,6 +51,7 @@ def made(request, tmp_path_factory):
     return request.param, done.folder
 
 
+@pytest.mark.papers
 def test_the_committed_table_is_what_comes_out(made):
     name, folder = made
     committed, new = (
@@ -62,6 +63,7 @@ def test_the_committed_table_is_what_comes_out(made):
     pd.testing.assert_frame_equal(new.drop(columns=loose), committed.drop(columns=loose), rtol=1e-6)
 
 
+@pytest.mark.papers
 def test_the_committed_verdicts_are_what_comes_out(made):
     name, folder = made
     committed, new = (
@@ -129,6 +131,7 @@ def telling():
     return [pytest.param(*line, marks=[pytest.mark.slow] * (line not in soon)) for line in lines]
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(("letter", "sets", "flips"), telling())
 def test_the_verdicts_hang_on_what_the_readme_says(letter, sets, flips):
     before = committed(letter)
@@ -144,6 +147,7 @@ def test_the_readme_tells_the_committed_verdicts():
         assert told == committed(letter)
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(
     ("letter", "keys", "claim"),
     [
@@ -159,6 +163,7 @@ def test_a_law_that_is_not_bounded_is_told(letter, keys, claim):
     assert signs(letter, keys, laws=("adaptive_neural",))[claim] == "-"
 
 
+@pytest.mark.papers
 def test_weights_that_take_a_sample_before_the_demand_do_not_cycle():
     keys = (
         "control.period=0.01",
@@ -168,6 +173,7 @@ def test_weights_that_take_a_sample_before_the_demand_do_not_cycle():
     assert signs("S", keys, laws=("adaptive_neural",))["C11c"] == "+"
 
 
+@pytest.mark.papers
 def test_with_narrow_nodes_the_heading_creeps_to_a_right_angle_and_the_run_diverges():
     keys = ("controller.network.spread=0.4", "simulation.duration=1240")
     scenario = load(ROOT / "configs/mu_2017/figures_compare_standoff.yaml", keys).scenario
@@ -326,6 +332,7 @@ def test_settled_velocity_errors_tell_the_gain() -> None:
         assert abs(ratio["rms_r_e"] - 1.0) < 0.003
 
 
+@pytest.mark.papers
 def test_the_limit_of_pid_is_that_of_its_lag() -> None:
     claim = module()
     pid = claim.sampled(claim.READINGS["C"], 0, "after")["pid"]
@@ -334,6 +341,7 @@ def test_the_limit_of_pid_is_that_of_its_lag() -> None:
         assert claim.predicted(pid.model_copy(update={"controller": law})) == period
 
 
+@pytest.mark.papers
 def test_a_few_cases_come_out_again() -> None:
     claim = module()
     table = pd.read_csv(PAPER / "unknown_dynamics.csv", index_col=[0, 1])

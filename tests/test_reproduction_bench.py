@@ -14,7 +14,6 @@ from podusv_cli.studies.bench.cases import AXES, shipped_bench
 from podusv_cli.studies.bench.page import as_markdown
 from podusv_cli.studies.bench.standing import middle
 from podusv_cli.studies.making.draws import drawn, draws
-from podusv_cli.studies.making.plan import plan
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.plan import TunePlan
 
@@ -450,13 +449,13 @@ def test_the_told_mass_sets_peak_demand_and_settled_error():
 @pytest.mark.parametrize("config", sorted(STUDIES.glob("*.yaml")), ids=lambda path: path.stem)
 def test_no_published_study_draws_what_a_metric_is_measured_by(config):
     """The standoff, and the execute and switch of trials: all runs of a law have the same."""
-    made = plan(load(config))
-    for law in made.laws:
-        single = made.single(law, 0)
+    scenario = load(config).scenario
+    assert scenario.sweep
+    for single in scenario.singles().values():
         probe = single.probe()
         same = probe.constants_for(single.closed_loop())
-        for draw in draws(made.sweep, 0, 5):
-            loop = drawn(single, made.sweep.vary, draw).closed_loop()
+        for draw in draws(scenario.sweep, 0, 2):
+            loop = drawn(single, scenario.sweep.vary, draw).closed_loop()
             assert probe.constants_for(loop) == same
 
 
@@ -509,6 +508,7 @@ def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
     assert seen[0] == seen[1]
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(
     ("law", "keys", "low", "high", "lost"),
     [

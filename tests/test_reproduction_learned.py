@@ -49,6 +49,7 @@ def test_the_page_says_where_velocity_vector_is_better():
     assert f"in {100 * calm.a_wins:.1f} % of the draws it is calmer" in words
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize("period", [0.0, 0.2])
 def test_the_shipped_policy_follows_the_paper_s_target_without_turning_round(period):
     """Its training is over at 80 s; the circle turns the vessel once."""

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parent.parent
 NAMES = ("ideal", "kept", "dropped", "single", "no_anti_windup")
 SOON = (
     "single",
-)  # the others take half a minute, and what `make test` sees of them is in the lines
+)  # the others take half a minute, and what `make test-papers` sees of them is in the lines
 LAWS = ["adaptive_neural", "dsc", "full_backstepping", "pid"]
 FOUND = (ROOT / "results/pod.md").read_text()
 
@@ -28,6 +28,7 @@ def committed(name: str, folder: Path = ROOT / "results/pod") -> Any:
     return pd.read_csv(folder / name / "comparison.csv", index_col=0)
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in SOON)) for n in NAMES]
 )
@@ -76,6 +77,7 @@ def test_which_law_arrives_first_is_as_committed():
     assert f"({settling['pid']:.1f} against {settling['adaptive_neural']:.1f} s)" in FOUND
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(
     ("name", "keys", "adaptive_neural", "pid"),
     [pytest.param(*line, marks=[pytest.mark.slow] * (i % 4 > 0)) for i, line in enumerate(LINES)],
@@ -93,6 +95,7 @@ def test_the_lines_that_say_so_are_there():
     assert len(LINES) == 13
 
 
+@pytest.mark.papers
 @pytest.mark.parametrize(
     ("name", "keys", "told"),
     [
@@ -106,6 +109,7 @@ def test_what_else_costs_at_the_propeller_comes_out(name, keys, told):
     assert told.format(round(rerun(law).run.metrics["energy_pod"])) in FOUND
 
 
+@pytest.mark.papers
 def test_unequal_thrust_holds_twice_the_disturbance_as_told():
     keys = ("disturbance.scale=2",)
     law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["adaptive_neural"]

@@ -165,6 +165,7 @@ def test_the_sea_with_pods_has_the_pods_and_laws_of_one_scenario_and_the_sea_of_
 SEEDED = "disturbance[0].seed={0} disturbance[2].seed={0} measurement.seed={0}"
 
 
+@pytest.mark.papers
 @pytest.mark.slow
 @pytest.mark.parametrize("law", SINGLE["pods"].columns.intersection(LAWS))
 def test_what_other_seas_and_the_true_state_do_behind_pods_is_what_comes_out(law):
@@ -240,6 +241,7 @@ def test_a_dead_zone_costs_what_is_told():
     assert off[1] == pytest.approx(off[0], rel=1e-3)
 
 
+@pytest.mark.papers
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_committed_comparison_is_what_comes_out(name, tmp_path, monkeypatch):
@@ -250,6 +252,7 @@ def test_the_committed_comparison_is_what_comes_out(name, tmp_path, monkeypatch)
     pd.testing.assert_frame_equal(found, SINGLE[name], rtol=1e-6)
 
 
+@pytest.mark.papers
 def test_one_committed_run_is_what_comes_out():
     """The one that a rounding error does not drive apart: no noise, no limit in the loop."""
     law = load(ROOT / "configs/sea/delay.yaml").scenario.singles()["velocity_vector"]
