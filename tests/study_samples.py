@@ -3,10 +3,10 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from podusv_cli.core.about import Claim
 from podusv_cli.metrics.table import METRICS
@@ -14,9 +14,17 @@ from podusv_cli.studies.counting.claims import ParsedClaim, judge, parse
 from podusv_cli.studies.counting.verdict import StudyVerdict
 from podusv_cli.studies.telling import summary as tables
 
-summary = partial(tables.summary, level=0.95, metrics=METRICS)
-pairs = partial(tables.pairs, margin=0.01, level=0.95, metrics=METRICS)
-sensitivity = partial(tables.sensitivity, level=0.95, metrics=METRICS)
+
+def summary(runs: Any) -> pd.DataFrame:
+    return pd.DataFrame(tables.summary(runs, 0.95, METRICS))
+
+
+def pairs(runs: Any, margin: float = 0.01, **given: Any) -> pd.DataFrame:
+    return pd.DataFrame(tables.pairs(runs, margin, 0.95, METRICS, **given))
+
+
+def sensitivity(runs: Any, draws: Any) -> pd.DataFrame:
+    return pd.DataFrame(tables.sensitivity(runs, draws, 0.95, METRICS))
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,11 @@ import pytest
 from scipy.stats import spearmanr
 from study_samples import Made, pairs, sensitivity, study, summary
 
+from podusv_cli.metrics.table import METRICS
+from podusv_cli.storage import csv_files
 from podusv_cli.studies.counting import statistics as st
-from podusv_cli.studies.telling.summary import as_csv
+from podusv_cli.studies.telling import summary as tables
+from podusv_cli.studies.telling.outputs import DIGITS
 
 inf, nan = math.inf, math.nan
 
@@ -45,7 +48,7 @@ def test_the_summary_counts_only_runs_that_are_there_and_broken_ones_as_failed()
     nothing = Made({"a": {"iae": a}}, undone={"a": True})
     assert summary(nothing).empty
     assert pairs(nothing).empty
-    assert as_csv(summary(nothing)).strip() in ("", '""')
+    assert csv_files.records([], DIGITS) == csv_files.text(summary(nothing), DIGITS)
 
 
 def test_metrics_that_a_law_lacks_are_left_out_and_missing_numbers_are_counted():
@@ -111,7 +114,9 @@ def test_measured_times_are_in_no_table():
 
 def test_tables_as_csv_have_six_digits_and_no_formulas():
     runs = study(["=cell"], a=np.full((1, 7), 1 / 3), b=np.full((1, 7), inf))
-    text = as_csv(summary(runs))
+    rows = tables.summary(runs, 0.95, METRICS)
+    text = csv_files.records(rows, DIGITS)
+    assert text == csv_files.text(pd.DataFrame(rows), DIGITS)  # as pandas writes it
     assert "\r" not in text
     lines = text.splitlines()
     assert lines[0].startswith("law,cell,n,broken,failed,failed_low,failed_high,metric,unit,")

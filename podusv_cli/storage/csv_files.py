@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from io import StringIO
 from typing import TYPE_CHECKING, Any
@@ -14,12 +15,28 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def lines(rows: Iterable[Sequence[object]]) -> str:
-    """Rows of a short table, the headings first; numbers in full precision."""
+def lines(rows: Iterable[Sequence[object]], digits: str | None = None) -> str:
+    """Rows of a short table, the headings first; numbers as `text` has them.
+
+    With `digits` an unknown number is an empty cell, too.
+    """
+
+    def cell(content: object) -> object:
+        if isinstance(content, str):
+            return escaping.csv(content)
+        if digits and isinstance(content, float):
+            return "" if math.isnan(content) else digits % content
+        return content
+
     written = StringIO()
-    cells = ([escaping.csv(c) if isinstance(c, str) else c for c in row] for row in rows)
-    csv.writer(written, lineterminator="\n").writerows(cells)
+    csv.writer(written, lineterminator="\n").writerows(map(cell, row) for row in rows)
     return written.getvalue()
+
+
+def records(rows: Sequence[Mapping[str, object]], digits: str | None = None) -> str:
+    """The same of rows by the names of their columns, which all rows have; without a row, none."""
+    heads = list(rows[0]) if rows else []
+    return lines([heads, *(list(row.values()) for row in rows)], digits)
 
 
 def text(frame: pd.DataFrame, digits: str | None = None) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import markdown
@@ -19,10 +19,13 @@ from podusv_cli.storage.run_folder import MISSING
 from podusv_cli.studies.counting.runs import AXES, ENDING, STATUSES
 from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.making.sessions import timing
-from podusv_cli.studies.telling import summary
 from podusv_cli.studies.telling.keep import Kept, tracks
 from podusv_cli.studies.telling.results import Results
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+DIGITS = "%.6g"  # of numbers in tables
 FIGURES, REPORT = "figures", "report.html"
 
 
@@ -34,9 +37,10 @@ def write_tables(folder: Path, results: Results) -> None:
         answer["contradicted"] = results.contradicted
         judged = f"{markdown(sentence(results.contradicted))}\n"
     contents = {
-        "summary.csv": summary.as_csv(results.summary).encode(),
-        "pairs.csv": summary.as_csv(results.pairs).encode(),
-        "sensitivity.csv": summary.as_csv(results.sensitivity).encode(),
+        **{
+            f"{name}.csv": csv_files.records(rows, DIGITS).encode()
+            for name, rows in results.tables._asdict().items()
+        },
         "claims.json": encode(answer),
         "claims.md": judged.encode(),
         "timing.json": encode(timing(folder)),
@@ -104,11 +108,15 @@ def as_frame(runs: Table) -> pd.DataFrame:
     frames = [
         _frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))
     ]  # fmt: skip
+    import pandas as pd  # slow to import
+
     return pd.concat(frames, ignore_index=True)
 
 
 def _frame(runs: Table, law: str, cell: int) -> pd.DataFrame:
     done = runs.tried(law)[cell]
+    import pandas as pd  # slow to import
+
     drawn = {name: values[done] for name, values in runs.drawn.items()}
     words = np.array(STATUSES)[runs.status(law)[cell][done]]
     numbers = {name: runs.metric(law, name)[cell][done] for name in runs.metrics}

@@ -79,16 +79,11 @@ def page(
 
 def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
     """For every law and cell: how many runs failed, the share's interval, and medians."""
-    for at, rows in results.summary.groupby(["law", "cell"], sort=False):
-        law, cell = map(str, at)
-        first, medians = rows.iloc[0], rows.set_index("metric").q50
-        failed = f"{round(first.failed * first.n)} of {first.n}"
+    for (law, cell), rows in results.of_places.items():
+        first = next(iter(rows.values()))
+        failed = f"{round(first['failed'] * first['n'])} of {first['n']}"
         share = Interval.of(first, "failed").ends(".3g%")
-        numbers = [
-            digits(medians.get(name, np.nan), infinite=results.known[name].infinite)
-            for name in results.shown
-        ]
-        yield law, cell, failed, share, numbers
+        yield law, cell, failed, share, results.medians(rows)
 
 
 def runs_that(results: Results, are: Any) -> Rows:
@@ -125,21 +120,18 @@ def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
 
 def _pairs(results: Results) -> list[Any]:
     """The rows of the shown metrics, in their order."""
-    rows: list[Any] = results.pairs.to_dict("records")
-    for row in rows:
-        row["ratio"] = Interval.of(row, "ratio").text(".4g")
+    rows = [{**row, "ratio": Interval.of(row, "ratio").text(".4g")} for row in results.tables.pairs]
     return [row for name in results.shown for row in rows if row["metric"] == name]
 
 
 def _numbers(results: Results) -> list[list[str]]:
     """Quantiles of the shown metrics, the median with its interval."""
-    rows: list[Any] = results.summary.to_dict("records")
     return [
         [row["law"], row["cell"], row["metric"], row["unit"],
          *(digits(row[q], infinite=word) for q in ("q05", "q25")),
          Interval.of(row, "q50").text(infinite=word),
          *(digits(row[q], infinite=word) for q in ("q75", "q95"))]
-        for row in rows if row["metric"] in results.shown
+        for row in results.tables.summary if row["metric"] in results.shown
         for word in [results.known[row["metric"]].infinite]
     ]  # fmt: skip
 

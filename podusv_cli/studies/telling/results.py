@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from podusv_cli.core.about import MetricAbout, StudyAbout
 from podusv_cli.studies.counting import claims, verdict
@@ -16,8 +15,19 @@ from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.telling import summary
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 ALWAYS = ("iae", "z_e_steady", "e_ct_rms")  # metrics that the answer has beside those of claims
 MARGIN = 0.01  # relative, of pairs
+
+
+class Tables(NamedTuple):
+    """The rows of the tables of `summary`; pandas, which is slow to import, need not have them."""
+
+    summary: summary.Rows
+    pairs: summary.Rows
+    sensitivity: summary.Rows
 
 
 @dataclass(frozen=True)
@@ -26,9 +36,7 @@ class Results:
 
     about: StudyAbout
     runs: Table
-    summary: pd.DataFrame
-    pairs: pd.DataFrame
-    sensitivity: pd.DataFrame
+    tables: Tables
     parsed: Sequence[claims.ParsedClaim]
     verdicts: Sequence[verdict.StudyVerdict]
     contradicted: str = ""  # why no claim is judged: a kept log has other numbers than the table
@@ -37,6 +45,29 @@ class Results:
     def known(self) -> Mapping[str, MetricAbout]:
         """All metrics, with those of plug-ins."""
         return self.about.metrics
+
+    @cached_property
+    def summary(self) -> pd.DataFrame:
+        """A row for each law, cell and metric."""
+        return _frame(self.tables.summary)
+
+    @cached_property
+    def pairs(self) -> pd.DataFrame:
+        """A row for each metric, cell and pair of laws."""
+        return _frame(self.tables.pairs)
+
+    @cached_property
+    def sensitivity(self) -> pd.DataFrame:
+        """A row for each law, cell, quantity and metric."""
+        return _frame(self.tables.sensitivity)
+
+    @cached_property
+    def of_places(self) -> dict[tuple[str, str], dict[str, dict[str, Any]]]:
+        """The rows of the summary by law and cell, and there by metric."""
+        places: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
+        for row in self.tables.summary:
+            places.setdefault((row["law"], row["cell"]), {})[row["metric"]] = row
+        return places
 
     @cached_property
     def broken(self) -> int:
@@ -94,17 +125,23 @@ class Results:
         rows = []
         for law in self.runs.laws:
             for cell in self.runs.cells:
-                mine = self.summary[(self.summary.law == law) & (self.summary.cell == cell)]
                 place = [law, cell] if several else [law]
-                rows.append([*place, *self._row(mine.set_index("metric"))])
+                rows.append([*place, *self._row(self.of_places.get((law, cell), {}))])
         return head, rows
 
-    def _row(self, mine: pd.DataFrame) -> list[str]:
-        if not len(mine):  # no run yet
+    def _row(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        if not mine:  # no run yet
             return ["-"] * (1 + len(self.shown))
-        failed = f"{Interval.of(mine.iloc[0], 'failed'):.3g%}"
-        medians = ((mine.q50.get(name, np.nan), self.known[name].infinite) for name in self.shown)
-        return [failed, *(digits(number, infinite=word) for number, word in medians)]
+        failed = f"{Interval.of(next(iter(mine.values())), 'failed'):.3g%}"
+        return [failed, *self.medians(mine)]
+
+    def medians(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """Medians of the shown metrics in these rows, by metric; a dash where there is none."""
+        return [
+            digits(number, infinite=self.known[name].infinite)
+            for name in self.shown
+            for number in [mine[name]["q50"] if name in mine else np.nan]
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -112,7 +149,7 @@ class Results:
             "preliminary": self.preliminary,
             "broken": self.broken,
             "contradicted": self.contradicted,
-            "summary": self.summary.to_dict("records"),
+            "summary": self.tables.summary,
             "claims": [verdict.as_json() for verdict in self.verdicts],
         }
 
@@ -125,12 +162,17 @@ def judged(about: StudyAbout, runs: Table) -> Results:
         for name, claim in about.claims.items()
     ]
     numbers = {q: values for q, values in runs.drawn.items() if not about.quantities[q].is_seed}
-    tables = (
+    tables = Tables(
         summary.summary(runs, level, known), summary.pairs(runs, MARGIN, level, known),
         summary.sensitivity(runs, numbers, level, known),
     )  # fmt: skip
-    laws, pairs, sensitivity = (
-        table if about.independent else summary.without_intervals(table) for table in tables
-    )
+    if not about.independent:
+        tables = Tables(*map(summary.without_intervals, tables))
     verdicts = claims.judge(parsed, runs, level, known)
-    return Results(about, runs, laws, pairs, sensitivity, parsed, verdicts)
+    return Results(about, runs, tables, parsed, verdicts)
+
+
+def _frame(rows: summary.Rows) -> pd.DataFrame:
+    import pandas as pd  # slow to import
+
+    return pd.DataFrame(rows)

@@ -7,33 +7,32 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
-from podusv_cli.storage import csv_files
 from podusv_cli.studies.counting import statistics
 from podusv_cli.studies.counting.runs import Mask, StudyRuns, worst
 
+ENDS = ("_low", "_high")  # of an interval's columns
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 Known = Mapping[str, MetricAbout]
+Rows = list[dict[str, Any]]  # of a table, each by the names of the columns
 
 
-def summary(runs: StudyRuns, level: float, metrics: Known) -> pd.DataFrame:
+def summary(runs: StudyRuns, level: float, metrics: Known) -> Rows:
     """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
-    rows = [
+    return [
         {**_failures(runs, law, cell, level), "metric": name, "unit": metrics[name].unit,
          **_quantiles(values, level)}
         for law in runs.laws for cell in range(len(runs.cells))
         for name, values in _columns(runs, law, cell, metrics)
     ]  # fmt: skip
-    return pd.DataFrame(rows)
 
 
 def pairs(
     runs: StudyRuns, margin: float, level: float, metrics: Known,
     names: Mapping[str, str] | None = None,
-) -> pd.DataFrame:  # fmt: skip
+) -> Rows:  # fmt: skip
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
     Of the draws that both laws met. A win is a smaller metric by more than the margin, which is
@@ -41,7 +40,7 @@ def pairs(
     default all.
     """
     laws = names or {law: law for law in runs.laws}
-    rows = [
+    return [
         {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
          **_pair(of_a[used], of_b[used], margin, level)}
         for name in _names(runs, metrics) for cell in range(len(runs.cells))
@@ -50,12 +49,9 @@ def pairs(
         for of_a, of_b in [(read[a], read[b])] if of_a is not None and of_b is not None
         for used in [runs.done(laws[a])[cell] & runs.done(laws[b])[cell]]
     ]  # fmt: skip
-    return pd.DataFrame(rows)
 
 
-def sensitivity(
-    runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics: Known
-) -> pd.DataFrame:
+def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics: Known) -> Rows:
     """Spearman's rank correlation of every metric with every drawn number, by law and cell.
 
     Of the `n` draws in which the metric is known. `by_chance` is what unrelated quantities stay
@@ -63,7 +59,7 @@ def sensitivity(
     """
     drawn = {name: np.asarray(values) for name, values in draws.items()}
     numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
-    rows = [
+    return [
         {"law": law, "cell": runs.cells[cell], "quantity": quantity, "metric": name,
          "n": known, "correlation": correlation,
          "by_chance": statistics.by_chance(known, level)}
@@ -74,18 +70,15 @@ def sensitivity(
         for known in [int(np.sum(~np.isnan(values)))]
         for quantity, correlation in statistics.rank_correlations(ranked, values).items()
     ]  # fmt: skip
-    return pd.DataFrame(rows)
 
 
-def without_intervals(frame: pd.DataFrame) -> pd.DataFrame:
+def without_intervals(rows: Rows) -> Rows:
     """The table with nothing in all columns that need independent draws."""
-    ends = [c for c in frame.columns if c.endswith(("_low", "_high")) or c == "by_chance"]
-    return frame.assign(**dict.fromkeys(ends, np.nan))
-
-
-def as_csv(frame: pd.DataFrame) -> str:
-    """A table as CSV with six significant digits."""
-    return csv_files.text(frame, "%.6g")
+    return [
+        {name: np.nan if name.endswith(ENDS) or name == "by_chance" else cell
+         for name, cell in row.items()}
+        for row in rows
+    ]  # fmt: skip
 
 
 def _names(runs: StudyRuns, metrics: Known) -> list[str]:

@@ -6,9 +6,8 @@ from pathlib import Path
 
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
-from podusv_cli.storage import files
-from podusv_cli.studies.telling.outputs import publish
-from podusv_cli.studies.telling.summary import as_csv
+from podusv_cli.storage import csv_files, files
+from podusv_cli.studies.telling.outputs import DIGITS, publish
 from podusv_cli.studies.tuning.results import SearchResults
 
 
@@ -19,7 +18,9 @@ def write_tables(folder: Path, results: SearchResults) -> None:
         "validation": results.pairs,
         "gains": results.gains, "importance": results.importance, "history": results.history,
     }  # fmt: skip
-    files.write_all({folder / f"{name}.csv": as_csv(t).encode() for name, t in tables.items()})
+    files.write_all(
+        {folder / f"{n}.csv": csv_files.text(t, DIGITS).encode() for n, t in tables.items()}
+    )
 
 
 def write_report(folder: Path, results: SearchResults, extras: Extras, *, figures: bool) -> None:

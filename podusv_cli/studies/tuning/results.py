@@ -235,8 +235,9 @@ class SearchResults:
             *(("tuning", {tuned(law): tuned(law), law: law}) for law in self.winners),
         ]
         tables = [
-            summary.pairs(self.runs, MARGIN, self.level, known, names).assign(when=when)
+            pd.DataFrame(rows).assign(when=when)
             for when, names in compared
+            for rows in [summary.pairs(self.runs, MARGIN, self.level, known, names)]
         ]
         return pd.concat([table for table in tables if len(table)] or tables, ignore_index=True)
 
