@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -15,16 +16,22 @@ SWEEP = {"draws": 2, "seed": 1, "vary": {"start.x": {"uniform": [-6.0, -4.0]}}}
 SHORT = {"simulation.duration": 1.0}
 
 
-@pytest.fixture
-def results(podusv: Command) -> Path:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two runs of other masses, a study and a damaged run in folders of their own."""
-    source = "podusv:own_vessel.yaml"
+    source, made = "podusv:own_vessel.yaml", tmp_path_factory.mktemp("made")
     for mass in (50.0, 60.0, 70.0):
-        changes, out = {**SHORT, "vessel.m": mass}, f"r/m/{mass:g}"
+        changes, out = {**SHORT, "vessel.m": mass}, made / f"m/{mass:g}"
         podusv_python.run(source, changes, out=out, figures=False)
-    podusv_python.sweep(source, {**SHORT, "sweep": SWEEP}, out="r/s", figures=False)
-    Path("r/m/70/manifest.json").write_text("{")
-    return Path("r")
+    podusv_python.sweep(source, {**SHORT, "sweep": SWEEP}, out=made / "s", figures=False)
+    (made / "m/70/manifest.json").write_text("{")
+    return made
+
+
+@pytest.fixture
+def results(podusv: Command, made: Path) -> Path:
+    """These, for a test to change."""
+    return shutil.copytree(made, Path("r"))
 
 
 def listed(podusv: Command, *words: str) -> list[list[str]]:

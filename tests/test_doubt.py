@@ -61,12 +61,14 @@ def left(u=0.5, damping=HULL.X_u, mass=MASS):
     return u * math.exp(damping * 10.0 / mass)
 
 
+STAY = "printed: [nominal, controllers, control]"  # what a test is not about is not tried
 WRITTEN = ADRIFT.replace("LIMIT", f"{1.03 * left():.17g}")
 
 
-def doubted(podusv, *words, text=WRITTEN):
+def doubted(podusv, text=WRITTEN, workers=1):
     Path("adrift.yaml").write_text(text, "utf-8")
-    said = podusv("doubt", "adrift.yaml", "--out", "out", "--no-figures", *words)
+    words = ("--out", "out", "--no-figures", "--workers", workers)
+    said = podusv("doubt", "adrift.yaml", *words)
     assert said.code == 0, said.err
     return said
 
@@ -116,7 +118,7 @@ def test_draws_are_judged_as_algebra_has_it(out):
 
 
 def test_one_process_or_two_find_the_same(out, podusv):
-    doubted(podusv, "--workers", "2")
+    doubted(podusv, workers=2)
     for name in ("turns.csv", "draws.csv", "doubt.json"):
         assert Path("out", name).read_bytes() == (out[0] / name).read_bytes()
 
@@ -132,14 +134,15 @@ def test_what_the_source_prints_stays(podusv):
 
 def test_vary_has_the_ranges(podusv):
     vary = "vary: {start.u: {times: {uniform: [0.9, 1.02]}}, start.x: {choice: [1.0, 2.0]}}"
-    doubted(podusv, text=WRITTEN.replace("doubt: {", f"doubt: {{{vary}, "))
+    doubted(podusv, text=WRITTEN.replace("doubt: {", f"doubt: {{{vary}, {STAY}, "))
     turns = [r for r in rows("turns.csv") if r["key"] == "start.u"]
     assert not turns  # 1.03 is where it would
     assert all(0.45 <= float(row["start.u"]) <= 0.51 for row in rows("draws.csv"))
 
 
 def test_a_hull_is_tried_as_a_whole(podusv):
-    text = WRITTEN.replace("doubt: {", "doubt: {hulls: [cybership1], ").replace("<=", ">=", 1)
+    hulls = f"doubt: {{hulls: [cybership1], {STAY}, "
+    text = WRITTEN.replace("doubt: {", hulls).replace("<=", ">=", 1)
     text = text.replace(f"{1.03 * left():.17g}", f"{0.9 * left():.17g}")
     doubted(podusv, text=text)
     (turn,) = (r for r in rows("turns.csv") if r["key"] == "vessel.preset" and r["claim"] == "slow")
@@ -240,9 +243,11 @@ def test_a_study_hangs_on_what_it_does_not_draw(podusv):
 def test_the_scenario_itself_is_judged_as_a_comparison_judges_it(podusv):
     """Also by a number that only a comparison has: operations of the law."""
     claim = "claims:\n  count: {says: Few., expect: a.law_operations <= 1000}\n"
-    doubted(podusv, text=WRITTEN.replace("claims:\n", claim).replace("draws: 40", "draws: 2"))
+    few = f"{STAY}, draws: 2"
+    doubted(podusv, text=WRITTEN.replace("claims:\n", claim).replace("draws: 40", few))
     found = json.loads(Path("out/doubt.json").read_text())["claims"]
-    assert podusv("compare", "adrift.yaml", "--no-figures", "--out", "c").code == 0
+    words = ("--no-figures", "--out", "c", "--workers", "1")
+    assert podusv("compare", "adrift.yaml", *words).code == 0
     known = json.loads(Path("c/claims.json").read_text())["claims"]
     answers = {c["claim"]: (c["verdict"], c["numbers"]) for c in known}
     assert {c["claim"]: (c["verdict"], c["numbers"]) for c in found} == answers
@@ -284,7 +289,7 @@ def test_a_verdict_that_some_value_leaves_open_is_robust_where_it_can_tell(podus
     """A run of 5 s has no window from 8 s to 10 s."""
     text = WRITTEN.replace("expect: max(abs(a.v))", "expect: 'max(abs(a.v), 8, 10)")
     text = text.replace("0.1, tolerance", "0.1', tolerance")
-    shorter = "doubt: {vary: {simulation.duration: {choice: [5.0]}}, "
+    shorter = f"doubt: {{vary: {{simulation.duration: {{choice: [5.0]}}}}, {STAY}, "
     doubted(podusv, text=text.replace("doubt: {", shorter))
     assert rows("doubt.csv")[1]["word"] == "robust where it can tell"
 

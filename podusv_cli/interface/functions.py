@@ -240,7 +240,7 @@ def doubt(
 
     >>> import podusv
     >>> claim = {"says": "It is near.", "expect": "pid.z_e_steady <= 1"}
-    >>> short = {"simulation.duration": 30.0, "doubt.draws": 20, "claims": {"A": claim}}
+    >>> short = {"simulation.duration": 10.0, "doubt.draws": 5, "claims": {"A": claim}}
     >>> podusv.doubt("podusv:own_vessel.yaml", short, out="doubts").loc["A", "verdict"]
     'not reproduced'
     """
