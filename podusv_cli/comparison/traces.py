@@ -89,10 +89,9 @@ def thinned(numbers: Vector) -> tuple[Vector, Vector]:
         return numbers, np.empty(0)
     edges = np.linspace(0, len(numbers), PIECES + 1).round().astype(int)
     first, sizes = edges[:-1, None], np.diff(edges)[:, None]
-    rows = first + np.arange(sizes.max())  # of every piece, the shorter ones filled up
-    inside = rows < edges[1:, None]
-    pieces = numbers[np.minimum(rows, len(numbers) - 1)]
-    good = inside & np.isfinite(pieces)
+    rows = np.minimum(first + np.arange(sizes.max()), edges[1:, None] - 1)  # the last one again
+    pieces = numbers[rows]
+    good = np.isfinite(pieces)
     least = np.where(good, pieces, np.inf).argmin(axis=1)
     most = np.where(good, pieces, -np.inf).argmax(axis=1)
     within = np.sort(np.stack((least, most), axis=1), axis=1)

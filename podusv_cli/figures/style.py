@@ -55,7 +55,8 @@ class Look:
 def house_style(names: Sequence[str] = STYLES["podusv"]) -> Iterator[None]:
     """matplotlib's settings as in these style files beside this module, for figures made inside."""
     with mpl.rc_context():
-        mpl.rcdefaults()
+        # as mpl.rcdefaults(), which reads all style sheets of matplotlib for it
+        mpl.rcParams.update({k: v for k, v in mpl.rcParamsDefault.items() if k != "backend"})
         for name in names:
             place = Path(__file__).with_name(f"{name}.mplstyle")
             mpl.rcParams.update(mpl.rc_params_from_file(place, use_default_template=False))
