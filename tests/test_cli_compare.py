@@ -318,6 +318,24 @@ def test_the_report_has_the_figures_as_they_are_written_and_runs_have_none(podus
     assert not list(Path("x").glob("*/figures"))
 
 
+@pytest.mark.slow
+def test_the_command_for_every_figure_names_where_the_runs_lie(podusv, monkeypatch, capsys):
+    run = commanded(monkeypatch, capsys)
+    one, two = write("one.yaml", ALONE), write("two.yaml", FIGURED)
+    said = run("run", one, "--controller", "soft", "--out", "a b")
+    assert said.err.splitlines()[-1] == "to draw every figure: podusv plot 'a b'"
+    assert figures("a b") == {"errors.png", "trajectory.png"}
+    assert podusv(two, "--out", "x").code == 0
+    said = podusv("x", "a b", "--out", "y", "--figures")
+    assert "to draw every figure: podusv plot x/stiff x/soft 'a b'" in said.err
+    for silent in ("--no-figures", "-q", "--json", "--figure=errors"):
+        assert "every figure" not in run("compare", "x", "--out", "z", "--force", silent).err
+    assert run("plot", "x", "--figure", "all", "--out", "all").code == 0
+    assert run("plot", "x", "--out", "plain").code == 0
+    drawn = {path.name for path in Path("all").iterdir()}
+    assert drawn == {path.name for path in Path("plain").iterdir()} > figures("a b")
+
+
 def test_a_report_without_figures_has_tables_and_the_animation_and_loads_no_matplotlib(podusv):
     config = write("two.yaml", SHORT)
     assert podusv(config, "--out", "x").code == 0
