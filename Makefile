@@ -34,7 +34,7 @@ COMPARISONS := printed_compare figures_compare figures_compare_standoff correcte
 DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN))
 
 .DEFAULT_GOAL := help
-.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest dist bench lint types contracts clean
+.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest dist bench checks lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -126,13 +126,13 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 quick: $(VENV)/dev.done ## the test files nearest to what has changed since main
 	@$(BIN)/python tests/quick.py --files $(or $(FILES),25) --numprocesses auto --dist loadfile --no-loadscope-reorder
 
-test: lint types contracts ## lint, types, import contracts, all tests but papers and slow ones
+test: checks ## lint, types, import contracts, all tests but papers and slow ones
 	@$(PYTEST)
 
 test-papers: $(VENV)/dev.done ## whole papers are computed again: the committed verdicts come out
 	@$(PYTEST) -m "papers and not slow"
 
-test-all: lint types contracts ## as test, with the papers and the slow tests
+test-all: checks ## as test, with the papers and the slow tests
 	@$(PYTEST) -m "not benchmark"
 
 test-faults: $(VENV)/dev.done ## the fault tests with their full counts
@@ -153,6 +153,10 @@ dist: ## sdist and wheel into dist/, checked with twine
 bench: $(VENV)/dev.done ## speed beside hand-written C (needs a C compiler), into benchmarks/results.md
 	@$(BIN)/python -m benchmarks.bench
 	@$(BIN)/pytest -m benchmark
+
+# mypy takes one core and longer than the two others together.
+checks: $(VENV)/dev.done
+	@$(MAKE) --no-print-directory --jobs=2 types lint contracts
 
 lint: $(VENV)/dev.done
 	@$(BIN)/ruff check $(OURS)

@@ -36,11 +36,13 @@ def changed(since: str) -> list[str]:
     """Files that differ from where this branch left that commit, and new ones."""
     difference = ["diff", "--name-only", "--merge-base", since]
     new = ["ls-files", "--others", "--exclude-standard"]
-    told = [
-        subprocess.run(["git", *words], cwd=ROOT, check=True, capture_output=True, text=True).stdout
-        for words in (difference, new)
-    ]
-    return sorted({name for text in told for name in text.splitlines()})
+    return sorted({name for words in (difference, new) for name in _git(words)})
+
+
+def _git(words: list[str]) -> list[str]:
+    """The lines that git prints; git's own exit code and message where it cannot."""
+    done = subprocess.run(["git", *words], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    return sys.exit(done.returncode) if done.returncode else done.stdout.splitlines()
 
 
 def node(file: str) -> str:
@@ -67,13 +69,16 @@ def users() -> dict[str, set[str]]:
     for module in graph.modules - GATES:
         for used in graph.find_modules_directly_imported_by(module):
             found[used].add(module)
-    by_name = {m[1]: m[0] for m in map(BY_NAME.fullmatch, graph.modules) if m}
+    by_name: dict[str, set[str]] = defaultdict(set)
+    for match in filter(None, map(BY_NAME.fullmatch, graph.modules)):
+        by_name[match[1]].add(match[0])
     for path in ROOT.glob("tests/**/*.py"):
         text = path.read_text()
         words = NAMED.findall(text)
         public = {getattr(interface, n).__module__ for n in _public(text)}
-        for used in {*_imported(ast.parse(text)), *public, *words} - GATES:
-            found[by_name.get(used, used)].add(path.stem)
+        named = {module for word in words for module in by_name.get(word, {word})}
+        for used in {*_imported(ast.parse(text)), *public, *named} - GATES:
+            found[used].add(path.stem)
     return found
 
 

@@ -144,10 +144,13 @@ if kind == "RLIMIT_DATA":  # what a short run imports and allocates is not the l
     execute(Task(load_text(short, "a.yaml").scenario, short, Path("short"), force=True))
     status = Path("/proc/self/status").read_text()
     limit += 1024 * int(status.partition("VmData:")[2].split()[0])
-resource.setrlimit(getattr(resource, kind), (limit, limit))
+which = getattr(resource, kind)
+before = resource.getrlimit(which)
+resource.setrlimit(which, (limit, before[1]))
 try:
     execute(Task(scenario, text, Path("run"), held=held))
 except (StorageError, MemoryError) as error:
+    resource.setrlimit(which, before)  # a profiler, say, may write files at the end
     sys.exit(report_error(error))
 """
 
