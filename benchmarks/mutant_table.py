@@ -144,7 +144,7 @@ TABLE: dict[str, list[Row]] = {
      "test_ratios_are_to_the_best_law_that_reached_its_target_and_failures_share_the_last_ranks"),
     ("np.where(np.isfinite(counted), counted / best, np.inf)", "counted / best",
      "test_a_case_that_no_law_does_has_no_best_law"),
-    ("middle(z_e.fillna(np.inf))", "middle(z_e.dropna())",
+    ("middle(rows.z_e_steady.fillna(np.inf))", "middle(rows.z_e_steady.dropna())",
      "test_a_run_that_ended_early_has_not_settled"),
     ('np.searchsorted(own, ratios, side="right")', 'np.searchsorted(own, ratios, side="left")',
      "test_a_profile_ends_at_the_share_of_cases_that_the_law_does"),
