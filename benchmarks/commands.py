@@ -1,4 +1,8 @@
-"""Whole commands, from the shell's point of view: time, memory, and where the time goes."""
+"""Whole commands, from the shell's point of view: time, memory, and where the time goes.
+
+`python -m benchmarks.commands` measures them alone, and prints processors' time in units of T, the
+time that importing podusv's libraries takes.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +20,46 @@ import numpy as np
 from benchmarks.cases import ROOT, SCENARIO
 from benchmarks.timing import quartiles
 
-REPEATS = 3
+REPEATS = 5
 COMPARED = SCENARIO.with_name("corrected_compare.yaml")  # four laws
 PODUSV = ("-m", "podusv_cli")
-LIBRARIES = ("-c", "import numpy, h5py, pydantic, typer, yaml, llvmlite")
+LIBRARIES = ("-c", "import numpy, h5py, pydantic, typer, yaml, llvmlite.binding")
 RUN = ("run", str(SCENARIO), "--json")
+FIRST = "podusv run --no-figures, for the first time"
+STUDY, SHORT = (
+    "podusv sweep run of {} draws, --no-figures",
+    "a run of 1000 steps of a study, 1000 T",
+)
+FEW, MANY = 8, 1008  # draws, of which the difference is what a run costs
 LATER = {
     "podusv --help": ("--help",),
     "podusv validate": ("validate", str(SCENARIO)),
     "podusv run --no-figures": (*RUN, "--no-figures"),
     "podusv run": RUN,
     "podusv compare": ("compare", str(COMPARED), "--json"),
-}
+    **{
+        STUDY.format(draws): (
+            "sweep", "run", "short.yaml", "--force", "--no-figures", "--workers", "1",
+            "--set", f"sweep.draws={draws}",
+        )
+        for draws in (FEW, MANY)
+    },
+}  # fmt: skip
+# Drawn hulls and seas with one law, ten seconds each; no log is kept.
+STUDIED = f"""
+extends: {ROOT / "configs/studies/hull_and_sea.yaml"}
+name: short
+simulation: {{duration: 10.0}}
+sweep:
+  laws: [adaptive_neural]
+  keep: {{failed: 0, worst: {{iae: 0}}, draws: []}}
+  claims: {{S1: null, S2: null, S3: null, S4: null}}
+"""
+# Has the code for eight runs side by side compiled, as a study of 20 000 such runs has.
+SIDE_BY_SIDE = """
+import podusv
+podusv.simulate_many("short.yaml", {"start.x": [0.0] * 8}, side_by_side=True)
+"""
 # Runs the command that its arguments make. A process of its own, since memory that a child has
 # in common with a large parent when it is started counts as the child's.
 MEASURE = """
@@ -69,23 +101,33 @@ def spent(
 def commands() -> dict[str, dict[str, Any]]:
     """Quartiles of time and memory; the first run finds no compiled code, the later ones do.
 
-    Processors' time also beside that of importing podusv's libraries, measured in turn. Runs also
-    say where the time of the last of them went.
+    Processors' time also in units of that of importing podusv's libraries, measured in turn:
+    quartiles of the ratios, and the ratio of the least times, which other programs disturb least.
+    Runs also say where the time of the last of them went.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        (folder / "short.yaml").write_text(STUDIED)
+        imports = [spent((), folder, LIBRARIES)["busy"]]
         first = spent((*RUN, "--no-figures", "--out", "first"), folder)
-        found = {"podusv run --no-figures, for the first time": _summary(RUN, [first])}
+        measured: dict[str, tuple[Sequence[str], list[dict[str, Any]]]] = {FIRST: (RUN, [first])}
+        spent((), folder, ("-c", SIDE_BY_SIDE))
+        spent(LATER[STUDY.format(FEW)], folder)
+        found: dict[str, dict[str, Any]] = {}
         for label, arguments in LATER.items():
-            several, imports = [], []
+            several, before = [], len(imports)
             for _ in range(REPEATS):
                 imports.append(spent((), folder, LIBRARIES)["busy"])
                 several.append(spent(_apart(arguments, folder), folder))
-            ratios = np.array([one["busy"] for one in several]) / imports
-            found[label] = _summary(arguments, several) | {"ratio": quartiles(ratios)}
+            measured[label] = (arguments, several)
+            ratios = np.array([one["busy"] for one in several]) / imports[before:]
+            found[label] = {"ratio": quartiles(ratios)}
+        for label, (words, several) in measured.items():
+            least = min(one["busy"] for one in several) / min(imports)
+            found[label] = _summary(words, several) | {"least": least} | found.get(label, {})
         report = next(folder.glob("*/report.html"))
         found["podusv compare"]["report_megabytes"] = report.stat().st_size / 1e6
-    return found
+        return found
 
 
 def _apart(arguments: Sequence[str], folder: Path) -> Sequence[str]:
@@ -102,3 +144,25 @@ def _summary(arguments: Sequence[str], several: list[dict[str, Any]]) -> dict[st
         "megabytes": quartiles(np.array([one["megabytes"] for one in several])),
         "parts": parts,
     }
+
+
+def short_run(found: Mapping[str, Mapping[str, Any]]) -> float:
+    """What one more run of a study of short runs takes, in thousandths of T."""
+    more = found[STUDY.format(MANY)]["least"] - found[STUDY.format(FEW)]["least"]
+    return float(1000.0 * more / (MANY - FEW))
+
+
+def main() -> None:
+    """Print the table."""
+    found = commands()
+    rows = [
+        [name, f"{measured['least']:.2f}", f"{measured['megabytes'][1]:.0f}"]
+        for name, measured in found.items()
+    ]
+    for cells in (["command", "T", "peak memory, MB"], ["---"] * 3, *rows):
+        print(f"| {' | '.join(cells)} |")
+    print(f"\none more run of 1000 steps in a study: {short_run(found):.2f} thousandths of T")
+
+
+if __name__ == "__main__":
+    main()
