@@ -68,8 +68,8 @@ def pictures() -> Iterable[tuple[str, bytes]]:
     for shown in SHOWN:
         scenario = podusv.load(shown, {"simulation.duration": SECONDS})
         runs = [
-            (name, podusv.simulate(one).recording, one)
-            for name, one in scenario.singles().items()
+            (name, *of_run(single))
+            for name, single in scenario.singles().items()
             if name in ("adaptive_neural", "pid")
         ]
         left = [sheet for name, sheet in FIGURES.items() if f"{name}.png" not in drawn]
@@ -77,13 +77,19 @@ def pictures() -> Iterable[tuple[str, bytes]]:
     return drawn.items()
 
 
+def of_run(scenario: Any) -> tuple[Any, Any, Any]:
+    """What a figure needs of the run of a scenario, but its label."""
+    run = podusv.simulate(scenario)
+    return run.recording, run.about, scenario.plugged
+
+
 def gallery_pictures() -> Iterable[tuple[str, bytes]]:
     """The tracks of every scenario of the gallery, over its whole time."""
     for shown, laws in GALLERY.items():
         singles = podusv.load(shown).singles()
         runs = [
-            (label, podusv.simulate(one).recording, one)
-            for label, one in singles.items()
+            (label, *of_run(single))
+            for label, single in singles.items()
             if label in (laws or singles)
         ]
         for _, picture in draw(dressed(runs), [FIGURES["trajectory"]], ["png"]):

@@ -39,7 +39,11 @@ def test_drawing_is_progress_too():
     run.recording = Recording("finished", "pid", signals, about=ABOUT)
     entry = Entry("a", run, about())
     result = outputs.Result({}, [entry], {}, {}, pd.DataFrame(), [], {}, {})
-    drawn = outputs.drawn(result, Extras(), lambda name, fraction: seen.append((name, fraction)))
+
+    def tell(name, fraction):
+        seen.append((name, fraction))
+
+    drawn = outputs.drawn(result, Extras(), tell, ("all",))
     assert "velocities.png" in drawn
     assert {name for name, _ in seen} == {"drawing figures"}
     fractions = [fraction for _, fraction in seen]
