@@ -77,6 +77,11 @@ def test_what_all_laws_share_of_a_training_set_is_in_no_interval():
     assert asif["ratio_low"] < 0.6, "searches that are drawn apart for each law"
 
 
+def test_searches_that_are_not_as_many_for_every_training_set_are_refused():
+    with pytest.raises(ValueError, match="a: 6 searches on 5 training sets"):
+        searches.compared({"a": np.ones((6, 4)), "b": np.ones((1, 4))}, 0.95, 1, sets=5)
+
+
 def test_a_training_set_on_which_one_law_is_lucky_widens_its_interval():
     lucky = np.array([0.6, 1.0, 1.0, 1.0, 1.4])[np.arange(20) % 5][:, None]
     runs = {"a": lucky, "b": np.ones((20, 1))}

@@ -95,8 +95,13 @@ def compared(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int =
 
     `runs` are numbers of each law, shape (search, draw), infinite for a run that failed. Of `sets`
     training sets, the n-th search of a law is on set n modulo `sets`. A law that was not searched
-    has a single row.
+    has a single row. Raises ValueError where a law's searches are not as many for every set.
     """
+    for law, table in runs.items():
+        if len(table) > 1 and len(table) % sets:
+            raise ValueError(
+                f"{law}: {len(table)} searches on {sets} training sets (training_sets)"
+            )
     random = np.random.default_rng(seed)
     draws = next(iter(runs.values())).shape[1] if runs else 1
     met = random.integers(draws, size=(SAMPLES, draws))
