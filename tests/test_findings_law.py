@@ -352,6 +352,7 @@ def test_docs_show_what_a_terminal_shows(podusv, monkeypatch):
 
 def test_findings_are_wrapped_on_a_terminal_and_whole_in_a_pipe(podusv, monkeypatch):
     monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.setenv("TERM", "dumb")  # no bar, which a slow run would have among them
     validate, run = (
         (command, scenario_file("corrected.yaml"), *SWAYING, *SHORT[:4])
         for command in ("validate", "run")
