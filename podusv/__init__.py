@@ -7,9 +7,9 @@ imported when the first of them is used.
 from podusv_cli import __version__ as __version__
 
 __all__ = [
-    "Bench", "Comparison", "PodusvError", "Run", "Scenario", "Study", "Tuning", "bench", "compare",
-    "doubt", "load", "open_run", "open_session", "open_study", "optimum", "run", "simulate",
-    "simulate_many", "sweep", "tune", "verify",
+    "Bench", "Comparison", "IdentifiedHull", "PodusvError", "Run", "Scenario", "Study", "Tuning",
+    "bench", "compare", "doubt", "identify", "load", "open_run", "open_session", "open_study",
+    "optimum", "run", "simulate", "simulate_many", "sweep", "tune", "verify",
 ]  # fmt: skip
 
 

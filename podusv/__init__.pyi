@@ -1,5 +1,6 @@
 from podusv_cli.interface import Bench as Bench
 from podusv_cli.interface import Comparison as Comparison
+from podusv_cli.interface import IdentifiedHull as IdentifiedHull
 from podusv_cli.interface import PodusvError as PodusvError
 from podusv_cli.interface import Run as Run
 from podusv_cli.interface import Scenario as Scenario
@@ -8,6 +9,7 @@ from podusv_cli.interface import Tuning as Tuning
 from podusv_cli.interface import bench as bench
 from podusv_cli.interface import compare as compare
 from podusv_cli.interface import doubt as doubt
+from podusv_cli.interface import identify as identify
 from podusv_cli.interface import load as load
 from podusv_cli.interface import open_run as open_run
 from podusv_cli.interface import open_session as open_session

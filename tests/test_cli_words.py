@@ -116,6 +116,7 @@ def test_explain_shows_the_sections_without_a_key(podusv):
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
         "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
         "controller", "simulation", "control", "log", "metrics", "sweep", "tune", "doubt",
+        "identify",
     ]  # fmt: skip
     assert f"    kinds: {', '.join(kinds('paths'))}\n" in out
 

@@ -9,6 +9,7 @@ from matplotlib.mathtext import MathTextParser
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.differences import as_text, differences
 from podusv_cli.comparison.entries import CHECKS, Entry, EntryWithoutLog
+from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.windows import NAMED, named
 
@@ -165,8 +166,8 @@ def test_a_difference_in_any_section_is_found(key):
 def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
     rest = {
-        "name", "description", "controller", "controllers", "claims", "silence", "plugins", "sweep",
-        "tune", "doubt", "measurement", "estimator",
+        "name", "description", "controller", "controllers", "claims", "silence", "plugins",
+        *BESIDE_RUNS, "measurement", "estimator",
     }  # fmt: skip
     assert sections | rest == set(type(scenario()).model_fields)
 

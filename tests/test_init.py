@@ -105,8 +105,8 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
         "fossen_2003/base", "lefeber_2003/base", "mu_2017/base", "mu_2017/claims",
         "mu_2017/ablation_laws", "theory/base", "trials/base",
     }  # fmt: skip
-    assert list(points)[:4] == [*FIRST]
-    assert list(points)[4:] == sorted(set(points) - set(FIRST))
+    assert list(points)[: len(FIRST)] == [*FIRST]
+    assert list(points)[len(FIRST) :] == sorted(set(points) - set(FIRST))
     first, rest = podusv("init").out.split("\n", 1)
     assert first.startswith("to begin with: mu_2017/corrected (a run), own_vessel (a hull of your")
     assert all(f" {name} (" in first for name in FIRST)
@@ -157,7 +157,13 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv, name):
     (schema,) = re.findall(r"^# yaml-language-server: \$schema=(.*)$", text, re.MULTILINE)
     assert (copy.parent / schema).read_text() == schema_text(tuple(finding_kinds()))
     scenario = load(copy).scenario
-    command = "sweep run" if scenario.sweep else "compare" if scenario.controllers else "run"
+    made_for = {
+        "sweep run": scenario.sweep, "identify": scenario.identify, "compare": scenario.controllers,
+    }  # fmt: skip
+    command = next((words for words, section in made_for.items() if section), "run")
+    for log in scenario.identify.logs if scenario.identify else ():
+        assert f"wrote {copy.with_name(log.file)}" in said.out.splitlines()
+        assert copy.with_name(log.file).read_text().startswith("time [s],north [m],east [m],")
     assert said.out.splitlines()[-1] == f"next: podusv {command} {copy}"
 
 

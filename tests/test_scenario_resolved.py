@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scenario_samples import SOUND, loaded, write
 
+from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import SizingError
 from podusv_cli.scenario.keys import limits, members, sections
@@ -169,9 +170,7 @@ def test_keys_stand_in_the_order_of_the_fields_behind_the_kind():
     assert HEADING.count("\n") == 1
     node = read(text, "a.yaml", [])
     assert node is not None
-    assert [*node.mapping, "sweep", "tune", "doubt"] == list(
-        Scenario.model_fields
-    )  # no run has these
+    assert [*node.mapping, *BESIDE_RUNS] == list(Scenario.model_fields)  # no run has these
     law = list(node.mapping["controller"].mapping)
     assert law[:3] == ["kind", "k_ze", "k_psie"]
 

@@ -155,17 +155,22 @@ def test_words_and_claims_do_not_make_another_study(whole):
 
 @pytest.mark.slow
 def test_a_run_that_kills_its_process_is_found(tmp_path, monkeypatch):
-    real = units.drawn
+    real = units.drawing
 
-    def deadly(scenario, vary, draw):
-        if abs(draw["start.psi"] - draws_of(5)) < 1e-15 and "pid" in scenario.controller.kind:
-            os._exit(3)
-        return real(scenario, vary, draw)
+    def deadly(scenario, vary):
+        alive = real(scenario, vary)
+
+        def drawn(draw):
+            if abs(draw["start.psi"] - draws_of(5)) < 1e-15 and "pid" in scenario.controller.kind:
+                os._exit(3)
+            return alive(draw)
+
+        return drawn
 
     def draws_of(number):
         return next(draws(small().sweep, number, 1))["start.psi"]
 
-    monkeypatch.setattr(units, "drawn", deadly)
+    monkeypatch.setattr(units, "drawing", deadly)
     runs = made(tmp_path / "deadly", draws=16).runs()
     words = np.array(units.STATUSES)[runs.status("pid")[0]]
     assert [i for i, word in enumerate(words) if word != "finished"] == [5]

@@ -24,7 +24,8 @@ from podusv_cli.cli.exit_codes import (
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
     "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
-    "explain", "list", "schema", "new", "bench", "tune", "doubt", "docs", "demo", "runs", "export",
+    "explain", "list", "schema", "new", "bench", "tune", "doubt", "identify", "docs", "demo",
+    "runs", "export",
 )  # fmt: skip
 
 # What others call it, and the command that does it.
@@ -32,7 +33,7 @@ MEANT = {
     "simulate": "podusv run CONFIG simulates a scenario",
     "help": "podusv docs [PAGE] shows the pages, and podusv --help all commands",
     "replay": "podusv rerun RUN repeats a finished run, and podusv compare RUN plays it on a page",
-    "fit": "podusv tune CONFIG searches gains of laws; no command fits a hull to data",
+    "fit": "podusv identify CONFIG fits a hull to logs, and podusv tune CONFIG searches gains",
 }
 FIRST_STEPS = """\
 podusv simulates and compares controllers for pod-propelled surface vessels. First steps:

@@ -41,4 +41,6 @@ def init(
         return
     begun = workflow.init(name, out)
     echo(f"wrote {begun.config}, and {begun.schema} for editors")
+    for log in begun.logs:
+        echo(f"wrote {log}")
     echo(f"next: {shlex.join(['podusv', *begun.command, str(begun.config)])}")

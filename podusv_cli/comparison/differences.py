@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import flat
 
 PROSE = (".source", ".validity")
 IGNORED = (
-    "name", "description", "controller", "controllers", "claims", "silence", "sweep", "tune",
-    "doubt",
+    "name", "description", "controller", "controllers", "claims", "silence", *BESIDE_RUNS,
 )  # fmt: skip
 
 

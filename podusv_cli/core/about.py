@@ -12,6 +12,9 @@ from pydantic import BaseModel, ConfigDict, PositiveInt, model_validator
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.signal import check_words
 
+# Sections of a scenario on which no run of it depends.
+BESIDE_RUNS = ("sweep", "tune", "doubt", "identify")
+
 
 @dataclass(frozen=True)
 class MetricAbout:

@@ -69,6 +69,12 @@ DEMAND = (
     Signal("tau_u_cmd", "N", "surge force that the law asked for", r"\tau_{u,\mathrm{cmd}}"),
     Signal("tau_r_cmd", "N m", "yaw moment that the law asked for", r"\tau_{r,\mathrm{cmd}}"),
 )
+# What the actuator does to the hull.
+TAU = (
+    Signal("tau_u", "N", "surge force on the hull", r"\tau_u"),
+    Signal("tau_v", "N", "sway force on the hull", r"\tau_v"),
+    Signal("tau_r", "N m", "yaw moment on the hull", r"\tau_r"),
+)
 LOOP = (
     Signal("time", "s", "time since the start of the run", "t"),
     *STATE,
@@ -76,9 +82,7 @@ LOOP = (
     Signal("y_d", "m", "target position, east"),
     Signal("z_e", "m", "distance to the target (18)"),
     *DEMAND,
-    Signal("tau_u", "N", "surge force on the hull", r"\tau_u"),
-    Signal("tau_v", "N", "sway force on the hull", r"\tau_v"),
-    Signal("tau_r", "N m", "yaw moment on the hull", r"\tau_r"),
+    *TAU,
     Signal("b_u", "N", "disturbance force in surge"),
     Signal("b_v", "N", "disturbance force in sway"),
     Signal("b_r", "N m", "disturbance moment in yaw"),

@@ -21,6 +21,7 @@ from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.findings.finding import Case, postflight
 from podusv_cli.interface.border import ParameterError
+from podusv_cli.interface.hulls import IdentifiedHull
 from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
@@ -32,6 +33,7 @@ from podusv_cli.storage import json_files
 from podusv_cli.verification import verify as verification
 from podusv_cli.workflows import compare as comparing
 from podusv_cli.workflows import doubt as doubting
+from podusv_cli.workflows import identify as identifying
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
 from podusv_cli.workflows.gather import Members, from_folder, from_scenario, gathered
@@ -248,6 +250,22 @@ def doubt(
     done = doubting.doubt_of(given, replace(request(out, force, figures), workers=workers))
     head, *rows = table(done.answers)
     return pd.DataFrame(rows, columns=list(head)).set_index("claim")
+
+
+def identify(
+    source: Source, changes: Changes | None = None, *,
+    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+) -> IdentifiedHull:  # fmt: skip
+    """The hull of a boat from the logs that a scenario names, as `podusv identify` finds it.
+
+    Raises UsageError without logs and for logs that cannot be used, ScenarioError, StorageError.
+
+    >>> import podusv
+    >>> hull = podusv.identify("otter.yaml", out="hull")  # doctest: +SKIP
+    >>> hull.forces[["force", "at", "value", "low", "high"]]  # doctest: +SKIP
+    """
+    done = identifying.identify_of(loaded(source, changes), request(out, force, figures))
+    return IdentifiedHull(done.folder, done.answer)
 
 
 def _single(given: Loaded) -> Scenario:

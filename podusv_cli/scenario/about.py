@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
-from podusv_cli.core.about import RunAbout
+from podusv_cli.core.about import BESIDE_RUNS, RunAbout
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.metrics.table import METRICS
@@ -31,7 +31,7 @@ def _told_by(scenario: Scenario) -> RunAbout:
     law, approach = scenario.controller, scenario.controller.approach()
     return RunAbout(
         **_of_parts(scenario),
-        values=scenario.model_dump(mode="json", exclude={"sweep", "tune", "doubt"}),
+        values=scenario.model_dump(mode="json", exclude={*BESIDE_RUNS}),
         metrics={n: m.about for n, m in scenario.known_metrics().items() if n not in METRICS},
         trial=law.trial() is not None, standoff=approach.standoff if approach else 0.0,
         polar=isinstance(law, PolarBackstepping), optimum_of=law.optimum_of(),

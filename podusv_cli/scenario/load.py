@@ -12,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
@@ -42,7 +43,6 @@ from podusv_cli.scenario.yaml_tree import (
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
-STUDIES = ("sweep", "tune", "doubt")  # sections that only studies have
 HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
@@ -240,7 +240,7 @@ def values(scenario: Scenario) -> dict[str, Any]:
 def _data(scenario: Scenario) -> dict[str, Any]:
     """The scenario as plain data; studies only where there are some, since runs have none."""
     data = scenario.model_dump()
-    return {k: v for k, v in data.items() if k not in STUDIES or v is not None}
+    return {k: v for k, v in data.items() if k not in BESIDE_RUNS or v is not None}
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:

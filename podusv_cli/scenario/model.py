@@ -20,7 +20,7 @@ from podusv_cli.components.measurements.base import Measurement
 from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.about import Claim, at_target
+from podusv_cli.core.about import BESIDE_RUNS, Claim, at_target
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
@@ -33,6 +33,7 @@ from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import Metrics, metrics_probe, metrics_with
 from podusv_cli.metrics.windows import NAMED
 from podusv_cli.scenario.doubt import Doubt
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.sections import (
     NAME,
     Control,
@@ -130,6 +131,10 @@ class Scenario(Component):
         None, "", "what `podusv doubt` moves to see whether verdicts turn; see podusv docs doubt"
     )
 
+    identify: Identify | None = value(
+        None, "", "the logs from which `podusv identify` takes the hull; see podusv docs identify"
+    )
+
     def __reduce_ex__(self, protocol: SupportsIndex) -> str | tuple[Any, ...]:
         """Pickle by value where plug-ins made the class, which another process has to make anew."""
         if not any(plugin.text for plugin in self.plugged):
@@ -150,7 +155,7 @@ class Scenario(Component):
     def alone(self) -> Scenario:
         """The scenario of one run: `controller` only, without comparison and studies."""
         return self.model_copy(
-            update={"controllers": {}, "claims": {}, "sweep": None, "tune": None, "doubt": None}
+            update={"controllers": {}, "claims": {}, **dict.fromkeys(BESIDE_RUNS)}
         )
 
     def singles(self) -> dict[str, Scenario]:

@@ -26,7 +26,8 @@ from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, merge, wit
 # and a section that is null all of them.
 NAMED: tuple[Route, ...] = (
     ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
-    ("tune", "space"), ("doubt", "vary"),
+    ("tune", "space"), ("doubt", "vary"), ("identify", "columns"), ("identify", "priors"),
+    ("identify", "noise"),
 )  # fmt: skip
 EMPTIED: tuple[Route, ...] = (*NAMED, ("sweep", "keep"))  # null is a section with nothing in it
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}

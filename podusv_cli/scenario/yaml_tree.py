@@ -19,6 +19,7 @@ NAMED_BY_KEYS = (
     ("sweep", "grid"),
     ("tune", "space"),
     ("doubt", "vary"),
+    ("identify", "priors"),
 )  # sections whose entries have names with dots
 RANGE = {"log", "around", "keep"}  # and some of the above: what a gain may be
 DISTRIBUTIONS = QUANTITY - {"keys"}

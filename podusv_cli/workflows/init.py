@@ -17,23 +17,26 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.schema import TITLE, schema_text
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.storage import files
+from podusv_cli.workflows import example_logs
 
 SCHEMA = "podusv.schema.json"
 # What to begin with, and what each shows.
 FIRST = {
     "mu_2017/corrected": "a run", "own_vessel": "a hull of your own",
     "mu_2017/corrected_compare": "a comparison of laws", "studies/hull_and_sea": "a study",
+    "identify/otter": "a hull from logs",
 }  # fmt: skip
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class Begun:
-    """A scenario file that was written, the schema beside it, and the words of its command."""
+    """A scenario file that was written, what is beside it, and the words of its command."""
 
     config: Path
     schema: Path
     command: tuple[str, ...]
+    logs: tuple[Path, ...] = ()
 
 
 def starting_points() -> dict[str, str]:
@@ -69,13 +72,16 @@ def init(name: str, out: Path | None = None) -> Begun:
     plugins = installed()
     known_to_editors = schema_text(tuple(finding_kinds(plugins)), plugins)
     files.write_all({config: text.encode(), schema: known_to_editors.encode()})
-    return Begun(config, schema, _command(scenario))
+    logs = example_logs.write(config, scenario.identify) if scenario.identify else []
+    return Begun(config, schema, _command(scenario), tuple(logs))
 
 
 def _command(scenario: Scenario) -> tuple[str, ...]:
-    """What a scenario is made for: a study, a comparison or a run."""
+    """What a scenario is made for: a study, a hull from logs, a comparison or a run."""
     if scenario.sweep:
         return ("sweep", "run")
+    if scenario.identify:
+        return ("identify",)
     return ("compare",) if scenario.controllers else ("run",)
 
 

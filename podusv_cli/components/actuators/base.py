@@ -18,7 +18,7 @@ from podusv_cli.components.actuators.command import (
 )
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
-from podusv_cli.core.signal import DEMAND, Signal
+from podusv_cli.core.signal import DEMAND, TAU, Signal
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
 ROUNDS = 20  # of Newton's method
@@ -30,6 +30,13 @@ def lose_evenly(k: Any, tau: Vector) -> None:
     """The loads that are left of those that `drive` wrote, once the actuator has failed."""
     for i in range(3):
         tau[i] *= k.failure_effectiveness
+
+
+@kernel
+def pass_loads(demand: Vector, tau: Vector) -> None:
+    """Loads as they stand in a log."""
+    for i in range(3):
+        tau[i] = demand[i]
 
 
 class Actuator(Component):
@@ -44,6 +51,9 @@ class Actuator(Component):
     `lose(state, k, table, tau, signals)` is a kernel that leaves a part of the loads and signals
     that `drive` wrote, once the actuator has failed; by default `k.failure_effectiveness` times the
     loads. Kernels take those of their arguments that they name.
+
+    `replay(x, demand, k, table, tau)` is a kernel that writes the loads again that a log tells of:
+    `demand` has the numbers of the signals `replayed`.
 
     `states` and `signals` declare every number; the numbers of one vector have the same signal,
     which has an axis.
@@ -75,6 +85,18 @@ class Actuator(Component):
     drive: ClassVar[Callable[..., None]] = staticmethod(absent("drive"))
 
     lose: ClassVar[Callable[..., None]] = staticmethod(lose_evenly)
+
+    @property
+    def replayed(self) -> tuple[Signal, ...]:
+        """What `replay` makes loads of, as a log has it: by default the loads themselves."""
+        return TAU
+
+    @property
+    def zero_where_missing(self) -> tuple[str, ...]:
+        """Names of signals `replayed` that a log need not have: without them they are 0."""
+        return (TAU[1].name,)
+
+    replay: ClassVar[Callable[..., None]] = staticmethod(pass_loads)
 
     def drive_with(self) -> Drive:
         """`drive` with command path and failure; `drive` itself where it has neither.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -242,6 +243,30 @@ class Pods(Actuator):
             for change in small * np.eye(2)
         ]
         return np.array(columns).T
+
+    @property
+    def replayed(self) -> tuple[Signal, ...]:
+        """Speed and angle of every pod, as they were; an angle that is fixed is 0."""
+        speed, count = SPEEDS[self.counts][0], len(self.pods)
+        return tuple(
+            replace(signal, name=f"{signal.name}_{i}", axes=())
+            for signal in (speed, DELTA) for i in range(1, count + 1)
+        )  # fmt: skip
+
+    @property
+    def zero_where_missing(self) -> tuple[str, ...]:
+        """The angles that are fixed."""
+        return tuple(f"delta_{i}" for i, pod in enumerate(self.pods, 1) if pod.angle_limit == 0.0)
+
+    @staticmethod
+    @kernel
+    def replay(x: Vector, demand: Vector, k: Any, table: Vector, tau: Vector) -> None:
+        """Loads of the pods as they stand."""
+        count = int(k.count)
+        flows, thrusts = scratch(MOST_PODS), scratch(MOST_PODS)
+        for i in range(count):
+            flows[i] = inflow(x, tail(table, i * WIDTH), demand[count + i], k)
+        act(demand, flows, k, table, tau, thrusts)
 
     @staticmethod
     @kernel

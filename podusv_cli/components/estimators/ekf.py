@@ -93,8 +93,11 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
 
 
 @kernel
-def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> None:
-    """Correct estimate and covariance by the measured value i, whose derivative is h."""
+def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> float:
+    """Correct estimate and covariance by the measured value i, whose derivative is h.
+
+    Returns the variance of its innovation.
+    """
     full, ph = scratch(81), scratch(9)
     packed = tail(state, N)
     unpacked(packed, full)
@@ -115,6 +118,7 @@ def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -
             at += 1
     packed[at + i] += innovation * gain * innovation
     packed[at + MOVING + i] += 1.0
+    return variance
 
 
 @kernel

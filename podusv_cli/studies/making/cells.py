@@ -9,6 +9,7 @@ from itertools import product
 from math import prod
 from typing import Any
 
+from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.scenario.load import Check, Loaded
@@ -16,7 +17,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, placed, plain, route
 
 MOST = 1000  # cells
-FIXED = ("extends", "plugins", "sweep", "tune", "doubt", "name", "claims")  # the same in all cells
+FIXED = ("extends", "plugins", *BESIDE_RUNS, "name", "claims")  # the same in all cells
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.components.controllers.base import Controller
-from podusv_cli.core.about import Keep
+from podusv_cli.core.about import BESIDE_RUNS, Keep
 from podusv_cli.core.errors import UsageError
 from podusv_cli.engine.machine.object_cache import ingredients
 from podusv_cli.engine.step import rk4 as closed_loop
@@ -24,9 +24,7 @@ from podusv_cli.studies.making.check import sweep_faults
 from podusv_cli.studies.making.draws import SWEEP
 
 # Sections of a scenario that change no number of a study.
-COSMETIC = (
-    "name", "description", "log", "silence", "claims", "controllers", "sweep", "tune", "doubt",
-)  # fmt: skip
+COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", *BESIDE_RUNS)
 MOST_NAMED = 4  # keys that a message about another study names
 LawInCell = tuple[str, int]  # a law, and the number of a cell
 KERNELS = " kernels"  # ends the key of the digest of a law's compiled source

@@ -1,0 +1,64 @@
+"""`podusv identify`: the hull of a boat from its logs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from podusv_cli.cli import options
+from podusv_cli.cli.exit_codes import INTERRUPTED
+from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+
+if TYPE_CHECKING:
+    from podusv_cli.identify.outputs import Identified
+
+
+def identify(
+    config: options.Config,
+    assign: options.Assignments = None,
+    out: options.Out = None,
+    force: options.Force = False,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
+    quiet: options.Quiet = False,
+    trust: options.Trust = False,
+    plugin: options.Plugins = None,
+) -> None:
+    """Find the numbers of a hull, and how far off they may be, from logs of the boat.
+
+    The section `identify` of the scenario names the logs and their columns; `vessel` is what is
+    known before. What the logs do not tell stays as it was, and is named.
+    """
+    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.run import Request
+
+    warned = Warnings(quiet)
+    request = Request(
+        assign or (), out, force, figures, sys.argv, warned, False, plugin or (), trust=trust
+    )
+    with progress_bars(wanted=not (quiet or as_json)) as bars:
+        done = workflow.identify(Path(config), request, bars)
+    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    for part in done.missing:
+        echo(part.traced, err=True)
+    if done.status == "interrupted":
+        echo("interrupted; the numbers are the best so far", err=True)
+        raise typer.Exit(INTERRUPTED)
+
+
+def _report(done: Identified) -> None:
+    from podusv_cli.identify.outputs import FORCES, SCORES, force_rows, score_rows
+    from podusv_cli.identify.phrases import open_words, summary
+
+    answer = done.answer
+    echo_table(list(FORCES), [*force_rows(answer)])
+    judged = [score for score in answer.scores if score.role == "judge"]
+    echo_table(list(SCORES), [*score_rows(judged or answer.scores)])
+    for line in (*summary(answer), *open_words(answer)):
+        echo(line)
+    echo(f"hull: {done.folder / 'identified.yaml'}")
+    echo(f"report: {done.folder / 'report.html'}")

@@ -1,0 +1,1 @@
+"""From the logs of a boat to its hull: numbers by the prediction-error method, with intervals."""

@@ -1,0 +1,259 @@
+"""What the logs say of a hull: numbers with intervals, forces, what they leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from pydantic import ValidationError
+
+from podusv_cli.components.estimators.ekf import MOVING
+from podusv_cli.components.vessels.envelope import Envelope
+from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
+from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import STATE
+from podusv_cli.identify.estimate import Directions, Estimate
+from podusv_cli.identify.judge import FreeRun, Score
+from podusv_cli.identify.problem import Problem, channels
+from podusv_cli.identify.records import Log
+
+SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
+COVERED = (0.1, 0.5, 0.9)  # quantiles of a speed along the logs
+OUTERMOST = 0.995  # quantile of the motion that becomes the envelope
+BEYOND, POINTS = 1.3, 40  # of a curve: how far beyond the fastest that is covered
+TRIES = 20  # hulls that are drawn for one that is possible
+WARM = 5.0  # s, in which innovations are those of the start
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number before and after the logs: the ends are those of an interval that holds 95 %."""
+
+    name: str
+    prior: float
+    prior_low: float
+    prior_high: float
+    value: float
+    low: float
+    high: float
+    width: float  # posterior over prior standard deviation, of the logarithm
+
+
+@dataclass(frozen=True)
+class Force:
+    """A damping force of the hull at one velocity, with intervals that hold 95 % of the hulls."""
+
+    force: str
+    at: float
+    value: float
+    low: float
+    high: float
+    prior_low: float
+    prior_high: float
+
+    @property
+    def width(self) -> float:
+        """Of the interval, over that of the prior."""
+        return (self.high - self.low) / (self.prior_high - self.prior_low)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A damping force of the hull over its own velocity, the other two being 0."""
+
+    name: str
+    unit: str
+    speed: str
+    force: Callable[..., float]
+
+
+AXES = (
+    Axis("X(u)", "N", "u [m/s]", surge_force), Axis("Y(v)", "N", "v [m/s]", sway_force),
+    Axis("N(r)", "N m", "r [rad/s]", yaw_moment),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A force over speed; `after` and `before` are the two ends of 95 % of the hulls."""
+
+    axis: Axis
+    speeds: Vector
+    value: Vector
+    after: Vector
+    before: Vector
+    covered: Vector
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Innovations of a sensor along a log: mean square over variance, and how like the one before.
+
+    Both say where the model is wrong: the first is 1 and the second 0 where it is right.
+    """
+
+    log: str
+    measured: str
+    count: int
+    nis: float
+    correlation: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A hull from logs, and all that is known of its errors."""
+
+    problem: Problem
+    estimate: Estimate
+    directions: Directions
+    judged: Sequence[tuple[Log, str, Sequence[FreeRun]]]
+    scores: Sequence[Score]
+
+    @cached_property
+    def vessel(self) -> Vessel:
+        """The hull, with the motion that the logs cover as its envelope."""
+        hull = self.problem.vessel(self.estimate.y)
+        names = ", ".join(log.name for log in self.problem.logs)
+        return hull.changed(
+            {
+                "preset": "",
+                "envelope": self.envelope,
+                "source": f"podusv identify, from {names}",
+                "validity": "the motion of the logs (envelope); posterior.csv has the joint errors",
+            }
+        )
+
+    @cached_property
+    def motion(self) -> Vector:
+        """u, v, r of the filter at all rows of all logs, without its first seconds."""
+        tracks = []
+        for log in self.problem.logs:
+            track = self.problem.followed(log, [self.estimate.y]).track[:, 3:MOVING, 0]
+            tracks.append(track[log.times >= log.times[0] + WARM])
+        return np.concatenate(tracks)
+
+    @cached_property
+    def envelope(self) -> Envelope:
+        """The motion that the logs cover."""
+        u, v, r = self.motion.T
+        speed = np.quantile(np.hypot(u, v), OUTERMOST)
+        drift = np.where(np.hypot(u, v) > 0.1 * speed, np.arctan2(np.abs(v), np.abs(u)), 0.0)
+        return Envelope(
+            source="the logs", speed=float(speed),
+            drift=float(max(np.quantile(drift, OUTERMOST), 1e-3)),
+            yaw_rate=float(max(np.quantile(np.abs(r), OUTERMOST), 1e-6)),
+        )  # fmt: skip
+
+    @cached_property
+    def parameters(self) -> list[Parameter]:
+        """The numbers that were looked for, the hull's first."""
+        sd = np.sqrt(np.diag(self.estimate.covariance))
+        found = []
+        for number, y, width in zip(self.problem.numbers, self.estimate.y, sd, strict=True):
+            (_, *before), (value, *after) = (
+                [number.at(e) for e in (y0, y0 - SIDE * w, y0 + SIDE * w)]
+                for y0, w in ((0.0, 1.0), (float(y), float(width)))
+            )
+            (low, high), (lowest, highest) = sorted(before), sorted(after)
+            ends = low, high, value, lowest, highest
+            found.append(Parameter(number.name, number.prior, *ends, float(width)))
+        return found
+
+    @cached_property
+    def draws(self) -> list[Vessel]:
+        """Hulls that the logs leave possible, drawn jointly.
+
+        Departures are linear in the numbers, as forces are: what the logs say of a sum of terms
+        then holds however a draw divides it among them.
+        """
+        size, sd = len(self.problem.hull), self.problem.sd
+        values, basis = np.linalg.eigh(self.estimate.covariance[:size, :size])
+        root = basis * np.sqrt(np.maximum(values, 0.0))
+
+        def point(normal: Vector) -> Vector:
+            factors = 1.0 + sd * (root @ normal)
+            with np.errstate(invalid="ignore", divide="ignore"):  # a number that would change sign
+                return np.asarray(self.estimate.y[:size] + np.log(factors) / sd)
+
+        return self._hulls(point)
+
+    @cached_property
+    def before(self) -> list[Vessel]:
+        """Hulls that were possible before the logs were read."""
+        return self._hulls(lambda normal: normal)
+
+    def _hulls(self, point: Callable[[Vector], Vector]) -> list[Vessel]:
+        """A hull of each draw of normal numbers, but for draws of which none can be made.
+
+        Raises UsageError where hardly any can.
+        """
+        rng = np.random.Generator(np.random.PCG64(self.problem.wanted.seed))
+        hulls: list[Vessel] = []
+        for _ in range(TRIES * self.problem.wanted.draws):
+            y = point(rng.standard_normal(len(self.problem.hull)))
+            if np.all(np.isfinite(y)):
+                with suppress(ValidationError):
+                    hulls.append(self.problem.vessel(y))
+            if len(hulls) == self.problem.wanted.draws:
+                return hulls
+        raise UsageError(
+            "hardly any hull that is drawn is possible (its mass matrix must be positive "
+            "definite); give the inertia a narrower prior, identify.priors"
+        )
+
+    @cached_property
+    def forces(self) -> list[Force]:
+        """Damping forces at speeds of the logs."""
+        found = []
+        for place, axis in enumerate(AXES):
+            speeds = np.quantile(np.abs(self.motion[:, place]), COVERED)
+            own, after, before = self._damping(place, speeds)
+            found += [
+                Force(axis.name, *map(float, numbers))
+                for numbers in zip(speeds, own, *after, *before, strict=True)
+            ]
+        return found
+
+    @cached_property
+    def curves(self) -> list[Curve]:
+        """Damping forces from rest to beyond the speeds of the logs."""
+        found = []
+        for place, axis in enumerate(AXES):
+            covered = np.quantile(np.abs(self.motion[:, place]), (COVERED[0], COVERED[-1]))
+            speeds = np.linspace(0.0, BEYOND * covered[1], POINTS)
+            found.append(Curve(axis, speeds, *self._damping(place, speeds), covered))
+        return found
+
+    def _damping(self, place: int, speeds: Vector) -> tuple[Vector, Vector, Vector]:
+        """Force at speeds, of the hull; with the ends of 95 % of the hulls after and before."""
+
+        def along(hull: Vessel) -> list[float]:
+            k, nu = bundle(hull.constants()), np.zeros((len(speeds), 3))
+            nu[:, place] = speeds
+            return [AXES[place].force(*row, k) for row in nu.tolist()]
+
+        after, before = (
+            np.quantile([along(hull) for hull in hulls], (0.025, 0.975), axis=0)
+            for hulls in (self.draws, self.before)
+        )
+        return np.array(along(self.vessel)), after, before
+
+    @cached_property
+    def whiteness(self) -> list[Whiteness]:
+        """Of every sensor along every log."""
+        return [w for log in self.problem.logs for w in self._whiteness(log)]
+
+    def _whiteness(self, log: Log) -> Iterator[Whiteness]:
+        followed = self.problem.followed(log, [self.estimate.y])
+        normal = followed.innovations[:, 0] / np.sqrt(followed.variances[:, 0])
+        of = channels(log)
+        for i, signal in enumerate(STATE):
+            own = normal[of == i][5:]
+            if len(own) > 10:
+                alike = float(np.mean(own[1:] * own[:-1]) / np.mean(own**2))
+                yield Whiteness(log.name, signal.name, len(own), float(np.mean(own**2)), alike)

@@ -1,0 +1,82 @@
+"""Figures of `podusv identify`. Import this module where a figure is drawn: matplotlib is slow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from podusv_cli.core import escaping
+from podusv_cli.figures.looks import nth_style
+from podusv_cli.figures.style import legend, new_figure
+from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.judge import WHO, FreeRun
+from podusv_cli.studies.sketch import COLUMNS, Sketch
+
+MEASURED = "#777777"
+HEIGHT = 2.6  # inches
+DRAWN = 1.6  # of the measured track: how far from its middle others are drawn
+
+
+def sketches(answer: Answer) -> Iterator[Sketch]:
+    """For every log its free run from the first start, measured and foretold; then the forces."""
+    for i, (log, role, runs) in enumerate(answer.judged, 1):
+        if runs:
+            yield Sketch(
+                f"free-run-{i}",
+                f"{log.name} ({role}): measured, and foretold from its commands alone from "
+                f"{runs[0].times[0] - log.times[0]:.0f} s on",
+                partial(free_run, runs[0]),
+            )
+    caption = (
+        "Damping over speed: the hull that was identified with its 95 % interval, and the interval "
+        "before the logs; between the dotted lines lies the middle 80 % of the logs"
+    )
+    yield Sketch("forces", caption, partial(forces, answer))
+
+
+def free_run(run: FreeRun) -> Figure:
+    """Track and heading of a free run."""
+    figure = new_figure(COLUMNS, HEIGHT)
+    track, heading = figure.subplots(1, 2)
+    since = run.times - run.times[0]
+    known = np.all(np.isfinite(run.measured), axis=1)
+    x, y, psi = run.measured[known].T
+    track.plot(y, x, ".", color=MEASURED, ms=2.0, label="measured")
+    heading.plot(since[known], np.degrees(np.unwrap(psi)), ".", color=MEASURED, ms=2.0)
+    middle_of_track = np.nanmean(run.measured[:, :2], axis=0)
+    reach = DRAWN * float(np.nanmax(np.abs(run.measured[:, :2] - middle_of_track)))
+    for i, (who, pose) in enumerate(zip(WHO, run.poses, strict=True)):
+        colour = nth_style(i)[0]
+        near = np.max(np.abs(pose[:, :2] - middle_of_track), axis=1) <= reach
+        track.plot(
+            np.where(near, pose[:, 1], np.nan), np.where(near, pose[:, 0], np.nan),
+            color=colour, label=escaping.figure(who),
+        )  # fmt: skip
+        heading.plot(since, np.degrees(pose[:, 2]), color=colour)
+    middle, side = np.degrees(np.median(np.unwrap(psi))), np.degrees(np.ptp(np.unwrap(psi)))
+    heading.set_ylim(middle - side - 10.0, middle + side + 10.0)
+    track.set(xlabel="east [m]", ylabel="north [m]")
+    track.set_aspect("equal", adjustable="datalim")
+    heading.set(xlabel="time since the start [s]", ylabel="heading [deg]")
+    legend(figure)
+    return figure
+
+
+def forces(answer: Answer) -> Figure:
+    """X(u), Y(v), N(r) with intervals."""
+    figure = new_figure(COLUMNS, HEIGHT)
+    for axes, curve in zip(figure.subplots(1, 3), answer.curves, strict=True):
+        for low, high, colour, label in (
+            (*curve.before, "#dddddd", "before the logs"),
+            (*curve.after, nth_style(0)[0], "95 % interval"),
+        ):
+            axes.fill_between(curve.speeds, low, high, color=colour, alpha=0.5, lw=0.0, label=label)
+        axes.plot(curve.speeds, curve.value, color=nth_style(0)[0], label="identified")
+        for edge in curve.covered:
+            axes.axvline(edge, color="black", lw=0.8, ls=":")
+        axes.set(xlabel=curve.axis.speed, ylabel=f"{curve.axis.name} [{curve.axis.unit}]")
+    legend(figure)
+    return figure

@@ -1,0 +1,134 @@
+"""How well a hull foretells a log that it has not seen: free runs from the log's commands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from podusv_cli.components.estimators.ekf import MOVING
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.identify.estimate import Search, estimated
+from podusv_cli.identify.march import DELIVERED, VALUES
+from podusv_cli.identify.problem import Problem
+from podusv_cli.identify.records import Log
+
+WARM = 20.0  # s, in which the filter finds velocities and load before the first free run
+EVERY = 30.0  # s, from one start to the next
+HORIZONS = (5.0, 30.0, np.inf)  # s after a start; infinite: to the end of the log, from the first
+WHO = ("identified", "prior", "constant velocity")
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """A motion foretold from one instant on, beside what was measured.
+
+    `poses` has an array a way to foretell (`WHO`): x, y, psi at each of `times`; `measured` is NaN
+    where nothing was delivered.
+    """
+
+    times: Vector
+    measured: Vector
+    poses: Sequence[Vector]
+
+    def errors(self, horizon: float) -> list[tuple[float, float]] | None:
+        """Of each way the error of position [m] and heading [rad] so long after the start.
+
+        With an infinite horizon their root mean squares along the run. None where nothing was
+        measured then.
+        """
+        since = self.times - self.times[0]
+        known = np.all(np.isfinite(self.measured), axis=1)
+        if np.isinf(horizon):
+            rows = np.flatnonzero(known)
+        else:
+            rows = np.flatnonzero(known & (np.abs(since - horizon) <= 0.1 * horizon))
+            rows = rows[np.argsort(np.abs(since[rows] - horizon), kind="stable")][:1]
+        if not len(rows):
+            return None
+        return [self._rms(pose[rows] - self.measured[rows]) for pose in self.poses]
+
+    @staticmethod
+    def _rms(off: Vector) -> tuple[float, float]:
+        headings = np.array([wrap(angle) for angle in off[:, 2]])
+        return (
+            float(np.sqrt(np.mean(off[:, 0] ** 2 + off[:, 1] ** 2))),
+            float(np.sqrt(np.mean(headings**2))),
+        )
+
+
+@dataclass(frozen=True)
+class Score:
+    """Root mean square error over the free runs of a log, of one way to foretell it."""
+
+    log: str
+    role: str
+    horizon: float
+    who: str
+    runs: int
+    position: float
+    heading: float
+
+
+def free_runs(problem: Problem, log: Log, y: Vector) -> list[FreeRun]:
+    """Free runs from several instants of a log, each to its end."""
+    last = log.times[-1] - HORIZONS[0]
+    starts = np.arange(log.times[0] + min(WARM, 0.5 * log.duration), last, EVERY)
+    return [_free_run(problem, log, y, int(np.searchsorted(log.times, t))) for t in starts]
+
+
+def _free_run(problem: Problem, log: Log, y: Vector, first: int) -> FreeRun:
+    rows = log.record.rows.copy()
+    rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
+    cut = log.of(rows)
+    points = [y, np.zeros(len(y))]
+    currents = [_current(problem, cut.until(first), point) for point in points]
+    track = problem.followed(cut, points, currents).track[first:]
+    measured = np.where(
+        log.record.rows[first:, DELIVERED : DELIVERED + 3] != 0.0,
+        log.record.rows[first:, VALUES : VALUES + 3], np.nan,
+    )  # fmt: skip
+    times = log.times[first:]
+    drift = (times - times[0])[:, None] * np.array([*currents[0], 0.0])
+    still = _turning(times, track[0, :, 0]) + drift
+    return FreeRun(times, measured, (track[:, :3, 0], track[:, :3, 1], still))
+
+
+def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
+    """The current that a hull sees along a log [m/s]."""
+    if not problem.current:
+        return [0.0, 0.0]
+
+    def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
+        currents = [list(problem.current * e) for e in points]
+        followed = problem.followed(log, [y] * len(points), currents)
+        return followed.innovations, followed.variances
+
+    blocks = np.zeros(log.record.delivered, np.int64)
+    found = estimated(Search(innovations, 2, blocks), np.zeros(2)).y
+    return list(problem.current * found)
+
+
+def _turning(times: Vector, state: Vector) -> Vector:
+    """Poses where the hull keeps the velocities (u, v, r) through the water that it had."""
+    x, y, psi, u, v, r = state[:MOVING]
+    since = times - times[0]
+    heading = psi + r * since
+    # Means of cos and sin of the heading since the start, also for r = 0.
+    middle, half = psi + 0.5 * r * since, np.sinc(0.5 * r * since / np.pi)
+    c, s = half * np.cos(middle), half * np.sin(middle)
+    return np.column_stack([x + since * (u * c - v * s), y + since * (u * s + v * c), heading])
+
+
+def scores(log: Log, role: str, runs: Sequence[FreeRun]) -> Iterator[Score]:
+    """The errors after each horizon, over the runs that reach it."""
+    for horizon in HORIZONS:
+        chosen = runs[:1] if np.isinf(horizon) else runs
+        errors = [e for e in (run.errors(horizon) for run in chosen) if e]
+        for i, who in enumerate(WHO):
+            own = np.array([e[i] for e in errors])
+            if len(own):
+                position, heading = np.sqrt(np.mean(own**2, axis=0))
+                yield Score(log.name, role, horizon, who, len(own), float(position), float(heading))

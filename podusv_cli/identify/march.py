@@ -1,0 +1,188 @@
+"""The extended Kalman filter along a log: every innovation, its variance, and the estimates.
+
+The filter is `components.estimators.ekf`; a log's commands stand in place of a law's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from ctypes import CFUNCTYPE
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.estimators.ekf import (
+    MOVING,
+    PACKED,
+    ExtendedKalmanFilter,
+    N,
+    derivative,
+    take_in,
+)
+from podusv_cli.components.vessels.vessel import COEFFICIENTS
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, tail, unpacker
+from podusv_cli.core.kinematics import wrap
+from podusv_cli.engine.machine import signatures
+from podusv_cli.engine.machine.signatures import LANE_PROTOTYPES, LANE_VECTOR, PROTOTYPES, WHOLE
+from podusv_cli.engine.machine.signatures import VECTOR as PLAIN
+from podusv_cli.engine.running.lanes import room
+from podusv_cli.engine.step.layout import Function, shifted
+
+SIZE = N + PACKED + 2 * MOVING  # numbers of the filter's state
+STAGES = 4 * SIZE
+MOST_COMMANDS = 32  # of a row
+# A row of a record: how long it holds [s], in how many steps, what is delivered, its values, then
+# the commands, and how fast these change [1/s].
+HOLDS, STEPS, DELIVERED, VALUES, COMMANDS = 0, 1, 2, 2 + MOVING, 2 + 2 * MOVING
+SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
+CURRENT = ("current_x", "current_y")  # m/s: how fast the water flows north and east
+DELAY = "delay"  # s: how much later than the log says its commands act
+THRUST = "thrust"  # what part of the loads that the actuator's numbers give acts on the hull
+NAMES = (*COEFFICIENTS, *ExtendedKalmanFilter().constants(), THRUST, DELAY, *CURRENT)
+named = unpacker(NAMES)
+
+
+class Record(NamedTuple):
+    """A log as the march takes it: rows as above, and how many values they deliver."""
+
+    rows: Vector
+    delivered: int
+
+
+class Followed(NamedTuple):
+    """What the filter says along a record; the last axis is that of the runs.
+
+    `innovations` and `variances` have a row a delivered value, `track` one a row of the record: the
+    nine numbers that are estimated, before what the row delivers is taken in. Its velocities are
+    those through the water.
+    """
+
+    innovations: Vector
+    variances: Vector
+    track: Vector
+
+
+@kernel
+def seen_from_water(i: int, value: float, since: float, psi: float, k: Any, h: Vector) -> float:
+    """A measured value as water sees it that flows since so long; its part of h is added.
+
+    A current that is constant leaves the equations of motion as they are (Fossen 2011, 8.3) where
+    place and velocity are those in the water's frame, which moves on.
+    """
+    c, s = cos_sin(psi)
+    if i == 0:
+        return float(value - since * k.current_x)
+    if i == 1:
+        return float(value - since * k.current_y)
+    along, across = c * k.current_x + s * k.current_y, c * k.current_y - s * k.current_x
+    if i == 3:
+        h[2] += across
+        return float(value - along)
+    if i == 4:
+        h[2] -= along
+        return float(value - across)
+    return value
+
+
+@kernel
+def corrected(line: Vector, since: float, state: Vector, k: Any, out: Vector) -> int:
+    """Take in what a row delivers; write innovation and variance of each value, and count them."""
+    sigma, h = scratch(MOVING), scratch(MOVING)
+    sigma[0], sigma[1], sigma[2] = k.sigma_p, k.sigma_p, k.sigma_psi
+    sigma[3], sigma[4], sigma[5] = k.sigma_u, k.sigma_v, k.sigma_r
+    at = 0
+    for i in range(MOVING):
+        if line[DELIVERED + i] != 0.0:
+            late = derivative(i, k.delay_p, state, h)
+            value = seen_from_water(i, line[VALUES + i], since, state[2], k, h)
+            innovation = value - (state[i] - late)
+            out[at] = wrap(innovation) if i == 2 else innovation
+            out[at + 1] = take_in(i, h, out[at], sigma[i], state)
+            at += 2
+    return at
+
+
+@kernel
+def filtered(
+    loads: Function, follow: Function, count: int, width: int, record: Vector, actuator: Vector,
+    table: Vector, p: Vector, state: Vector, out: Vector, track: Vector,
+) -> None:  # fmt: skip
+    """The filter along the rows of a record: classical RK4 between them, with commands held."""
+    k = named(p)
+    tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
+    at, since, inputs = 0, 0.0, (width - COMMANDS) // 2
+    for row in range(count):
+        line = tail(record, row * width)
+        for i in range(N):
+            track[N * row + i] = state[i]
+        at += corrected(line, since, state, k, tail(out, at))
+        for i in range(inputs):
+            commands[i] = line[COMMANDS + i] - k.delay * line[COMMANDS + inputs + i]
+        h = line[HOLDS] / line[STEPS]
+        since += line[HOLDS]
+        for _ in range(int(line[STEPS])):
+            shifted(SIZE, state, 0.0, state, y)
+            for stage in range(4):
+                rate = tail(stages, stage * SIZE)
+                loads(0.0, y, y, commands, actuator, table, tau, rate, rate)
+                for i in range(3):
+                    tau[i] *= k.thrust
+                follow(0.0, y, tau, y, p, table, rate)
+                shifted(SIZE, state, h if stage == 2 else 0.5 * h, rate, y)
+            for i in range(SIZE):
+                between = stages[SIZE + i] + stages[2 * SIZE + i]
+                state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
+
+
+FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], WHOLE, WHOLE, *[PLAIN] * 7)
+FILTERED_LANES = (
+    LANE_PROTOTYPES["actuator"], LANE_PROTOTYPES["follow"], WHOLE, WHOLE, PLAIN, *[LANE_VECTOR] * 6,
+)  # fmt: skip
+
+
+Follow = Callable[[Record, Sequence[Vector], Sequence[Vector]], Followed]
+
+
+def side_by_side(actuator: Actuator) -> Follow:
+    """A function that follows a record with several constants and starts, in compiled code.
+
+    Of each run it takes the constants, in the order of `NAMES`, and the filter's state at the
+    start. Raises LawError, and TypeError where the actuator's kernel cannot go side by side.
+    """
+    from podusv_cli.engine.machine import compile
+
+    constants = actuator.constants()
+    every = frozenset(constants)
+    pieces = [
+        compile.lane_adapter("actuator", actuator.replay, tuple(constants), every),
+        compile.lane_adapter("follow", ExtendedKalmanFilter.follow, NAMES, frozenset()),
+        compile.Piece(filtered, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
+    ]
+    compile.prepare(pieces)
+    loads, follow, march = map(compile.routine, pieces)
+    a = _in_lanes([np.array([*constants.values(), 0.0])])
+    table = _in_lanes([actuator.table()])
+
+    def followed(record: Record, constants: Sequence[Vector], starts: Sequence[Vector]) -> Followed:
+        count, width = record.rows.shape
+        out, track = room(2 * record.delivered * LANES), room(N * count * LANES)
+        p, state = _in_lanes(constants), _in_lanes(starts)
+        march(
+            loads, follow, count, width, signatures.pointer(record.rows),
+            *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],
+        )  # fmt: skip
+        runs = len(constants)
+        pairs = out.reshape(record.delivered, 2, LANES)[..., :runs]
+        return Followed(pairs[:, 0], pairs[:, 1], track.reshape(count, N, LANES)[..., :runs])
+
+    return followed
+
+
+def _in_lanes(vectors: Sequence[Vector]) -> Vector:
+    """One vector of several, a lane each; the lanes that are left repeat the first."""
+    together = room(LANES * len(vectors[0]))
+    for lane in range(LANES):
+        together[lane::LANES] = vectors[lane if lane < len(vectors) else 0]
+    return together

@@ -1,0 +1,149 @@
+"""Files and page of a hull that was identified."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.phrases import value_text
+from podusv_cli.core.recording import Status
+from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.estimate import OPEN
+from podusv_cli.identify.judge import WHO, Score
+from podusv_cli.identify.phrases import open_words, summary
+from podusv_cli.pages.page import Picture, environment, flat
+from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.scenario.load import yaml_text
+from podusv_cli.storage import csv_files
+from podusv_cli.storage.run_folder import RunWriter
+
+IDENTIFIED, POSTERIOR = "identified.yaml", "posterior.csv"
+HEADING = (
+    "# A hull that podusv identify found from logs; posterior.csv has what these leave open.\n"
+)
+DIGITS = "%.9g"
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A hull from logs, and where its files are."""
+
+    folder: Path
+    answer: Answer
+    status: Status
+    warnings: tuple[str, ...] = ()
+    missing: tuple[Failure, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {
+            "format": 1, "status": self.status, "folder": str(self.folder),
+            "settled": self.answer.estimate.settled,
+            "known": self.answer.directions.known, "of": len(self.answer.problem.hull),
+            "parameters": [asdict(p) for p in self.answer.parameters],
+            "forces": [asdict(f) for f in self.answer.forces],
+            "scores": [asdict(s) for s in self.answer.scores],
+            "open": open_words(self.answer), "warnings": list(self.warnings),
+            "missing": [str(part) for part in self.missing],
+        }  # fmt: skip
+
+
+def write(
+    writer: RunWriter, answer: Answer, text: str, origin: Mapping[str, Any], extras: Extras, *,
+    warnings: Sequence[str], figures: bool,
+) -> None:  # fmt: skip
+    """All files of the folder but the manifest; `text` is the scenario's file."""
+    writer.add("scenario.yaml", text.encode())
+    writer.add(IDENTIFIED, (HEADING + yaml_text(given(answer))).encode())
+    for name, rows in {
+        "parameters.csv": [asdict(p) for p in answer.parameters],
+        "forces.csv": [{**asdict(f), "width": f.width} for f in answer.forces],
+        "fits.csv": [asdict(w) for w in answer.whiteness],
+        "judged.csv": [asdict(s) for s in answer.scores],
+        POSTERIOR: drawn(answer),
+    }.items():
+        writer.add(name, csv_files.records(rows, DIGITS).encode())
+    pictures = _pictures(answer, extras) if figures else []
+    for picture in pictures:
+        writer.add(f"figures/{picture.name}.png", picture.file)
+    writer.add("report.html", page(answer, pictures, origin, warnings).encode())
+    writer.add_json("provenance.json", origin)
+    writer.add_missing(extras)
+
+
+def given(answer: Answer) -> dict[str, Any]:
+    """The hull as a vessel file has it: without what is 0 or absent anyway."""
+    fields = type(answer.vessel).model_fields
+    return {
+        name: content
+        for name, content in answer.vessel.model_dump().items()
+        if name != "preset" and (fields[name].is_required() or content != fields[name].default)
+    }
+
+
+def drawn(answer: Answer) -> list[dict[str, float]]:
+    """A row a hull, with those of its numbers that differ between hulls."""
+    rows = [hull.constants() for hull in answer.draws]
+    own = {name for name in rows[0] if name in type(answer.vessel).model_fields}
+    moving = [n for n in rows[0] if n in own and len({row[n] for row in rows}) > 1]
+    return [{name: row[name] for name in moving} for row in rows]
+
+
+def _pictures(answer: Answer, extras: Extras) -> list[Picture]:
+    from podusv_cli.identify.figures import sketches  # matplotlib is slow to import
+    from podusv_cli.studies.sketch import rendered
+
+    return rendered(sketches(answer), extras)[1]
+
+
+def parameter_rows(answer: Answer) -> Iterator[list[str]]:
+    """Of every number: name, prior, estimate, interval, and how much narrower it has become."""
+    for p in answer.parameters:
+        told = "yes" if p.width <= OPEN else "little" if p.width < 0.8 else "no"
+        yield [
+            p.name, f"{p.prior:.4g}", f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}",
+            f"{p.width:.2g}", told,
+        ]  # fmt: skip
+
+
+def force_rows(answer: Answer) -> Iterator[list[str]]:
+    """Of every force: where, its value, the interval, and the interval over the prior's."""
+    for f in answer.forces:
+        yield [
+            f.force, f"{f.at:.3g}", f"{f.value:.4g}", f"{f.low:.4g} to {f.high:.4g}",
+            f"{f.width:.2g}", "yes" if f.width <= OPEN else "no",
+        ]  # fmt: skip
+
+
+def score_rows(scores: Sequence[Score]) -> Iterator[list[str]]:
+    """Of every log and horizon: the errors of every way to foretell it."""
+    for (log, horizon), of in groupby(scores, lambda s: (s.log, s.horizon)):
+        ways = list(of)
+        after = "whole log" if math.isinf(horizon) else f"{horizon:g} s"
+        errors = [f"{s.position:.3g} m, {math.degrees(s.heading):.3g} deg" for s in ways]
+        yield [log, ways[0].role, after, str(ways[0].runs), *errors]
+
+
+PARAMETERS = ("number", "prior", "estimate", "95 % interval", "width over the prior's", "told")
+FORCES = ("force", "at", "estimate [N, N m]", "95 % interval", "width over the prior's", "told")
+SCORES = ("log", "role", "after", "runs", *WHO)
+
+
+def page(
+    answer: Answer, pictures: Sequence[Picture], origin: Mapping[str, Any], warnings: Sequence[str]
+) -> str:
+    """The page."""
+    scenario = answer.problem.scenario
+    return environment("podusv_cli.identify").get_template("identify.html.j2").render(
+        title=f"The hull of {scenario.name} from its logs",
+        scenario=scenario, summary=summary(answer), open=open_words(answer), warnings=warnings,
+        parameters=(PARAMETERS, [*parameter_rows(answer)]), forces=(FORCES, [*force_rows(answer)]),
+        scores=(SCORES, [*score_rows(answer.scores)]), whiteness=answer.whiteness,
+        widths=[f"{width:.2g}" for width in answer.directions.widths],
+        known=answer.directions.known, pictures=list(enumerate(pictures, 1)),
+        provenance=[(key, value_text(value)) for key, value in flat(origin)],
+    )  # fmt: skip

@@ -1,0 +1,59 @@
+"""What the logs say of a hull, and what they leave open, in sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.estimate import OPEN
+
+# The manoeuvre that tells the numbers of an axis.
+TELLING = {
+    "X": "straight runs at three speeds tell the surge damping",
+    "Y": "turning circles at two speeds tell the sway damping",
+    "N": "turning circles and zig-zags tell the yaw damping",
+    "m": "zig-zags, and starts and stops, tell the inertia",
+    "t": "thrust is known where one mass is",
+}
+SHARE = 0.3  # of a direction, from which on a number is named
+
+
+def summary(answer: Answer) -> list[str]:
+    """What came out, a sentence each."""
+    hull, known = answer.problem.hull, answer.directions.known
+    logs = answer.problem.logs
+    lines = [
+        f"{len(logs)} logs of {sum(log.duration for log in logs):.0f} s in all tell {known} of "
+        f"{len(hull)} directions of the hull's numbers (each to less than {OPEN:g} of what was "
+        "known before)."
+    ]
+    for axis, unit in (("X", "m/s"), ("Y", "m/s"), ("N", "rad/s")):
+        own = [f for f in answer.forces if f.force.startswith(axis)]
+        told = [f for f in own if f.width <= OPEN]
+        if told:
+            error = max(0.5 * (f.high - f.low) / abs(f.value) for f in told)
+            ends = f"{min(f.at for f in told):.3g} to {max(f.at for f in told):.3g} {unit}"
+            lines.append(f"{own[0].force} is known to {100.0 * error:.2g} % at {ends}.")
+        elif own:
+            lines.append(f"{own[0].force} is not told by these logs; it stays as it was.")
+    if not answer.estimate.settled:
+        lines.append("The search had not settled when it ended; the numbers may still move.")
+    if not answer.judged:
+        lines.append(
+            "No log was kept for judging (role: judge): how well it foretells is not known."
+        )
+    return lines
+
+
+def open_words(answer: Answer) -> list[str]:
+    """Each direction that the logs leave open, by its numbers; the manoeuvres that would tell."""
+    ways, hull = answer.directions, answer.problem.hull
+    lines, axes = [], set()
+    for i in range(ways.known, len(hull)):
+        shares = ways.basis[:, i]
+        named = [j for j in np.argsort(-np.abs(shares)) if abs(shares[j]) >= SHARE]
+        axes |= {hull[j].name[0] for j in named}
+        names = ", ".join(hull[j].name for j in named)
+        what = "how these share a force" if len(named) > 1 else "this number"
+        lines.append(f"{what} is open ({ways.widths[i]:.2g} of the prior's width): {names}")
+    return [*lines, *(TELLING[axis] for axis in sorted(axes))]

@@ -1,0 +1,281 @@
+"""Which numbers are looked for, what is known of them before, and the filter that they make."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from podusv_cli.components.estimators.ekf import MOVING, ExtendedKalmanFilter, N
+from podusv_cli.components.facts import Facts
+from podusv_cli.components.vessels.vessel import COEFFICIENTS, INERTIA, Vessel
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.identify.march import (
+    CURRENT,
+    DELAY,
+    DELIVERED,
+    NAMES,
+    THRUST,
+    VALUES,
+    Follow,
+    Followed,
+    side_by_side,
+)
+from podusv_cli.identify.reading import Whole
+from podusv_cli.identify.records import Log
+from podusv_cli.process.workers import available_workers
+from podusv_cli.scenario.identify import DAMPING, GROUPS, Identify
+from podusv_cli.scenario.model import Scenario
+
+# Where an entry of the mass matrix is, and what of it stands beside the added mass.
+ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m33": "N_rdot"}
+DAMPINGS = tuple(n for n in COEFFICIENTS if n[1:2] == "_" and n not in ADDED.values())
+SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
+WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
+UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
+CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain, on the model ship
+AT_START = (0.3, 0.2, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
+TURNED = 0.05  # rad, of the heading at the start
+FINEST = 1e-4  # of what a sensor measured, its least error
+FLOWING = 0.2  # of the speed at full thrust: a current that nothing is known of
+BLOCK = 10.0  # s of a log, whose innovations count together
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number that is looked for: its logarithm is normal about that of `prior`, with `sd`.
+
+    Without a `ratio` it is normal itself.
+    """
+
+    name: str
+    prior: float
+    sd: float
+    ratio: bool = True
+
+    def at(self, e: float) -> float:
+        """The number so many standard deviations from its prior."""
+        return self.prior * math.exp(self.sd * e) if self.ratio else self.prior + self.sd * e
+
+
+def hull_numbers(vessel: Vessel, wanted: Identify) -> list[Number]:
+    """The vessel's numbers that are looked for. Raises UsageError for names that it has not.
+
+    A number that is 0 stays 0, since its prior is relative.
+    """
+    names: dict[str, None] = {}
+    constants = vessel.constants()
+    for name in wanted.free:
+        names |= dict.fromkeys(_members(name, constants))
+    unknown = [name for name in wanted.priors if name not in names]
+    if unknown:
+        raise UsageError(
+            f"identify.priors: {unknown[0]} is not looked for; looked for: {', '.join(names)}"
+        )
+    return [
+        Number(n, constants.get(n, 1.0), _log_sd(wanted.priors.get(n, wanted.prior))) for n in names
+    ]
+
+
+def _members(name: str, constants: Mapping[str, float]) -> list[str]:
+    """The numbers of a group, or the number of this name."""
+    group = {"inertia": ("m11", "m22", "m33")} | {
+        f"damping.{axis}": tuple(n for n in DAMPINGS if n.startswith(first))
+        for axis, first in DAMPING.items()
+    }
+    if name in group:
+        return [n for n in group[name] if constants[n] != 0.0]
+    alone = {*INERTIA, THRUST, *(n for members in group.values() for n in members)}
+    if name not in alone:
+        near = difflib.get_close_matches(name, [*GROUPS, *alone], 1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise UsageError(
+            f"identify.free: {name!r} is no group ({', '.join(GROUPS)}) and no number of the "
+            f"vessel ({', '.join(sorted(alone))}){hint}"
+        )
+    if constants.get(name, 1.0) == 0.0:
+        raise UsageError(
+            f"identify.free: {name} of the vessel is 0, and what is known of it is relative to "
+            "that, so it would stay 0; give vessel a first guess of it"
+        )
+    return [name]
+
+
+def _log_sd(relative: float) -> float:
+    """The standard deviation of the logarithm, of a log-normal number with this relative one."""
+    return math.sqrt(math.log1p(relative * relative))
+
+
+def sensor_noise(log: Log) -> Vector:
+    """Standard deviations of the sensors' errors, by third differences; 0 where none is measured.
+
+    White noise has third differences of sqrt(20) times its own deviation, a smooth motion small
+    ones.
+    """
+    rows, found = log.record.rows, np.zeros(MOVING)
+    for i in range(MOVING):
+        values = rows[rows[:, DELIVERED + i] != 0.0, VALUES + i]
+        if len(values) > 10:
+            smooth = np.unwrap(values) if i == 2 else values
+            noise = np.median(np.abs(np.diff(smooth, 3))) / 0.6745 / math.sqrt(20.0)
+            found[i] = max(noise, FINEST * np.std(smooth))
+    return found
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The filter along several logs as a function of the numbers that are looked for.
+
+    Points are in units of the priors' standard deviations, 0 where the prior is.
+    """
+
+    scenario: Scenario
+    wanted: Identify
+    logs: Sequence[Log]
+
+    @cached_property
+    def facts(self) -> Facts:
+        """What sizes the filter."""
+        return self.scenario.facts
+
+    @cached_property
+    def filter(self) -> ExtendedKalmanFilter:
+        """The filter before anything is looked for."""
+        sized = ExtendedKalmanFilter().sized(self.facts)
+        pace = self.facts.lam**0.25  # of an acceleration times the root of a time, after Froude
+        quiet = {"q_u": CALM * pace, "q_v": CALM * pace, "q_r": CALM * pace / self.facts.lam}
+        return sized.changed(quiet | self._sensed)
+
+    @cached_property
+    def _sensed(self) -> dict[str, float]:
+        """The deviations of sensors that a log has: given, or guessed from it."""
+        guesses = np.array([sensor_noise(log) for log in self.logs])
+        sigmas: dict[str, float] = {}
+        for i, name in enumerate(SIGMAS):
+            measured = guesses[guesses[:, i] > 0.0, i]
+            if name in self.wanted.noise:
+                sigmas[name] = self.wanted.noise[name]
+            elif len(measured):
+                sigmas[name] = max(float(np.median(measured)), sigmas.get(name, 0.0))
+        return sigmas
+
+    @cached_property
+    def hull(self) -> list[Number]:
+        """The hull's numbers that are looked for."""
+        return hull_numbers(self.scenario.vessel, self.wanted)
+
+    @cached_property
+    def numbers(self) -> list[Number]:
+        """All numbers that are looked for: the hull's, the noises, the current of every log."""
+        guessed = [name for name in self._sensed if name not in self.wanted.noise]
+        noises = [Number(n, getattr(self.filter, n), UNSURE) for n in (*guessed, *WALKS)]
+        currents = [
+            Number(f"{axis}, {log.name}", 0.0, self.current, ratio=False)
+            for log in self.logs for axis in (CURRENT if self.current else ())
+        ]  # fmt: skip
+        return [*self.hull, *noises, Number(DELAY, 0.0, self.wanted.step, ratio=False), *currents]
+
+    @cached_property
+    def current(self) -> float:
+        """Standard deviation of a log's current, before it is read [m/s]."""
+        given = self.wanted.current
+        return FLOWING * self.facts.U if given is None else given
+
+    @cached_property
+    def sd(self) -> Vector:
+        """Standard deviations of the hull's logarithms, before the logs are read."""
+        return np.array([number.sd for number in self.hull])
+
+    @cached_property
+    def _base(self) -> dict[str, float]:
+        return {
+            **self.scenario.vessel.constants(),
+            **self.filter.constants(),
+            THRUST: 1.0,
+            DELAY: 0.0,
+        }
+
+    def values(self, y: Vector) -> dict[str, float]:
+        """The numbers at a point, by name."""
+        return {n.name: n.at(e) for n, e in zip(self.numbers, y.tolist(), strict=True)}
+
+    def constants(self, y: Vector, current: Sequence[float]) -> Vector:
+        """The filter's constants at a point, in water that flows north and east so fast [m/s]."""
+        constants = self._base | self.values(y) | dict(zip(CURRENT, current, strict=True))
+        return np.array([constants[name] for name in NAMES])
+
+    def currents(self, log: Log, y: Vector) -> list[float]:
+        """The current of a log at a point [m/s]."""
+        values = self.values(y)
+        return [values.get(f"{axis}, {log.name}", 0.0) for axis in CURRENT]
+
+    def vessel(self, y: Vector) -> Vessel:
+        """The hull at a point. Raises ValidationError where no hull can be like that."""
+        own = self.scenario.vessel
+        new = {n.name: n.at(e) for n, e in zip(self.hull, y.tolist(), strict=False)}
+        new.pop(THRUST, None)
+        beside = {n: getattr(own, n) + getattr(own, ADDED[n]) for n in ADDED}
+        added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}
+        return own.changed(new | added)
+
+    @cached_property
+    def _follow(self) -> Follow:
+        return side_by_side(self.scenario.actuator)
+
+    def start(self, log: Log, current: Sequence[float]) -> Vector:
+        """The filter's state at the beginning of a log, in the water's frame."""
+        state, (c, s) = log.state.copy(), (math.cos(log.state[2]), math.sin(log.state[2]))
+        state[3] -= c * current[0] + s * current[1]
+        state[4] -= c * current[1] - s * current[0]
+        pose = max(self.filter.sigma_p, 1e-9) * 3.0
+        speeds = np.array(AT_START) * [self.facts.s, self.facts.s, self.facts.s / self.facts.lam]
+        loads = [self.filter.sigma_b, self.filter.sigma_b, self.filter.sigma_b_psi]
+        unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
+        return np.concatenate(
+            [state, np.zeros(N - MOVING), unsure[np.triu_indices(N)], np.zeros(2 * MOVING)]
+        )
+
+    def followed(
+        self, log: Log, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
+    ) -> Followed:
+        """The filter along a log, for every point, in the current of the point or another."""
+        flows = currents or [self.currents(log, y) for y in points]
+        constants = [self.constants(y, flow) for y, flow in zip(points, flows, strict=True)]
+        starts = [self.start(log, flow) for flow in flows]
+        parts = [slice(i, i + LANES) for i in range(0, len(points), LANES)]
+        runs = [self._follow(log.record, constants[part], starts[part]) for part in parts]
+        whole = Followed(*(np.concatenate(arrays, axis=-1) for arrays in zip(*runs, strict=True)))
+        since = log.times - log.times[0]
+        whole.track[:, :2] += since[:, None, None] * np.array(flows).T
+        return whole
+
+    def innovations(self, points: Sequence[Vector]) -> tuple[Vector, Vector]:
+        """Innovations and their variances of all logs, a row a value, a column a point."""
+        with ThreadPoolExecutor(available_workers()) as pool:
+            runs = list(pool.map(lambda log: self.followed(log, points), self.logs))
+        return (
+            np.concatenate([run.innovations for run in runs]),
+            np.concatenate([run.variances for run in runs]),
+        )
+
+    @cached_property
+    def blocks(self) -> Whole:
+        """Of every delivered value, in which part of the logs it is."""
+        blocks, first = [], 0
+        for log in self.logs:
+            number = ((log.times - log.times[0]) // BLOCK).astype(int)
+            per_row = log.record.rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=1).astype(int)
+            blocks.append(first + np.repeat(number, per_row))
+            first += int(number[-1]) + 1
+        return np.concatenate(blocks)
+
+
+def channels(log: Log) -> Whole:
+    """Of every value that a log delivers, which of x, y, psi, u, v, r it is."""
+    return np.nonzero(log.record.rows[:, DELIVERED : DELIVERED + MOVING])[1].astype(np.int64)

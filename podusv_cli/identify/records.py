@@ -1,0 +1,131 @@
+"""A log as the filter takes it: rows of what was delivered and commanded, and where it begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.estimators.ekf import MOVING
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import STATE
+from podusv_cli.identify.march import COMMANDS, DELIVERED, HOLDS, STEPS, VALUES, Record
+from podusv_cli.identify.reading import LogFault, Marks, Table, Whole, delivered
+
+BEGIN = 3.0  # s, from which the velocities at the start are guessed
+FEWEST = 20  # values of the position, or a log says nothing
+POSE = 3  # of the state's numbers, those without which nothing can be followed
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log as the filter takes it.
+
+    `times` [s] are those of the record's rows, `state` what is guessed of (x, y, psi, u, v, r) at
+    the first, and `counts` how many values of each are delivered.
+    """
+
+    name: str
+    times: Vector
+    record: Record
+    state: Vector
+    counts: Vector
+
+    def of(self, rows: Vector) -> Log:
+        """The same with other rows, from the first on."""
+        counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
+        record = Record(np.ascontiguousarray(rows), int(counts.sum()))
+        return replace(self, times=self.times[: len(rows)], record=record, counts=counts)
+
+    def until(self, row: int) -> Log:
+        """The log before a row."""
+        return self.of(self.record.rows[:row])
+
+    @property
+    def duration(self) -> float:
+        """From the first row to the last [s]."""
+        return float(self.times[-1] - self.times[0])
+
+
+def log_of(table: Table, actuator: Actuator, step: float) -> Log:
+    """The log of a table, with at most `step` [s] from one evaluation of the filter to the next.
+
+    A row stands where something is delivered, and otherwise every `step`; the commands of a row are
+    the mean until the next. Raises LogFault where pose or commands are missing.
+    """
+    commands = actuator.replayed
+    needed = {s.name for s in (*STATE[:POSE], *commands)} - {*actuator.zero_where_missing}
+    if lacking := sorted(needed - table.columns.keys()):
+        raise LogFault(
+            f"{table.name}: nothing is known of {', '.join(lacking)}; name the columns that have "
+            "them under identify.columns, or choose the actuator whose commands the log has"
+        )
+    nothing = np.full(len(table.times), np.nan)
+    new = np.column_stack([delivered(table.columns.get(s.name, nothing)) for s in STATE])
+    if min(new[:, :POSE].sum(axis=0)) < FEWEST:
+        raise LogFault(
+            f"{table.name}: has {min(new[:, :POSE].sum(axis=0))} values of the pose, at least "
+            f"{FEWEST} are needed; take a longer part of the log"
+        )
+    kept = _rows(table.times, np.any(new, axis=1), step)
+    rows = np.zeros((len(kept), COMMANDS + 2 * len(commands)))
+    times = table.times[kept]
+    rows[:-1, HOLDS] = np.diff(times)
+    rows[:, STEPS] = np.maximum(1.0, np.ceil(rows[:, HOLDS] / step - 1e-9))
+    for i, signal in enumerate(STATE):
+        if signal.name in table.columns:
+            marks = np.logical_or.reduceat(new[:, i], kept)
+            rows[:, DELIVERED + i] = marks
+            rows[:, VALUES + i] = np.where(marks, table.columns[signal.name][kept], 0.0)
+    for i, signal in enumerate(commands):
+        if signal.name in table.columns:
+            held = _held(table.times, table.columns[signal.name], kept)
+            rows[:, COMMANDS + i] = held
+            rows[:, COMMANDS + len(commands) + i] = np.gradient(held, times)
+    counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
+    return Log(table.name, times, Record(rows, int(counts.sum())), _state(table, new), counts)
+
+
+def _rows(times: Vector, new: Marks, step: float) -> Whole:
+    """The rows that are kept: those that deliver something, and one every `step` otherwise."""
+    kept, last = [0], times[0]
+    for i in range(1, len(times)):
+        if new[i] or times[i] - last >= step * (1.0 - 1e-9) or i == len(times) - 1:
+            kept.append(i)
+            last = times[i]
+    return np.array(kept)
+
+
+def _held(times: Vector, values: Vector, kept: Whole) -> Vector:
+    """The mean from each row that is kept to the next; what is missing is as before."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return np.zeros(len(kept))
+    last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), known[0]))
+    whole = values[last]
+    spans = np.append(np.diff(times), 0.0)
+    sums, lengths = np.add.reduceat(whole * spans, kept), np.add.reduceat(spans, kept)
+    return np.where(lengths > 0.0, sums / np.where(lengths > 0.0, lengths, 1.0), whole[kept])
+
+
+def _state(table: Table, new: Marks) -> Vector:
+    """Pose and velocities at the start, by straight lines through the first seconds."""
+    state = np.zeros(MOVING)
+    slopes = np.zeros(MOVING)
+    for i, signal in enumerate(STATE):
+        at = np.flatnonzero(new[:, i])
+        if not len(at):
+            continue
+        early = at[table.times[at] <= table.times[at[0]] + BEGIN]
+        values = table.columns[signal.name][early]
+        values = np.unwrap(values) if i == 2 else values
+        state[i] = values[0]
+        if i < POSE and len(early) > 2:
+            slopes[i], state[i] = np.polyfit(table.times[early] - table.times[0], values, 1)
+    c, s = np.cos(state[2]), np.sin(state[2])
+    guessed = (c * slopes[0] + s * slopes[1], c * slopes[1] - s * slopes[0], slopes[2])
+    for i, velocity in enumerate(guessed, POSE):
+        if not new[:, i].any():
+            state[i] = velocity
+    return state

@@ -1,0 +1,51 @@
+"""A hull from logs in Python."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.outputs import drawn, given
+
+
+@dataclass(frozen=True, repr=False)
+class IdentifiedHull:
+    """A hull that logs gave, what is known of its errors, and the folder with all of it."""
+
+    folder: Path
+    _answer: Answer
+
+    def __repr__(self) -> str:
+        """How many directions of the hull's numbers the logs tell."""
+        known, whole = self._answer.directions.known, len(self._answer.problem.hull)
+        return f"<podusv hull: {known} of {whole} directions told, {self.folder}>"
+
+    @property
+    def vessel(self) -> dict[str, Any]:
+        """The section `vessel` of a scenario."""
+        return given(self._answer)
+
+    @cached_property
+    def parameters(self) -> pd.DataFrame:
+        """A row a number: before and after the logs, with 95 % intervals."""
+        return pd.DataFrame([asdict(row) for row in self._answer.parameters])
+
+    @cached_property
+    def forces(self) -> pd.DataFrame:
+        """A row a damping force at a speed of the logs, with 95 % intervals."""
+        return pd.DataFrame([asdict(row) for row in self._answer.forces])
+
+    @cached_property
+    def scores(self) -> pd.DataFrame:
+        """A row a log, a horizon and a way to foretell: errors of free runs [m, rad]."""
+        return pd.DataFrame([asdict(row) for row in self._answer.scores])
+
+    @cached_property
+    def draws(self) -> pd.DataFrame:
+        """Hulls that the logs leave possible, a row each: the keys of `vessel` that differ."""
+        return pd.DataFrame(drawn(self._answer))

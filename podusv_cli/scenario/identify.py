@@ -1,0 +1,69 @@
+"""The key `identify`: the logs of a boat, and which numbers of its hull they are to give."""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import field_validator, model_validator
+
+from podusv_cli.core.component import Component, Positive, value
+
+DAMPING = {"surge": "X_", "sway": "Y_", "yaw": "N_"}
+GROUPS = ("inertia", *(f"damping.{axis}" for axis in DAMPING))
+
+
+class LogFile(Component):
+    """One log, of which all or a part is used."""
+
+    file: str = value(..., "", "CSV file or log.h5, beside the scenario")
+    span: tuple[float, float] | None = value(
+        None, "s", "[from, to]: the part of the log that is used; null: all of it"
+    )
+    role: Literal["fit", "judge"] = value(
+        "fit", "", "fit: the numbers follow from it; judge: it shows how well they predict"
+    )
+
+    @model_validator(mode="after")
+    def _forward(self) -> Self:
+        if self.span and not self.span[0] < self.span[1]:
+            raise ValueError(f"span: {self.span[0]:g} s is not before {self.span[1]:g} s")
+        return self
+
+
+class Identify(Component):
+    """Which logs there are, what their columns mean, and which numbers are looked for."""
+
+    logs: tuple[LogFile, ...] = value(..., "", "the logs", strict=False)
+    columns: dict[str, str] = value(
+        {}, "", "what a log calls a quantity, with its unit where that is not podusv's: "
+        '{psi: "heading [deg]"}; a column called as podusv does needs no entry',
+    )  # fmt: skip
+    free: tuple[str, ...] = value(
+        GROUPS, "", "numbers of the vessel that are looked for, or groups of them: "
+        f"{', '.join(GROUPS)}; all others stay as the vessel has them", strict=False,
+    )  # fmt: skip
+    prior: Positive = value(
+        0.5, "", "relative standard deviation of the vessel's own numbers, before the logs are read"
+    )
+    priors: dict[str, Positive] = value({}, "", "the same of single numbers, in place of `prior`")
+    noise: dict[str, Positive] = value(
+        {}, "", "standard deviations of sensors that are known, by the names of the ekf: sigma_p, "
+        "sigma_psi, sigma_u, sigma_v, sigma_r; all others follow from the logs",
+    )  # fmt: skip
+    current: float | None = value(
+        None, "m/s", "standard deviation of the current north and east, which every log has its "
+        "own of; null: a fifth of the speed at full thrust; 0: no current", ge=0,
+    )  # fmt: skip
+    step: Positive = value(0.1, "s", "longest step of the filter along a log")
+    draws: int = value(
+        200, "", "hulls that are drawn from what the logs leave open", ge=2, le=10**5
+    )
+    seed: int = value(1, "", "of the draws", ge=0, lt=2**63)
+
+    @field_validator("logs")
+    @classmethod
+    def _some_to_fit(cls, logs: tuple[LogFile, ...]) -> tuple[LogFile, ...]:
+        if not any(log.role == "fit" for log in logs):
+            what = "all logs are for judging" if logs else "it is empty"
+            raise ValueError(f"{what}; at least one log has to have role: fit")
+        return logs

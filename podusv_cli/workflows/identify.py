@@ -1,0 +1,97 @@
+"""`podusv identify`: the hull of a boat from its logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.recording import Status
+from podusv_cli.core.signal import STATE
+from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.identify import estimate, outputs
+from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.judge import free_runs, scores
+from podusv_cli.identify.problem import Problem
+from podusv_cli.identify.reading import table
+from podusv_cli.identify.records import Log, log_of
+from podusv_cli.process.extras import Extras
+from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
+from podusv_cli.scenario.identify import Identify, LogFile
+from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.shipped import relative_to
+from podusv_cli.storage import provenance
+from podusv_cli.storage.run_folder import RunWriter, default_folder
+from podusv_cli.workflows.run import RESULTS, Request, opened
+
+Progress = Callable[[str, float], None]
+SETTLES = 30  # rounds, after which a search has usually settled
+
+
+def identify(
+    config: Path, request: Request, progress: Progress | None = None
+) -> outputs.Identified:
+    """Find the hull's numbers from the logs that a scenario names.
+
+    An interrupt keeps the best numbers so far. Raises UsageError without logs and for logs that
+    cannot be used, ScenarioError, StorageError.
+    """
+    loaded = opened(config, request, (unknown_codes,))
+    return identify_of(loaded, request, progress)
+
+
+def identify_of(
+    loaded: Loaded, request: Request, progress: Progress | None = None
+) -> outputs.Identified:
+    """The same for a scenario that is loaded and checked."""
+    started, scenario = datetime.now(UTC), loaded.scenario
+    if scenario.identify is None:
+        raise UsageError(
+            f"{scenario.name} names no logs; write the section `identify`, as podusv docs identify "
+            "shows"
+        )
+    source = loaded.root.mark.source
+    logs = [(_log(scenario, source, log), log.role) for log in scenario.identify.logs]
+    target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
+    with (
+        interrupts_deferred(),
+        RunWriter(target, force=request.force, named=request.out is not None) as writer,
+    ):
+        with interrupts_enabled():
+            answer = answered(scenario, scenario.identify, logs, progress)
+        extras = Extras()
+        origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
+        outputs.write(
+            writer, answer, loaded.text, origin, extras, warnings=(), figures=request.figures
+        )
+        status: Status = "interrupted" if answer.estimate.interrupted else "finished"
+        return outputs.Identified(writer.finish(status), answer, status, (), tuple(extras.missing))
+
+
+def _log(scenario: Scenario, source: str, log: LogFile) -> Log:
+    """A log as the filter takes it. Raises UsageError."""
+    assert scenario.identify is not None
+    path = Path(relative_to(source, log.file))
+    wanted = (*STATE, *scenario.actuator.replayed)
+    whole = table(path, wanted, scenario.identify.columns, name=log.file)
+    part = whole.part(*log.span) if log.span else whole
+    return log_of(part, scenario.actuator, scenario.identify.step)
+
+
+def answered(
+    scenario: Scenario, wanted: Identify, logs: Sequence[tuple[Log, str]], progress: Progress | None
+) -> Answer:
+    """The hull, and what is known of its errors."""
+    problem = Problem(scenario, wanted, [log for log, role in logs if role == "fit"])
+    search = estimate.Search(problem.innovations, len(problem.numbers), problem.blocks)
+
+    def tell(i: int, value: float) -> None:
+        if progress:
+            progress(f"fitting, round {i}", min(i / SETTLES, 0.99))
+
+    found, ways = estimate.told(search, len(problem.hull), tell)
+    judged = [(log, role, free_runs(problem, log, found.y)) for log, role in logs]
+    marks = [score for log, role, runs in judged for score in scores(log, role, runs)]
+    return Answer(problem, found, ways, judged, marks)

@@ -1,0 +1,407 @@
+"""A hull from logs: the filter along a log, the search, what is told and what is left open."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
+from podusv_cli.components.vessels.plant import plant
+from podusv_cli.core.kernel import bundle
+from podusv_cli.core.signal import STATE
+from podusv_cli.identify import judge
+from podusv_cli.identify.estimate import Search, estimated, told
+from podusv_cli.identify.march import (
+    COMMANDS,
+    DELIVERED,
+    HOLDS,
+    NAMES,
+    STEPS,
+    VALUES,
+    Record,
+    side_by_side,
+)
+from podusv_cli.identify.problem import Problem
+from podusv_cli.identify.reading import Table, delivered
+from podusv_cli.identify.records import log_of
+from podusv_cli.scenario.identify import Identify, LogFile
+from podusv_cli.scenario.load import load
+
+LOGS = (LogFile(file="a.csv"),)
+SCENARIO = load(
+    "podusv:trials/base.yaml",
+    [
+        "vessel={preset: cybership2}", "actuator={kind: ideal}", "controller={kind: pid}",
+        "name=boat",
+    ],
+).scenario  # fmt: skip
+HULL = SCENARIO.vessel
+
+
+def slope(k, tau, current=(0.0, 0.0)):
+    """The hull's rate over ground, as plain Python: state, then load in the earth's frame."""
+
+    def rate(_, s):
+        c, n = math.cos(s[2]), math.sin(s[2])
+        x = s[:6].copy()
+        x[3] -= c * current[0] + n * current[1]
+        x[4] -= c * current[1] - n * current[0]
+        b = np.array([c * s[6] + n * s[7], c * s[7] - n * s[6], s[8]])
+        out = np.zeros(6)
+        plant(x, np.asarray(tau), b, k, out)
+        out[0] = c * s[3] - n * s[4]
+        out[1] = n * s[3] + c * s[4]
+        # The water's velocity in the hull's frame turns with the hull.
+        r = s[5]
+        out[3] += r * (c * current[1] - n * current[0])
+        out[4] -= r * (c * current[0] + n * current[1])
+        return np.concatenate([out, np.zeros(3)])
+
+    return rate
+
+
+def motion(commands, times, start, hull=HULL, current=(0.0, 0.0)):
+    """States at times, with commands held from each to the next, by another integrator."""
+    k, states = bundle(hull.constants()), [np.concatenate([start, np.zeros(3)])]
+    for i in range(len(times) - 1):
+        span = times[i], times[i + 1]
+        ended = solve_ivp(slope(k, commands[i], current), span, states[-1], rtol=1e-9, atol=1e-11)
+        states.append(ended.y[:, -1])
+    return np.array(states)[:, :6]
+
+
+def commands_of(times, seed=0):
+    """Force and moment that change every 4 s, with some that stay."""
+    rng = np.random.default_rng(seed)
+    count = int(times[-1] // 4.0) + 1
+    u, r = rng.uniform(0.5, 4.0, count), rng.uniform(-0.6, 0.6, count)
+    at = (times // 4.0).astype(int)
+    return np.column_stack([u[at], np.zeros(len(times)), r[at]])
+
+
+def table_of(times, states, commands, *, noise=(0.01, 0.005, 0.002), seed=1, name="a.csv"):
+    """A log with pose and yaw rate measured."""
+    rng = np.random.default_rng(seed)
+    sigma = dict(zip(("x", "y", "psi", "r"), (noise[0], *noise), strict=True))
+    names = [signal.name for signal in STATE]
+    columns = {
+        n: states[:, names.index(n)] + sigma[n] * rng.standard_normal(len(times)) for n in sigma
+    }
+    columns |= {"tau_u": commands[:, 0], "tau_r": commands[:, 2]}
+    return Table(name, times, columns)
+
+
+@pytest.fixture(scope="module")
+def boat():
+    """Three logs at 5 Hz, of different commands, in a current that the first two have."""
+    logs = []
+    for i, current in enumerate([(0.05, -0.03), (0.0, 0.04), (0.0, 0.0)]):
+        times = np.arange(0.0, 90.0, 0.2)
+        commands = commands_of(times, seed=i)
+        states = motion(commands, times, np.array([1.0, -2.0, 3.0, 0.4, 0, 0]), current=current)
+        logs.append(log_of(table_of(times, states, commands, seed=i, name=f"{i}"), Ideal(), 0.1))
+    return logs
+
+
+def problem(logs, vessel=HULL, **wanted):
+    """The problem of logs, by default with the wide prior of a hull that is guessed."""
+    scenario = SCENARIO.model_copy(update={"vessel": vessel, "nominal": vessel})
+    return Problem(scenario, Identify(logs=LOGS, **wanted), logs)
+
+
+def search(given):
+    return Search(given.innovations, len(given.numbers), given.blocks)
+
+
+def test_the_filter_along_a_log_is_that_of_plain_python():
+    """Irregular times, late and missing values; the matrices by another program's integrator.
+
+    No velocity passes through 0, where the slopes of |v| v jump and every integrator is rough.
+    """
+    rng = np.random.default_rng(3)
+    rows = np.zeros((12, COMMANDS + 6))
+    rows[:, HOLDS] = rng.uniform(0.05, 0.4, 12)
+    rows[:, STEPS] = 40.0  # so that RK4's own error is small
+    rows[:, DELIVERED : DELIVERED + 6] = rng.integers(0, 2, (12, 6))
+    rows[:, VALUES : VALUES + 6] = rng.normal(0.0, 0.3, (12, 6))
+    rows[:, COMMANDS : COMMANDS + 3] = rng.normal(0.0, 1.0, (12, 3))
+    filter_ = ExtendedKalmanFilter(sigma_p=0.03, sigma_u=0.05, sigma_v=0.06, q_u=0.1, q_b=0.2)
+    current, delay = (0.2, -0.1), 0.07
+    constants = {
+        **HULL.constants(), **filter_.constants(), "thrust": 0.9, "delay": delay,
+        "current_x": current[0], "current_y": current[1],
+    }  # fmt: skip
+    rows[:, COMMANDS + 3 :] = rng.normal(0.0, 1.0, (12, 3))
+    size, moving = 9, np.array([0.9, 0.4, 0.5])
+    x = rng.normal(0.0, 0.3, size)
+    x[3:6] = moving
+    rows[:, VALUES + 3 : VALUES + 6] = moving + rng.normal(0.0, 0.05, (12, 3))
+    P = np.diag(rng.uniform(1e-4, 4e-4, size))
+    start = np.concatenate([x, P[np.triu_indices(size)], np.zeros(12)])
+    count = int(rows[:, DELIVERED : DELIVERED + 6].sum())
+    run = side_by_side(Ideal())(
+        Record(rows, count), [np.array([constants[n] for n in NAMES])], [start]
+    )
+    expected = filtered(rows, x, P, bundle(constants), filter_, current)
+    assert np.column_stack([run.innovations, run.variances]) == pytest.approx(
+        np.array(expected), rel=2e-6, abs=5e-7
+    )
+
+
+def filtered(rows, x, P, k, filter_, current):
+    """An extended Kalman filter with slopes by differences, and its covariance by solve_ivp."""
+    sigma = (
+        filter_.sigma_p, filter_.sigma_p, filter_.sigma_psi,
+        filter_.sigma_u, filter_.sigma_v, filter_.sigma_r,
+    )  # fmt: skip
+    walks = (filter_.q_u, filter_.q_v, filter_.q_r, filter_.q_b, filter_.q_b, filter_.q_b_psi)
+    Q = np.diag([0.0, 0.0, 0.0, *np.square(walks)])
+    found, since = [], 0.0
+
+    def measured(s, i):
+        c, n = math.cos(s[2]), math.sin(s[2])
+        flow = {3: c * current[0] + n * current[1], 4: c * current[1] - n * current[0]}
+        return s[i] + {0: since * current[0], 1: since * current[1]}.get(i, flow.get(i, 0.0))
+
+    def slopes(function, s):
+        return np.array(
+            [(function(s + 1e-6 * e) - function(s - 1e-6 * e)) / 2e-6 for e in np.eye(len(s))]
+        ).T
+
+    for line in rows:
+        for i in np.flatnonzero(line[DELIVERED : DELIVERED + 6]):
+            h = slopes(lambda s: measured(s, i), x)  # noqa: B023
+            nu = line[VALUES + i] - measured(x, i)
+            S = h @ P @ h + sigma[i] ** 2
+            found.append((nu, S))
+            K = P @ h / S
+            x, P = x + K * nu, P - np.outer(K, h @ P)
+        tau = 0.9 * (line[COMMANDS : COMMANDS + 3] - k.delay * line[COMMANDS + 3 :])
+        rate = slope(k, tau)
+
+        def whole(t, s):
+            F = slopes(lambda y: rate(t, y), s[:9])  # noqa: B023
+            C = s[9:].reshape(9, 9)
+            return np.concatenate([rate(t, s[:9]), (F @ C + C @ F.T + Q).ravel()])  # noqa: B023
+
+        ended = solve_ivp(
+            whole, (0.0, line[HOLDS]), np.concatenate([x, P.ravel()]), rtol=1e-8, atol=1e-10
+        )
+        x, P = ended.y[:9, -1], ended.y[9:, -1].reshape(9, 9)
+        since += line[HOLDS]
+    return found
+
+
+def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
+    """Values z with mean m and deviation e^s: the estimates with a normal prior are known."""
+    z = np.random.default_rng(5).normal(0.7, 0.3, 400)
+
+    def innovations(points):
+        nu = np.column_stack([z - y[0] for y in points])
+        return nu, np.column_stack([np.full(len(z), math.exp(2.0 * y[1])) for y in points])
+
+    found = estimated(Search(innovations, 2, np.arange(400) // 20), np.zeros(2))
+    m, s = found.y
+    variance = math.exp(2.0 * s)
+    assert found.settled
+    assert m == pytest.approx(z.sum() / (len(z) + variance), abs=1e-4)
+    # Of the deviation: -N + sum (z - m)^2 / e^2s - s = 0.
+    assert -len(z) + np.sum((z - m) ** 2) / variance - s == pytest.approx(0.0, abs=0.2)
+    sd = np.sqrt(np.diag(found.covariance))
+    assert sd == pytest.approx([math.sqrt(variance / 400), math.sqrt(0.5 / 400)], rel=0.35)
+    assert np.all(sd >= [0.99 * math.sqrt(variance / 401), 0.99 * math.sqrt(0.5 / 401)])
+
+
+def test_a_few_numbers_come_out_of_two_logs(boat):
+    """From half to twice the truth; with the current of each log, and no delay."""
+    off = {"X_udot": -15.0, "N_rdot": -3.0, "Y_vv": -20.0, "N_r": -3.0}
+    given = problem(boat[:2], HULL.changed(off), free=("m11", "m33", "Y_vv", "N_r"), prior=1.0)
+    found, ways = told(search(given), len(given.hull))
+    assert found.settled
+    assert ways.known == 4
+    values, sd, truth = given.values(found.y), np.sqrt(np.diag(found.covariance)), HULL.constants()
+    for i, number in enumerate(given.hull):
+        width = number.sd * sd[i]
+        assert width < 0.05
+        assert abs(math.log(values[number.name] / truth[number.name])) < 3.5 * width
+    assert given.currents(boat[0], found.y) == pytest.approx([0.05, -0.03], abs=0.01)
+    assert given.currents(boat[1], found.y) == pytest.approx([0.0, 0.04], abs=0.01)
+    assert values["delay"] == pytest.approx(0.0, abs=0.03)
+    assert values["sigma_p"] == pytest.approx(0.01, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_hull_comes_out_of_its_logs_with_its_error(boat):
+    """All numbers, from such as are 1.5 times the truth, and half of it."""
+    off = {"X_uuu": 1.5, "Y_vv": 1.5, "N_r": 0.6, "N_vv": 1.4, "Y_r": 0.7}
+    guess = HULL.changed(
+        {n: getattr(HULL, n) * f for n, f in off.items()} | {"X_udot": -10.0, "N_rdot": -2.0}
+    )
+    given = problem(boat, guess)
+    found, ways = told(search(given), len(given.hull))
+    assert found.settled
+    values, sd = given.values(found.y), np.sqrt(np.diag(found.covariance))
+    truth = HULL.constants()
+    for i, number in enumerate(given.hull):
+        if sd[i] <= 0.3:
+            z = math.log(values[number.name] / truth[number.name]) / (number.sd * sd[i])
+            assert abs(z) < 3.5, (number.name, z)
+    assert values["m11"] == pytest.approx(HULL.m11, rel=0.02)
+    assert values["m33"] == pytest.approx(HULL.m33, rel=0.04)
+    assert given.vessel(found.y).m33 == pytest.approx(values["m33"])
+    assert 6 <= ways.known < len(given.hull)
+
+
+def test_straight_runs_leave_sway_and_yaw_as_they_were():
+    times = np.arange(0.0, 60.0, 0.2)
+    commands = np.zeros((len(times), 3))
+    commands[:, 0] = np.repeat([1.0, 3.0, 5.0], 100)
+    commands *= 10.0
+    otter = load("podusv:trials/base.yaml", ["controller={kind: pid}", "name=boat"]).scenario.vessel
+    states = motion(commands, times, np.array([0.0, 0.0, 0.5, 0.3, 0.0, 0.0]), otter)
+    log = log_of(table_of(times, states, commands), Ideal(), 0.1)
+    given = problem([log], otter.changed({"X_u": -50.0}), current=0.0)
+    found, ways = told(search(given), len(given.hull))
+    sd = dict(zip([n.name for n in given.numbers], np.sqrt(np.diag(found.covariance)), strict=True))
+    y = dict(zip([n.name for n in given.numbers], found.y, strict=True))
+    assert sd["m11"] < 0.2
+    for name in ("m22", "Y_vv", "Y_v", "N_r", "N_rr", "N_vr"):
+        assert sd[name] > 0.9
+        assert abs(y[name]) < 0.1  # the prior's own value
+    assert given.values(found.y)["X_u"] == pytest.approx(otter.X_u, rel=0.03)
+    assert ways.known == 2  # m11 and X_u
+
+
+def test_a_free_run_of_the_true_hull_stays_with_the_boat(boat):
+    """With the hull that made the log the error is that of the measurement; thrust lost shows."""
+    given = problem(boat[2:], current=0.0)
+    names = [n.name for n in given.numbers]
+    calm = np.array([-3.0 if name.startswith("q_") else 0.0 for name in names])
+    errors = judge.free_runs(given, boat[2], calm)[0].errors(30.0)
+    assert errors[0][0] < 0.3
+    weak = np.where(np.array(names) == "m11", 1.0, calm)
+    assert judge.free_runs(given, boat[2], weak)[0].errors(30.0)[0][0] > 3.0 * errors[0][0]
+
+
+def test_who_keeps_the_velocities_of_an_instant_goes_round_a_circle():
+    times = np.linspace(3.0, 11.0, 9)
+    state = np.array([1.0, 2.0, 0.3, 0.9, 0.2, 0.25])
+    turned = judge._turning(times, state)
+
+    def rate(_, s):
+        c, n = math.cos(s[2]), math.sin(s[2])
+        return [c * 0.9 - n * 0.2, n * 0.9 + c * 0.2, 0.25]
+
+    ended = solve_ivp(rate, (3.0, 11.0), state[:3], t_eval=times, rtol=1e-10, atol=1e-12)
+    assert turned == pytest.approx(ended.y.T, abs=1e-8)
+
+
+def test_values_that_a_logger_repeats_count_once():
+    rng = np.random.default_rng(0)
+    true = rng.normal(size=100)
+    assert delivered(true).all()
+    held = np.repeat(true, 5)
+    assert delivered(held).sum() == 100
+    assert delivered(held)[::5].all()
+    uneven = true[np.floor(np.arange(350) / 3.5).astype(int)]  # 3 and 4 rows in turn
+    assert delivered(uneven).sum() == 100
+    coarse = np.round(np.cumsum(rng.normal(0.0, 0.6, 400)))  # a resolution, not a rate
+    assert delivered(coarse).all()
+    gaps = true.copy()
+    gaps[10:20] = np.nan
+    assert delivered(gaps).sum() == 90
+
+
+def test_a_log_becomes_rows_of_which_none_is_lost():
+    """A gyro at 20 Hz beside a pose at 4 Hz, and a gap of 10 s."""
+    times = np.concatenate([np.arange(0.0, 20.0, 0.05), np.arange(30.0, 40.0, 0.05)]) + 1.7e9
+    count = len(times)
+    pose = np.where(np.arange(count) % 5 == 0, 1.0, np.nan)
+    rng = np.random.default_rng(2)
+    columns = {
+        "x": pose * rng.normal(size=count), "y": pose * rng.normal(size=count),
+        "psi": pose * 0.1 * rng.normal(size=count), "r": rng.normal(size=count),
+        "tau_u": np.linspace(0.0, 1.0, count), "tau_r": np.zeros(count),
+    }  # fmt: skip
+    log = log_of(Table("a", times, columns), Ideal(), 0.1)
+    assert log.counts.tolist() == [count // 5] * 3 + [0, 0, count]
+    rows = log.record.rows
+    assert rows[:, HOLDS].sum() == pytest.approx(times[-1] - times[0])
+    assert np.all(rows[:, HOLDS] / rows[:, STEPS] <= 0.1 + 1e-6)
+    assert rows[:, STEPS].max() == 101  # of the gap
+
+
+def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
+    from podusv_cli.components.vessels.vessel import Vessel
+    from podusv_cli.scenario.yaml_text import read
+    from podusv_cli.scenario.yaml_tree import plain
+
+    config = tmp_path / "boat.yaml"
+    times = np.arange(0.0, 60.0, 0.2)
+    for i in range(2):
+        commands = commands_of(times, seed=i)
+        states = motion(commands, times, np.array([0.0, 0.0, 0.0, 0.4, 0.0, 0.0]))
+        table = table_of(times, states, commands, seed=i)
+        names = ["t", *table.columns]
+        cells = np.column_stack([times, *table.columns.values()])
+        cells[:, 1 + list(table.columns).index("psi")] *= 180.0 / math.pi
+        lines = [",".join(names), *(",".join(f"{c:.8g}" for c in row) for row in cells)]
+        (tmp_path / f"{i}.csv").write_text("\n".join(lines))
+    config.write_text(
+        "extends: podusv:trials/base.yaml\nvessel: {preset: cybership2, N_r: -2.5}\n"
+        "actuator: {kind: ideal}\ncontroller: {kind: pid}\n"
+        "identify:\n  columns: {time: t, psi: 'psi [deg]'}\n  draws: 5\n"
+        "  logs: [{file: 0.csv}, {file: 1.csv, role: judge}]\n"
+    )
+    import podusv
+
+    hull = podusv.identify(config, out=tmp_path / "hull", figures=False)
+    assert set(hull.draws.columns) <= set(Vessel.model_fields)
+    assert len(hull.draws) == 5
+    node = read((tmp_path / "hull/identified.yaml").read_text(), "identified.yaml", [])
+    vessel = Vessel(**plain(node))
+    assert vessel.N_r == pytest.approx(hull.vessel["N_r"])
+    assert vessel.envelope.speed < 1.5
+    judged = hull.scores[(hull.scores.role == "judge") & (hull.scores.horizon == 30.0)]
+    errors = judged.set_index("who").position
+    assert errors["identified"] < 0.5 * errors["constant velocity"]
+    assert json.loads((tmp_path / "hull/provenance.json").read_text())
+    assert "What the logs leave open" in (tmp_path / "hull/report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("section", "sentence"),
+    [
+        ({"logs": []}, "it is empty; at least one log has to have role: fit"),
+        ({"logs": [{"file": "a", "role": "judge"}]}, "all logs are for judging"),
+        ({"logs": [{"file": "a", "span": (9.0, 3.0)}]}, "9 s is not before 3 s"),
+    ],
+)
+def test_a_section_that_cannot_be_meant_gets_a_sentence(section, sentence):
+    with pytest.raises(ValueError, match=sentence):
+        Identify.model_validate(section)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "sentence"),
+    [
+        ({"free": ("damping.roll",)}, "is no group .* did you mean .damping.surge."),
+        ({"free": ("X_u",), "priors": {"Y_v": 0.1}}, "Y_v is not looked for"),
+        ({"free": ("N_rv", "Y_vr")}, None),
+    ],
+)
+def test_names_of_what_is_looked_for(wanted, sentence):
+    from podusv_cli.core.errors import UsageError
+    from podusv_cli.identify.problem import hull_numbers
+
+    asked = Identify(logs=LOGS, **wanted)
+    if sentence is None:
+        assert [n.name for n in hull_numbers(HULL, asked)] == list(wanted["free"])
+        return
+    with pytest.raises(UsageError, match=sentence):
+        hull_numbers(HULL, asked)
