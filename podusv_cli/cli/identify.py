@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,11 +13,39 @@ from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
 
 if TYPE_CHECKING:
+    from podusv_cli.identify.listing import Listing
     from podusv_cli.identify.outputs import Identified
 
 
+def _show_columns(log: Path, as_json: bool) -> None:
+    from podusv_cli.identify.listing import listing
+
+    found = listing(log)
+    echo_result(found, lambda: _report_columns(found), as_json=as_json, quiet=False)
+
+
+def _report_columns(found: Listing) -> None:
+    rows = [
+        [c.name, f"{c.rate:.4g}", f"{c.least:.5g}", f"{c.most:.5g}", f"{c.missing:.1%}", c.guess]
+        for c in found.columns
+    ]
+    echo_table(["column", "new values a second", "least", "most", "missing", "may be"], rows)
+    for line in ("", "identify:", *(f"  {line}" for line in found.mapping())):
+        echo(line)
+
+
+Columns = Annotated[
+    Path | None,
+    typer.Option(
+        "--columns", metavar="LOG",
+        help="Only list the columns of a log, and what each may be; needs no CONFIG.",
+    ),
+]  # fmt: skip
+
+
 def identify(
-    config: options.Config,
+    config: options.Config = "",
+    columns: Columns = None,
     assign: options.Assignments = None,
     out: options.Out = None,
     force: options.Force = False,
@@ -32,6 +60,10 @@ def identify(
     The section `identify` of the scenario names the logs and their columns; `vessel` is what is
     known before. What the logs do not tell stays as it was, and is named.
     """
+    if columns:
+        return _show_columns(columns, as_json)
+    if not config:
+        raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
     from podusv_cli.workflows.run import Request

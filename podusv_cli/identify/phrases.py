@@ -15,6 +15,7 @@ TELLING = {
     "m": "zig-zags, and starts and stops, tell the inertia",
     "t": "thrust is known where one mass is",
 }
+FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
 SHARE = 0.3  # of a direction, from which on a number is named
 
 
@@ -38,6 +39,7 @@ def summary(answer: Answer) -> list[str]:
             lines.append(f"{own[0].force} is not told by these logs; it stays as it was.")
     if not answer.estimate.settled:
         lines.append("The search had not settled when it ended; the numbers may still move.")
+    lines += [note for log, _, _ in answer.judged for note in log.notes]
     if not answer.judged:
         lines.append(
             "No log was kept for judging (role: judge): how well it foretells is not known."
@@ -57,3 +59,20 @@ def open_words(answer: Answer) -> list[str]:
         what = "how these share a force" if len(named) > 1 else "this number"
         lines.append(f"{what} is open ({ways.widths[i]:.2g} of the prior's width): {names}")
     return [*lines, *(TELLING[axis] for axis in sorted(axes))]
+
+
+def far_words(answer: Answer) -> list[str]:
+    """A sentence where numbers end far from what was known before: the vessel is another one."""
+    far = [
+        f"{p.name} {p.value:.4g} (before {p.prior:.4g})"
+        for p, y in zip(answer.parameters, answer.estimate.y, strict=True)
+        if abs(y) > FAR and p.name in {number.name for number in answer.problem.hull}
+    ]
+    if not far:
+        return []
+    return [
+        f"{len(far)} numbers are more than {FAR:g} standard deviations from what was known before: "
+        f"{', '.join(far)}. Is the vessel's preset of another size, or the thrust in another unit? "
+        "With a prior so far off the intervals are too narrow; give the vessel numbers nearer to "
+        "these."
+    ]

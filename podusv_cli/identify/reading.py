@@ -1,184 +1,209 @@
-"""Logs of a boat as tables of named quantities in SI units."""
+"""Logs of a boat as tables of named quantities in SI units, north, east, and to starboard."""
 
 from __future__ import annotations
 
 import difflib
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.storage.log_reader import read_log
+from podusv_cli.core.signal import Signal
+from podusv_cli.identify.formats import TIME, Columns, LogFault, columns_of
+from podusv_cli.identify.frames import LAT, LON, local_plane, turned
 
 Marks = npt.NDArray[np.bool_]
 Whole = npt.NDArray[np.int64]
-TIME = "time"
-STATE_NAMES = {signal.name for signal in STATE}
-MEASURED = "_m"  # ends the name of what a sensor of podusv measured
+CLOCK = Signal(TIME, "s", "time")
 SELDOM = 0.05  # of a sensor's values, that may come at another time than the others
+LISTED = 30  # columns that a message names
 # Of units that logs have, what one of them is in podusv's own units.
 UNITS: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "m": {"m": 1.0, "mm": 1e-3, "cm": 0.01, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
     "rad": {"rad": 1.0, "deg": math.pi / 180.0},
-    "m/s": {"m/s": 1.0, "cm/s": 0.01, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0},
+    "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7},
+    "m/s": {
+        "m/s": 1.0, "cm/s": 0.01, "mm/s": 1e-3, "ft/s": 0.3048, "km/h": 1.0 / 3.6,
+        "kn": 1852.0 / 3600.0,
+    },
     "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "N": {"N": 1.0, "kN": 1e3, "kgf": 9.80665},
     "N m": {"N m": 1.0, "kN m": 1e3},
     "1/s": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
     "1": {"1": 1.0, "%": 0.01},
-}
-
-
-class LogFault(UsageError):
-    """A log cannot be used as it is; the message says where, why, and what may help."""
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Table:
-    """A log: times [s], and of every quantity a value at each time, NaN where there is none."""
+    """A log: times [s], and of every quantity a value at each time, NaN where there is none.
+
+    `notes` says how the log was understood, `warnings` what is doubtful about it.
+    """
 
     name: str
     times: Vector
     columns: Mapping[str, Vector]
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def part(self, begin: float, end: float) -> Table:
         """What lies between two times. Raises LogFault where that is nothing."""
         inside = (self.times >= begin) & (self.times <= end)
         if not inside.any():
             raise LogFault(
-                f"{self.name}: nothing lies between {begin:g} and {end:g} s; the log goes from "
-                f"{self.times[0]:g} to {self.times[-1]:g} s"
+                f"{self.name}: nothing lies between {begin:.10g} and {end:.10g} s; the log goes "
+                f"from {self.times[0]:.10g} to {self.times[-1]:.10g} s"
             )
-        columns = {name: column[inside] for name, column in self.columns.items()}
-        return Table(self.name, self.times[inside], columns)
+        return self.where(inside)
+
+    def where(self, rows: Marks) -> Table:
+        """These rows alone."""
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return replace(self, times=self.times[rows], columns=columns)
 
 
-def _csv(path: Path) -> dict[str, Vector]:
-    """The columns of a CSV file, whose first line names them; NaN for what is no number."""
-    import pandas as pd  # slow to import
+class Named(NamedTuple):
+    """What a log calls quantities, and the frame that it has them in."""
 
-    try:
-        frame = pd.read_csv(path, sep=None, engine="python", comment="#", skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        raise LogFault(f"{path}: cannot be read as CSV with a line of names: {error}") from error
-    frame.columns = [" ".join(str(name).split()) for name in frame.columns]
-    numbers = frame.apply(pd.to_numeric, errors="coerce").dropna(how="all")
-    return {str(name): numbers[name].to_numpy(float) for name in numbers}
+    columns: Mapping[str, str] = {}
+    frame: Literal["ned", "enu"] = "ned"
 
 
-def _own(path: Path) -> dict[str, Vector]:
-    """The signals of podusv's own log; where sensors are logged, of the state what these saw."""
-    recording = read_log(path)
-    columns: dict[str, Vector] = {}
-    for name, values in recording.signals.items():
-        if values.ndim == 1:
-            columns[name] = np.array(values)
-        elif values.ndim == 2:
-            columns |= {f"{name}_{i}": column for i, column in enumerate(values.T, 1)}
-    measured = {name for name in columns if f"{name}{MEASURED}" in columns}
-    if not measured:
-        return columns
-    rest = {name: column for name, column in columns.items() if name not in STATE_NAMES}
-    return rest | {name: columns[f"{name}{MEASURED}"] for name in measured}
+class _Series(NamedTuple):
+    """Values of a quantity, and the column that has their times."""
+
+    clock: str
+    values: Vector
 
 
-READERS: dict[str, Callable[[Path], dict[str, Vector]]] = {".csv": _csv, ".h5": _own}
+def table(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = "") -> Table:
+    """The quantities `wanted` of a log that has them, at the times of any, in podusv's units.
 
-
-def columns_of(path: Path) -> dict[str, Vector]:
-    """All columns of a log by the names that the log gives them. Raises LogFault, StorageError."""
-    read = READERS.get(path.suffix.lower())
-    if not read:
-        raise LogFault(f"{path}: a log is a file with one of these endings: {', '.join(READERS)}")
-    if not path.is_file():
-        raise LogFault(f"{path}: there is no such file")
-    return read(path)
-
-
-def table(
-    path: Path, wanted: Sequence[Signal], named: Mapping[str, str], *, name: str = ""
-) -> Table:
-    """The quantities `wanted` of a log that has them, and its times, in podusv's units.
-
-    `named` says what the log calls them, with a unit in brackets where that is another. Raises
-    LogFault where there is no time, or a column that is named is not there.
+    Latitude and longitude stand for x and y where the log has no others. Raises LogFault where
+    there is no time, or a column that is named is not there, or a clock goes backwards.
     """
-    columns = columns_of(path)
-    taken: dict[str, Vector] = {}
-    for signal in (Signal(TIME, "s", "time"), *wanted):
-        place = named.get(signal.name)
-        found = _found(columns, place or signal.name, path, asked=place is not None)
-        if found:
-            column, unit = found
-            taken[signal.name] = columns[column] * _factor(signal, unit, path)
-    if TIME not in taken:
-        raise LogFault(
-            f"{path}: no column is called time; name the one that has it, as in columns: "
-            f"{{time: {next(iter(columns), 't')}}} (columns: {_listed(columns)})"
-        )
-    return _sound(Table(name or path.name, taken.pop(TIME), taken), path)
+    columns, name = columns_of(path), name or path.name
+    clock = _found(columns, CLOCK, named, name)
+    series: dict[str, _Series] = {}
+    for signal in (*wanted, LAT, LON):
+        if found := _found(columns, signal, named, name):
+            own = clock_of(found.column, columns) or (clock.column if clock else "")
+            if not own:
+                raise LogFault(
+                    f"{name}: no column is called time; name the one that has it, as in columns: "
+                    f"{{time: {next(iter(columns), 't')}}} (columns: {_listed(columns)})"
+                )
+            series[signal.name] = _Series(own, columns[found.column] * found.factor)
+    if clock:
+        columns = {**columns, clock.column: columns[clock.column] * clock.factor}
+    whole = _together(name, series, columns)
+    # Latitude and longitude are north and east whatever the frame.
+    flat, notes = local_plane(turned(whole.columns, named.frame))
+    return replace(whole, columns=flat, notes=tuple(f"{name}: {note}." for note in notes))
 
 
-def _found(
-    columns: Mapping[str, Vector], wanted: str, path: Path, *, asked: bool
-) -> tuple[str, str] | None:  # fmt: skip
-    """The column that is called so, and its unit; None where there is none and none was asked."""
-    name, unit = _parted(wanted)
-    for column in columns:
-        own, own_unit = _parted(column)
-        if column == wanted or own == name:
-            return column, unit or own_unit
-    if not asked:
+class _Found(NamedTuple):
+    column: str
+    factor: float
+
+
+def _found(columns: Columns, signal: Signal, named: Named, name: str) -> _Found | None:
+    """The column that has a quantity, and what its numbers are multiplied by.
+
+    None where there is none and none was named. Raises LogFault.
+    """
+    place = named.columns.get(signal.name)
+    wanted, sign = place or signal.name, 1.0
+    if wanted.startswith("-") and wanted not in columns:
+        wanted, sign = wanted[1:].strip(), -1.0
+    asked, unit = parted(wanted)
+    for matches in (lambda column: column == wanted, lambda column: parted(column)[0] == asked):
+        for column in filter(matches, columns):
+            return _Found(column, sign * _factor(signal, unit or parted(column)[1], name))
+    if place is None:
         return None
-    near = difflib.get_close_matches(name, columns, 1)
+    near = difflib.get_close_matches(asked, columns, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise LogFault(f"{path}: no column is called {name!r}{hint} (columns: {_listed(columns)})")
+    raise LogFault(f"{name}: no column is called {asked!r}{hint} (columns: {_listed(columns)})")
 
 
-def _parted(name: str) -> tuple[str, str]:
-    """Name and unit of "heading [deg]"; without brackets the unit is empty."""
-    match = re.fullmatch(r"(.*?) *\[(.*)\]", name)
-    return (match[1], match[2]) if match else (name, "")
+def parted(name: str) -> tuple[str, str]:
+    """Name and unit of "heading [deg]" or "heading (deg)"; "q[0]" has no unit."""
+    match = re.fullmatch(r"(.*?)(?: +[\[(](.*)[\])]|[\[(]([^\d].*)[\])])", name)
+    return (match[1], match[2] or match[3]) if match else (name, "")
 
 
-def _factor(signal: Signal, unit: str, path: Path) -> float:
+def _factor(signal: Signal, unit: str, name: str) -> float:
     known = UNITS.get(signal.unit, {signal.unit: 1.0})
     if unit and unit not in known:
-        raise LogFault(f"{path}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}")
+        raise LogFault(f"{name}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}")
     return known[unit] if unit else 1.0
 
 
-def _sound(log: Table, path: Path) -> Table:
-    """The log, if its clock can be used. Raises LogFault."""
+def clock_of(column: str, columns: Columns) -> str | None:
+    """The column that has the times of a message's field: "topic.time" of "topic.field.x"."""
+    parts = column.split(".")
+    clocks = (".".join([*parts[:n], TIME]) for n in range(len(parts) - 1, 0, -1))
+    return next((clock for clock in clocks if clock in columns), None)
+
+
+def _together(name: str, series: Mapping[str, _Series], columns: Columns) -> Table:
+    """One table of quantities that have clocks of their own."""
+    sound: list[Table] = []
+    for clock in dict.fromkeys(s.clock for s in series.values()):
+        own = {q: s.values for q, s in series.items() if s.clock == clock}
+        sound.append(_sound(Table(name, columns[clock], own), clock))
+    if not sound:
+        raise LogFault(f"{name}: has no quantity that is needed (columns: {_listed(columns)})")
+    times = np.unique(np.concatenate([part.times for part in sound]))
+    together = {}
+    for part in sound:
+        at = np.searchsorted(times, part.times)
+        for quantity, values in part.columns.items():
+            together[quantity] = np.full(len(times), np.nan)
+            together[quantity][at] = values
+    return Table(name, times, together, warnings=tuple(w for part in sound for w in part.warnings))
+
+
+def _sound(log: Table, clock: str) -> Table:
+    """The log without rows that have no time or are there twice. Raises LogFault."""
+    timed = np.isfinite(log.times)
+    warnings = []
+    if lost := int(np.sum(~timed)):
+        warnings.append(f"{log.name}: {lost} rows without a number under {clock!r} are left out.")
+    log = log.where(timed)
     if len(log.times) < 2:
-        raise LogFault(f"{path}: has {len(log.times)} rows with numbers; a log needs many")
-    if not np.all(np.isfinite(log.times)):
-        row = int(np.flatnonzero(~np.isfinite(log.times))[0]) + 1
-        raise LogFault(f"{path}: row {row} has no time; leave the row out")
+        raise LogFault(f"{log.name}: has {len(log.times)} rows with numbers; a log needs many")
     steps = np.diff(log.times)
-    if np.any(steps <= 0.0):
-        row = int(np.flatnonzero(steps <= 0.0)[0]) + 2
-        what = "the same time as" if steps[row - 2] == 0.0 else "an earlier time than"
+    again = np.append(False, steps == 0.0)
+    for column in log.columns.values():
+        again[1:] &= (np.diff(column) == 0.0) | np.isnan(column[1:])
+    if twice := int(again.sum()):
+        warnings.append(f"{log.name}: {twice} rows are there twice and are left out.")
+    wrong = np.flatnonzero((steps <= 0.0) & ~again[1:])
+    if len(wrong):
+        row = int(wrong[0])
+        what = "the same time as" if steps[row] == 0.0 else "an earlier time than"
         raise LogFault(
-            f"{path}: row {row} has {what} the row before ({log.times[row - 1]:g} s); leave out "
-            "rows that are there twice, or split the log where its clock was set, as two logs "
-            "with a span each"
+            f"{log.name}: row {row + 2} has {what} the row before ({log.times[row]:.10g} s); leave "
+            "out what is there twice, or split the log where its clock was set, as two logs with "
+            "a span each"
         )
-    return log
+    return replace(log.where(~again), warnings=tuple(warnings))
 
 
-def _listed(columns: Mapping[str, Vector]) -> str:
+def _listed(columns: Columns) -> str:
     names = list(columns)
-    more = f" and {len(names) - 30} more" if len(names) > 30 else ""
-    return ", ".join(names[:30]) + more
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more
 
 
 def delivered(values: Vector) -> Marks:

@@ -10,9 +10,11 @@ from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
+from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.march import COMMANDS, DELIVERED, HOLDS, STEPS, VALUES, Record
-from podusv_cli.identify.reading import LogFault, Marks, Table, Whole, delivered
+from podusv_cli.identify.reading import Marks, Table, Whole, delivered
 
+SLACK = 1e-5  # of a step, to which times of a date are true
 BEGIN = 3.0  # s, from which the velocities at the start are guessed
 FEWEST = 20  # values of the position, or a log says nothing
 POSE = 3  # of the state's numbers, those without which nothing can be followed
@@ -23,7 +25,8 @@ class Log:
     """A log as the filter takes it.
 
     `times` [s] are those of the record's rows, `state` what is guessed of (x, y, psi, u, v, r) at
-    the first, and `counts` how many values of each are delivered.
+    the first, and `counts` how many values of each are delivered; `notes` say how the log was
+    understood, `warnings` what is doubtful about it.
     """
 
     name: str
@@ -31,6 +34,8 @@ class Log:
     record: Record
     state: Vector
     counts: Vector
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def of(self, rows: Vector) -> Log:
         """The same with other rows, from the first on."""
@@ -72,7 +77,7 @@ def log_of(table: Table, actuator: Actuator, step: float) -> Log:
     rows = np.zeros((len(kept), COMMANDS + 2 * len(commands)))
     times = table.times[kept]
     rows[:-1, HOLDS] = np.diff(times)
-    rows[:, STEPS] = np.maximum(1.0, np.ceil(rows[:, HOLDS] / step - 1e-9))
+    rows[:, STEPS] = np.maximum(1.0, np.ceil(rows[:, HOLDS] / step - SLACK))
     for i, signal in enumerate(STATE):
         if signal.name in table.columns:
             marks = np.logical_or.reduceat(new[:, i], kept)
@@ -84,14 +89,15 @@ def log_of(table: Table, actuator: Actuator, step: float) -> Log:
             rows[:, COMMANDS + i] = held
             rows[:, COMMANDS + len(commands) + i] = np.gradient(held, times)
     counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
-    return Log(table.name, times, Record(rows, int(counts.sum())), _state(table, new), counts)
+    record, words = Record(rows, int(counts.sum())), (table.notes, table.warnings)
+    return Log(table.name, times, record, _state(table, new), counts, *words)
 
 
 def _rows(times: Vector, new: Marks, step: float) -> Whole:
     """The rows that are kept: those that deliver something, and one every `step` otherwise."""
     kept, last = [0], times[0]
     for i in range(1, len(times)):
-        if new[i] or times[i] - last >= step * (1.0 - 1e-9) or i == len(times) - 1:
+        if new[i] or times[i] - last >= step * (1.0 - SLACK) or i == len(times) - 1:
             kept.append(i)
             last = times[i]
     return np.array(kept)

@@ -15,9 +15,12 @@ GROUPS = ("inertia", *(f"damping.{axis}" for axis in DAMPING))
 class LogFile(Component):
     """One log, of which all or a part is used."""
 
-    file: str = value(..., "", "CSV file or log.h5, beside the scenario")
+    file: str = value(..., "", "CSV, log.h5, ROS 2 bag, .ulg or .bin, beside the scenario")
     span: tuple[float, float] | None = value(
         None, "s", "[from, to]: the part of the log that is used; null: all of it"
+    )
+    delay: float | None = value(
+        None, "s", "by how much later than the log says its commands act; null: as the motion says"
     )
     role: Literal["fit", "judge"] = value(
         "fit", "", "fit: the numbers follow from it; judge: it shows how well they predict"
@@ -36,7 +39,12 @@ class Identify(Component):
     logs: tuple[LogFile, ...] = value(..., "", "the logs", strict=False)
     columns: dict[str, str] = value(
         {}, "", "what a log calls a quantity, with its unit where that is not podusv's: "
-        '{psi: "heading [deg]"}; a column called as podusv does needs no entry',
+        '{psi: "heading [deg]"}, with a minus before the name if its sign is the other one; a '
+        "column called as podusv does needs no entry",
+    )  # fmt: skip
+    frame: Literal["ned", "enu"] = value(
+        "ned", "", "axes of the logs: ned as podusv (x north, y east, psi from north towards east; "
+        "v, r to starboard), or enu (x east, y north, psi from east towards north; v, r to port)"
     )  # fmt: skip
     free: tuple[str, ...] = value(
         GROUPS, "", "numbers of the vessel that are looked for, or groups of them: "

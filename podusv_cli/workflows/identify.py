@@ -8,17 +8,17 @@ from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
-from podusv_cli.core.signal import STATE
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.identify import estimate, outputs
 from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import free_runs, scores
+from podusv_cli.identify.phrases import far_words
 from podusv_cli.identify.problem import Problem
-from podusv_cli.identify.reading import table
-from podusv_cli.identify.records import Log, log_of
+from podusv_cli.identify.records import Log
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
-from podusv_cli.scenario.identify import Identify, LogFile
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.shipped import relative_to
@@ -53,7 +53,11 @@ def identify_of(
             "shows"
         )
     source = loaded.root.mark.source
-    logs = [(_log(scenario, source, log), log.role) for log in scenario.identify.logs]
+    logs = [
+        (log, given.role)
+        for given in scenario.identify.logs
+        for log in logs_of(Path(relative_to(source, given.file)), given, scenario)
+    ]
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with (
         interrupts_deferred(),
@@ -61,23 +65,17 @@ def identify_of(
     ):
         with interrupts_enabled():
             answer = answered(scenario, scenario.identify, logs, progress)
+        warnings = (*(line for log, _ in logs for line in log.warnings), *far_words(answer))
+        for line in warnings:
+            request.warn(line)
         extras = Extras()
         origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
         outputs.write(
-            writer, answer, loaded.text, origin, extras, warnings=(), figures=request.figures
+            writer, answer, loaded.text, origin, extras, warnings=warnings, figures=request.figures
         )
         status: Status = "interrupted" if answer.estimate.interrupted else "finished"
-        return outputs.Identified(writer.finish(status), answer, status, (), tuple(extras.missing))
-
-
-def _log(scenario: Scenario, source: str, log: LogFile) -> Log:
-    """A log as the filter takes it. Raises UsageError."""
-    assert scenario.identify is not None
-    path = Path(relative_to(source, log.file))
-    wanted = (*STATE, *scenario.actuator.replayed)
-    whole = table(path, wanted, scenario.identify.columns, name=log.file)
-    part = whole.part(*log.span) if log.span else whole
-    return log_of(part, scenario.actuator, scenario.identify.step)
+        folder, missing = writer.finish(status), tuple(extras.missing)
+        return outputs.Identified(folder, answer, status, warnings, missing)
 
 
 def answered(

@@ -55,6 +55,9 @@ class Actuator(Component):
     `replay(x, demand, k, table, tau)` is a kernel that writes the loads again that a log tells of:
     `demand` has the numbers of the signals `replayed`.
 
+    `lag(state, command, k, table, rate)` is a kernel that writes the rates of what is `replayed`
+    from the commands `lagged`; an actuator without such commands has none.
+
     `states` and `signals` declare every number; the numbers of one vector have the same signal,
     which has an axis.
 
@@ -97,6 +100,18 @@ class Actuator(Component):
         return (TAU[1].name,)
 
     replay: ClassVar[Callable[..., None]] = staticmethod(pass_loads)
+
+    @property
+    def lagged(self) -> tuple[Signal, ...]:
+        """Commands that the signals `replayed` follow, one each, as a log has them; or none."""
+        return ()
+
+    lag: ClassVar[Callable[..., None]] = staticmethod(absent("lag"))
+
+    @property
+    def reach(self) -> dict[str, float]:
+        """Of signals `replayed` the largest size that they can have, where one is known."""
+        return {}
 
     def drive_with(self) -> Drive:
         """`drive` with command path and failure; `drive` itself where it has neither.

@@ -247,10 +247,31 @@ class Pods(Actuator):
     @property
     def replayed(self) -> tuple[Signal, ...]:
         """Speed and angle of every pod, as they were; an angle that is fixed is 0."""
-        speed, count = SPEEDS[self.counts][0], len(self.pods)
+        return self._each(SPEEDS[self.counts][0], DELTA)
+
+    @property
+    def lagged(self) -> tuple[Signal, ...]:
+        """Speed and angle of every pod, as they were asked for."""
+        return self._each(SPEEDS[self.counts][1], DELTA_CMD)
+
+    @staticmethod
+    @kernel
+    def lag(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) -> None:
+        """Rates towards what is asked for."""
+        follow(state, command, k, table, rate)
+
+    @property
+    def reach(self) -> dict[str, float]:
+        """Of speeds, and of angles that turn."""
+        speeds = [max(pod.n_max, pod.n_max_astern) for pod in self.pods]
+        most = [*speeds, *(pod.angle_limit for pod in self.pods)]
+        return {s.name: m for s, m in zip(self.replayed, most, strict=True) if m > 0.0}
+
+    def _each(self, *vectors: Signal) -> tuple[Signal, ...]:
+        """The numbers of these vectors as signals of their own, counted from 1."""
         return tuple(
-            replace(signal, name=f"{signal.name}_{i}", axes=())
-            for signal in (speed, DELTA) for i in range(1, count + 1)
+            replace(vector, name=f"{vector.name}_{i}", axes=())
+            for vector in vectors for i in range(1, len(self.pods) + 1)
         )  # fmt: skip
 
     @property

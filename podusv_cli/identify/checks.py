@@ -1,0 +1,262 @@
+"""Mistakes in a log that its motion shows before any hull is looked for.
+
+Kinematics alone tell: a boat moves about where it points, its heading turns as its yaw rate says,
+and its positions move on as its speeds say. What no motion could explain is an error that says what
+to write; what is only unlikely is a warning.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import STATE
+from podusv_cli.identify.formats import LogFault
+from podusv_cli.identify.reading import UNITS, Table, Whole
+
+SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
+FINER = {unit: UNITS["s"][unit] for unit in ("ms", "us", "ns")}
+BIN = 1.0  # s, over which values are averaged; at least that of VALUES_A_BIN
+VALUES_A_BIN = 3
+FEWEST_BINS = 10
+MOVING = 0.2  # of the fastest speed, above which a course says something
+ALIKE = 0.9  # correlation or agreement, from which on two quantities are the same one
+UNLIKE = 0.005  # of 1, that an agreement lacks in a log with turns
+BETTER = 0.25  # of what it lacks, that another reading of the heading may lack at most
+ABEAM = 0.2  # of an agreement, within which a mean angle means something
+NEAR = math.log(1.1)  # of a ratio, that counts as the ratio of two units
+ODD = math.log(1.4)  # of a ratio, that no unit explains and no sensor has
+ASIDE = 60.0  # deg, a mean angle between course and heading
+RADIANS, DEGREES = 2.0 * math.pi, 360.0  # a full turn
+STEADY = 0.05  # of a speed, and in rad of a heading: standard deviations without a manoeuvre
+BEYOND = 1.3  # of what an actuator can do
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A log averaged over bins of some seconds, and the actuator that moved the boat."""
+
+    table: Table
+    actuator: Actuator
+
+    @cached_property
+    def width(self) -> float:
+        """Of a bin [s]."""
+        times = self.table.times[np.isfinite(self.table.columns["x"])]
+        usual = float(np.median(np.diff(times))) if len(times) > 1 else BIN
+        return max(BIN, VALUES_A_BIN * usual)
+
+    @cached_property
+    def _bins(self) -> Whole:
+        since = self.table.times - self.table.times[0]
+        return np.asarray(since // self.width, np.int64)
+
+    def mean(self, name: str, values: Vector | None = None) -> Vector:
+        """Of a quantity in each bin, NaN where it has no value there."""
+        values = self.table.columns[name] if values is None else values
+        known = np.isfinite(values)
+        size = int(self._bins[-1]) + 1
+        counts = np.bincount(self._bins[known], minlength=size)
+        sums = np.bincount(self._bins[known], values[known], minlength=size)
+        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
+
+    def rate(self, means: Vector) -> Vector:
+        """How fast a quantity changes, by the bins on either side."""
+        return np.asarray(np.gradient(means, self.width))
+
+    def heading(self, turn: float = RADIANS) -> Vector:
+        """Of each bin, in the log's own numbers, of which `turn` make a full turn."""
+        values = self.table.columns["psi"].copy()
+        known = np.isfinite(values)
+        values[known] = np.unwrap(values[known], period=turn)
+        return self.mean("psi", values) * (RADIANS / turn)
+
+    @cached_property
+    def velocity(self) -> Vector:
+        """Over ground, north + 1j east [m/s], by positions."""
+        return self.rate(self.mean("x")) + 1j * self.rate(self.mean("y"))
+
+
+def checked(table: Table, actuator: Actuator) -> list[str]:
+    """What is doubtful about a log, a sentence each. Raises LogFault where a mistake is certain."""
+    motion, lines = Motion(table, actuator), list[str]()
+    try:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            for check in CHECKS:
+                lines += check(motion)
+    except LogFault as error:
+        raise LogFault("; also, ".join((f"{table.name}: {error}", *lines))) from error
+    return [f"{table.name}: {line}." for line in lines]
+
+
+def _out_of_reach(motion: Motion) -> Iterator[str]:
+    """Commands in another unit: by what the actuator can do."""
+    reaches = motion.actuator.reach
+    for signal in motion.actuator.replayed:
+        values, reach = motion.table.columns.get(signal.name, np.zeros(1)), reaches.get(signal.name)
+        most = float(np.nanmax(np.abs(values), initial=0.0))
+        if reach is None or most <= BEYOND * reach:
+            continue
+        what = f"{signal.name} reaches {most:.4g} {signal.unit}, and the actuator {reach:.4g}"
+        units = [u for u, f in UNITS[signal.unit].items() if f < 1.0 and most * f <= BEYOND * reach]
+        if units:
+            forms = " or ".join(f'{signal.name}: "COLUMN [{unit}]"' for unit in units)
+            raise LogFault(f"{what}; write {forms} under identify.columns")
+        yield what
+
+
+def _clock(motion: Motion) -> Iterator[str]:
+    """Times in milliseconds or finer."""
+    times = motion.table.times
+    step = float(np.median(np.diff(times)))
+    if step >= SLOWEST:
+        unit = next((u for u, f in FINER.items() if step * f < SLOWEST), "ns")
+        raise LogFault(
+            f"its rows are {step:g} s apart, too far to follow a turn; if "
+            f'these are {unit}, write time: "COLUMN [{unit}]" under identify.columns'
+        )
+    yield from ()
+
+
+def _constant(motion: Motion) -> Iterator[str]:
+    """Columns that never change, or have hardly any numbers."""
+    for name, values in motion.table.columns.items():
+        known = values[np.isfinite(values)]
+        if not len(known):
+            yield f"{name} has no number at all"
+        elif np.ptp(known) == 0.0 and known[0] != 0.0:
+            if name in {signal.name for signal in STATE[:3]}:
+                raise LogFault(
+                    f"{name} is {known[0]:g} throughout; its sensor stood "
+                    f"still, or identify.columns names another column than that of {name}"
+                )
+            yield f"{name} is {known[0]:g} throughout"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read headings: how much a full turn is, and whether it is counted to port.
+
+    `mean` is the mean of exp(i (course - heading)): of size 1 where both turn together.
+    """
+
+    turn: float
+    sign: float
+    mean: complex
+
+    @property
+    def words(self) -> str:
+        """As a condition."""
+        degrees = "psi is in degrees" if self.turn == DEGREES else ""
+        counted = "psi or the position is counted the other way round" if self.sign < 0.0 else ""
+        return " and ".join(filter(None, (degrees, counted)))
+
+    @property
+    def remedy(self) -> str:
+        """What to write."""
+        column = "COLUMN [deg]" if self.turn == DEGREES else "COLUMN"
+        if self.sign > 0.0:
+            return f'write psi: "{column}" under identify.columns'
+        if abs(cmath.phase(self.mean)) < math.pi / 4.0:
+            return f'psi is counted to port: write psi: "-{column}" under identify.columns'
+        return (
+            "x is east and y north, or psi is counted from the east: exchange x and y under "
+            "identify.columns if psi is a compass's, or write identify.frame: enu if all is east, "
+            f'north, up; psi: "{column}"'
+        )
+
+
+def _courses(motion: Motion) -> Iterator[str]:
+    """Heading in degrees, counted to port, or axes exchanged: by the course of the track."""
+    speed = np.abs(motion.velocity)
+    moving = speed > MOVING * np.nanmax(speed)
+    if np.sum(moving) < FEWEST_BINS:
+        return
+    course = np.angle(motion.velocity[moving])
+
+    def read(turn: float, sign: float) -> Reading:
+        apart = course - sign * motion.heading(turn)[moving]
+        return Reading(turn, sign, complex(np.nanmean(np.exp(1j * apart))))
+
+    own, *others = [read(turn, sign) for turn in (RADIANS, DEGREES) for sign in (1.0, -1.0)]
+    best, lack = max(others, key=lambda reading: abs(reading.mean)), 1.0 - abs(own.mean)
+    if abs(best.mean) > ALIKE and lack > UNLIKE and 1.0 - abs(best.mean) < BETTER * lack:
+        raise LogFault(
+            f"the track's course and psi agree to {abs(own.mean):.2f} of 1 as "
+            f"given, but to {abs(best.mean):.2f} if {best.words}; {best.remedy}"
+        )
+    aside = math.degrees(cmath.phase(own.mean))
+    if lack < ABEAM and abs(aside) > ASIDE:
+        yield (
+            f"the boat moves {aside:.0f} deg off its heading on average; is x north, y east, and "
+            "psi counted from north towards east?"
+        )
+
+
+def _yaw_rate(motion: Motion) -> Iterator[str]:
+    """Yaw rate in deg/s or of the other sign: by how fast the heading turns."""
+    if "r" not in motion.table.columns:
+        return
+    turning, given = motion.rate(motion.heading()), motion.mean("r")
+    for line in _compared(motion, "r", turning, given, UNITS["rad/s"]):
+        yield line + " than psi turns"
+
+
+def _speeds(motion: Motion) -> Iterator[str]:
+    """Speeds in knots or of the other sign: by how positions move."""
+    body = motion.velocity * np.exp(-1j * motion.heading())
+    for name, moved in (("u", body.real), ("v", body.imag)):
+        if name in motion.table.columns:
+            for line in _compared(motion, name, moved, motion.mean(name), UNITS["m/s"]):
+                yield line + " than positions move"
+
+
+def _compared(
+    motion: Motion, name: str, seen: Vector, given: Vector, units: dict[str, float]
+) -> Iterator[str]:
+    """A quantity beside what positions and headings say of it. Raises LogFault."""
+    both = np.isfinite(seen) & np.isfinite(given)
+    if np.sum(both) < FEWEST_BINS:
+        return
+    a, b = seen[both], given[both]
+    middle = np.abs(a - np.median(a)) <= 4.0 * np.std(a)  # an edge of a gap is no motion
+    a, b = a[middle], b[middle]
+    alike = float(a @ b / math.sqrt((a @ a) * (b @ b))) if a.any() and b.any() else 0.0
+    if abs(alike) < ALIKE:
+        return
+    ratio = math.sqrt((a @ a) / (b @ b))
+    unit = next((u for u, f in units.items() if f != 1.0 and abs(math.log(ratio / f)) < NEAR), "")
+    if unit or alike < 0.0:
+        sign, brackets = "-" if alike < 0.0 else "", f" [{unit}]" if unit else ""
+        raise LogFault(
+            f"{name} is {'-' if alike < 0.0 else ''}{1.0 / ratio:.3g} times "
+            f"what positions and headings say (correlation {alike:.2f}); write {name}: "
+            f'"{sign}COLUMN{brackets}" under identify.columns, with the log\'s name of {name}'
+        )
+    if abs(math.log(ratio)) > ODD:
+        yield f"{name} is {1.0 / ratio:.2g} times as large"
+
+
+def _manoeuvres(motion: Motion) -> Iterator[str]:
+    """Logs without excitation."""
+    speed = np.abs(motion.velocity)
+    fast = speed[speed > MOVING * np.nanmax(speed)]
+    turned = np.nanstd(motion.heading())
+    if turned < STEADY and len(fast) and np.nanstd(fast) < STEADY * np.nanmean(fast):
+        yield (
+            f"its heading stays within {math.degrees(2.0 * turned):.1f} deg and its speed within "
+            f"{200.0 * np.nanstd(fast) / np.nanmean(fast):.0f} %, which tells the drag at one "
+            "speed and little else; zig-zags, turning circles and stops tell more"
+        )
+
+
+CHECKS: tuple[Callable[[Motion], Iterator[str]], ...] = (
+    _clock, _constant, _courses, _yaw_rate, _speeds, _out_of_reach, _manoeuvres,
+)  # fmt: skip

@@ -1,0 +1,68 @@
+"""From a file to logs that the filter can follow: read, checked, in pieces without gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from podusv_cli.core.signal import STATE
+from podusv_cli.identify.checks import checked
+from podusv_cli.identify.commands import acted
+from podusv_cli.identify.offsets import Clocks
+from podusv_cli.identify.reading import Named, Table, table
+from podusv_cli.identify.records import FEWEST, POSE, Log, log_of
+from podusv_cli.scenario.identify import LogFile
+from podusv_cli.scenario.model import Scenario
+
+GAP, ROWS = 2.0, 10.0  # s without a row, and usual distances of rows: a gap that ends a piece
+
+
+def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
+    """The logs of a file, one for each piece without a gap. Raises LogFault, StorageError."""
+    wanted, actuator = scenario.identify, scenario.actuator
+    assert wanted is not None
+    signals = (*STATE, *actuator.replayed, *actuator.lagged)
+    whole = table(path, signals, Named(wanted.columns, wanted.frame), name=given.file)
+    part = acted(whole.part(*given.span) if given.span else whole, actuator)
+    log_of(part, actuator, wanted.step)  # says what is missing before anything else is looked at
+    part = replace(part, warnings=(*part.warnings, *checked(part, actuator)))
+    settled = Clocks(scenario, part).settled(given.delay)
+    return [log_of(piece, actuator, wanted.step) for piece in pieces(settled)]
+
+
+def pieces(log: Table) -> Iterator[Table]:
+    """The parts of a log between its gaps, but those that are too short to follow.
+
+    Nobody knows what was commanded in a gap. The first piece has the warnings.
+    """
+    steps = np.diff(log.times)
+    ends = np.flatnonzero(steps > max(GAP, ROWS * float(np.median(steps)))) + 1
+    marks = [0, *ends.tolist(), len(log.times)]
+    spans = [(a, b) for a, b in pairwise(marks) if _long(log, a, b)]
+    if not len(ends) or not spans:
+        yield log
+        return
+    longest = int(ends[np.argmax(steps[ends - 1])])
+    line = (
+        f"{log.name}: has {len(ends)} gap{'s' if len(ends) > 1 else ''}, the longest of "
+        f"{steps[longest - 1]:.3g} s at {log.times[longest - 1]:.10g} s; it is taken as "
+        f"{len(spans)} log{'s' if len(spans) > 1 else ''}, without {len(marks) - 1 - len(spans)} "
+        "that would be too short."
+    )
+    warnings: tuple[str, ...] = (*log.warnings, line)
+    rows = np.arange(len(log.times))
+    for a, b in spans:
+        piece = log.where((rows >= a) & (rows < b))
+        name = f"{log.name} from {log.times[a]:.10g} s"
+        yield replace(piece, name=name, warnings=warnings)
+        warnings = ()
+
+
+def _long(log: Table, begin: int, end: int) -> bool:
+    """Whether enough of the pose is in these rows."""
+    pose = [log.columns[signal.name][begin:end] for signal in STATE[:POSE]]
+    return min(int(np.isfinite(values).sum()) for values in pose) >= FEWEST

@@ -1,0 +1,159 @@
+"""The columns of a log, and what each may be: by its name, its unit and its range."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.identify.checks import FINER, SLOWEST
+from podusv_cli.identify.formats import TIME, Columns, columns_of
+from podusv_cli.identify.reading import UNITS, clock_of, delivered, parted
+
+# What the end of a column's name says of it, the likelier first. "#" stands for 1, 2, ... in the
+# order of the log.
+NAMES = {
+    TIME: r"time|t|timestamp|time_?stamp|stamp|timeus|epoch|secs?|seconds",
+    "lat": r"lat|latitude", "lon": r"lon|lng|longitude",
+    "x": r"x|north|northing|pos_?n|pn|position\.x", "y": r"y|east|easting|pos_?e|pe|position\.y",
+    "psi": r"psi|heading|hdg|compass|yaw",
+    "u": r"u|surge|linear\.x|speed_?x|vx", "v": r"v|sway|linear\.y|speed_?y|vy",
+    "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
+    "n_#": r"n_?\d|.*rpm.*|.*rps.*|.*propeller.*|.*motor.*|.*esc.*speed.*",
+    "delta_#": r"delta_?\d|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
+    "tau_u": r"tau_u|surge_?force|force\.x", "tau_v": r"tau_v|sway_?force|force\.y",
+    "tau_r": r"tau_r|yaw_?moment|torque\.z",
+}  # fmt: skip
+FORMS = ("^({})$", "([./ ]|_(?=...))({})$")  # the whole name, or its last part
+# Of quantities the unit that the end of a name means, and that which a range means that begins so.
+ENDINGS = {
+    "deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "deg": "deg", "rad": "", "kn": "kn",
+    "kts": "kn", "knots": "kn", "kmh": "km/h", "rpm": "rpm", "ms": "ms", "us": "us", "ns": "ns",
+    "timeus": "us",
+}  # fmt: skip
+BEYOND = {
+    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "lat": ((90.5, "1e-7 deg"),),
+    "lon": ((361.0, "1e-7 deg"),), "n_#": ((100.0, "rpm"),), "delta_#": ((3.2, "deg"),),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A column: new values a second, their range, the share that is missing, and what it may be."""
+
+    name: str
+    rate: float
+    least: float
+    most: float
+    missing: float
+    quantity: str = ""
+    unit: str = ""
+
+    @property
+    def guess(self) -> str:
+        """As in a table."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+
+@dataclass(frozen=True)
+class Listing:
+    """All columns of a log."""
+
+    columns: list[Listed]
+    turned: bool  # whether headings are those of quaternions, which ROS counts from the east
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {
+            "format": 1, "columns": [asdict(listed) for listed in self.columns],
+            "mapping": self.mapping(),
+        }  # fmt: skip
+
+    def mapping(self) -> list[str]:
+        """Lines to write under `identify`, as far as they can be guessed."""
+        lines = ["columns:"]
+        for listed in self.columns:
+            if listed.quantity:
+                own, _ = parted(listed.name)
+                unit = f" [{listed.unit}]" if listed.unit else ""
+                lines.append(f'  {listed.quantity}: "{own}{unit}"')
+        if self.turned:
+            lines.append("frame: enu  # ROS counts x to the east, y to the north, turns to port")
+        return lines
+
+
+def listing(path: Path) -> Listing:
+    """The columns of a log. Raises LogFault, StorageError."""
+    columns = columns_of(path)
+    guesses = dict(_guesses(columns))
+    listed = [_listed(name, columns, guesses) for name in columns]
+    return Listing(listed, any(name.endswith("orientation.yaw") for name in guesses))
+
+
+def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
+    values, quantity = columns[name], guesses.get(name, "")
+    known = values[np.isfinite(values)]
+    ends = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+    seconds = _duration(name, columns, guesses)
+    rate = float(np.sum(delivered(values))) / seconds if seconds > 0.0 else np.nan
+    unit = _unit(name, quantity, values) if quantity else ""
+    missing = 1.0 - len(known) / max(len(values), 1)
+    return Listed(name, rate, *ends, missing, _numbered(quantity, name, guesses), unit)
+
+
+def _numbered(quantity: str, name: str, guesses: dict[str, str]) -> str:
+    """`n_2` for the second of several."""
+    alike = [column for column, guess in guesses.items() if guess == quantity]
+    return quantity.replace("#", str(alike.index(name) + 1)) if quantity else ""
+
+
+def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
+    """Columns and what they are, each quantity once but those that are numbered."""
+    taken: set[str] = set()
+    for quantity, pattern in NAMES.items():
+        numbered = "#" in quantity
+        likely = [pattern] if numbered else pattern.split("|")
+        for form in [form.format(name) for form in FORMS for name in likely]:
+            for column in columns:
+                free = column not in taken and (numbered or quantity not in taken)
+                own = quantity != TIME or clock_of(column, columns) is None
+                if free and own and re.search(form, _plain(column)):
+                    taken |= {column, quantity}
+                    yield column, quantity
+
+
+def _plain(column: str) -> str:
+    """A name without its unit, in small letters."""
+    name = parted(column)[0].lower().replace("-", "_").removesuffix("_")
+    ending = next((e for e in ENDINGS if name.endswith(f"_{e}")), "")
+    return name.removesuffix(f"_{ending}") if ending else name
+
+
+def _unit(name: str, quantity: str, values: Vector) -> str:
+    """Of a column: in brackets, at the end of its name, or by its range."""
+    own, unit = parted(name)
+    if unit:
+        return unit
+    ending = next((e for e in ENDINGS if re.search(rf"(^|[._]){e}$", own.lower())), None)
+    if ending is not None:
+        return ENDINGS[ending]
+    if quantity == TIME:
+        step = float(np.nanmedian(np.diff(values))) if len(values) > 1 else 0.0
+        return next((u for u, f in {"": 1.0, **FINER}.items() if step * f < SLOWEST), "")
+    most = float(np.nanmax(np.abs(values), initial=0.0))
+    return next((unit for least, unit in BEYOND.get(quantity, ()) if most > least), "")
+
+
+def _duration(name: str, columns: Columns, guesses: dict[str, str]) -> float:
+    """Of the values of a column [s]; NaN where nobody knows."""
+    own = clock_of(name, columns)
+    clock = own or next((column for column, guess in guesses.items() if guess == TIME), None)
+    if clock is None or not np.isfinite(columns[clock]).any():
+        return np.nan
+    unit = "" if own else _unit(clock, TIME, columns[clock])
+    return float(np.nanmax(columns[clock]) - np.nanmin(columns[clock])) * UNITS["s"].get(unit, 1.0)

@@ -1,0 +1,105 @@
+"""Small logs as other programs write them: a ROS 2 bag, a ULog of PX4, a DataFlash log."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+
+def write_bag(folder, begin=1_700_000_000_000_000_000):
+    """Odometry at 10 Hz, whose stamps are 5 ms older than its arrival, and a thruster at 4 Hz."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds = store.types
+
+    def make(name, *parts):
+        return kinds[name](*parts)
+
+    with Writer(folder, version=9) as writer:
+        odometry = writer.add_connection("/boat/odom", "nav_msgs/msg/Odometry", typestore=store)
+        thruster = writer.add_connection("/left", "std_msgs/msg/Float64", typestore=store)
+        for i in range(25):
+            now = begin + i * 100_000_000
+            stamp = make("builtin_interfaces/msg/Time", now // 10**9, now % 10**9)
+            half = 0.5 * 0.1 * i
+            pose = make(
+                "geometry_msgs/msg/Pose",
+                make("geometry_msgs/msg/Point", 2.0 * i, 3.0 * i, 0.0),
+                make("geometry_msgs/msg/Quaternion", 0.0, 0.0, np.sin(half), np.cos(half)),
+            )
+            twist = make(
+                "geometry_msgs/msg/Twist",
+                make("geometry_msgs/msg/Vector3", 1.0, 0.25, 0.0),
+                make("geometry_msgs/msg/Vector3", 0.0, 0.0, 1.0),
+            )
+            message = make(
+                "nav_msgs/msg/Odometry",
+                make("std_msgs/msg/Header", stamp, "map"), "boat",
+                make("geometry_msgs/msg/PoseWithCovariance", pose, np.zeros(36)),
+                make("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
+            )  # fmt: skip
+            raw = store.serialize_cdr(message, "nav_msgs/msg/Odometry")
+            writer.write(odometry, now + 5_000_000, raw)
+        for i in range(10):
+            raw = store.serialize_cdr(
+                make("std_msgs/msg/Float64", 10.0 * i), "std_msgs/msg/Float64"
+            )
+            writer.write(thruster, begin + 5_000_000 + i * 250_000_000, raw)
+    return folder
+
+
+def write_ulog(path):
+    """Attitude at 10 Hz from 2 s after the start, and positions of two receivers.
+
+    After the file format of the PX4 user guide: header, flags, formats, subscriptions, data.
+    """
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 5_000_000)]
+    out.append(message("B", bytes(40)))
+    for text in (
+        "vehicle_attitude:uint64_t timestamp;float[4] q;",
+        "gps:uint64_t timestamp;int32_t lat;",
+    ):
+        out.append(message("F", text.encode()))
+    for kind, number, name in ((0, 0, b"vehicle_attitude"), (0, 1, b"gps"), (1, 2, b"gps")):
+        out.append(message("A", struct.pack("<BH", kind, number) + name))
+    for i in range(20):
+        time, half = 7_000_000 + 100_000 * i, 0.5 * 0.1 * i
+        q = struct.pack("<Qffff", time, np.cos(half), 0.0, 0.0, np.sin(half))
+        out.append(message("D", struct.pack("<H", 0) + q))
+        for receiver in (1, 2):
+            body = struct.pack("<HQi", receiver, time, 590_000_000 + receiver)
+            out.append(message("D", body))
+    path.write_bytes(b"".join(out))
+    return path
+
+
+def write_dataflash(path):
+    """ATT at 10 Hz and GPS at 5 Hz of an ArduPilot log, after its FMT messages."""
+
+    def form(number, name, codes, columns):
+        sizes = {"Q": 8, "L": 4, "f": 4, "I": 4, "H": 2, "B": 1, "C": 2}
+        length = 3 + sum(sizes[code] for code in codes)
+        text = struct.pack("<4s16s64s", name.encode(), codes.encode(), columns.encode())
+        return b"\xa3\x95\x80" + struct.pack("<BB", number, length) + text
+
+    head = struct.pack("<4s16s64s", b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+    out = [b"\xa3\x95\x80" + struct.pack("<BB", 0x80, 89) + head]
+    out.append(form(1, "ATT", "QCf", "TimeUS,Yaw,DesYaw"))
+    out.append(form(2, "GPS", "QBIHLL", "TimeUS,Status,GMS,GWk,Lat,Lng"))
+    for i in range(40):
+        time = 3_000_000 + 100_000 * i
+        out.append(b"\xa3\x95\x01" + struct.pack("<QHf", time, 100 * (350 + i) % 36000, 0.0))
+        if i % 2 == 0:
+            place = (590_000_000 + 90 * i, 100_000_000 + 180 * i)
+            out.append(
+                b"\xa3\x95\x02" + struct.pack("<QBIHii", time + 20_000, 3, 1000, 2300, *place)
+            )
+    path.write_bytes(b"".join(out))
+    return path
