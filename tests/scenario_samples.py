@@ -8,7 +8,7 @@ from conftest import VESSELS
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.load import Loaded, load, load_text
 
-VESSEL_NAMES = ", ".join(VESSELS)
+VESSEL_NAMES = ", ".join([*VESSELS, "any FILE.yaml"])
 SOUND = """\
 vessel: {preset: paper}
 path: {kind: line}

@@ -1,5 +1,6 @@
 """Explanations: of every key, generated from the models."""
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -353,7 +354,10 @@ def test_a_kind_is_one_word_and_a_preset_one_of_the_vessels():
     assert {names[0] for names in words} == set(laws)
     assert [names for names in words if len(names) > 1] == [["full_backstepping", "backstepping"]]
     (preset,) = places(SCHEMA, ("vessel", "preset"))
-    assert preset["enum"] == ["", *preset_names(SHIPPED)]
+    named, file = preset["anyOf"]
+    assert named["enum"] == ["", *preset_names(SHIPPED)]
+    assert re.search(file["pattern"], "found/identified.yaml")
+    assert not re.search(file["pattern"], "posterior.csv")
 
 
 def test_defaults_are_there_but_where_they_depend_on_the_place():

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,9 @@ from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
 from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
-from podusv_cli.core.errors import ScenarioError
+from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.scenario import presets
-from podusv_cli.scenario.load import load, load_text, resolved_yaml
+from podusv_cli.scenario.load import load, load_stored, load_text, resolved_yaml, tree_yaml
 from podusv_cli.scenario.named_files import MAX_POINTS
 from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
@@ -100,6 +101,84 @@ def test_a_source_tells_what_the_scenario_changed_and_is_the_same_when_loaded_ag
     assert loaded(resolved, ["vessel.m=23.8", "vessel.I_z=1.76"]).scenario.vessel.source == whole
     own = loaded(SOUND, ["vessel.m=30", "vessel.source=my tank"]).scenario.vessel
     assert own.source == "my tank"
+
+
+HULL = """\
+source: "my tank."
+length: 1.37
+beam: 0.43
+m: 31.7
+I_z: 2.91
+X_u: -0.83
+Y_vdot: -7.1
+envelope: {speed: 0.61, drift: 0.9, yaw_rate: 0.37}
+"""
+
+
+def test_a_hull_comes_from_a_file_beside_the_scenario():
+    write("sub/hull.yaml", HULL)
+    write("sub/a.yaml", SOUND.replace("paper", "hull.yaml, X_u: -1.9"))
+    got = load("sub/a.yaml")
+    vessel = got.scenario.vessel
+    assert (vessel.m, vessel.X_u, vessel.Y_vdot, vessel.X_uu) == (31.7, -1.9, -7.1, 0.0)
+    assert vessel.envelope
+    assert vessel.envelope.speed == 0.61
+    assert vessel.source == "my tank; X_u changed by the scenario."
+    assert got.scenario.nominal == vessel
+    assert got.origins["vessel.m"] == "sub/hull.yaml:4:4"
+    assert got.origins["vessel.X_u"] == "sub/a.yaml:1:34"
+
+
+def test_what_comes_from_a_file_runs_elsewhere_without_it():
+    write("hull.yaml", HULL)
+    given = loaded(SOUND.replace("paper", "hull.yaml"), ["nominal.m=33"])
+    texts = resolved_yaml(given.scenario), tree_yaml(given)
+    Path("hull.yaml").unlink()
+    for text in texts:
+        assert load_stored(text, "a.yaml").scenario == given.scenario
+    other = loaded(texts[1], ["vessel.preset=cybership2"]).scenario.vessel
+    assert other == loaded(SOUND.replace("paper", "cybership2")).scenario.vessel
+
+
+def test_every_section_with_presets_takes_a_file():
+    own = (files(Pods.presets.package) / "otter.yaml").read_text("utf-8")
+    write("mine.yaml", own.replace("n_max: 16.54", "n_max: 13.7"))
+    write("hull.yaml", HULL + "preset: cybership2\n")
+    changes = ["actuator.preset=mine.yaml", "nominal={preset: hull.yaml}"]
+    got, shipped = loaded(POD_SOUND, changes).scenario, loaded(POD_SOUND).scenario
+    assert isinstance(got.actuator, Pods)
+    assert isinstance(shipped.actuator, Pods)
+    pods = got.actuator.pods, shipped.actuator.pods
+    assert [pod.n_max for pod in pods[0]] == [13.7, 13.7]
+    assert [pod.T_nn for pod in pods[0]] == [pod.T_nn for pod in pods[1]]
+    below = loaded(SOUND.replace("paper", "cybership2")).scenario.vessel
+    assert (got.nominal.m, got.nominal.N_vv) == (31.7, below.N_vv), (
+        "a file may have a preset itself"
+    )
+
+
+def test_what_is_wrong_with_a_file_of_a_hull_is_told_at_its_place():
+    write("hull.yaml", HULL.replace("beam", "bema: 0.43\nbeam").replace("-0.83", "0.83"))
+    write("list.yaml", "- 1\n")
+    assert told(SOUND.replace("paper", "hul.yaml"))[0].startswith(
+        "a.yaml:1:18: vessel.preset: 'hul.yaml' cannot be read: no such file or directory"
+    )
+    wrong = told(SOUND.replace("paper", "hull.yaml"))
+    assert wrong[0].startswith("hull.yaml:3:1: vessel.bema: unknown key; did you mean 'beam'?")
+    assert wrong[1].startswith("hull.yaml:7:6: vessel.X_u: must be a number not above 0")
+    assert told(SOUND.replace("paper", "list.yaml")) == [
+        "a.yaml:1:18: vessel.preset: list.yaml is no vessel file: it has no keys"
+    ]
+
+
+def test_what_podusv_keeps_in_a_folder_names_no_file_of_a_hull():
+    write("hull.yaml", HULL)
+    text = resolved_yaml(loaded().scenario).replace("preset: paper", "preset: hull.yaml")
+    with pytest.raises(StorageError, match=r"a.yaml:5:11: vessel.preset: refers to another file"):
+        load_stored(text, "a.yaml")
+    whole = resolved_yaml(loaded().scenario)
+    taken = load_stored(whole, "a.yaml", ["vessel.preset=hull.yaml"]).scenario.vessel
+    assert taken.m == 31.7
 
 
 def test_a_wrong_nominal_value_is_told_at_its_place():
@@ -233,7 +312,7 @@ def test_pods_come_from_their_file_and_what_is_given_goes_over_it():
 def test_what_is_wrong_with_pods_is_one_sentence_at_its_place():
     assert told(POD_SOUND.replace("otter", "oter")) == [
         "a.yaml:4:31: actuator.preset: unknown set of pods 'oter'; did you mean 'otter'? "
-        f"(allowed: {', '.join(preset_names(Pods.presets))})"
+        f"(allowed: {', '.join(preset_names(Pods.presets))}, any FILE.yaml)"
     ]
     one = "{x: 0, T_nn: 1, T_nn_astern: 1, n_max: 1, n_max_astern: 1, n_rate: 1, n_lag: 1, "
     one += "angle_rate: 1, angle_lag: 1}"

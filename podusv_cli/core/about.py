@@ -124,7 +124,10 @@ class SweepCall(_Plain):
 
 
 class QuantityAbout(_Plain):
-    """A drawn quantity: the keys that it changes, and how it is drawn, in words."""
+    """A drawn quantity: the keys that it changes, and how it is drawn, in words.
+
+    `is_seed`: a larger number means nothing, as of seeds and of rows of a table.
+    """
 
     keys: tuple[str, ...]
     drawn: str

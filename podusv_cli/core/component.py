@@ -55,16 +55,18 @@ class Component(BaseModel):
     `presets` are what its field `preset` chooses from. `rows_of` has the fields that may name a
     CSV file of pairs, each with the field that takes the file's rows, `texts_of` those that may
     name a file whose text another field takes, `bytes_of` those that may name a file whose bytes
-    another field takes, as base64. One that `stands_alone` takes no value of another kind whose
-    place it takes. `noun` is what messages call it. `rules` has the fields that may be null, and
-    in a scenario are by default, with the rule that gives the number; the field's own default is
-    the model ship's.
+    another field takes, as base64, `folders_of` those that may name a finished folder, with the
+    field that takes a text of it and that text's name. One that `stands_alone` takes no value of
+    another kind whose place it takes. `noun` is what messages call it. `rules` has the fields that
+    may be null, and in a scenario are by default, with the rule that gives the number; the field's
+    own default is the model ship's.
     """
 
     presets: ClassVar[Presets | None] = None
     rows_of: ClassVar[dict[str, str]] = {}
     texts_of: ClassVar[dict[str, str]] = {}
     bytes_of: ClassVar[dict[str, str]] = {}
+    folders_of: ClassVar[dict[str, tuple[str, str]]] = {}
     rules: ClassVar[dict[str, Rule]] = {}
     stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"

@@ -46,6 +46,34 @@ def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
     return rows
 
 
+class Named(NamedTuple):
+    """Rows of numbers under names, as text with commas has them."""
+
+    names: tuple[str, ...]
+    rows: Vector
+
+
+def named_rows(text: str, noun: str) -> Named:
+    """The rows under the names in the first line; `noun` is what the text is called.
+
+    Raises ValueError, which does not repeat the text but for names.
+    """
+    if len(text) > LARGEST:
+        raise ValueError(f"{noun} is longer than {LARGEST:,} characters; leave rows out")
+    header, lines = lines_of(text)
+    if not header and lines and not _is_number(lines[0].cells[0]):
+        header, *lines = lines  # a single column
+    if not header or not lines:
+        what = "rows of numbers" if header else "first line that names the columns"
+        raise ValueError(f"{noun} has no {what}")
+    names = tuple(" ".join(cell.split()) for cell in header.cells)
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise ValueError(f"line {header.number} of {noun} names {twice[0]!r} twice")
+    _counted(lines, noun, {len(names): names})
+    return Named(names, _numbers(lines, noun))
+
+
 def lines_of(text: str) -> tuple[Line | None, list[Line]]:
     """The header, which is a first line of several cells without any number, and all other lines.
 

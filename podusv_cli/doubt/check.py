@@ -33,6 +33,14 @@ def _vary(scenario: Scenario) -> Faults:
     assert scenario.doubt
     known = by_key(scenario.singles())
     for name, quantity in scenario.doubt.vary.items():
+        if quantity.rows:
+            text = (
+                "one number is moved at a time, and a row has several; hulls that are drawn whole "
+                "belong under sweep.vary (podusv doubt judges that study, too), hulls to be tried "
+                "under doubt.hulls"
+            )
+            yield ("doubt", "vary", name), text
+            continue
         for key in quantity.targets(name):
             if bracketed(key) not in known:
                 text = unknown(f"key {key!r}", key, sorted(known), LISTED)

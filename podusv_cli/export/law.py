@@ -42,6 +42,7 @@ NOT_SAMPLED = (
     "the law acts continuously in this scenario, and a computer on a boat takes samples; set "
     "control.period to the time between two of them, as --set control.period=0.1 [s]"
 )
+NO_LAW = "the controller gives recorded commands to propellers, which is no law; export a law"
 
 
 class Number(NamedTuple):
@@ -91,6 +92,8 @@ class ExportedLaw:
         every = scenario.log.model_copy(update={"every": 1})
         scenario = scenario.model_copy(update={"log": every})
         plan = scenario.plan()
+        if scenario.controller.commands():
+            raise UsageError(f"{scenario.name}: {NO_LAW}")
         if not plan.grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
         whole, signals = plan.layout, len(plan.loop.controller.signals)

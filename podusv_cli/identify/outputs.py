@@ -18,10 +18,11 @@ from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.load import yaml_text
+from podusv_cli.scenario.sweep import POSTERIOR
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 
-IDENTIFIED, POSTERIOR = "identified.yaml", "posterior.csv"
+IDENTIFIED = "identified.yaml"
 HEADING = (
     "# A hull that podusv identify found from logs; posterior.csv has what these leave open.\n"
 )

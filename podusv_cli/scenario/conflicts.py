@@ -21,7 +21,10 @@ MOST_INSTANTS = 2**53  # that are distinct numbers
 def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other; plans no loop."""
     parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
-    return parts or [*of_numbers(scenario), *_names(scenario), *scenario.metrics.conflicts()]
+    return parts or [
+        *_recorded(scenario), *of_numbers(scenario), *_names(scenario),
+        *scenario.metrics.conflicts(),
+    ]  # fmt: skip
 
 
 def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
@@ -70,6 +73,16 @@ def _summands(scenario: Scenario) -> Conflicts:
                 "given several times)"
             )
             yield key, text
+
+
+def _recorded(scenario: Scenario) -> Conflicts:
+    """Commands over time that the actuator does not take."""
+    for key, law in scenario.laws().items():
+        if recorded := law.commands():
+            try:
+                scenario.actuator.commands(recorded)
+            except ValueError as error:
+                yield f"{key}.rows", str(error)
 
 
 def _unanswered(scenario: Scenario) -> Conflicts:

@@ -224,7 +224,7 @@ class Distribution(Component):
     def _one_way(self) -> Self:
         given = self.given
         if len(given) != 1:
-            ways = [n for n in type(self).model_fields if n != "keys"]
+            ways = [n for n in type(self).model_fields if n not in ("keys", "rows")]
             found = f"found {' and '.join(given)}" if given else "found none"
             raise ValueError(f"must have one of {', '.join(ways)}; {found}")
         check, _ = WAYS.get(given[0], (_sound, None))

@@ -15,6 +15,7 @@ from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.signal import Signal
 from podusv_cli.scenario.keys import NAME, NO_DEFAULT, NUMBER, Key, either, keys_of
 from podusv_cli.scenario.model import BASES, Scenario, scenario_class
+from podusv_cli.scenario.named_files import ANY_FILE
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.yaml_tree import dotted, route, with_dotted_key
 
@@ -202,7 +203,9 @@ def _row(key: Key) -> Row:
     if key.keys:
         return Row(path, meaning, "kinds" if key.kinds else "keys", choices=tuple(key.keys))
     choices = _choices(key)
-    kind = either(choices) if key.name in ("preset", "kind") else key.type_in_words
+    named = key.name in ("preset", "kind")
+    words = [*choices, *([ANY_FILE] if key.name == "preset" else [])]
+    kind = either(words) if named else key.type_in_words
     return Row(path, meaning, kind, key.unit, key.range, _default(key), choices)
 
 

@@ -24,8 +24,8 @@ from podusv_cli.scenario.kinds import kept
 from podusv_cli.scenario.layers import composed, self_contained
 from podusv_cli.scenario.messages import check
 from podusv_cli.scenario.model import Scenario, scenario_class
-from podusv_cli.scenario.named_files import without_files
-from podusv_cli.scenario.presets import complete, stands_in, with_contents
+from podusv_cli.scenario.named_files import with_contents, without_files
+from podusv_cli.scenario.presets import complete, stands_in
 from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve
 from podusv_cli.scenario.yaml_tree import (
     Fault,

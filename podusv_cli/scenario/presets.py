@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
@@ -16,7 +15,7 @@ from podusv_cli.core.phrases import found, quoted, unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.kinds import over
-from podusv_cli.scenario.named_files import with_files
+from podusv_cli.scenario.named_files import ANY_FILE, with_contents
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX
 from podusv_cli.scenario.yaml_text import read
@@ -31,7 +30,6 @@ NAMED: tuple[Route, ...] = (
 )  # fmt: skip
 EMPTIED: tuple[Route, ...] = (*NAMED, ("sweep", "keep"))  # null is a section with nothing in it
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
-Fill = Callable[[Node, str, type[Component], list[Fault]], Node]  # a section with its files
 
 
 @cache
@@ -100,58 +98,20 @@ def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
     `top` are the scenario's keys.
     """
     plugins = top.scenario.plugged
-    root = _name(_without_null(root), faults)
+    root = with_contents(_name(_without_null(root), faults), top, faults)
     root = _nominal(_vessel(root, plugins, faults), plugins, faults)
     return _controllers(_sections(root, top, faults), top)
 
 
 def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
-    """Sections with kinds, completed from presets and CSV files."""
-    for name, given, model in _of_kinds(root, top):
-        if model.presets:
-            filled = _over_preset(given, name, model.presets, top.scenario.plugged, faults)
-            root = root.with_entry(name, filled)
-    return with_contents(root, top, faults)
-
-
-def with_contents(root: Node, top: Key, faults: list[Fault], fill: Fill = with_files) -> Node:
-    """The tree with what files hold in place of the files' names, or as `fill` has it."""
-    for name, given, model in _of_kinds(root, top):
-        root = root.with_entry(name, fill(given, name, model, faults))
-    for name, parts, item in _lists(root, top):
-        kinds = [item.kinds.get(part.word("kind")) if part.mapping else None for part in parts]
-        parts = tuple(
-            fill(part, f"{name}[{i}]", kind.model, faults) if kind else part
-            for i, (part, kind) in enumerate(zip(parts, kinds, strict=True))
-        )
-        root = root.with_entry(name, replace(root.mapping[name], content=parts))
-    several, default = root.mapping.get("controllers"), root.mapping.get("controller")
-    if not several or not several.mapping:
-        return root
-    laws = dict(several.mapping)
-    for label, own in laws.items():
-        kind = own.word("kind") or (default.word("kind") if default else "")
-        law = top.keys["controller"].kinds.get(kind)
-        if law and own.mapping:
-            laws[label] = fill(own, f"controllers.{label}", law.model, faults)
-    return root.with_entry("controllers", replace(several, content=laws))
-
-
-def _lists(root: Node, top: Key) -> Iterator[tuple[str, tuple[Node, ...], Key]]:
-    """Name and content of every list of sections, and what the models say of one of them."""
+    """Sections with kinds, completed from presets."""
     for name, key in top.keys.items():
-        given, item = root.mapping.get(name), key.item(0)
-        if given and isinstance(given.content, tuple) and item and item.kinds:
-            yield name, given.content, item
-
-
-def _of_kinds(root: Node, top: Key) -> list[tuple[str, Node, type[Component]]]:
-    """Name, content and class of every section that is given with a kind."""
-    given = (
-        (name, root.mapping[name], key) for name, key in top.keys.items() if name in root.mapping
-    )
-    with_kinds = ((name, node, key.kinds.get(node.word("kind"))) for name, node, key in given)
-    return [(name, node, key.model) for name, node, key in with_kinds if key and node.mapping]
+        given = root.mapping.get(name)
+        kind = key.kinds.get(given.word("kind")) if given else None
+        if given and kind and kind.model.presets:
+            filled = _over_preset(given, name, kind.model.presets, top.scenario.plugged, faults)
+            root = root.with_entry(name, filled)
+    return root
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:
@@ -219,7 +179,7 @@ def _without_preset(given: Node, key: str, plugins: Plugins, faults: list[Fault]
     lacking = [name for name, field in fields if field.is_required() and name not in given.mapping]
     if not lacking or given.faulty:
         return given
-    known = ", ".join(preset_names(VESSELS, plugins))
+    known = ", ".join([*preset_names(VESSELS, plugins), ANY_FILE])
     text = f"missing: {', '.join(lacking)}; or take them from a preset (allowed: {known})"
     faults.append(Fault(given.mark, key, text))
     return replace(given, faulty=True)
@@ -256,7 +216,8 @@ def _over_preset(
         base = preset_file(presets, str(preset.content), faults, plugins)
         return merge(base, without_misfits(base, given, faults, (key,))) if base else given
     what = f"{presets.noun} {found(preset.content, preset.text)}"
-    faults.append(Fault(preset.mark, f"{key}.preset", unknown(what, str(preset.content), names)))
+    text = unknown(what, str(preset.content), [*names, ANY_FILE])
+    faults.append(Fault(preset.mark, f"{key}.preset", text))
     wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))
     return replace(wrong, faulty=True)
 

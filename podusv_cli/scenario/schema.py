@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario.explain import EXTENDS
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import scenario_class
+from podusv_cli.scenario.named_files import YAML
 from podusv_cli.scenario.presets import preset_names, with_presets
 
 TITLE = "podusv scenario"
@@ -39,7 +41,9 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
             definitions[_name(key.model, definitions)]["properties"][key.name]["default"] = None
     for model, presets in with_presets(top).values():
         properties = definitions[_name(model, definitions)]["properties"]
-        properties["preset"]["enum"] = ["", *preset_names(presets, plugins)]
+        named = {"enum": ["", *preset_names(presets, plugins)]}
+        file = {"pattern": rf"({'|'.join(map(re.escape, YAML))})$"}
+        properties["preset"]["anyOf"] = [named, file]
     scenario = _converted(made)
     scenario["properties"]["silence"]["items"]["enum"] = list(codes)
     for part in scenario["properties"]["disturbance"]["anyOf"]:

@@ -2,25 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from functools import lru_cache
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import field_validator, model_validator
 
 from podusv_cli.core.about import Keep, StudyClaim
 from podusv_cli.core.component import Component, value
+from podusv_cli.core.timed_rows import Named, named_rows
 from podusv_cli.scenario.distributions import WAYS, Distribution
 from podusv_cli.scenario.yaml_tree import bracketed
+
+POSTERIOR = "posterior.csv"  # hulls that logs leave possible, in a folder of `podusv identify`
+
+
+@lru_cache(maxsize=16)  # a study asks for it at every draw
+def _lines(text: str) -> Named:
+    return named_rows(text, "`rows`")
 
 
 class Quantity(Distribution):
     """A drawn quantity: how it is drawn, and what becomes of the scenario's own value."""
 
+    folders_of: ClassVar[dict[str, tuple[str, str]]] = {"identified": ("rows", POSTERIOR)}
     keys: tuple[str, ...] = value(
         (), "", "keys that all get the same draw; where left out, the quantity's name is the key"
     )
     times: Distribution | None = value(None, "", "a factor on the scenario's own value")
     plus: Distribution | None = value(None, "", "a summand to the scenario's own value")
     seed: bool = value(False, "", "true: a whole number from 0 to 2^53 - 1, as seed of something")
+    identified: str | None = value(
+        None, "", "folder of `podusv identify`, beside the scenario; the hulls that its logs leave "
+        "possible (posterior.csv) are read into `rows`",
+    )  # fmt: skip
+    rows: str = value(
+        "", "", "lines of numbers with commas, the first of names: a draw takes one line, and each "
+        "key below the quantity (or below each of `keys`) its number there",
+    )  # fmt: skip
 
     @field_validator("keys")
     @classmethod
@@ -30,31 +48,55 @@ class Quantity(Distribution):
     @property
     def given(self) -> list[str]:
         """The keys that say how to draw."""
-        return [name for name in (*WAYS, "times", "plus", "seed") if self._says(name)]
+        return [name for name in (*WAYS, "times", "plus", "seed", "rows") if self._says(name)]
 
     def _says(self, name: str) -> bool:
         content = getattr(self, name)
-        return content is not None and content is not False
+        return content not in (None, False, "")
 
     @property
     def distribution(self) -> Distribution:
-        """What is drawn from; not for seeds."""
+        """What is drawn from; not for seeds. Of rows it is which of them."""
+        if self.rows:
+            return Distribution(integers=(0, len(self.lines.rows) - 1))
         return self.times or self.plus or self
+
+    @property
+    def lines(self) -> Named:
+        """The numbers of `rows`, under the names of keys. Raises ValueError."""
+        return _lines(self.rows)
+
+    @property
+    def is_label(self) -> bool:
+        """Whether a larger number drawn means nothing, as of seeds and of rows."""
+        return self.seed or bool(self.rows)
 
     @property
     def relative(self) -> bool:
         """Whether the scenario's own value matters."""
         return bool(self.times or self.plus)
 
-    def value(self, own: Any, drawn: Any) -> Any:
-        """The value of a key, from the scenario's own and the draw."""
+    def value(self, own: Any, drawn: Any, place: int = 0) -> Any:
+        """The value of the key at a place of `targets`, from the scenario's own and the draw."""
+        if self.rows:
+            numbers = self.lines.rows[drawn]
+            return float(numbers[place % len(numbers)])
         if self.times:
             return own * drawn
         return own + drawn if self.plus else drawn
 
     def targets(self, name: str) -> tuple[str, ...]:
         """The keys that the quantity of this name changes."""
-        return self.keys or (name,)
+        keys = self.keys or (name,)
+        if self.rows:
+            return tuple(f"{key}.{column}" for key in keys for column in self.lines.names)
+        return keys
+
+    @model_validator(mode="after")
+    def _readable(self) -> Self:
+        if self.rows and len(self.lines.rows) < 2:
+            raise ValueError("rows: has a single line of numbers; nothing can be drawn from it")
+        return self
 
     @model_validator(mode="after")
     def _of_numbers(self) -> Self:

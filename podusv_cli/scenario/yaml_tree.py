@@ -12,7 +12,7 @@ Route = tuple[str | int, ...]
 # The keys of a quantity that a study draws, and those of them that say how it is drawn.
 QUANTITY = {
     "uniform", "log_uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle",
-    "times", "plus", "seed", "keys",
+    "times", "plus", "seed", "identified", "rows", "keys",
 }  # fmt: skip
 NAMED_BY_KEYS = (
     ("sweep", "vary"),

@@ -16,6 +16,13 @@ from podusv_cli.components.actuators.command import (
     commanded,
     failing,
 )
+from podusv_cli.components.actuators.recorded import (
+    Recorded,
+    constants_of,
+    obeying,
+    rows_of,
+    table_of,
+)
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
 from podusv_cli.core.signal import DEMAND, TAU, Signal
@@ -52,6 +59,10 @@ class Actuator(Component):
     that `drive` wrote, once the actuator has failed; by default `k.failure_effectiveness` times the
     loads. Kernels take those of their arguments that they name.
 
+    `obey(t, x, state, demand, k, table, tau, rate, signals)` is a kernel as `drive`, but that the
+    `demand` has a command for each of the signals `replayed`, which is asked for as it is; an
+    actuator without it takes no recorded commands.
+
     `replay(x, demand, k, table, tau)` is a kernel that writes the loads again that a log tells of:
     `demand` has the numbers of the signals `replayed`.
 
@@ -87,6 +98,8 @@ class Actuator(Component):
 
     drive: ClassVar[Callable[..., None]] = staticmethod(absent("drive"))
 
+    obey: ClassVar[Callable[..., None] | None] = None
+
     lose: ClassVar[Callable[..., None]] = staticmethod(lose_evenly)
 
     @property
@@ -113,12 +126,37 @@ class Actuator(Component):
         """Of signals `replayed` the largest size that they can have, where one is known."""
         return {}
 
-    def drive_with(self) -> Drive:
+    def commands(self, recorded: Recorded) -> Vector:
+        """The rows of recorded commands: t [s] and one for each of `replayed`.
+
+        Columns are called as these, or as the commands `lagged`. Raises ValueError.
+        """
+        if self.obey is None:
+            raise ValueError(
+                f"gives commands to propellers, and {self.label} takes surge force and yaw moment; "
+                "write columns t, tau_u, tau_r, or choose the actuator that had these commands"
+            )
+        return rows_of(recorded.rows, self.replayed, self.lagged, self.zero_where_missing)
+
+    def constants_with(self, recorded: Recorded | None) -> dict[str, float]:
+        """The constants, with those of recorded commands where there are any."""
+        if not recorded:
+            return self.constants()
+        rows, first = self.commands(recorded), len(self.table())
+        return self.constants() | constants_of(rows, first, held=recorded.held)
+
+    def table_with(self, recorded: Recorded | None) -> Vector:
+        """The table, with recorded commands behind it where there are any."""
+        own = self.table()
+        return np.concatenate([own, table_of(self.commands(recorded))]) if recorded else own
+
+    def drive_with(self, recorded: Recorded | None = None) -> Drive:
         """`drive` with command path and failure; `drive` itself where it has neither.
 
-        Its `demand` has one more number, when the present step began [s].
+        Recorded commands are obeyed in place of the demand. The `demand` has one more number, when
+        the present step began [s].
         """
-        drive: Drive = self.drive
+        drive: Drive = obeying(self.obey) if recorded and self.obey else self.drive
         if self.failure:
             drive = failing(drive, self.lose)
         return commanded(drive) if self.command else drive

@@ -91,6 +91,20 @@ def at_limits(command: Vector, k: Any, table: Vector, flags: Vector) -> None:
             flags[ANGLE_LIMITED] = 1.0
 
 
+@kernel
+def pursue(state: Vector, k: Any, table: Vector, rate: Vector, signals: Vector) -> None:
+    """Rates towards the commands that are in the signals; the flags of limits, and the power."""
+    count = int(k.count)
+    command = tail(signals, FLAGS)
+    signals[RATE_LIMITED] = 1.0 if follow(state, command, k, table, rate) else 0.0
+    at_limits(command, k, table, signals)
+    if k.power_known > 0.0:
+        power = tail(signals, FLAGS + 3 * count)
+        for i in range(count):
+            n = abs(state[i])
+            power[i] = table[i * WIDTH + POWER] * n * n * n
+
+
 class Pods(Actuator):
     """Pods that turn surge force and yaw moment into propeller speeds and propulsion angles.
 
@@ -99,7 +113,10 @@ class Pods(Actuator):
 
     kind: Literal["pod"] = "pod"
     presets = Presets("podusv_cli.components.actuators", "set of pods", "pod file")
-    preset: str = value("", "", "name of the file that brings the pods along; none where empty")
+    preset: str = value(
+        "", "", "the file that brings the pods along: the name of one of podusv's, or a YAML file "
+        "beside the scenario, which is read in; none where empty",
+    )  # fmt: skip
     source: str = value("", "", "where the pods' numbers come from")
     validity: str = value("", "", "what they hold for")
     counts: Literal["turns", "parts"] = value(
@@ -325,10 +342,25 @@ class Pods(Actuator):
         for i in range(2 * count):
             command[i] += lost
         signals[SATURATED] = 0.0 if met else 1.0
-        signals[RATE_LIMITED] = 1.0 if follow(state, command, k, table, rate) else 0.0
-        at_limits(command, k, table, signals)
-        if k.power_known > 0.0:
-            power = tail(thrusts, count)
-            for i in range(count):
-                n = abs(state[i])
-                power[i] = table[i * WIDTH + POWER] * n * n * n
+        pursue(state, k, table, rate, signals)
+
+    @staticmethod
+    @kernel
+    def obey(
+        x: Vector, state: Vector, demand: Vector, k: Any, table: Vector, tau: Vector, rate: Vector,
+        signals: Vector,
+    ) -> None:  # fmt: skip
+        """Loads from the pods' states; rates towards the speeds and angles, cut at their limits."""
+        count, met = int(k.count), True
+        command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
+        flows = scratch(MOST_PODS)
+        for i in range(count):
+            pod = tail(table, i * WIDTH)
+            flows[i] = inflow(x, pod, state[count + i], k)
+            command[i] = within(demand[i], -pod[N_ASTERN], pod[N_AHEAD])
+            command[count + i] = within(demand[count + i], -pod[ANGLE], pod[ANGLE])
+            if command[i] != demand[i] or command[count + i] != demand[count + i]:
+                met = False
+        act(state, flows, k, table, tau, thrusts)
+        signals[SATURATED] = 0.0 if met else 1.0
+        pursue(state, k, table, rate, signals)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from podusv_cli.components.actuators.recorded import Recorded
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Component
@@ -121,6 +122,10 @@ class Controller(Component):
     def steering(self) -> tuple[str, float]:
         """Key and gain [1/s] with which it turns the hull; "" where it has no such gain."""
         return "", math.nan
+
+    def commands(self) -> Recorded | None:
+        """What the actuator obeys in place of the demand; None for laws."""
+        return None
 
     def optimum_of(self) -> str:
         """The metric that its motion minimises among all motions of the task; empty for laws."""

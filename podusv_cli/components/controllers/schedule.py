@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import lru_cache
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import field_validator, model_validator
 
+from podusv_cli.components.actuators.recorded import NOUN, Recorded
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.component import value
 from podusv_cli.core.interpolation import cubic, linear, segment
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import Signal
-from podusv_cli.core.timed_rows import timed_rows
+from podusv_cli.core.timed_rows import lines_of, named_rows, timed_rows
 
 TIMED, STATES = 3, 6  # numbers of a row: time and demand; then the state, then the gains
 WITH_MOTION = TIMED + STATES + 2 * STATES
 DEMAND = ("t [s]", "tau_u [N]", "tau_r [N m]")
 MOTION = ("x [m]", "y [m]", "psi [rad]", "u [m/s]", "v [m/s]", "r [rad/s]")
 LAYOUTS = {TIMED: DEMAND, WITH_MOTION: (*DEMAND, *MOTION, "then the gains of tau_u and tau_r")}
+NUMBERED = re.compile(r".*_[0-9]+( *\[.*\])?")  # a column of one propeller or pod
 HOLD = 1.0  # the place of "hold" among the choices of `between`, as kernels know it
 # Where a row of the table has these, behind the demand: state and its rate, gains (surge, yaw).
 STATE, GAINS = 2, 2 + 2 * STATES
@@ -29,10 +32,24 @@ FEEDBACK_U = Signal("feedback_u", "N", "surge force that departures from the sch
 FEEDBACK_R = Signal("feedback_r", "N m", "yaw moment that departures from the motion add")
 
 
+@lru_cache(maxsize=4)
+def _recorded(text: str, *, held: bool) -> Recorded | None:
+    """Commands to single propellers, which the header has by number, as `n_1`; None for demands."""
+    header, _ = lines_of(text)
+    numbered = any(NUMBERED.fullmatch(cell) for cell in header.cells) if header else False
+    return Recorded(text, held) if numbered else None
+
+
 @lru_cache(maxsize=4)  # one schedule is read a dozen times in a run
 def _rows(text: str) -> Vector:
-    """The numbers in lines with commas, the heading continuous. Raises ValueError."""
-    rows = timed_rows(text, "the schedule", LAYOUTS)
+    """The numbers in lines with commas, the heading continuous. Raises ValueError.
+
+    Recorded commands are for the actuator to read: their demand is 0.
+    """
+    if _recorded(text, held=False):
+        rows = named_rows(text, NOUN).rows[:, [0, 0, 0]] * [1.0, 0.0, 0.0]
+    else:
+        rows = timed_rows(text, NOUN, LAYOUTS)
     if rows.shape[1] == WITH_MOTION:
         rows[:, TIMED + 2] = np.unwrap(rows[:, TIMED + 2])
     rows.flags.writeable = False
@@ -48,6 +65,10 @@ class Schedule(Controller):
     not keep its course by itself needs feedback to repeat a motion: every rounding error grows.
     Demand and gains are straight lines between rows, x_s a cubic. Before the first and after the
     last row the nearest row holds.
+
+    Rows of t and commands (n_1 or n_cmd_1 [1/s], delta_1 or delta_cmd_1 [rad] and so on: speed and
+    angle of every pod) go to the pods themselves, in place of what an allocation makes of a demand.
+    Lags, rates and limits act as always, a delay of commands does not; the demand is logged as 0.
     """
 
     kind: Literal["schedule"] = "schedule"
@@ -56,10 +77,11 @@ class Schedule(Controller):
     file: str | None = value(None, "", "CSV file beside the scenario; its text is read into `rows`")
     rows: str = value(
         "", "", "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
-        "and the gains from its errors, six of tau_u and six of tau_r",
+        "and the gains from its errors, six of tau_u and six of tau_r; or of t and the commands "
+        "of every pod, such as n_1 [1/s] and delta_1 [rad] of the first",
     )  # fmt: skip
     between: Literal["linear", "hold"] = value(
-        "linear", "", "demand between rows: a straight line, or the last row's"
+        "linear", "", "demand or commands between rows: a straight line, or the last row's"
     )
     minimises: Literal["nothing", "iae", "ise"] = value(
         "nothing", "", "the metric of which the motion is an optimum, where it is one"
@@ -76,6 +98,10 @@ class Schedule(Controller):
         if not self.rows:
             raise ValueError("file is missing; name a CSV file with columns t, tau_u, tau_r")
         return self
+
+    def commands(self) -> Recorded | None:
+        """The rows, where their columns are commands to propellers."""
+        return _recorded(self.rows, held=self.between == "hold")
 
     def optimum_of(self) -> str:
         """What `minimises` says."""

@@ -27,7 +27,10 @@ class Vessel(Component):
 
     presets = VESSELS
     preset: str = value(
-        "", "", "name of the parameter file that the other values come from; none where empty"
+        "",
+        "",
+        "the parameter file that the other values come from: the name of one of podusv's, or a "
+        "YAML file beside the scenario, which is read in; none where empty",
     )
     source: str = value("", "", "where the numbers come from")
     validity: str = value("", "", "what the numbers hold for")

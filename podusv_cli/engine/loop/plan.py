@@ -182,7 +182,7 @@ class Plan:
             "disturbance": loop.disturbance.kernel_with(loop.vessel),
             "law": law.law,
             "sample": law.sample if law.takes_samples() else nothing,
-            "actuator": loop.actuator.drive_with(),
+            "actuator": loop.actuator.drive_with(law.commands()),
             "after_saturation": law.after_saturation if law.wants_loads() else nothing,
             "measurement": seen.sense if loop.measured else nothing,
             "correct": estimator.correct if loop.measured else nothing,
@@ -208,7 +208,8 @@ class Plan:
         return {
             "path": self.path_constants,
             "disturbance": recall(loop.disturbance.constants_with, loop.vessel),
-            "law": self.law_constants, "actuator": recall(loop.actuator.constants),
+            "law": self.law_constants,
+            "actuator": recall(loop.actuator.constants_with, loop.controller.commands()),
             "measurement": recall(loop.measurement.constants_with, step, motion),
             "estimator": recall(loop.estimator.constants_with, loop.nominal),
             "vessel": recall(loop.vessel.constants),
@@ -281,7 +282,7 @@ class Plan:
             **numbers, path_table=self.path_table,
             disturbance_table=recall(sea.table_for, loop.vessel, end),
             law_table=self.law_table.copy(),  # a session writes to it
-            actuator_table=recall(loop.actuator.table),
+            actuator_table=recall(loop.actuator.table_with, law.commands()),
             measurement_table=recall(loop.measurement.table_for, grid.step, grid.steps),
             estimator_table=recall(estimator.table),
             s=np.concatenate([begun[part] for part in self.states]),

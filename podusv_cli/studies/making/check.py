@@ -104,7 +104,8 @@ def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep)
             continue
         texts = [text for key in quantity.targets(name) for text in _key(key, quantity, laws)]
         texts = texts or list(_tried(name, quantity, laws, own))
-        yield from ((("sweep", "vary", name), text) for text in dict.fromkeys(texts))
+        told = [*dict.fromkeys(texts)][: 1 if quantity.rows else None]  # they have many keys
+        yield from ((("sweep", "vary", name), text) for text in told)
 
 
 def _wrong_name(name: str, quantity: Quantity, taken: Collection[str]) -> str:
@@ -199,16 +200,19 @@ def _tried(
 
     `own` is what the runs of a law have in common.
     """
-    discrete = quantity.distribution.choice or ()
+    rows = range(len(quantity.lines.rows)) if quantity.rows else ()
+    discrete = rows or (quantity.distribution.choice or ())[:MOST_TRIED]
     drawn_values = [
-        *discrete[:MOST_TRIED],
+        *discrete,
         *([] if discrete or quantity.seed else quantity.distribution.at(TRIED).tolist()),
         *([1] if quantity.seed else []),
     ]
     for law, single in laws.items():
         refusals = [_refused(name, quantity, single, value) for value in drawn_values]
         if all(refusals) or (discrete and any(refusals)):
-            yield next(filter(None, refusals)).removeprefix(f"sweep.vary.{name}: ")
+            place, refused = next((i, text) for i, text in enumerate(refusals) if text)
+            row = f"row {place + 1} of {len(rows)}: " if rows else ""
+            yield row + refused.removeprefix(f"sweep.vary.{name}: ")
         yield from (
             "changes how the loop is put together or sampled; list its values under grid"
             for value, refused in zip(drawn_values, refusals, strict=True)
@@ -232,9 +236,13 @@ def _structure(scenario: Scenario) -> Any:
 
 def _twice(sweep: Sweep) -> Faults:
     keys = [(name, key) for name, q in sweep.vary.items() for key in q.targets(name)]
-    counts = Counter(key for _, key in keys)
+    counts, of_rows = Counter(key for _, key in keys), set[str]()
     for name, key in keys:
+        if name in of_rows:
+            continue
         others = [other for other, same in keys if same == key and other != name]
+        if sweep.vary[name].rows and (counts[key] > 1 or key in sweep.grid):
+            of_rows.add(name)  # one of its many keys is enough
         if counts[key] > 1:
             yield ("sweep", "vary", name), f"{key} is drawn twice{_by(others)}"
         if key in sweep.grid:

@@ -96,17 +96,17 @@ def drawing(scenario: Scenario, vary: Mapping[str, Quantity]) -> Callable[[Draw]
     where a number is out of range. It looks up places and the scenario's own values only once.
     """
     targets = [
-        (steps, f"sweep.vary.{name}: ", name, quantity, _own(scenario, quantity, steps))
+        (steps, f"sweep.vary.{name}: ", name, quantity, _own(scenario, quantity, steps), place)
         for name, quantity in vary.items()
-        for steps in map(steps_at, quantity.targets(name))
+        for place, steps in enumerate(map(steps_at, quantity.targets(name)))
     ]
 
     def scenario_of(draw: Draw) -> Scenario:
         return with_values(
             scenario,
             {
-                steps: Number(source, quantity.value(own, draw[name]))
-                for steps, source, name, quantity, own in targets
+                steps: Number(source, quantity.value(own, draw[name], place))
+                for steps, source, name, quantity, own, place in targets
             },
         )
 

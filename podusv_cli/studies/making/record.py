@@ -50,8 +50,8 @@ def of_scenario(
         draws=sweep.draws, seed=sweep.seed, design=sweep.design, success=sweep.success,
         level=sweep.level, keep=sweep.keep, claims=sweep.claims,
         quantities={
-            name: QuantityAbout(keys=drawn.targets(name), drawn=in_words(drawn), is_seed=drawn.seed)
-            for name, drawn in sweep.vary.items()
+            name: QuantityAbout(keys=q.targets(name), drawn=in_words(q), is_seed=q.is_label)
+            for name, q in sweep.vary.items()
         },
         metrics=metrics, measured=measured, identity=json_files.plain(identity), history=(),
     )  # fmt: skip

@@ -13,6 +13,8 @@ def in_words(quantity: Quantity) -> str:
     """How a quantity is drawn, and what becomes of the scenario's own value."""
     if quantity.seed:
         return "a new seed for every draw"
+    if quantity.rows:
+        return f"one of {len(quantity.lines.rows)} rows, all equally likely"
     drawn = of_distribution(quantity.distribution)
     if quantity.times:
         return f"the scenario's own value times a factor: {drawn}"
