@@ -31,7 +31,10 @@ SOME_FAILED = 3
 def compare(
     items: Annotated[
         list[str],
-        typer.Argument(metavar="CONFIG_OR_RUN...", help="Scenarios, run folders, comparisons."),
+        typer.Argument(
+            metavar="CONFIG_OR_RUN...",
+            help="Scenarios, run folders, comparisons; beside them a log of a boat.",
+        ),
     ],
     assign: options.Assignments = None,
     out: options.Out = None,
@@ -62,7 +65,8 @@ def compare(
 ) -> None:
     """Simulate scenarios, and compare them with finished runs: table, claims, figures, report.
 
-    One scenario with `controllers`, several scenarios, finished runs, or any mixture. Exit code 3
+    One scenario with `controllers`, several scenarios, finished runs, or any mixture. A log, such
+    as LOG.csv with columns time, x, y, psi, is drawn beside them. Exit code 3
     when a run failed or diverged; the others are compared all the same. Draws trajectory and
     errors, with `--figure all` every figure that the runs have signals for.
     """
@@ -128,7 +132,10 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = ()) -> None:
 
 def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:
     """How to find out whether the numbers have converged."""
-    scenario = next((item for item in items if not Path(item).is_dir()), "SCENARIO")
+    from podusv_cli.workflows.measured import is_log
+
+    scenarios = (i for i in items if not (Path(i).is_dir() or is_log(Path(i))))
+    scenario = next(scenarios, "SCENARIO")
     changes = [word for change in assign for word in ("--set", change)]
     files = [word for file in plugin for word in ("--plugin", file)]
     command = shlex.join(["podusv", "verify", scenario, *changes, *files])

@@ -50,7 +50,7 @@ def resolved(runs: Sequence[Shown]) -> float:
 
     How near a vessel comes in passing depends on where the steps happen to fall.
     """
-    return min(map(_resolved, runs))
+    return min(_resolved(run) for run in runs if run.has("u"))  # a measured track may have none
 
 
 def _resolved(run: Shown) -> float:

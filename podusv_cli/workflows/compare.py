@@ -33,7 +33,7 @@ from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.limits import Size, estimate, needed
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
+from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder, open_run
 from podusv_cli.workflows.doubt import comparison, doubt_of
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
@@ -72,7 +72,8 @@ class Compared:
 
     def places(self) -> list[Path]:
         """The fewest folders that have all of its runs."""
-        places = [self._place(entry) for entry in self.result.entries]
+        runs = (entry for entry in self.result.entries if not entry.run.folder.is_file())
+        places = [self._place(entry) for entry in runs]  # without what was measured
         return [self.folder] if {place.parent for place in places} == {self.folder} else places
 
     def _place(self, entry: Entry) -> Path:
@@ -232,6 +233,7 @@ def collect(
     finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
     runs = {m.label: m.run for m in members if m.run}
     runs |= {label: open_run(done.folder) for label, done in finished.items()}
+    runs |= _measured(members, runs)
     endings = {
         m.label: outcomes.get(m.label, Outcome()).failure
         or (runs[m.label].recording.message if m.label in runs else "")
@@ -246,6 +248,7 @@ def collect(
     ]
     made = {m.label: m.case for m in members if m.case and m.label in finished}
     entries = related(_with_costs(entries, made, extras), extras)
+    entries = _with_departures(entries, members)
     scenarios = {label: case.scenario for label, case in made.items()}
     entries = with_margins(entries, scenarios, parsed, extras)
     sources: dict[str, ClaimedRun] = {
@@ -272,6 +275,25 @@ def collect(
         meanings=extras.made("what the warnings mean", lambda: _meanings(plugins)) or {},
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
+
+
+def _measured(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> dict[str, FinishedRun]:
+    """What was measured as a run, with the target of the first of the others that has a log."""
+    logs = (run.recording for run in runs.values())
+    first = next((log for log in logs if len(log["time"])), None)
+    return {m.label: m.track.beside(first) for m in members if m.track and first}
+
+
+def _with_departures(entries: Sequence[Entry], members: Sequence[Member]) -> list[Entry]:
+    """The entries; runs with how far they are from the measured track, where there is one."""
+    measured = {m.label: m.track for m in members if m.track}
+    return [
+        replace(entry, cost={**entry.cost, **track.departures(entry.recording)})
+        if entry.label not in measured
+        else entry
+        for track in measured.values()
+        for entry in entries
+    ] or [*entries]
 
 
 def _meanings(plugins: Plugins) -> dict[str, str]:

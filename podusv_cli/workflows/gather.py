@@ -12,9 +12,11 @@ from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.workflows.execute import examined
+from podusv_cli.workflows.measured import is_log, track
 from podusv_cli.workflows.members import Member, distinct, numbered
 from podusv_cli.workflows.members import from_folder as members_of
 from podusv_cli.workflows.run import Request, opened
@@ -31,16 +33,42 @@ class Members:
     members: Sequence[Member]
     names: Sequence[str] = ()
     claims: Sequence[ParsedClaim] = ()
+    identify: Identify | None = None  # what columns of logs are called
 
 
 def gather(items: Sequence[Path], request: Request) -> Members:
     """Open every argument. Raises UsageError, ScenarioError, StorageError."""
-    if request.overrides and all(item.is_dir() for item in items):
+    if request.overrides and all(item.is_dir() or is_log(item) for item in items):
         given = ", ".join(request.overrides)
         raise UsageError(
             f"--set {given}: --set changes scenarios, and only finished runs are given"
         )
-    return gathered([_opened(item, request, alone=len(items) == 1) for item in items])
+    logs = [item for item in items if is_log(item)]
+    others = [item for item in items if item not in logs]
+    groups = [_opened(item, request, alone=len(others) == 1) for item in others]
+    return gathered([*groups, *_measured(logs, groups)])
+
+
+def _measured(logs: Sequence[Path], groups: Sequence[Members]) -> list[Members]:
+    """A log among the arguments as the last of all runs. Raises UsageError."""
+    if not logs:
+        return []
+    if len(logs) > 1 or not groups:
+        given = ", ".join(map(str, logs))
+        raise UsageError(
+            f"{given}: runs are compared with one log at a time; name one, and a scenario or a run "
+            "beside it"
+        )
+    measured = track(logs[0], [group.identify for group in groups if group.identify])
+    beside = groups[0].members[0].about
+    first, last = measured.times[0], measured.times[-1]
+    if first > beside.duration or last < 0.0:
+        raise UsageError(
+            f"{logs[0]}: its times go from {first:.10g} to {last:.10g} s, and the run from 0 to "
+            f"{beside.duration:g} s; count the log's time from where the run begins"
+        )
+    name, text = logs[0].stem, repr(measured.signals["x"].tolist())
+    return [Members(name, [Member(name, measured.about(beside), text, track=measured)])]
 
 
 def gathered(groups: Sequence[Members]) -> Members:
@@ -78,7 +106,8 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
         )
         for label, case in zip(labels, cases, strict=True)
     ]  # fmt: skip
-    return Members(scenario.name, members, list(singles), parse_claims(loaded))
+    claims = parse_claims(loaded)
+    return Members(scenario.name, members, list(singles), claims, scenario.identify)
 
 
 def _labelled(groups: Sequence[Members], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.comparison import stability
+from podusv_cli.comparison.measured import Track
 from podusv_cli.comparison.outputs import RESERVED, TABLE
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
@@ -57,7 +58,7 @@ LARGEST = 1e300  # beyond it the engine calls a run diverged and logs no row
 class Member:
     """One run of several: finished, or the `case` of one that is still to be made.
 
-    `plugins` have figures, metrics and signals for it.
+    A `track` is no run: it was measured. `plugins` have figures, metrics and signals for it.
     """
 
     label: str
@@ -68,6 +69,7 @@ class Member:
     case: Case | None = None
     text: str = ""  # the scenario's file
     noticed: Sequence[Finding] = ()  # before the run
+    track: Track | None = None
 
 
 def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:

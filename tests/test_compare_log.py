@@ -1,0 +1,142 @@
+"""`podusv compare` of runs with a log of a boat: its track beside theirs, and how far they are."""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_samples import Command
+from scenario_samples import write
+
+import podusv as p
+from podusv_cli.core.errors import PodusvError
+from podusv_cli.workflows import compare as comparing
+from podusv_cli.workflows.run import Request
+
+TASK = """
+vessel: {preset: cybership2}
+path: {kind: sinusoid, speed: 0.17}
+disturbance: {kind: none}
+actuator: {kind: ideal}
+controllers: {velocity: {kind: velocity_vector}, momentum: {kind: momentum_vector}}
+simulation: {duration: 7.9, step: 0.02}
+log: {every: 5}
+"""
+ROWS = [[0.0, 0.0, 0.0, 0.1], [3.1, 0.4, 0.1, 0.3], [6.2, 1.0, 0.2, 0.2]]
+LEGS = "path: {kind: legs, points: [[0, 0], [3, 0], [3, 3]], speed: 0.2}"
+METRICS = ("log_distance_rms", "log_distance_max", "log_heading_rms")
+
+
+@pytest.fixture(autouse=True)
+def _in_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write("task.yaml", TASK)
+
+
+def log(name, head, rows):
+    """A CSV file; NaN is an empty cell."""
+    lines = [",".join("" if math.isnan(x) else f"{x:.17g}" for x in row) for row in rows]
+    write(name, "\n".join([head, *lines, ""]))
+
+
+def compared(*items, overrides=(), **options):
+    request = Request(overrides, out=Path("both"), force=True, figures=False, **options)
+    return comparing.compare([Path(item) for item in items], request)
+
+
+def numbers(done, label):
+    return [done.result.table.of(label).get(name, math.nan) for name in METRICS]
+
+
+def test_a_track_beside_a_run_is_as_far_away_as_it_was_put():
+    alone = {"controllers": None, "controller": {"kind": "momentum_vector"}}
+    run = p.run("task.yaml", alone, out="run")
+    t, x, y, psi = (run[name][3:61:4] for name in ("time", "x", "y", "psi"))
+    aside = np.where(np.arange(len(t)) == 5, 1.7, 0.5)
+    turned = np.degrees(psi + 0.31 + 2.0 * np.pi) % 360.0
+    log("LOG.csv", "x,time [ms],psi [deg],y", np.column_stack(
+        [x + 0.6 * aside, 1e3 * t, turned, y - 0.8 * aside]
+    ))  # fmt: skip
+    done = compared("run", "LOG.csv")
+    rms = math.sqrt((1.7**2 + (len(t) - 1) * 0.5**2) / len(t))
+    assert numbers(done, "run") == pytest.approx([rms, 1.7, 0.31], rel=1e-9)
+    assert all(math.isnan(x) for x in numbers(done, "LOG"))
+    measured = done.result.entries[-1]
+    assert measured.label == "LOG"
+    assert measured.recording["z_e"] == pytest.approx(
+        np.hypot(run["x_d"][3:61:4] - x - 0.6 * aside, run["y_d"][3:61:4] - y + 0.8 * aside)
+    )
+
+
+def test_sensors_may_come_at_different_times_and_the_log_last_longer():
+    """Positions once a second, on a straight line that no run is on; heading in between."""
+    times = np.arange(0.0, 12.01, 0.25)
+    nothing = np.full(len(times), np.nan)
+    x, psi = nothing.copy(), nothing.copy()
+    x[::4], psi[2::4] = 0.3 * times[::4], 0.1
+    log("LOG.csv", "t,x,y,psi", np.column_stack([times, x, 0.0 * x + 1.3, psi]))
+    names = "identify: {logs: [{file: LOG.csv}], columns: {time: t}}"
+    write("names.yaml", f"extends: task.yaml\n{names}\n")
+    done = compared("names.yaml", "LOG.csv")
+    for label in ("velocity", "momentum"):
+        run = p.open_run(Path("both") / label)
+        at = np.arange(0.0, 7.5)
+        off = np.hypot(np.interp(at, run["time"], run["x"]) - 0.3 * at,
+                       np.interp(at, run["time"], run["y"]) - 1.3)  # fmt: skip
+        assert numbers(done, label)[:2] == pytest.approx(
+            [math.sqrt(np.mean(off**2)), off.max()], rel=1e-9
+        )
+    assert done.result.table.rows["log_distance_rms"][0] > 0.1
+
+
+def test_the_command_draws_it_and_tells_the_numbers(podusv: Command):
+    log("LOG.csv", "time,x,y,psi", ROWS)
+    podusv("compare", "task.yaml", "LOG.csv", "--out", "both", "--figure", "all")
+    assert {file.name for file in Path("both").iterdir()} >= {"report.html", "velocity", "momentum"}
+    assert not Path("both/missing.json").exists()
+    assert {"trajectory.png", "errors.png"} <= {f.name for f in Path("both/figures").iterdir()}
+    with Path("both/comparison.csv").open() as file:
+        rows = {row["metric"]: row for row in csv.DictReader(file)}
+    assert set(METRICS) <= rows.keys()
+    assert float(rows["log_distance_rms"]["momentum"]) > 0.0
+    assert rows["iae"]["LOG"] == ""
+    again = podusv("compare", "both/momentum", "LOG.csv", "--json", "--out", "third")
+    runs = json.loads(again.out)["runs"]
+    assert [run["controller"] for run in runs] == ["momentum_vector", "measured"]
+
+
+def test_a_path_that_is_followed_has_no_target_to_be_off(podusv: Command):
+    alone = "controllers: null\ncontroller: {kind: alos}\n"
+    write("legs.yaml", f"extends: task.yaml\n{LEGS}\n{alone}")
+    log("LOG.csv", "time,x,y,psi", ROWS)
+    podusv("compare", "legs.yaml", "LOG.csv", "--out", "both", "--figure", "all")
+    assert not Path("both/missing.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("items", "head", "says"),
+    [
+        (["task.yaml", "LOG.csv"], "time,north,east,heading", "has no quantity that is needed"),
+        (["task.yaml", "LOG.csv"], "clock,x,y,psi", "no column is called time"),
+        (["task.yaml", "LOG.csv"], "time [min],x,y,psi [furlong]", "is given in 'furlong'"),
+        (["task.yaml", "NO.csv"], "time,x,y,psi", "NO.csv: there is no such file"),
+        (["task.yaml", "LOG.csv", "LOG.csv"], "time,x,y,psi", "one log at a time"),
+        (["LOG.csv"], "time,x,y,psi", "one log at a time"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_the_log_is_a_sentence(items, head, says):
+    log("LOG.csv", head, [[0.0, 0.1, 0.2, 0.3], [1.0, 0.7, 0.9, 0.2]])
+    with pytest.raises(PodusvError) as caught:
+        compared(*items)
+    assert says in str(caught.value)
+
+
+def test_times_that_are_not_those_of_the_run_are_told():
+    log("LOG.csv", "time,x,y,psi", [[1.78e9, 0.1, 0.2, 0.3], [1.78e9 + 1, 0.7, 0.9, 0.2]])
+    with pytest.raises(PodusvError, match="times go from 1780000000 to 1780000001 s, and the run"):
+        compared("task.yaml", "LOG.csv")
+    log("LOG.csv", "time,x,y,psi", [[1.0, 0.1, 0.2, 0.3]])
+    with pytest.raises(PodusvError, match=r"fewer than two positions|has 1 row"):
+        compared("task.yaml", "LOG.csv")
