@@ -52,7 +52,7 @@ def as_json(content: dict[str, Any]) -> str:
 
 def _track(run: Shown) -> dict[str, Any]:
     count = len(run.recording["time"])
-    rows = np.unique(np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int))
+    rows = np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)
     names = ("time", *WHERE, *(("x_d", "y_d", "z_e") if run.has("z_e") else ()))
     legs = np.array(run.about.waypoints if run.about.follows else ())
     stopped = f"{run.recording.status} at t = {run.end:g} s"

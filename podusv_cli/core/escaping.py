@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Callable
 
 # Also * and _ at an end of a word, and ] where a link's target follows.
 MARKDOWN = re.compile(r"[\\`<>&]|(?<!\s)\*|\*(?!\s)|(?<![^\W_])_|_(?![^\W_])|\](?=[(\[])")
@@ -20,7 +21,7 @@ FORMULA = tuple("=+-@\uff1d\uff0b\uff0d\uff20")
 
 def visible(text: object) -> str:
     r"""The text on one line; what would move a cursor or turn letters around, as `\x1b`."""
-    return "".join(c if _shows(c) else _named(c) for c in str(text))
+    return _spelt(str(text), _named)
 
 
 def markdown(text: str) -> str:
@@ -63,7 +64,12 @@ def lines(text: object) -> str:
 
 def json(encoded: str) -> str:
     """Encoded JSON; letters that do not show, which only strings can hold, as JSON escapes them."""
-    return "".join(c if c == "\n" or _shows(c) else _json_named(c) for c in encoded)
+    return "\n".join(_spelt(line, _json_named) for line in encoded.split("\n"))
+
+
+def _spelt(text: str, name: Callable[[str], str]) -> str:
+    """The text, each letter that does not show by its name."""
+    return text if text.isprintable() else "".join(c if _shows(c) else name(c) for c in text)
 
 
 def _shows(letter: str) -> bool:

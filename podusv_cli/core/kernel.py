@@ -193,10 +193,8 @@ def transplanted(function: Any, parts: Mapping[Any, Any]) -> Any:
     `parts` says what stands for a kernel, a module or a builtin. So the copy computes with other
     things than numbers.
     """
-    code = dis.get_instructions(function)
-    named = {part.argval for part in code if part.opname == "LOAD_GLOBAL"}
     replaced = {}
-    for name in named:
+    for name in _globals_read(function.__code__):
         thing = function.__globals__.get(name, getattr(builtins, name, None))
         other = next((new for old, new in parts.items() if old is thing), None)
         if other is not None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from podusv_cli.components.facts import Facts
 from podusv_cli.core import registry
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.finding import Finding, FindingKind, merged
 from podusv_cli.core.kernel import Vector
@@ -18,7 +19,8 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
-from podusv_cli.scenario.load import Loaded
+from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import BASES, Scenario
 
 # A kind of finding may be in the file of the component that it is about.
@@ -75,7 +77,7 @@ def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Case:
-    """A scenario with one law, its plan, and what several findings need of it, computed once.
+    """A scenario with one law, its plan, and what is needed of it several times, computed once.
 
     The plan is the run's loop on its grid, with the probe of all metrics.
     """
@@ -96,6 +98,16 @@ class Case:
     def reference(self) -> Reference:
         """The steady motion that follows the target."""
         return reference(self.scenario)
+
+    @cached_property
+    def about(self) -> RunAbout:
+        """What readers of its run need."""
+        return about_of(self.scenario)
+
+    @cached_property
+    def resolved_yaml(self) -> str:
+        """The scenario as a file with every value in it."""
+        return resolved_yaml(self.scenario)
 
     @cached_property
     def facts(self) -> Facts:

@@ -26,7 +26,6 @@ from podusv_cli.interface.parameters import check_words, columns, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.process.extras import Extras
-from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -65,7 +64,7 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     numbers = summary(case, recording, extras)
     warned = tuple(map(str, (*findings, *extras.missing)))
     return Run(
-        whole.controller, about_of(case.scenario), whole, numbers, warned,
+        whole.controller, case.about, whole, numbers, warned,
         given=case.scenario,
     )  # fmt: skip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache
@@ -23,7 +23,18 @@ GIT_PATIENCE = 5.0  # s
 def collect(
     argv: Sequence[str], started: datetime, finished: datetime, plugins: Iterable[Plugin] = ()
 ) -> dict[str, Any]:
-    """The content of provenance.json; times are aware datetimes.
+    """The content of provenance.json; times are aware datetimes."""
+    return {
+        **surroundings(),
+        "plugins": [plugin.as_json() for plugin in plugins if plugin.version or plugin.path],
+        "argv": list(argv),
+        **times(started, finished),
+    }
+
+
+@cache
+def surroundings() -> Mapping[str, Any]:
+    """What is the same for all results of a process, and of those that it forks afterwards.
 
     `git` is None where podusv does not run from a git checkout or git is missing; a version is
     None where a package is not installed. Processor and C library are noted because functions of
@@ -40,10 +51,7 @@ def collect(
             "processor": processor(),
             "libc": " ".join(platform.libc_ver()).strip() or None,
         },
-        "plugins": [plugin.as_json() for plugin in plugins if plugin.version or plugin.path],
         "git": source_tree(Path(podusv_cli.__file__).parent),
-        "argv": list(argv),
-        **times(started, finished),
     }
 
 

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from podusv_cli.comparison import claims, outputs, table
 from podusv_cli.comparison.curves import ClaimedRun
@@ -22,8 +23,6 @@ from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Status
-from podusv_cli.doubt.check import doubt_faults
-from podusv_cli.doubt.outputs import HEAD, Doubted, row
 from podusv_cli.findings.finding import Case, finding_kinds
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED, metrics_with
@@ -34,11 +33,13 @@ from podusv_cli.scenario.limits import Size, estimate, needed
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder, open_run
-from podusv_cli.workflows.doubt import comparison, doubt_of
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened
+
+if TYPE_CHECKING:
+    from podusv_cli.doubt.outputs import Doubted
 
 Progress = Callable[[str, float], None]
 UNMEASURED = dict.fromkeys(CLOCKED, math.nan)
@@ -111,6 +112,9 @@ def compare(items: Sequence[Path], request: Request, progress: Progress | None =
 
 def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
     """The scenario whose verdicts are doubted. Raises UsageError unless it is the only item."""
+    from podusv_cli.doubt.check import doubt_faults  # slow to import, as much of podusv's studies
+    from podusv_cli.workflows.doubt import comparison
+
     if len(items) > 1 or items[0].is_dir():
         given = ", ".join(map(str, items))
         raise UsageError(
@@ -147,6 +151,9 @@ def compare_gathered(
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
         doubted = None
         if loaded and not extras.interrupted:
+            from podusv_cli.doubt.outputs import HEAD, row
+            from podusv_cli.workflows.doubt import doubt_of
+
             own = replace(request, out=writer.folder / "doubt", force=True)
             doubted = doubt_of(loaded, own, progress)
             result = replace(result, doubts=[HEAD, *map(row, doubted.answers)])
@@ -200,6 +207,9 @@ def make_runs(
 ) -> dict[str, Outcome]:
     """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
     wanted = [(member, member.case) for member in members if member.case]
+    # once, before the forks
+    provenance.surroundings()
+    import_module("podusv_cli.storage.log_reader")
     with interrupts_enabled():
         for _, case in wanted:
             warm_up(case, request.compiling)

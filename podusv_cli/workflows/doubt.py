@@ -29,7 +29,6 @@ from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Job, run_shares
-from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.address import Number, with_values
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.limits import limits
@@ -225,4 +224,4 @@ def _entry(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> Entry:
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)
     run = InMemory(Path(), recording.status, numbers, {}, "", kept=whole)
-    return Entry(label, run, about_of(case.scenario), plugins=case.scenario.plugged)
+    return Entry(label, run, case.about, plugins=case.scenario.plugged)

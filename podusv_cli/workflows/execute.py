@@ -28,9 +28,7 @@ from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
-from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.limits import HELD, estimate
-from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import csv_files, files, provenance
 from podusv_cli.storage import run_folder as folder
@@ -151,13 +149,13 @@ def execute(
                 lambda: monitored(case, recording, allocate),
             ) or (recording, {})
         with watch.part("write"):
-            whole = _logged(writer, task.scenario, whole, again=long)
+            whole = _logged(writer, case, whole, again=long)
         with watch.part("metrics"):
             noticed = extras.made("warnings", lambda: postflight(task.scenario, whole))
-        warnings, told_of = (*task.noticed, *(noticed or ())), partial(about_of, task.scenario)
+        warnings = *task.noticed, *(noticed or ())
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
-            about = extras.made(f"{folder.ABOUT}, which figures need,", told_of)
+            about = extras.made(f"{folder.ABOUT}, which figures need,", lambda: case.about)
             if about:
                 facts = about.model_dump(exclude_defaults=True)
                 writer.add_json(folder.ABOUT, {"format": 1, **facts})
@@ -277,18 +275,20 @@ def monitored(
 
 
 def _logged(
-    writer: folder.RunWriter, scenario: Scenario, recording: Recording, *, again: bool
+    writer: folder.RunWriter, case: Case, recording: Recording, *, again: bool
 ) -> Recording:
-    """Write the log; the recording, `again` with its signals as they lie in the log.
+    """Write log and scenario; the recording, `again` with its signals as they lie in the log.
 
     There each signal is in one piece. The march leaves them row by row, so that whoever looks at
     one signal of a long log there reads all others from the disk, too.
     """
     from podusv_cli.storage import log, log_reader  # h5py is slow to import
 
-    path, title = writer.folder / folder.LOG, scenario.description or scenario.name
-    texts = log.Texts(resolved_yaml(scenario), title, scenario.vessel.source, __version__)
+    path, scenario = writer.folder / folder.LOG, case.scenario
+    title = scenario.description or scenario.name
+    texts = log.Texts(case.resolved_yaml, title, scenario.vessel.source, __version__)
     log.write(path, recording, texts, compress=scenario.log.compress)
+    writer.add(folder.RESOLVED, case.resolved_yaml.encode())
     signals = log_reader.read_log(path, math.inf).signals if again else recording.signals
     return replace(recording, signals=signals)
 
@@ -298,7 +298,6 @@ def _write(
     warnings: Sequence[Finding],
 ) -> None:  # fmt: skip
     writer.add("scenario.yaml", task.text.encode())
-    writer.add(folder.RESOLVED, resolved_yaml(task.scenario).encode())
     for name, text in task.scenario.plugin_files().items():
         writer.add(name, text.encode())
     status = {"status": recording.status, "controller": recording.controller}

@@ -11,10 +11,9 @@ from podusv_cli.comparison.claims import ParsedClaim
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import Case, unknown_codes
-from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.measured import is_log, track
 from podusv_cli.workflows.members import Member, distinct, numbered
@@ -101,7 +100,7 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
     cases = [Case(single, loaded.plans[label]) for label, single in singles.items()]
     members = [
         Member(
-            label, about_of(case.scenario), resolved_yaml(case.scenario), case.scenario.plugged,
+            label, case.about, case.resolved_yaml, case.scenario.plugged,
             case=case, text=loaded.text, noticed=examined(case),
         )
         for label, case in zip(labels, cases, strict=True)

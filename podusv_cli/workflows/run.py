@@ -11,7 +11,7 @@ from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Check, Loaded, load, resolved_yaml
+from podusv_cli.scenario.load import Check, Loaded, load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage.run_folder import default_folder
@@ -67,7 +67,7 @@ def run_loaded(
         scenario = single(loaded, request.controller)
         check_asked(request, [scenario.plugged])
         case = Case(scenario, loaded.plan(scenario))
-        target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
+        target = request.out or default_folder(RESULTS, scenario.name, case.resolved_yaml)
     with watch.part("preflight"):
         noticed = examined(case)
     for finding in noticed:

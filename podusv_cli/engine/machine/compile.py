@@ -43,8 +43,7 @@ class Piece(NamedTuple):
     @property
     def name(self) -> str:
         """The name under which its code is kept."""
-        name = self.label or self.function.__qualname__
-        return re.sub(r"\W", "_", f"{name}_{object_cache.fingerprint(self.function)}")
+        return _kept_as(self)
 
     @property
     def size(self) -> int:
@@ -57,6 +56,12 @@ class Piece(NamedTuple):
         with interrupts_deferred():
             module = import_module(f"podusv_cli.engine.machine.{self.compiler}")
             return cast(object_cache.Code, module.object_code(self.function, self.prototype))
+
+
+@cache  # it reads all byte code of a piece
+def _kept_as(piece: Piece) -> str:
+    name = piece.label or piece.function.__qualname__
+    return re.sub(r"\W", "_", f"{name}_{object_cache.fingerprint(piece.function)}")
 
 
 def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None) -> None:
