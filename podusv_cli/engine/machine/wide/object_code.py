@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,8 +13,7 @@ import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
 from numba import njit, types
-from numba.core import cgutils, config
-from numba.core.compiler_lock import global_compiler_lock
+from numba.core import cgutils
 from numba.core.errors import NumbaError
 from numba.core.typing.ctypes_utils import from_ctypes
 from numba.extending import intrinsic
@@ -58,7 +55,7 @@ def object_code(function: Any, prototype: Any) -> Code:
 def _module(function: Any, prototype: Any) -> Any:
     signature = compile_numba.signature(prototype, _type)
     compiled = njit(**compile_numba.INNER)(_with_inlined(function))
-    with _unoptimised():
+    with compile_numba.unoptimised():  # which `widening` works on
         compiled.compile(signature.args)
     scalar = compiled.overloads[signature.args]
     module = llvm.parse_assembly(scalar.library.get_llvm_str())
@@ -66,18 +63,6 @@ def _module(function: Any, prototype: Any) -> Any:
     result = "i64" if prototype._restype_ else ""
     name = scalar.fndesc.llvm_func_name
     return widening.widened(module, name, memory, result, target())
-
-
-@contextmanager
-def _unoptimised() -> Iterator[None]:
-    """Have numba leave its code as it comes, which `widening` works on."""
-    with global_compiler_lock:
-        before = config.OPT
-        config.OPT = type(before)(0)
-        try:
-            yield
-        finally:
-            config.OPT = before
 
 
 def _type(kind: Any) -> Any:
