@@ -1,3 +1,4 @@
+# mypy: disable-error-code="attr-defined"
 """Object code of kernels by numba. `object_cache` keeps it on the disk for later processes."""
 
 from __future__ import annotations
@@ -162,7 +163,7 @@ def signature(prototype: Any, type_of: Any) -> Any:
     """A prototype in numba's types; `type_of` gives that of what is no function."""
 
     def typed(kind: Any) -> Any:
-        if kind and issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
+        if kind and issubclass(kind, ctypes._CFuncPtr):
             # numba wants a function from a Python object to its address, but never calls it here.
             return types.ExternalFunctionPointer(signature(kind, type_of), ctypes.addressof)
         return type_of(kind)
