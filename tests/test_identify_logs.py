@@ -162,6 +162,15 @@ def test_a_column_may_have_units_in_brackets_another_sign_and_dates_for_times(tm
     assert np.degrees(log.columns["psi"]) == pytest.approx([-7.0, -8.0])
 
 
+@pytest.mark.parametrize(
+    "text",
+    ["t;x\n0;1,5\n1;2,5\n", "t\tx\n0\t1.5\n1\t2.5\n", "\ufeff# made by hand\nt x\n0 1.5\n1 2.5\n"],
+)
+def test_separators_and_decimal_commas(tmp_path, text):
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    assert columns_of(tmp_path / "log.csv")["x"].tolist() == [1.5, 2.5]
+
+
 def test_the_local_plane_is_that_of_the_ellipsoid():
     """Against the earth-centred algebra of the same ellipsoid, and tables of a degree's length."""
     a, e2 = 6378137.0, 0.00669437999014
@@ -301,7 +310,7 @@ def test_a_compass_that_is_mounted_backwards_is_said_with_what_follows_from_it(w
         checked(replace(weaving, columns=given), Ideal())
     given.pop("u"), given.pop("v")
     lines = checked(replace(weaving, columns=given), Ideal())
-    assert "deg off its heading on average; is x north" in lines[0]
+    assert "deg off its heading on average; check that x is north" in lines[0]
 
 
 def test_times_in_milliseconds(weaving):
@@ -312,7 +321,7 @@ def test_times_in_milliseconds(weaving):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"u": lambda c: 1.7 * c["u"]}, "u is 1.7 times as large than positions move"),
+        ({"u": lambda c: 1.7 * c["u"]}, "u is 1.7 times as fast as positions move"),
         ({"tau_u": lambda c: 0 * c["u"] + 2.5}, "tau_u is 2.5 throughout"),
         ({"v": lambda c: np.nan * c["v"]}, "v has no number at all"),
     ],
@@ -419,22 +428,32 @@ def test_what_pods_did_follows_from_their_commands():
     assert acted(own, actuator) is own
 
 
-def test_commands_that_act_two_seconds_later_are_moved_and_said(sailed):
-    clean = Clocks(scenario(), sailed).settled(None)
-    assert clean is sailed
+def test_commands_that_act_two_seconds_later_are_found_and_said(tmp_path, sailed):
+    assert Clocks(scenario(), sailed).delay() == (0.0, [])
     early = later(sailed, Ideal(), -2.0)
-    moved = Clocks(scenario(), early).settled(None)
-    assert "its commands act 2.00 s later than it says" in moved.warnings[0]
-    same = slice(20, -20)
-    assert moved.columns["tau_r"][same] == pytest.approx(sailed.columns["tau_r"][same])
-    given = Clocks(scenario(), early).settled(2.0)
-    assert given.columns["tau_r"][same] == pytest.approx(sailed.columns["tau_r"][same])
+    path = written(tmp_path / "a.csv", {"time": early.times, **early.columns})
+    (log,) = logs_of(path, LogFile(file="a.csv"), scenario())
+    assert "its commands act 2.00 s later than it says" in log.warnings[0]
+    moved = log_of(later(early, Ideal(), 2.0), Ideal(), 0.1).record.rows
+    assert log.record.rows == pytest.approx(moved)
+    (given,) = logs_of(path, LogFile(file="a.csv", delay=2.0), scenario())
+    assert given.record.rows == pytest.approx(moved)
+    assert given.warnings == ()
+
+
+def test_a_delay_is_looked_for_where_the_boat_turns(sailed):
+    moored = np.arange(-1000.0, 0.0, 0.5)
+    columns = {
+        n: np.concatenate([np.full(len(moored), c[0]), c]) for n, c in sailed.columns.items()
+    }
+    long = Table("long.csv", np.concatenate([moored, sailed.times]), columns)
+    assert Clocks(scenario(), long).part.times[-1] == sailed.times[-1]
 
 
 def test_port_and_starboard_exchanged(sailed):
     turned = replace(sailed, columns={**sailed.columns, "tau_r": -sailed.columns["tau_r"]})
     with pytest.raises(LogFault, match=r"turns against its commands.*Exchange the columns of port"):
-        Clocks(scenario(), turned).settled(None)
+        Clocks(scenario(), turned).delay()
 
 
 def test_a_whole_log_counted_to_port_is_found_by_its_commands(tmp_path, sailed):

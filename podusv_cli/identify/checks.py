@@ -17,7 +17,6 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.signal import STATE
 from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.reading import UNITS, Table, Whole
 
@@ -126,16 +125,16 @@ def _clock(motion: Motion) -> Iterator[str]:
 
 
 def _constant(motion: Motion) -> Iterator[str]:
-    """Columns that never change, or have hardly any numbers."""
+    """Columns that never change, or have no numbers: a compass that stands while the boat turns."""
     for name, values in motion.table.columns.items():
         known = values[np.isfinite(values)]
         if not len(known):
             yield f"{name} has no number at all"
         elif np.ptp(known) == 0.0 and known[0] != 0.0:
-            if name in {signal.name for signal in STATE[:3]}:
+            if name == "psi" and abs(np.nanmean(np.exp(1j * np.angle(motion.velocity)))) < ALIKE:
                 raise LogFault(
-                    f"{name} is {known[0]:g} throughout; its sensor stood "
-                    f"still, or identify.columns names another column than that of {name}"
+                    f"psi is {known[0]:g} throughout while the track turns; its sensor stood "
+                    "still, or identify.columns names another column"
                 )
             yield f"{name} is {known[0]:g} throughout"
 
@@ -195,8 +194,8 @@ def _courses(motion: Motion) -> Iterator[str]:
     aside = math.degrees(cmath.phase(own.mean))
     if lack < ABEAM and abs(aside) > ASIDE:
         yield (
-            f"the boat moves {aside:.0f} deg off its heading on average; is x north, y east, and "
-            "psi counted from north towards east?"
+            f"the boat moves {aside:.0f} deg off its heading on average; check that x is "
+            "north, y east, and psi counted from north towards east"
         )
 
 
@@ -206,7 +205,7 @@ def _yaw_rate(motion: Motion) -> Iterator[str]:
         return
     turning, given = motion.rate(motion.heading()), motion.mean("r")
     for line in _compared(motion, "r", turning, given, UNITS["rad/s"]):
-        yield line + " than psi turns"
+        yield f"{line} as fast as psi turns"
 
 
 def _speeds(motion: Motion) -> Iterator[str]:
@@ -215,7 +214,7 @@ def _speeds(motion: Motion) -> Iterator[str]:
     for name, moved in (("u", body.real), ("v", body.imag)):
         if name in motion.table.columns:
             for line in _compared(motion, name, moved, motion.mean(name), UNITS["m/s"]):
-                yield line + " than positions move"
+                yield f"{line} as fast as positions move"
 
 
 def _compared(
@@ -241,7 +240,7 @@ def _compared(
             f'"{sign}COLUMN{brackets}" under identify.columns, with the log\'s name of {name}'
         )
     if abs(math.log(ratio)) > ODD:
-        yield f"{name} is {1.0 / ratio:.2g} times as large"
+        yield f"{name} is {1.0 / ratio:.2g} times"
 
 
 def _manoeuvres(motion: Motion) -> Iterator[str]:

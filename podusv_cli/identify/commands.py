@@ -62,6 +62,8 @@ def _lagged(times: Vector, commands: Vector, actuator: Actuator) -> Vector:
 
 def later(table: Table, actuator: Actuator, delay: float) -> Table:
     """The log with its commands acting so much later [s]."""
+    if not delay:
+        return table
     at = np.searchsorted(table.times, table.times - delay + 1e-9, "right") - 1
     moved = {
         signal.name: held(table.columns[signal.name])[np.maximum(at, 0)]

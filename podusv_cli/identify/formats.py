@@ -29,6 +29,7 @@ TIME = "time"
 STATE_NAMES = {signal.name for signal in STATE}
 MEASURED = "_m"  # ends the name of what a sensor of podusv measured
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+SEPARATORS, SAMPLE = ",;\t", 20  # and lines of a file that tell which of them it has
 LONGEST = 16  # numbers of an array in a message; longer ones are pictures and clouds
 OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simulation's clock set it
 
@@ -53,12 +54,21 @@ def columns_of(path: Path) -> Columns:
 def _csv(path: Path) -> Columns:
     """The columns of a CSV file, whose first line names them; NaN for what is no number.
 
+    Separated by commas, semicolons, tabs or blanks; unless by commas, these may be decimal ones.
     Dates, as 2026-05-04T10:00:00Z, become seconds since 1970.
     """
     import pandas as pd  # slow to import
 
     try:
-        frame = pd.read_csv(path, sep=None, engine="python", comment="#", skipinitialspace=True)
+        with path.open(encoding="utf-8-sig") as file:
+            lines = [line for _, line in zip(range(SAMPLE), file, strict=False)]
+        head, *body = [line for line in lines if line.strip() and not line.startswith("#")]
+        sep = max(SEPARATORS, key=head.count)
+        decimal = "," if sep != "," and "," in "".join(body) else "."
+        frame = pd.read_csv(
+            path, sep=sep if sep in head else r"\s+", decimal=decimal, comment="#",
+            skipinitialspace=True, encoding="utf-8-sig", low_memory=False,
+        )  # fmt: skip
     except (OSError, ValueError) as error:
         raise LogFault(f"{path}: cannot be read as CSV with a line of names: {error}") from error
     frame.columns = [" ".join(str(name).split()) for name in frame.columns]

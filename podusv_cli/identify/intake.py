@@ -11,7 +11,7 @@ import numpy as np
 
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.checks import checked
-from podusv_cli.identify.commands import acted
+from podusv_cli.identify.commands import acted, later
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.reading import Named, Table, table
 from podusv_cli.identify.records import FEWEST, POSE, Log, log_of
@@ -30,8 +30,14 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     part = acted(whole.part(*given.span) if given.span else whole, actuator)
     log_of(part, actuator, wanted.step)  # says what is missing before anything else is looked at
     part = replace(part, warnings=(*part.warnings, *checked(part, actuator)))
-    settled = Clocks(scenario, part).settled(given.delay)
-    return [log_of(piece, actuator, wanted.step) for piece in pieces(settled)]
+    found = list(pieces(part))
+    longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
+    delay, lines = (
+        (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
+    )
+    moved = [later(piece, actuator, delay) for piece in found]
+    moved[0] = replace(moved[0], warnings=(*moved[0].warnings, *lines))
+    return [log_of(piece, actuator, wanted.step) for piece in moved]
 
 
 def pieces(log: Table) -> Iterator[Table]:

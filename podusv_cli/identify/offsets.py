@@ -6,24 +6,26 @@ Where that foretells the log much better, also once the hull is fitted to it, th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from podusv_cli.identify import estimate
 from podusv_cli.identify.commands import later
 from podusv_cli.identify.formats import LogFault
-from podusv_cli.identify.problem import Problem
+from podusv_cli.identify.march import DELAY
+from podusv_cli.identify.problem import WALKS, Problem
 from podusv_cli.identify.reading import Table
 from podusv_cli.identify.records import log_of
+from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.model import Scenario
 
-STEP = 0.25
-DELAYS = STEP * np.arange(-4, 21)  # s, by which commands may act later than the log says
-SMALL = 0.4  # s: a delay that the fit itself finds
-BETTER = 30.0  # in -2 log of the posterior
-ENOUGH = 300.0  # s of a log, which tell a delay
+DELAYS = tuple(0.5 * i for i in range(-2, 11))  # s, by which commands may act later than logged
+BETTER = 30.0  # in -2 log of the likelihood, or of the posterior
+QUIET = -2.0  # prior standard deviations
+ENOUGH = 200.0  # s of a log, which tell a delay
 MIRRORED = ("y", "psi", "v", "r")
 
 
@@ -31,11 +33,12 @@ MIRRORED = ("y", "psi", "v", "r")
 class Way:
     """A way to read a log: its commands act later [s], port and starboard are exchanged.
 
-    `value` is -2 log of the likelihood, or of the posterior once the hull is fitted.
+    By default it is as it says. `value` is -2 log of the likelihood, or of the posterior once the
+    hull is fitted.
     """
 
-    delay: float
-    mirrored: bool
+    delay: float = 0.0
+    mirrored: bool = False
     value: float = np.inf
 
 
@@ -46,17 +49,16 @@ class Clocks:
     scenario: Scenario
     table: Table
 
-    def settled(self, delay: float | None) -> Table:
-        """The log with its commands as they acted: `delay` [s] later, or as the motion says.
+    def delay(self) -> tuple[float, list[str]]:
+        """By how much later than the log says its commands act [s], and a sentence if they do.
 
         Raises LogFault where port and starboard are exchanged.
         """
-        if delay is not None:
-            return later(self.table, self.scenario.actuator, delay)
-        none, *others = self._likely()
-        if not others:
-            return self.table
-        none, *others = [self._fitted(way) for way in (none, *others)]
+        likely = self._likely()
+        if not likely:
+            return 0.0, []
+        with ThreadPoolExecutor(available_workers()) as pool:
+            none, *others = pool.map(self._fitted, (Way(), *likely))
         best = min(others, key=lambda way: way.value)
         straight = min(way.value for way in (none, *others) if not way.mirrored)
         if best.mirrored and straight - best.value > BETTER:
@@ -69,49 +71,62 @@ class Clocks:
             )
         gain = none.value - best.value
         if best.mirrored or gain <= BETTER:
-            return self.table
+            return 0.0, []
         line = (
             f"{self.table.name}: its commands act {best.delay:.2f} s later than it says, and are "
             f"moved by that (its motion is foretold better, by {gain:.0f} in -2 log of the "
             "posterior). identify.logs[].delay gives another."
         )
-        moved = later(self.table, self.scenario.actuator, best.delay)
-        return replace(moved, warnings=(*self.table.warnings, line))
+        return best.delay, [line]
 
     def _likely(self) -> list[Way]:
-        """The log as it is, then what the vessel as it was given foretells much better."""
-        own, mirrored = ([self._valued(Way(d, m)) for d in DELAYS.tolist()] for m in (False, True))
-        none = own[int(np.argmin(np.abs(DELAYS)))]
-        lower = [w for w in (*_lowest(own), *_lowest(mirrored)) if w.value < none.value - BETTER]
-        return [none, *(way for way in lower if way.mirrored or abs(way.delay) >= SMALL)]
+        """Ways that the vessel as it was given foretells much better than the log as it is."""
+        with ThreadPoolExecutor(available_workers()) as pool:
+            own, mirrored = (
+                [*pool.map(self._valued, [Way(d, turned) for d in DELAYS])]
+                for turned in (False, True)
+            )
+        none = own[DELAYS.index(0.0)].value
+        best, turned = (min(ways, key=lambda way: way.value) for ways in (own, mirrored))
+        likely = [best] if best.value < none - BETTER else []
+        if turned.value < none - BETTER:
+            likely += [turned, Way(0.0, True)][: 2 if turned.delay else 1]
+        return likely
+
+    @cached_property
+    def part(self) -> Table:
+        """So much of the log as tells a delay: where the heading turns most."""
+        times, psi = self.table.times, self.table.columns["psi"]
+        known = np.flatnonzero(np.isfinite(psi))
+        turned = np.zeros(len(times))
+        turned[known[1:]] = np.abs(np.diff(np.unwrap(psi[known])))
+        sums = np.cumsum(turned)
+        ends = np.searchsorted(times, times + ENOUGH, "right") - 1
+        begin = times[np.argmax(sums[ends] - sums)]
+        return self.table.part(begin, begin + ENOUGH)
 
     def _problem(self, way: Way) -> Problem:
         """The filter along a log that is read so."""
         wanted, actuator = self.scenario.identify, self.scenario.actuator
         assert wanted is not None
-        part = self.table.part(self.table.times[0], self.table.times[0] + ENOUGH)
-        read = later(_mirrored(part) if way.mirrored else part, actuator, way.delay)
+        read = later(_mirrored(self.part) if way.mirrored else self.part, actuator, way.delay)
         return Problem(self.scenario, wanted, [log_of(read, actuator, wanted.step)])
 
     def _valued(self, way: Way) -> Way:
+        """With loads that hardly wander, so that the commands have to explain the motion."""
         problem = self._problem(way)
-        return replace(way, value=_search(problem).value(np.zeros(len(problem.numbers))))
+        y = np.array([QUIET * (number.name in WALKS) for number in problem.numbers])
+        return replace(way, value=_search(problem).value(y))
 
     def _fitted(self, way: Way) -> Way:
         problem = self._problem(way)
         found = estimate.estimated(_search(problem), np.zeros(len(problem.numbers)))
-        return replace(way, value=found.value)
+        delay = way.delay + problem.values(found.y)[DELAY]
+        return replace(way, delay=delay, value=found.value)
 
 
 def _search(problem: Problem) -> estimate.Search:
     return estimate.Search(problem.innovations, len(problem.numbers), problem.blocks)
-
-
-def _lowest(ways: Sequence[Way]) -> list[Way]:
-    """The two lowest of those that are lower than their neighbours."""
-    values = np.array([np.inf, *(way.value for way in ways), np.inf])
-    low = np.flatnonzero((values[1:-1] <= values[:-2]) & (values[1:-1] < values[2:]))
-    return sorted((ways[i] for i in low.tolist()), key=lambda way: way.value)[:2]
 
 
 def _mirrored(table: Table) -> Table:
