@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 from dataclasses import replace
 
@@ -313,6 +314,16 @@ def test_a_compass_that_is_mounted_backwards_is_said_with_what_follows_from_it(w
     assert "deg off its heading on average; check that x is north" in lines[0]
 
 
+def test_a_boat_that_yaws_in_waves_on_a_straight_track_is_no_mistake():
+    times = np.arange(0.0, 120.0, 0.1)
+    noise = 0.01 * np.random.default_rng(2).standard_normal((2, len(times)))
+    columns = {
+        "x": 1.5 * times + noise[0], "y": 0.1 * times + noise[1],
+        "psi": 0.4 * np.sin(1.3 * times), "tau_u": np.sin(times),
+    }  # fmt: skip
+    assert checked(Table("waves.csv", times, columns), Ideal()) == []
+
+
 def test_times_in_milliseconds(weaving):
     with pytest.raises(LogFault, match=r'100 s apart.* write time: "COLUMN \[ms\]"'):
         checked(replace(weaving, times=1e3 * weaving.times), Ideal())
@@ -330,6 +341,13 @@ def test_what_is_only_unlikely_is_a_warning(weaving, changes, sentence):
     changed = {name: change(weaving.columns) for name, change in changes.items()}
     given = replace(weaving, columns={**weaving.columns, **changed})
     assert [line for line in checked(given, Ideal()) if sentence in line]
+
+
+def test_a_position_that_jumps_is_a_warning(weaving):
+    x = weaving.columns["x"] + np.where(weaving.times < 30.0, 0.0, 40.0)
+    (line,) = checked(replace(weaving, columns={**weaving.columns, "x": x}), Ideal())
+    jump = re.search(r"jumps at 29\.5 s \(a speed of (.*?) m/s", line)
+    assert float(jump[1]) == pytest.approx(40.0 / 2.0, abs=1.5)  # over two bins of a second
 
 
 def test_a_straight_run_at_one_speed_tells_little():

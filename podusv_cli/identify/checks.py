@@ -18,14 +18,16 @@ import numpy as np
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.formats import LogFault
-from podusv_cli.identify.reading import UNITS, Table, Whole
+from podusv_cli.identify.reading import UNITS, Marks, Table, Whole
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
 FINER = {unit: UNITS["s"][unit] for unit in ("ms", "us", "ns")}
 BIN = 1.0  # s, over which values are averaged; at least that of VALUES_A_BIN
 VALUES_A_BIN = 3
 FEWEST_BINS = 10
-MOVING = 0.2  # of the fastest speed, above which a course says something
+FAST = 0.95  # quantile of the speed that counts as the fastest
+MOVING = 0.2  # of that, above which a course says something
+JUMP = 5.0  # times that, above which a position has jumped
 ALIKE = 0.9  # correlation or agreement, from which on two quantities are the same one
 UNLIKE = 0.005  # of 1, that an agreement lacks in a log with turns
 BETTER = 0.25  # of what it lacks, that another reading of the heading may lack at most
@@ -81,6 +83,17 @@ class Motion:
     def velocity(self) -> Vector:
         """Over ground, north + 1j east [m/s], by positions."""
         return self.rate(self.mean("x")) + 1j * self.rate(self.mean("y"))
+
+    @cached_property
+    def fastest(self) -> float:
+        """The speed that hardly any bin exceeds [m/s]."""
+        return float(np.nanquantile(np.abs(self.velocity), FAST))
+
+    @cached_property
+    def moving(self) -> Marks:
+        """The bins in which the course of the track says something."""
+        speed = np.abs(self.velocity)
+        return np.asarray((speed > MOVING * self.fastest) & (speed < JUMP * self.fastest))
 
 
 def checked(table: Table, actuator: Actuator) -> list[str]:
@@ -174,8 +187,7 @@ class Reading:
 
 def _courses(motion: Motion) -> Iterator[str]:
     """Heading in degrees, counted to port, or axes exchanged: by the course of the track."""
-    speed = np.abs(motion.velocity)
-    moving = speed > MOVING * np.nanmax(speed)
+    moving = motion.moving
     if np.sum(moving) < FEWEST_BINS:
         return
     course = np.angle(motion.velocity[moving])
@@ -186,7 +198,9 @@ def _courses(motion: Motion) -> Iterator[str]:
 
     own, *others = [read(turn, sign) for turn in (RADIANS, DEGREES) for sign in (1.0, -1.0)]
     best, lack = max(others, key=lambda reading: abs(reading.mean)), 1.0 - abs(own.mean)
-    if abs(best.mean) > ALIKE and lack > UNLIKE and 1.0 - abs(best.mean) < BETTER * lack:
+    # A reading that takes all headings for the same one agrees as well as the courses alike are.
+    least = min(lack, 1.0 - abs(complex(np.nanmean(np.exp(1j * course)))))
+    if abs(best.mean) > ALIKE and least > UNLIKE and 1.0 - abs(best.mean) < BETTER * least:
         raise LogFault(
             f"the track's course and psi agree to {abs(own.mean):.2f} of 1 as "
             f"given, but to {abs(best.mean):.2f} if {best.words}; {best.remedy}"
@@ -196,6 +210,18 @@ def _courses(motion: Motion) -> Iterator[str]:
         yield (
             f"the boat moves {aside:.0f} deg off its heading on average; check that x is "
             "north, y east, and psi counted from north towards east"
+        )
+
+
+def _jumps(motion: Motion) -> Iterator[str]:
+    """Positions that jump, as of a receiver that finds itself elsewhere."""
+    jumps = np.flatnonzero(np.abs(motion.velocity) > JUMP * motion.fastest)
+    if len(jumps) and len(motion.velocity) > FEWEST_BINS:
+        at = motion.table.times[0] + motion.width * (jumps[0] + 0.5)
+        yield (
+            f"its position jumps at {at:.10g} s (a speed of {abs(motion.velocity[jumps[0]]):.3g} "
+            f"m/s, while {100.0 * FAST:g} % of the log are below {motion.fastest:.3g}); the filter "
+            "takes that for motion, so leave out what is around it, with spans"
         )
 
 
@@ -245,8 +271,7 @@ def _compared(
 
 def _manoeuvres(motion: Motion) -> Iterator[str]:
     """Logs without excitation."""
-    speed = np.abs(motion.velocity)
-    fast = speed[speed > MOVING * np.nanmax(speed)]
+    fast = np.abs(motion.velocity)[motion.moving]
     turned = np.nanstd(motion.heading())
     if turned < STEADY and len(fast) and np.nanstd(fast) < STEADY * np.nanmean(fast):
         yield (
@@ -257,5 +282,5 @@ def _manoeuvres(motion: Motion) -> Iterator[str]:
 
 
 CHECKS: tuple[Callable[[Motion], Iterator[str]], ...] = (
-    _clock, _constant, _courses, _yaw_rate, _speeds, _out_of_reach, _manoeuvres,
+    _clock, _constant, _courses, _jumps, _yaw_rate, _speeds, _out_of_reach, _manoeuvres,
 )  # fmt: skip

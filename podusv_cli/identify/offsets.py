@@ -24,6 +24,7 @@ from podusv_cli.scenario.model import Scenario
 
 DELAYS = tuple(0.5 * i for i in range(-2, 11))  # s, by which commands may act later than logged
 BETTER = 30.0  # in -2 log of the likelihood, or of the posterior
+REFINED = 4  # times, that a delay is the start of another fit
 QUIET = -2.0  # prior standard deviations
 ENOUGH = 200.0  # s of a log, which tell a delay
 MIRRORED = ("y", "psi", "v", "r")
@@ -70,8 +71,13 @@ class Clocks:
                 "identify.frame: enu if all of the motion is counted to port"
             )
         gain = none.value - best.value
-        if best.mirrored or gain <= BETTER:
+        if best.mirrored or not gain > BETTER:  # also where no fit came to an end
             return 0.0, []
+        for _ in range(REFINED):
+            nearer = self._fitted(Way(best.delay))
+            if nearer.value > best.value - 1.0:
+                break
+            best = nearer
         line = (
             f"{self.table.name}: its commands act {best.delay:.2f} s later than it says, and are "
             f"moved by that (its motion is foretold better, by {gain:.0f} in -2 log of the "
