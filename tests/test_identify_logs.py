@@ -222,8 +222,8 @@ def test_latitude_stays_north_where_all_else_is_east_north_up(tmp_path):
 
 
 def test_a_log_of_a_date_is_the_log_from_zero(sailed):
-    own = log_of(sailed, Ideal(), 0.1)
-    dated = log_of(replace(sailed, times=sailed.times + 1.7e9), Ideal(), 0.1)
+    own = log_of(sailed, Ideal(), 0.05)
+    dated = log_of(replace(sailed, times=sailed.times + 1.7e9), Ideal(), 0.05)
     assert dated.record.rows == pytest.approx(own.record.rows, abs=1e-5)
 
 
@@ -232,8 +232,8 @@ def test_headings_may_wrap(sailed):
     assert np.any(np.abs(np.diff(wrapped)) > 3.0)
     turned = replace(sailed, columns={**sailed.columns, "psi": wrapped})
     assert checked(turned, Ideal()) == checked(sailed, Ideal()) == []
-    assert log_of(turned, Ideal(), 0.1).state[3:] == pytest.approx(
-        log_of(sailed, Ideal(), 0.1).state[3:]
+    assert log_of(turned, Ideal(), 0.05).state[3:] == pytest.approx(
+        log_of(sailed, Ideal(), 0.05).state[3:]
     )
 
 
@@ -249,7 +249,7 @@ def test_sensors_of_rates_that_do_not_divide_deliver_what_they_measured(tmp_path
     longest = max(map(len, columns.values()))
     full = {n: np.append(v, np.full(longest - len(v), np.nan)) for n, v in columns.items()}
     path = written(tmp_path / "log.csv", full)
-    log = log_of(read(path, {"x": "gps.x", "y": "gps.y", "psi": "imu.psi"}), Ideal(), 0.1)
+    log = log_of(read(path, {"x": "gps.x", "y": "gps.y", "psi": "imu.psi"}), Ideal(), 0.05)
     rows = log.record.rows
     assert log.counts[:3].tolist() == [90, 90, 210]
     given = rows[:, DELIVERED + 2] != 0
@@ -259,7 +259,7 @@ def test_sensors_of_rates_that_do_not_divide_deliver_what_they_measured(tmp_path
 
 def test_a_sensor_that_is_held_between_its_values_counts_once(weaving):
     held = np.repeat(weaving.columns["x"][::5], 5)
-    log = log_of(replace(weaving, columns={**weaving.columns, "x": held}), Ideal(), 0.1)
+    log = log_of(replace(weaving, columns={**weaving.columns, "x": held}), Ideal(), 0.05)
     assert log.counts[:2].tolist() == [120, 600]
 
 
@@ -403,10 +403,10 @@ def test_names_that_are_not_there_are_answered_with_near_ones(tmp_path):
 
 def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
     with pytest.raises(LogFault, match="has 11 values of the pose, at least 20"):
-        log_of(sailed.part(0.0, 2.0), Ideal(), 0.1)
+        log_of(sailed.part(0.0, 2.0), Ideal(), 0.05)
     bare = {n: c for n, c in sailed.columns.items() if n != "tau_r"}
     with pytest.raises(LogFault, match="nothing is known of tau_r"):
-        log_of(replace(sailed, columns=bare), Ideal(), 0.1)
+        log_of(replace(sailed, columns=bare), Ideal(), 0.05)
 
 
 def test_all_logs_for_judging():
@@ -452,7 +452,7 @@ def test_commands_that_act_two_seconds_later_are_found_and_said(tmp_path, sailed
     path = written(tmp_path / "a.csv", {"time": early.times, **early.columns})
     (log,) = logs_of(path, LogFile(file="a.csv"), scenario())
     assert "its commands act 2.00 s later than it says" in log.warnings[0]
-    moved = log_of(later(early, Ideal(), 2.0), Ideal(), 0.1).record.rows
+    moved = log_of(later(early, Ideal(), 2.0), Ideal(), 0.05).record.rows
     assert log.record.rows == pytest.approx(moved)
     (given,) = logs_of(path, LogFile(file="a.csv", delay=2.0), scenario())
     assert given.record.rows == pytest.approx(moved)
@@ -490,7 +490,7 @@ def test_a_whole_log_counted_to_port_is_found_by_its_commands(tmp_path, sailed):
     path = written(tmp_path / "enu.csv", enu | {"tau_u": c["tau_u"]})
     (log,) = logs_of(path, LogFile(file="enu.csv"), scenario(frame="enu"))
     assert log.warnings == ()
-    assert log.record.rows == pytest.approx(log_of(sailed, Ideal(), 0.1).record.rows)
+    assert log.record.rows == pytest.approx(log_of(sailed, Ideal(), 0.05).record.rows)
 
 
 def test_a_hull_ten_times_too_heavy_is_doubted(sailed):
@@ -499,7 +499,7 @@ def test_a_hull_ten_times_too_heavy_is_doubted(sailed):
     wanted = {"draws": 2, "prior": 0.3}
     for hull, far in ((HULL, False), (heavy, True)):
         given = scenario(hull, **wanted)
-        logs = [(log_of(sailed, Ideal(), 0.1), "fit")]
+        logs = [(log_of(sailed, Ideal(), 0.05), "fit")]
         lines = far_words(answered(given, given.identify, logs, None))
         assert bool(lines) is far
     assert "Is the vessel's preset of another size" in lines[0]

@@ -7,18 +7,21 @@ likelihood, plus the prior's part. Source: L. Ljung, "System Identification", 2n
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.reading import Whole
 
 SHIFT = 1e-4  # of a point's coordinate, for slopes
 LONGEST = 1.0  # of a coordinate, in one step
-ROUNDS = 60
-ENOUGH = 0.01  # of a posterior standard deviation: a step that ends the search
+ROUNDS = 100
+DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of the curvature, tried side by side
+ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 OPEN = 0.3  # posterior over prior standard deviation of a direction that logs leave open
 
 # From points to innovations and their variances, a row a value, a column a point.
@@ -46,21 +49,18 @@ class Search:
     size: int
     blocks: Whole
 
-    def along(self, basis: Vector) -> Search:
-        """The search in the space that the columns of `basis`, orthonormal, span."""
-
-        def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
-            return self.innovations([basis @ y for y in points])
-
-        return Search(innovations, basis.shape[1], self.blocks)
-
-    def value(self, y: Vector) -> float:
-        """-2 log of the posterior at a point; infinite where the filter breaks down."""
-        nu, s = self.innovations([y])
-        return _value(nu[:, 0], s[:, 0], y)
+    def values(self, points: Sequence[Vector]) -> list[float]:
+        """-2 log of the posterior at points; infinite where the filter breaks down."""
+        with np.errstate(all="ignore"):
+            nu, s = self.innovations(points)
+        return [_value(nu[:, i], s[:, i], y) for i, y in enumerate(points)]
 
     def scored(self, y: Vector) -> Scored:
         """Value, slopes and Fisher's matrix at a point."""
+        with np.errstate(all="ignore"):
+            return self._scored(y)
+
+    def _scored(self, y: Vector) -> Scored:
         nus, variances = self.innovations([y, *(y + SHIFT * np.eye(self.size))])
         nu, s = nus[:, :1], variances[:, :1]
         d_nu, d_s = (nus[:, 1:] - nu) / SHIFT, (variances[:, 1:] - s) / SHIFT
@@ -93,29 +93,43 @@ class Estimate:
     interrupted: bool = False
 
 
-def estimated(search: Search, start: Vector, tell: Tell = lambda i, value: None) -> Estimate:
-    """The estimate by Fisher scoring. An interrupt leaves the best so far."""
-    y, at, settled, stopped, i = start, search.scored(start), False, False, 0
+def estimated(search: Search, tell: Tell = lambda i, value: None) -> Estimate:
+    """The estimate by Fisher scoring from the prior's centre, damped as Marquardt does.
+
+    Each round tries eight dampings side by side. An interrupt leaves the best so far. Raises
+    UsageError where the filter breaks down at the start.
+    """
+    y, i, settled, stopped = np.zeros(search.size), 0, False, False
+    at = search.scored(y)
+    if not math.isfinite(at.value):
+        raise UsageError(
+            "with the vessel as it is given the filter along the logs leaves the finite numbers; "
+            "check units and signs of the columns, give a vessel nearer to the boat's size, or a "
+            "shorter identify.step"
+        )
     try:
         for i in range(1, ROUNDS + 1):
             tell(i, at.value)
-            step = _step(at, y)
-            while search.value(y + step) >= at.value and np.abs(step).max() > SHIFT:
-                step = 0.5 * step
-            if np.abs(step).max() > SHIFT:
-                y, at = y + step, search.scored(y + step)
-            settled = bool(np.all(np.abs(step) < ENOUGH * np.sqrt(np.diag(_by_curvature(at)))))
-            if settled:
+            steps, expected = _steps(at, y)
+            values = search.values([y + step for step in steps])
+            best = int(np.argmin(values))
+            settled = expected <= ENOUGH
+            if settled or not values[best] < at.value:
                 break
+            y, at = y + steps[best], search.scored(y + steps[best])
     except KeyboardInterrupt:
         stopped = True
     return Estimate(y, at.value, covariance(at, y), i, settled, stopped)
 
 
-def _step(at: Scored, y: Vector) -> Vector:
+def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:
+    """Steps of growing damping, none longer than LONGEST, and what the first should gain."""
     gradient = at.slopes.sum(axis=0) + 2.0 * y
-    step: Vector = -np.linalg.solve(at.information + 2.0 * np.eye(len(y)), gradient)
-    return np.asarray(step * min(1.0, LONGEST / max(np.abs(step).max(), SHIFT)))
+    curvature = at.information + 2.0 * np.eye(len(y))
+    damped = (curvature + part * np.diag(np.diag(curvature)) for part in DAMPINGS)
+    steps = [-np.linalg.solve(matrix, gradient) for matrix in damped]
+    short = [step * min(1.0, LONGEST / max(np.abs(step).max(), SHIFT)) for step in steps]
+    return short, float(-0.5 * gradient @ steps[0])
 
 
 def _by_curvature(at: Scored) -> Vector:
@@ -160,24 +174,3 @@ def directions(covariance: Vector, hull: int) -> Directions:
     """Of the first `hull` coordinates."""
     squares, basis = np.linalg.eigh(covariance[:hull, :hull])
     return Directions(basis, np.sqrt(np.maximum(squares, 0.0)))
-
-
-def told(
-    search: Search, hull: int, tell: Tell = lambda i, value: None
-) -> tuple[Estimate, Directions]:
-    """The estimate, and what of the first `hull` numbers the logs tell.
-
-    In a direction that they leave open the estimate keeps the prior, its centre and its width.
-    """
-    free = estimated(search, np.zeros(search.size), tell)
-    ways = directions(free.covariance, hull)
-    if ways.known == hull or free.interrupted:
-        return free, ways
-    basis = np.zeros((search.size, search.size - hull + ways.known))
-    basis[:hull, : ways.known] = ways.basis[:, : ways.known]
-    basis[hull:, ways.known :] = np.eye(search.size - hull)
-    inside = estimated(search.along(basis), basis.T @ free.y, tell)
-    whole = basis @ inside.covariance @ basis.T
-    left = ways.basis[:, ways.known :]
-    whole[:hull, :hull] += left @ left.T
-    return replace(inside, y=basis @ inside.y, covariance=whole), ways

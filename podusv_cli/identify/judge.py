@@ -107,7 +107,7 @@ def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
         return followed.innovations, followed.variances
 
     blocks = np.zeros(log.record.delivered, np.int64)
-    found = estimated(Search(innovations, 2, blocks), np.zeros(2)).y
+    found = estimated(Search(innovations, 2, blocks)).y
     return list(problem.current * found)
 
 

@@ -98,7 +98,9 @@ def corrected(line: Vector, since: float, state: Vector, k: Any, out: Vector) ->
             late = derivative(i, k.delay_p, state, h)
             value = seen_from_water(i, line[VALUES + i], since, state[2], k, h)
             innovation = value - (state[i] - late)
-            out[at] = wrap(innovation) if i == 2 else innovation
+            if i == 2:
+                innovation = wrap(innovation)
+            out[at] = innovation
             out[at + 1] = take_in(i, h, out[at], sigma[i], state)
             at += 2
     return at

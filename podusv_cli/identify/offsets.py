@@ -122,11 +122,11 @@ class Clocks:
         """With loads that hardly wander, so that the commands have to explain the motion."""
         problem = self._problem(way)
         y = np.array([QUIET * (number.name in WALKS) for number in problem.numbers])
-        return replace(way, value=_search(problem).value(y))
+        return replace(way, value=_search(problem).values([y])[0])
 
     def _fitted(self, way: Way) -> Way:
         problem = self._problem(way)
-        found = estimate.estimated(_search(problem), np.zeros(len(problem.numbers)))
+        found = estimate.estimated(_search(problem))
         delay = way.delay + problem.values(found.y)[DELAY]
         return replace(way, delay=delay, value=found.value)
 

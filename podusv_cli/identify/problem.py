@@ -40,11 +40,11 @@ SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
 CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain, on the model ship
-AT_START = (0.3, 0.2, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
+AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
 TURNED = 0.05  # rad, of the heading at the start
 FINEST = 1e-4  # of what a sensor measured, its least error
 FLOWING = 0.2  # of the speed at full thrust: a current that nothing is known of
-BLOCK = 10.0  # s of a log, whose innovations count together
+BLOCK = 30.0  # s of a log, whose innovations count together
 
 
 @dataclass(frozen=True)

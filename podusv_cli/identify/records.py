@@ -116,7 +116,10 @@ def _held(times: Vector, values: Vector, kept: Whole) -> Vector:
 
 
 def _state(table: Table, new: Marks) -> Vector:
-    """Pose and velocities at the start, by straight lines through the first seconds."""
+    """Pose and velocities at the start, by straight lines through the first seconds.
+
+    Sway is not guessed: a few seconds of GNSS tell less of it than that hulls hardly slip.
+    """
     state = np.zeros(MOVING)
     slopes = np.zeros(MOVING)
     for i, signal in enumerate(STATE):
@@ -130,7 +133,7 @@ def _state(table: Table, new: Marks) -> Vector:
         if i < POSE and len(early) > 2:
             slopes[i], state[i] = np.polyfit(table.times[early] - table.times[0], values, 1)
     c, s = np.cos(state[2]), np.sin(state[2])
-    guessed = (c * slopes[0] + s * slopes[1], c * slopes[1] - s * slopes[0], slopes[2])
+    guessed = (c * slopes[0] + s * slopes[1], 0.0, slopes[2])
     for i, velocity in enumerate(guessed, POSE):
         if not new[:, i].any():
             state[i] = velocity

@@ -62,7 +62,7 @@ class Identify(Component):
         None, "m/s", "standard deviation of the current north and east, which every log has its "
         "own of; null: a fifth of the speed at full thrust; 0: no current", ge=0,
     )  # fmt: skip
-    step: Positive = value(0.1, "s", "longest step of the filter along a log")
+    step: Positive = value(0.05, "s", "longest step of the filter along a log")
     draws: int = value(
         200, "", "hulls that are drawn from what the logs leave open", ge=2, le=10**5
     )

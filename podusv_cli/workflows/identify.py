@@ -89,7 +89,8 @@ def answered(
         if progress:
             progress(f"fitting, round {i}", min(i / SETTLES, 0.99))
 
-    found, ways = estimate.told(search, len(problem.hull), tell)
+    found = estimate.estimated(search, tell)
+    ways = estimate.directions(found.covariance, len(problem.hull))
     judged = [(log, role, free_runs(problem, log, found.y)) for log, role in logs]
     marks = [score for log, role, runs in judged for score in scores(log, role, runs)]
     return Answer(problem, found, ways, judged, marks)
