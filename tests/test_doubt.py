@@ -20,6 +20,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP, explored
 from podusv_cli.doubt.answer import compared
+from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import Choice, Range, choices, public
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judged
@@ -28,7 +29,9 @@ from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.sweep import Quantity
-from podusv_cli.workflows.doubt import InMemory
+from podusv_cli.storage.run_folder import InMemory
+from podusv_cli.workflows import doubt as doubting
+from podusv_cli.workflows.run import Request
 
 # A hull that nothing pushes: u' = X_u u/(m - X_udot), by Fossen (2021), eq. 6.110, with u alone.
 ADRIFT = """
@@ -399,6 +402,29 @@ def test_what_two_laws_differ_in_stays_in_claims_about_both():
     assert not own.is_contrast(frozenset("a"))
     assert other.is_contrast(frozenset("b"))  # 0.2 in place of the default is what b is for
     assert not by_name()["controllers.c.k_s"].is_contrast(frozenset("abc"))
+
+
+def test_hulls_are_drawn_whole_and_judged_as_algebra_has_it():
+    rows = np.array([[-0.31, -1.7], [-4.1, -3.9], [-1.3, -60.0], [-2.9, -11.0]])
+    lines = "\n".join(["X_u,X_udot", *(f"{x},{m}" for x, m in rows.tolist())])
+    fixed = "vessel nominal start path controllers control simulation"
+    section = {"draws": 60, "vary": {"vessel": {"rows": lines}}, "printed": fixed.split()}
+    text = WRITTEN.replace("doubt: {draws: 40}", f"doubt: {json.dumps(section)}")
+    loaded = load_text(text, "adrift.yaml", (), (doubt_faults,))
+    report, _ = doubting.doubted(
+        doubting.comparison(loaded), loaded.scenario, Request(workers=1), None
+    )
+    (choice,) = report.tried.draws.choices
+    drawn_rows = [values[0] for values in report.tried.draws.values]
+    assert {public(place) for place in choice.places} == {
+        f"{hull}.{name}" for hull in ("vessel", "nominal") for name in ("X_u", "X_udot")
+    }
+    limit = 1.03 * left()
+    slow = [left(damping=x, mass=HULL.m - m) <= limit for x, m in rows.tolist()]
+    assert sorted(slow) != [slow[0]] * 4, "some hulls turn it"
+    answers = [world.answers["slow"] for world in report.tried.worlds]
+    assert answers == [slow[row] for row in drawn_rows]
+    assert {0, 1, 2, 3} == set(drawn_rows)
 
 
 def test_the_hull_moves_with_what_laws_know_of_it():

@@ -173,7 +173,8 @@ def test_what_is_wrong_with_the_folder_is_one_sentence():
     assert "unknown key 'hull.X_u'" in told("sweep.vary={vessel: null, hull: {identified: found}}")
     assert "vessel.X_u is drawn twice" in told("sweep.vary.vessel.X_u={uniform: [-2, -1]}")
     assert "is under grid, too" in told("sweep.grid.vessel.N_r=[-1, -2]")
-    alone = told("doubt.vary={vessel: {identified: found}}")
-    assert "doubt.vary.vessel: one number is moved at a time, and a row has several" in alone
+    claims = "sweep.claims={c: {says: It ends., expect: fraction(finished) >= 0.5}}"
+    of_study = told(claims, "doubt.vary={vessel: {identified: found}}")
+    assert "doubt.vary.vessel: a study draws rows itself: write this under sweep.vary" in of_study
     Path("found/posterior.csv").unlink()
     assert told().endswith("the folder found has no posterior.csv; podusv identify makes it")

@@ -14,7 +14,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE
 from podusv_cli.metrics.measured import OF_LOG
-from podusv_cli.storage.run_folder import FinishedRun
+from podusv_cli.storage.run_folder import FinishedRun, InMemory
 
 POSE = tuple(signal.name for signal in STATE[:3])
 TARGET = ("x_d", "y_d")
@@ -52,7 +52,7 @@ class Track:
             signals["z_e"] = np.hypot(signals["x_d"] - signals["x"], signals["y_d"] - signals["y"])
         about = {signal.name: signal for signal in LOOP if signal.name in signals}
         log = Recording("finished", NO_LAW, signals, about=about)
-        return _Measured(self.file, "finished", {}, {}, "", log=log)
+        return InMemory(self.file, "finished", {}, {}, "", kept=log)
 
     def departures(self, run: Recording) -> dict[str, float]:
         """How far a run is from it where times agree, by metric; nothing where none do."""
@@ -67,15 +67,3 @@ class Track:
         distances, turned = np.hypot(x, y), np.remainder(psi + math.pi, 2.0 * math.pi) - math.pi
         numbers = (np.sqrt(np.mean(distances**2)), distances.max(), np.sqrt(np.mean(turned**2)))
         return {metric.name: float(x) for metric, x in zip(OF_LOG, numbers, strict=True)}
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Measured(FinishedRun):
-    """A run that has its log in memory."""
-
-    log: Recording
-
-    @property
-    def recording(self) -> Recording:
-        """The measured signals."""
-        return self.log

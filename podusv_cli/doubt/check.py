@@ -33,11 +33,10 @@ def _vary(scenario: Scenario) -> Faults:
     assert scenario.doubt
     known = by_key(scenario.singles())
     for name, quantity in scenario.doubt.vary.items():
-        if quantity.rows:
+        if quantity.rows and scenario.sweep and scenario.sweep.claims:
             text = (
-                "one number is moved at a time, and a row has several; hulls that are drawn whole "
-                "belong under sweep.vary (podusv doubt judges that study, too), hulls to be tried "
-                "under doubt.hulls"
+                "a study draws rows itself: write this under sweep.vary, whose claims are judged "
+                "here; single hulls to be tried belong under doubt.hulls"
             )
             yield ("doubt", "vary", name), text
             continue

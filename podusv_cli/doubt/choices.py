@@ -25,6 +25,7 @@ from podusv_cli.scenario.yaml_tree import Route, bracketed, dotted
 HULL: Route = ("vessel",)  # where the name of a preset stands for the whole hull
 Singles = Mapping[str, Scenario]  # the scenario of each law, by its label
 Place = tuple[str, Route]  # a law's label, and where the value stands in the scenario of its run
+ITS_OWN = "the scenario's own"
 GRAVITY = 9.81  # m/s2
 
 
@@ -43,7 +44,9 @@ class Range(NamedTuple):
 class Choice:
     """A value that may be another, at all places that have it together.
 
-    A number has a `range`, all else `values` to be tried in its place.
+    A number has a `range`, all else `values` to be tried in its place. Several numbers that move
+    together, as those of a hull, have `rows` of which draws take one, and stay where others are
+    tried.
     """
 
     name: str  # the key that readers see
@@ -55,11 +58,23 @@ class Choice:
     task: bool = False  # whether another value is another task
     beside: frozenset[str] = frozenset()  # laws of the same kind that differ in it
     named: bool = False  # whether it is what distinguishes its law from those
+    rows: Quantity | None = None
 
     @property
     def labels(self) -> frozenset[str]:
         """The laws whose runs it moves."""
         return frozenset(label for label, _ in self.places)
+
+    def at(self, value: Any) -> dict[Place, Any]:
+        """Every place with what it has for a value of the choice; of rows, a value is a place."""
+        if not self.rows:
+            return dict.fromkeys(self.places, value)
+        row = dict(zip(self.rows.lines.names, self.rows.lines.rows[value].tolist(), strict=True))
+        keys = {place: f".{dotted(place[1])}" for place in self.places}
+        return {
+            place: row[max((name for name in row if key.endswith(f".{name}")), key=len)]
+            for place, key in keys.items()
+        }
 
     def is_contrast(self, labels: frozenset[str]) -> bool:
         """Whether it is what a claim about these laws compares, and so has to stay."""
@@ -268,6 +283,8 @@ def _given(name: str, quantity: Quantity, singles: Singles) -> Choice:
     own = [place for key in quantity.targets(name) for place in known[bracketed(key)]]
     base, key = _base(own, singles)
     moving = (*own, *_known(own, singles))
+    if quantity.rows:
+        return replace(base, name=name, own=ITS_OWN, unit="", places=moving, rows=quantity)
     if quantity.seed or quantity.distribution.choice:
         values = quantity.distribution.choice or _values(key, base.own)
         return replace(base, places=moving, values=values)

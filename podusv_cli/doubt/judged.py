@@ -37,9 +37,10 @@ Judge = Callable[[World], Judged]
 
 def moved(choice: Choice, value: Any) -> World:
     """The world in which one choice has another value."""
-    return dict.fromkeys(choice.places, value)
+    return choice.at(value)
 
 
 def together(choices: Sequence[Choice], values: Sequence[Any]) -> World:
     """The world in which several choices have other values."""
-    return {place: v for choice, v in zip(choices, values, strict=True) for place in choice.places}
+    pairs = zip(choices, values, strict=True)
+    return {place: v for choice, value in pairs for place, v in choice.at(value).items()}

@@ -18,6 +18,7 @@ from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.storage import csv_files, json_files
 from podusv_cli.storage.run_folder import RunWriter
+from podusv_cli.studies.making.words import in_words as rows_in_words
 
 HEAD = ("claim", "verdict", "in draws", "turns at", "hangs on")
 
@@ -157,4 +158,4 @@ def _moves(choice: Choice) -> str:
     """The values that a choice had, in words."""
     if choice.range:
         return " to ".join(f"{end:.4g}" for end in ends(choice))
-    return ", ".join(as_yaml(value) for value in choice.values)
+    return rows_in_words(choice.rows) if choice.rows else ", ".join(map(as_yaml, choice.values))

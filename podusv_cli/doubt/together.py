@@ -42,11 +42,11 @@ class Draws:
 
 
 def drawn(choices: Sequence[Choice], seed: int, count: int) -> Draws:
-    """Draws of all numbers among the choices but those that make another task.
+    """Draws of all numbers and rows among the choices but those that make another task.
 
     A draw depends on the seed, the choice's name and the draw's number alone.
     """
-    moving = [choice for choice in choices if choice.range and not (choice.task or choice.beside)]
+    moving = [c for c in choices if (c.range or c.rows) and not (c.task or c.beside)]
     shares = np.array(
         [random_words.uniforms((seed, STREAM, choice.name), 0, count) for choice in moving]
     ).reshape(len(moving), count)
@@ -55,6 +55,8 @@ def drawn(choices: Sequence[Choice], seed: int, count: int) -> Draws:
 
 
 def _values(choice: Choice, shares: Vector) -> list[Any]:
+    if choice.rows:
+        return list(choice.rows.distribution.at(shares).tolist())
     assert choice.range
     way = choice.range.together
     return [way.value(choice.own, d) for d in way.distribution.at(shares).tolist()]

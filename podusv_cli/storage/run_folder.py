@@ -208,6 +208,18 @@ class FinishedRun:
         return log_reader.read_log(self.folder / LOG)
 
 
+@dataclass(frozen=True)
+class InMemory(FinishedRun):
+    """A run that lies in no folder."""
+
+    kept: Recording = field(kw_only=True)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """What was recorded."""
+        return self.kept
+
+
 def open_run(folder: Path) -> FinishedRun:
     """Open a run folder whose files are unchanged since it was finished.
 

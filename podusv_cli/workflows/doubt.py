@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from podusv_cli.comparison.entries import Entry, metrics_of
 from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
-from podusv_cli.core.recording import Recording, Status
+from podusv_cli.core.recording import Status
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import TriedChoice, explored
 from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
@@ -36,7 +36,7 @@ from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import find, placed
 from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder
+from podusv_cli.storage.run_folder import InMemory, RunWriter, default_folder
 from podusv_cli.workflows.doubt_study import doubt_study
 from podusv_cli.workflows.execute import Stopwatch, examined, monitored, simulated, summary, warm_up
 from podusv_cli.workflows.run import RESULTS, Request, opened
@@ -200,18 +200,6 @@ def _changed(subject: Subject, label: str, world: World) -> Scenario:
     hull = new.pop(HULL, None)
     single = (subject.hulls[hull.value] if hull else subject.singles)[label]
     return with_values(single, new)
-
-
-@dataclass(frozen=True)
-class InMemory(FinishedRun):
-    """A run that lies in no folder."""
-
-    kept: Recording = field(kw_only=True)
-
-    @cached_property
-    def recording(self) -> Recording:
-        """What was recorded."""
-        return self.kept
 
 
 def _entry(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> Entry:
