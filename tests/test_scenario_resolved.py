@@ -12,6 +12,8 @@ from scenario_samples import SOUND, loaded, write
 from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import SizingError
+from podusv_cli.scenario.doubt import Doubt
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.keys import limits, members, sections
 from podusv_cli.scenario.limits import LEAST_COMPRESSED, Size, needed
 from podusv_cli.scenario.load import HEADING, load, load_stored, load_text, resolved_yaml, values
@@ -28,7 +30,10 @@ TEXT = st.text(st.characters(exclude_categories=("Cs", "Cc"), include_characters
 
 SWEEP = {
     "draws": 3,
-    "vary": {"vessel.m": {"times": {"normal": {"sigma": 0.1, "within": (-0.5, 1e-3)}}}},
+    "vary": {
+        "vessel.m": {"times": {"normal": {"sigma": 0.1, "within": (-0.5, 1e-3)}}},
+        "hull": {"keys": ("vessel",), "rows": "X_u,Y_v\n-1.5,-2\n-1e-300,-.25\n"},
+    },
     "grid": {"path": ({"kind": "line", "x": (1, 2.5)}, None, True), "name": ("a: b", "")},
     "claims": {"S1": {"says": "#", "source": "ours", "expect": "share(a.iae < b.iae) > 0.5"}},
 }
@@ -36,6 +41,13 @@ TUNE = {
     "objective": ("median(iae)", "failures"),
     "space": {"around": 10.0, "pid.K_Pu": {"log": (1e-3, 2.5)}, "fold": {"choice": ("none", 1)}},
 }
+DOUBT = {"printed": ("path",), "vary": {"start.y": {"plus": {"uniform": (-1, 0.25)}}}}
+IDENTIFY = {
+    "logs": ({"file": "a.csv", "span": (0, 1e3)}, {"file": "b.csv", "role": "judge"}),
+    "columns": {"psi": "heading [deg]"}, "priors": {"m11": 1e-3},
+}  # fmt: skip
+# Sections of which hardly any mixture of values is possible.
+SAMPLES = {Sweep: SWEEP, Tune: TUNE, Doubt: DOUBT, Identify: IDENTIFY}
 
 
 def numbers(found: dict[str, Any]) -> st.SearchStrategy[float]:
@@ -47,10 +59,9 @@ def numbers(found: dict[str, Any]) -> st.SearchStrategy[float]:
 
 def contents(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
     """Anything that a type allows within the field's limits."""
-    if Sweep in sections(annotation).values():
-        return st.sampled_from([None, SWEEP])
-    if Tune in sections(annotation).values():
-        return st.sampled_from([None, TUNE])
+    for section in sections(annotation).values():
+        if section in SAMPLES:
+            return st.sampled_from([None, SAMPLES[section]])
     if sections(annotation):
         return st.one_of(*(components(part) for part in sections(annotation).values()))
     simple = {
