@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import sys
@@ -528,6 +529,39 @@ def test_columns_are_listed_with_rate_range_and_a_guess(tmp_path):
     assert (heading.least, heading.most) == (columns["Heading"].min(), columns["Heading"].max())
     assert battery.missing == pytest.approx(0.25)
     assert found.mapping()[4] == '  psi: "Heading [deg]"'
+
+
+def test_the_command_lists_columns_without_a_scenario(podusv, tmp_path):
+    written(tmp_path / "log.csv", {"t": [0.0, 0.5], "heading": [350.0, 10.0]})
+    said = podusv("identify", "--columns", "log.csv")
+    assert said.code == 0
+    assert "heading" in said.out
+    assert said.out.rstrip().endswith('psi: "heading [deg]"')
+    listed = json.loads(podusv("identify", "--columns", "log.csv", "--json").out)
+    assert listed["columns"][1]["unit"] == "deg"
+    assert podusv("identify", "--columns", "none.csv").err == "none.csv: there is no such file\n"
+    assert "CONFIG is missing" in podusv("identify").err
+
+
+def test_what_is_doubtful_reaches_terminal_and_report(podusv, tmp_path, sailed):
+    """A log of degrees ends before the fit; with its unit it is fitted, and its gap is said."""
+    kept = sailed.where((sailed.times < 40.0) | (sailed.times >= 46.0))
+    columns = {"time": kept.times, **kept.columns, "psi": np.degrees(kept.columns["psi"])}
+    written(tmp_path / "log.csv", columns)
+    (tmp_path / "boat.yaml").write_text(
+        "extends: podusv:trials/base.yaml\nvessel: {preset: cybership2}\n"
+        "actuator: {kind: ideal}\ncontroller: {kind: pid}\n"
+        "identify:\n  logs: [{file: log.csv}]\n  free: [inertia]\n  draws: 2\n"
+    )
+    said = podusv("identify", "boat.yaml", "--out", "hull", "--no-figures")
+    assert said.code == 2
+    assert 'write psi: "COLUMN [deg]" under identify.columns' in said.err
+    unit = "identify.columns={psi: 'psi [deg]'}"
+    said = podusv("identify", "boat.yaml", "--out", "hull", "--no-figures", "--set", unit)
+    line = "has 1 gap, the longest of 6.2 s at 39.8 s; it is taken as 2 logs"
+    assert said.code == 0
+    assert line in " ".join(said.err.split())
+    assert line in (tmp_path / "hull/report.html").read_text()
 
 
 def test_what_is_guessed_of_a_ros_bag_can_be_pasted(tmp_path):

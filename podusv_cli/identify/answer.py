@@ -58,8 +58,9 @@ class Force:
 
     @property
     def width(self) -> float:
-        """Of the interval, over that of the prior."""
-        return (self.high - self.low) / (self.prior_high - self.prior_low)
+        """Of the interval, over that of the prior; 1 where nothing of it was looked for."""
+        before = self.prior_high - self.prior_low
+        return (self.high - self.low) / before if before else 1.0
 
 
 @dataclass(frozen=True)

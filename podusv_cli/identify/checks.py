@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +30,9 @@ FAST = 0.95  # quantile of the speed that counts as the fastest
 MOVING = 0.2  # of that, above which a course says something
 JUMP = 5.0  # times that, above which a position has jumped
 ALIKE = 0.9  # correlation or agreement, from which on two quantities are the same one
+SURE = 25.0  # courses times a squared agreement: e to the minus this is its chance without cause
 UNLIKE = 0.005  # of 1, that an agreement lacks in a log with turns
-BETTER = 0.25  # of what it lacks, that another reading of the heading may lack at most
+BETTER = 0.3  # of what it lacks, that another reading of the heading may lack at most
 ABEAM = 0.2  # of an agreement, within which a mean angle means something
 NEAR = math.log(1.1)  # of a ratio, that counts as the ratio of two units
 ODD = math.log(1.4)  # of a ratio, that no unit explains and no sensor has
@@ -200,7 +202,8 @@ def _courses(motion: Motion) -> Iterator[str]:
     best, lack = max(others, key=lambda reading: abs(reading.mean)), 1.0 - abs(own.mean)
     # A reading that takes all headings for the same one agrees as well as the courses alike are.
     least = min(lack, 1.0 - abs(complex(np.nanmean(np.exp(1j * course)))))
-    if abs(best.mean) > ALIKE and least > UNLIKE and 1.0 - abs(best.mean) < BETTER * least:
+    sure = np.sum(moving) * abs(best.mean) ** 2 > SURE
+    if sure and least > UNLIKE and 1.0 - abs(best.mean) < BETTER * least:
         raise LogFault(
             f"the track's course and psi agree to {abs(own.mean):.2f} of 1 as "
             f"given, but to {abs(best.mean):.2f} if {best.words}; {best.remedy}"
@@ -226,11 +229,17 @@ def _jumps(motion: Motion) -> Iterator[str]:
 
 
 def _yaw_rate(motion: Motion) -> Iterator[str]:
-    """Yaw rate in deg/s or of the other sign: by how fast the heading turns."""
+    """Yaw rate in deg/s or of the other sign, or heading in degrees: by how both turn."""
     if "r" not in motion.table.columns:
         return
-    turning, given = motion.rate(motion.heading()), motion.mean("r")
-    for line in _compared(motion, "r", turning, given, UNITS["rad/s"]):
+    given = motion.mean("r")
+    own, degrees = (_match(motion.rate(motion.heading(turn)), given) for turn in (RADIANS, DEGREES))
+    if degrees.same and not own.same:
+        raise LogFault(
+            f"psi turns as r says if it is in degrees (correlation {degrees.alike:.2f}; as given "
+            f'{own.alike:.2f}); write psi: "COLUMN [deg]" under identify.columns'
+        )
+    for line in _compared("r", own, UNITS["rad/s"]):
         yield f"{line} as fast as psi turns"
 
 
@@ -239,31 +248,49 @@ def _speeds(motion: Motion) -> Iterator[str]:
     body = motion.velocity * np.exp(-1j * motion.heading())
     for name, moved in (("u", body.real), ("v", body.imag)):
         if name in motion.table.columns:
-            for line in _compared(motion, name, moved, motion.mean(name), UNITS["m/s"]):
+            for line in _compared(name, _match(moved, motion.mean(name)), UNITS["m/s"]):
                 yield f"{line} as fast as positions move"
 
 
-def _compared(
-    motion: Motion, name: str, seen: Vector, given: Vector, units: dict[str, float]
-) -> Iterator[str]:
-    """A quantity beside what positions and headings say of it. Raises LogFault."""
+class Match(NamedTuple):
+    """What positions and headings say of a quantity beside what a log says of it.
+
+    `alike` is their correlation about 0, 0 where there is too little of both; `ratio` that of
+    their sizes, the first over the second.
+    """
+
+    alike: float
+    ratio: float
+
+    @property
+    def same(self) -> bool:
+        """Whether both are the same quantity in the same unit."""
+        return self.alike > ALIKE and abs(math.log(self.ratio)) < NEAR
+
+
+def _match(seen: Vector, given: Vector) -> Match:
     both = np.isfinite(seen) & np.isfinite(given)
-    if np.sum(both) < FEWEST_BINS:
-        return
     a, b = seen[both], given[both]
-    middle = np.abs(a - np.median(a)) <= 4.0 * np.std(a)  # an edge of a gap is no motion
-    a, b = a[middle], b[middle]
-    alike = float(a @ b / math.sqrt((a @ a) * (b @ b))) if a.any() and b.any() else 0.0
+    if len(a) >= FEWEST_BINS:
+        middle = np.abs(a - np.median(a)) <= 4.0 * np.std(a)  # an edge of a gap is no motion
+        a, b = a[middle], b[middle]
+    if len(a) < FEWEST_BINS or not (a.any() and b.any()):
+        return Match(0.0, 1.0)
+    return Match(float(a @ b / math.sqrt((a @ a) * (b @ b))), math.sqrt((a @ a) / (b @ b)))
+
+
+def _compared(name: str, match: Match, units: dict[str, float]) -> Iterator[str]:
+    """A quantity beside what positions and headings say of it. Raises LogFault."""
+    alike, ratio = match
     if abs(alike) < ALIKE:
         return
-    ratio = math.sqrt((a @ a) / (b @ b))
     unit = next((u for u, f in units.items() if f != 1.0 and abs(math.log(ratio / f)) < NEAR), "")
     if unit or alike < 0.0:
         sign, brackets = "-" if alike < 0.0 else "", f" [{unit}]" if unit else ""
         raise LogFault(
-            f"{name} is {'-' if alike < 0.0 else ''}{1.0 / ratio:.3g} times "
-            f"what positions and headings say (correlation {alike:.2f}); write {name}: "
-            f'"{sign}COLUMN{brackets}" under identify.columns, with the log\'s name of {name}'
+            f"{name} is {'-' if alike < 0.0 else ''}{1.0 / ratio:.3g} times what positions and "
+            f'headings say (correlation {alike:.2f}); write {name}: "{sign}COLUMN{brackets}" under '
+            f"identify.columns, with the log's name of {name}"
         )
     if abs(math.log(ratio)) > ODD:
         yield f"{name} is {1.0 / ratio:.2g} times"

@@ -60,6 +60,8 @@ class Clocks:
             return 0.0, []
         with ThreadPoolExecutor(available_workers()) as pool:
             none, *others = pool.map(self._fitted, (Way(), *likely))
+        if not np.isfinite(none.value):  # the fit of all logs says why
+            return 0.0, []
         best = min(others, key=lambda way: way.value)
         straight = min(way.value for way in (none, *others) if not way.mirrored)
         if best.mirrored and straight - best.value > BETTER:
@@ -71,7 +73,7 @@ class Clocks:
                 "identify.frame: enu if all of the motion is counted to port"
             )
         gain = none.value - best.value
-        if best.mirrored or not gain > BETTER:  # also where no fit came to an end
+        if best.mirrored or gain <= BETTER:
             return 0.0, []
         for _ in range(REFINED):
             nearer = self._fitted(Way(best.delay))
@@ -122,11 +124,14 @@ class Clocks:
         """With loads that hardly wander, so that the commands have to explain the motion."""
         problem = self._problem(way)
         y = np.array([QUIET * (number.name in WALKS) for number in problem.numbers])
-        return replace(way, value=_search(problem).values([y])[0])
+        return replace(way, value=float(_search(problem).values([y])[0]))
 
     def _fitted(self, way: Way) -> Way:
         problem = self._problem(way)
-        found = estimate.estimated(_search(problem))
+        search = _search(problem)
+        if not np.isfinite(search.values([np.zeros(search.size)])[0]):
+            return replace(way, value=np.inf)
+        found = estimate.estimated(search)
         delay = way.delay + problem.values(found.y)[DELAY]
         return replace(way, delay=delay, value=found.value)
 

@@ -53,11 +53,12 @@ def identify_of(
             "shows"
         )
     source = loaded.root.mark.source
-    logs = [
-        (log, given.role)
-        for given in scenario.identify.logs
-        for log in logs_of(Path(relative_to(source, given.file)), given, scenario)
-    ]
+    logs: list[tuple[Log, str]] = []
+    for i, given in enumerate(scenario.identify.logs):
+        if progress:
+            progress(f"looking at {given.file}", i / len(scenario.identify.logs))
+        path = Path(relative_to(source, given.file))
+        logs += [(log, given.role) for log in logs_of(path, given, scenario)]
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with (
         interrupts_deferred(),
