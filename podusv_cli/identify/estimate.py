@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +21,9 @@ SHIFT = 1e-4  # of a point's coordinate, for slopes
 LONGEST = 1.0  # of a coordinate, in one step
 ROUNDS = 100
 DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of the curvature, tried side by side
+STARTS, NEARER = 3, 0.5  # other starts, and their share of the prior's deviations
+# |v| v makes kinks at which no step gains, though so much may be left: 0.7 deviations of a number.
+SETTLED = 0.5
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 OPEN = 0.3  # posterior over prior standard deviation of a direction that logs leave open
 
@@ -94,32 +97,45 @@ class Estimate:
 
 
 def estimated(search: Search, tell: Tell = lambda i, value: None) -> Estimate:
-    """The estimate by Fisher scoring from the prior's centre, damped as Marquardt does.
+    """The estimate from the prior's centre, or where that does not settle, the best of several.
 
-    Each round tries eight dampings side by side. An interrupt leaves the best so far. Raises
-    UsageError where the filter breaks down at the start.
+    The others begin at draws from the prior. An interrupt leaves the best so far. Raises UsageError
+    where the filter breaks down at the prior's centre.
     """
-    y, i, settled, stopped = np.zeros(search.size), 0, False, False
-    at = search.scored(y)
-    if not math.isfinite(at.value):
+    best = _estimated(search, np.zeros(search.size), tell)
+    if not math.isfinite(best.value):
         raise UsageError(
             "with the vessel as it is given the filter along the logs leaves the finite numbers; "
             "check units and signs of the columns, give a vessel nearer to the boat's size, or a "
             "shorter identify.step"
         )
+    rng = np.random.Generator(np.random.PCG64(search.size))
+    for _ in range(STARTS):
+        if best.settled or best.interrupted:
+            break
+        other = _estimated(search, NEARER * rng.standard_normal(search.size), tell)
+        best = min(best, other, key=lambda e: e.value)
+        best = replace(best, interrupted=other.interrupted)
+    return best
+
+
+def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
+    """Fisher scoring, damped as Marquardt does; each round tries eight dampings side by side."""
+    i, settled, stopped, at = 0, False, False, search.scored(y)
     try:
         for i in range(1, ROUNDS + 1):
             tell(i, at.value)
             steps, expected = _steps(at, y)
             values = search.values([y + step for step in steps])
             best = int(np.argmin(values))
-            settled = expected <= ENOUGH
-            if settled or not values[best] < at.value:
+            if expected <= ENOUGH or not values[best] < at.value:
+                settled = expected <= SETTLED
                 break
             y, at = y + steps[best], search.scored(y + steps[best])
     except KeyboardInterrupt:
         stopped = True
-    return Estimate(y, at.value, covariance(at, y), i, settled, stopped)
+    with np.errstate(all="ignore"):  # of a start at which the filter breaks down
+        return Estimate(y, at.value, covariance(at, y), i, settled, stopped)
 
 
 def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:

@@ -42,10 +42,10 @@ def free_run(run: FreeRun) -> Figure:
     figure = new_figure(COLUMNS, HEIGHT)
     track, heading = figure.subplots(1, 2)
     since = run.times - run.times[0]
-    known = np.all(np.isfinite(run.measured), axis=1)
-    x, y, psi = run.measured[known].T
-    track.plot(y, x, ".", color=MEASURED, ms=2.0, label="measured")
-    heading.plot(since[known], np.degrees(np.unwrap(psi)), ".", color=MEASURED, ms=2.0)
+    seen = np.isfinite(run.measured[:, 2])
+    psi = np.unwrap(run.measured[seen, 2])
+    track.plot(*run.measured[:, [1, 0]].T, ".", color=MEASURED, ms=2.0, label="measured")
+    heading.plot(since[seen], np.degrees(psi), ".", color=MEASURED, ms=2.0)
     middle_of_track = np.nanmean(run.measured[:, :2], axis=0)
     reach = DRAWN * float(np.nanmax(np.abs(run.measured[:, :2] - middle_of_track)))
     for i, (who, pose) in enumerate(zip(WHO, run.poses, strict=True)):
@@ -56,7 +56,7 @@ def free_run(run: FreeRun) -> Figure:
             color=colour, label=escaping.figure(who),
         )  # fmt: skip
         heading.plot(since, np.degrees(pose[:, 2]), color=colour)
-    middle, side = np.degrees(np.median(np.unwrap(psi))), np.degrees(np.ptp(np.unwrap(psi)))
+    middle, side = np.degrees(np.median(psi)), np.degrees(np.ptp(psi))
     heading.set_ylim(middle - side - 10.0, middle + side + 10.0)
     track.set(xlabel="east [m]", ylabel="north [m]")
     track.set_aspect("equal", adjustable="datalim")

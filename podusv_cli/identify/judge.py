@@ -13,11 +13,13 @@ from podusv_cli.core.kinematics import wrap
 from podusv_cli.identify.estimate import Search, estimated
 from podusv_cli.identify.march import DELIVERED, VALUES
 from podusv_cli.identify.problem import Problem
+from podusv_cli.identify.reading import Whole
 from podusv_cli.identify.records import Log
 
 WARM = 20.0  # s, in which the filter finds velocities and load before the first free run
 EVERY = 30.0  # s, from one start to the next
 HORIZONS = (5.0, 30.0, np.inf)  # s after a start; infinite: to the end of the log, from the first
+NEAR = 0.1  # of a horizon: how far from it a measured value may be
 WHO = ("identified", "prior", "constant velocity")
 
 
@@ -33,30 +35,38 @@ class FreeRun:
     measured: Vector
     poses: Sequence[Vector]
 
-    def errors(self, horizon: float) -> list[tuple[float, float]] | None:
+    def errors(self, horizon: float) -> list[tuple[float, float]]:
         """Of each way the error of position [m] and heading [rad] so long after the start.
 
-        With an infinite horizon their root mean squares along the run. None where nothing was
+        With an infinite horizon their root mean squares along the run. NaN where nothing was
         measured then.
         """
-        since = self.times - self.times[0]
-        known = np.all(np.isfinite(self.measured), axis=1)
-        if np.isinf(horizon):
-            rows = np.flatnonzero(known)
-        else:
-            rows = np.flatnonzero(known & (np.abs(since - horizon) <= 0.1 * horizon))
-            rows = rows[np.argsort(np.abs(since[rows] - horizon), kind="stable")][:1]
-        if not len(rows):
-            return None
-        return [self._rms(pose[rows] - self.measured[rows]) for pose in self.poses]
+        place, heading = (self._rows(columns, horizon) for columns in ([0, 1], [2]))
+        offs = [
+            (p[place] - self.measured[place], p[heading] - self.measured[heading])
+            for p in self.poses
+        ]
+        return [
+            (_rms(np.hypot(*there[:, :2].T)), _rms(_wrapped(turned[:, 2])))
+            for there, turned in offs
+        ]
 
-    @staticmethod
-    def _rms(off: Vector) -> tuple[float, float]:
-        headings = np.array([wrap(angle) for angle in off[:, 2]])
-        return (
-            float(np.sqrt(np.mean(off[:, 0] ** 2 + off[:, 1] ** 2))),
-            float(np.sqrt(np.mean(headings**2))),
-        )
+    def _rows(self, columns: list[int], horizon: float) -> Whole:
+        """Rows in which these columns were measured: all, or the one nearest to a horizon."""
+        rows = np.flatnonzero(np.all(np.isfinite(self.measured[:, columns]), axis=1))
+        if np.isinf(horizon):
+            return rows
+        late = np.abs(self.times[rows] - self.times[0] - horizon)
+        near = np.argsort(late, kind="stable")[:1]
+        return np.asarray(rows[near[late[near] <= NEAR * horizon]])
+
+
+def _rms(errors: Vector) -> float:
+    return float(np.sqrt(np.mean(errors**2))) if len(errors) else np.nan
+
+
+def _wrapped(angles: Vector) -> Vector:
+    return np.array([wrap(angle) for angle in angles])
 
 
 @dataclass(frozen=True)
@@ -126,9 +136,10 @@ def scores(log: Log, role: str, runs: Sequence[FreeRun]) -> Iterator[Score]:
     """The errors after each horizon, over the runs that reach it."""
     for horizon in HORIZONS:
         chosen = runs[:1] if np.isinf(horizon) else runs
-        errors = [e for e in (run.errors(horizon) for run in chosen) if e]
+        errors = np.array([run.errors(horizon) for run in chosen]).reshape(len(chosen), -1, 2)
+        errors = errors[np.isfinite(errors[:, 0, 0])]
         for i, who in enumerate(WHO):
-            own = np.array([e[i] for e in errors])
-            if len(own):
-                position, heading = np.sqrt(np.mean(own**2, axis=0))
-                yield Score(log.name, role, horizon, who, len(own), float(position), float(heading))
+            if len(errors):
+                own = errors[:, i]
+                position, heading = _rms(own[:, 0]), _rms(own[np.isfinite(own[:, 1]), 1])
+                yield Score(log.name, role, horizon, who, len(own), position, heading)
