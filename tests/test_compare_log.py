@@ -107,6 +107,15 @@ def test_the_command_draws_it_and_tells_the_numbers(podusv: Command):
     assert [run["controller"] for run in runs] == ["momentum_vector", "measured"]
 
 
+def test_python_has_the_same():
+    log("LOG.csv", "time,x,y,psi", ROWS)
+    made = p.compare(["task.yaml", "LOG.csv"], out="made", figures=False)
+    assert [*made.table.columns] == ["velocity", "momentum", "LOG"]
+    done = compared("task.yaml", "LOG.csv")
+    assert made.table.loc["log_distance_rms", "velocity"] == numbers(done, "velocity")[0]
+    assert made["LOG"]["x"].tolist() == [row[1] for row in ROWS]
+
+
 def test_a_path_that_is_followed_has_no_target_to_be_off(podusv: Command):
     alone = "controllers: null\ncontroller: {kind: alos}\n"
     write("legs.yaml", f"extends: task.yaml\n{LEGS}\n{alone}")

@@ -136,6 +136,22 @@ def test_a_run_of_a_study_is_a_run_of_that_hull():
         assert podusv.run("task.yaml", changes).metrics["iae"] == row["iae"]
 
 
+def test_an_environment_begins_on_a_drawn_hull():
+    """Half a second straight on, by hand: (m - X_udot) u' = tau_u + X_u u is all there is."""
+    gym = pytest.importorskip("podusv.gym")
+    env = gym.Env("task.yaml", limits=(2.0, 1.0), period=0.1)
+    for seed in range(4):
+        env.reset(seed=seed)
+        (row,) = (draw["vessel"] for draw in draws(study().scenario.sweep, seed, 1))
+        hull, u = study().scenario.vessel, 0.0
+        for _ in range(5):
+            seen, *_ = env.step(np.array([1.3, 0.0]))
+        mass, damping = hull.m - hull.X_udot, [HULLS[row][0], hull.X_uu, hull.X_uuu]
+        for _ in range(5000):
+            u += 1e-4 * (1.3 + damping[0] * u + damping[1] * u * u + damping[2] * u**3) / mass
+        assert seen[2] == pytest.approx(u, rel=1e-3)
+
+
 NOT_ABOVE = "row 3 of 3: vessel.X_u = 0.72; must be a number not above 0 [kg/s]"
 INDEFINITE = "row 2 of 2: vessel: the mass matrix is not positive definite"
 

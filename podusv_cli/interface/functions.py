@@ -35,7 +35,14 @@ from podusv_cli.workflows import doubt as doubting
 from podusv_cli.workflows import identify as identifying
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
-from podusv_cli.workflows.gather import Members, from_folder, from_scenario, gathered
+from podusv_cli.workflows.gather import (
+    Members,
+    from_folder,
+    from_scenario,
+    gathered,
+    measured,
+)
+from podusv_cli.workflows.measured import is_log
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
 
@@ -111,7 +118,8 @@ def compare(
     """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
 
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
-    mixture. Raises ScenarioError, UsageError, StorageError.
+    mixture; beside them a log of a boat, such as "sea_trial.csv". Raises ScenarioError, UsageError,
+    StorageError.
 
     >>> import podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
@@ -327,12 +335,15 @@ def _file(source: Any) -> Path | None:
 def _items(
     given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None
 ) -> list[Members]:
-    folders = [file if file and file.is_dir() else None for file in files]
+    logs = [file for file in files if file and is_log(file)]
+    others = [(source, f) for source, f in zip(given, files, strict=True) if f not in logs]
+    folders = [file if file and file.is_dir() else None for _, file in others]
     if changes and all(folders):
         raise UsageError(f"{', '.join(changes)}: only finished runs are given, which do not change")
-    return [
+    groups = [
         from_folder(folder)
         if folder
-        else from_scenario(loaded(source, changes), alone=len(given) == 1)
-        for source, folder in zip(given, folders, strict=True)
+        else from_scenario(loaded(source, changes), alone=len(others) == 1)
+        for (source, _), folder in zip(others, folders, strict=True)
     ]
+    return [*groups, *measured(logs, groups)]

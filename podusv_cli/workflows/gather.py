@@ -45,10 +45,10 @@ def gather(items: Sequence[Path], request: Request) -> Members:
     logs = [item for item in items if is_log(item)]
     others = [item for item in items if item not in logs]
     groups = [_opened(item, request, alone=len(others) == 1) for item in others]
-    return gathered([*groups, *_measured(logs, groups)])
+    return gathered([*groups, *measured(logs, groups)])
 
 
-def _measured(logs: Sequence[Path], groups: Sequence[Members]) -> list[Members]:
+def measured(logs: Sequence[Path], groups: Sequence[Members]) -> list[Members]:
     """A log among the arguments as the last of all runs. Raises UsageError."""
     if not logs:
         return []
@@ -58,16 +58,16 @@ def _measured(logs: Sequence[Path], groups: Sequence[Members]) -> list[Members]:
             f"{given}: runs are compared with one log at a time; name one, and a scenario or a run "
             "beside it"
         )
-    measured = track(logs[0], [group.identify for group in groups if group.identify])
+    log = track(logs[0], [group.identify for group in groups if group.identify])
     beside = groups[0].members[0].about
-    first, last = measured.times[0], measured.times[-1]
+    first, last = log.times[0], log.times[-1]
     if first > beside.duration or last < 0.0:
         raise UsageError(
             f"{logs[0]}: its times go from {first:.10g} to {last:.10g} s, and the run from 0 to "
             f"{beside.duration:g} s; count the log's time from where the run begins"
         )
-    name, text = logs[0].stem, repr(measured.signals["x"].tolist())
-    return [Members(name, [Member(name, measured.about(beside), text, track=measured)])]
+    name, text = logs[0].stem, repr(log.signals["x"].tolist())
+    return [Members(name, [Member(name, log.about(beside), text, track=log)])]
 
 
 def gathered(groups: Sequence[Members]) -> Members:

@@ -10,14 +10,17 @@ import numpy as np
 from podusv_cli.comparison.measured import POSE, Track
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.formats import READERS
-from podusv_cli.identify.reading import Named, delivered, table
 from podusv_cli.scenario.identify import Identify
+from podusv_cli.scenario.named_files import YAML
 
 
 def is_log(path: Path) -> bool:
     """Whether an argument is a log, and neither a scenario nor a folder."""
-    return bool(path.suffix) and path.suffix.lower() in READERS and not path.is_dir()
+    if path.suffix in ("", *YAML) or path.is_dir():
+        return False
+    from podusv_cli.identify.formats import READERS  # h5py is slow to import
+
+    return path.suffix.lower() in READERS
 
 
 def track(path: Path, identify: Sequence[Identify]) -> Track:
@@ -26,6 +29,8 @@ def track(path: Path, identify: Sequence[Identify]) -> Track:
     A row stands where a position is new; all else is straight between its own values. Raises
     UsageError where the log has no pose.
     """
+    from podusv_cli.identify.reading import Named, delivered, table
+
     named = Named(identify[0].columns, identify[0].frame) if identify else Named()
     log = table(path, STATE, named)
     if lacking := [name for name in POSE if name not in log.columns]:
