@@ -60,7 +60,7 @@ TABLE: dict[str, list[Row]] = {
      "test_files_of_a_finished_run_are_never_replaced"),
     ('run.status == "diverged" and run.was != "diverged"', 'run.status == "diverged"',
      "test_a_run_that_diverges_as_it_did_is_identical"),
-    ("if request.overrides and all(item.is_dir() for item in items):", "if False:",
+    ("if request.overrides and all(item.is_dir() or is_log(item) for item in items):", "if False:",
      "test_set_without_a_scenario_is_refused"),
     ("    if config.exists():\n", "    if False:\n", "test_init_replaces_nothing"),
     ("if study.resolve() == out.resolve()]:", "if False]:",
