@@ -58,9 +58,12 @@ class Force:
 
     @property
     def width(self) -> float:
-        """Of the interval, over that of the prior; 1 where nothing of it was looked for."""
-        before = self.prior_high - self.prior_low
-        return (self.high - self.low) / before if before else 1.0
+        """Of the interval, over that of the prior, each relative to what it is about.
+
+        1 where nothing of it was looked for.
+        """
+        before = (self.prior_high - self.prior_low) / abs(self.prior_high + self.prior_low)
+        return 0.5 * (self.high - self.low) / abs(self.value) / before if before else 1.0
 
 
 @dataclass(frozen=True)

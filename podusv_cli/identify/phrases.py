@@ -16,6 +16,7 @@ TELLING = {
     "t": "thrust is known where one mass is",
 }
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
+MOST = 4  # directions that are named
 SHARE = 0.3  # of a direction, from which on a number is named
 
 
@@ -36,7 +37,9 @@ def summary(answer: Answer) -> list[str]:
             ends = f"{min(f.at for f in told):.3g} to {max(f.at for f in told):.3g} {unit}"
             lines.append(f"{own[0].force} is known to {100.0 * error:.2g} % at {ends}.")
         elif own:
-            lines.append(f"{own[0].force} is not told by these logs; it stays as it was.")
+            lines.append(
+                f"{own[0].force} is not told by these logs: it is known little better than before."
+            )
     if not answer.estimate.settled:
         lines.append("The search had not settled when it ended; the numbers may still move.")
     lines += [note for log, _, _ in answer.judged for note in log.notes]
@@ -58,6 +61,8 @@ def open_words(answer: Answer) -> list[str]:
         names = ", ".join(hull[j].name for j in named)
         what = "how these share a force" if len(named) > 1 else "this number"
         lines.append(f"{what} is open ({ways.widths[i]:.2g} of the prior's width): {names}")
+    if len(lines) > MOST:
+        lines[MOST:] = [f"and so are {len(lines) - MOST} more directions"]
     return [*lines, *(TELLING[axis] for axis in sorted(axes))]
 
 
