@@ -22,8 +22,9 @@ LONGEST = 1.0  # of a coordinate, in one step
 ROUNDS = 100
 DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of the curvature, tried side by side
 STARTS, NEARER = 3, 0.5  # other starts, and their share of the prior's deviations
-# |v| v makes kinks at which no step gains, though so much may be left: 0.7 deviations of a number.
-SETTLED = 0.5
+# The filter's slopes jump where v or r pass through 0 (|v| r), so -2 log of the posterior is rough
+# by about this much, and no step may gain what is expected; it is little beside 1 a number.
+SETTLED = 2.0
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 OPEN = 0.3  # posterior over prior standard deviation of a direction that logs leave open
 
