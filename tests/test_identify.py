@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from podusv_cli.identify.march import (
     Record,
     side_by_side,
 )
+from podusv_cli.identify.phrases import worse_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.reading import Table, delivered
 from podusv_cli.identify.records import log_of
@@ -293,6 +295,32 @@ def test_a_free_run_of_the_true_hull_stays_with_the_boat(boat):
     assert errors[0][0] < 0.3
     weak = np.where(np.array(names) == "m11", 1.0, calm)
     assert judge.free_runs(given, boat[2], weak)[0].errors(30.0)[0][0] > 3.0 * errors[0][0]
+
+
+def test_on_a_straight_track_a_current_along_it_is_left_to_the_load(boat):
+    times = np.arange(0.0, 40.0, 0.2)
+    commands = np.tile([2.0, 0.0, 0.0], (len(times), 1))
+    states = motion(commands, times, np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]), current=(0.1, 0.0))
+    log = log_of(table_of(times, states, commands), Ideal(), 0.1)
+    given = problem([log])
+    assert judge._current(given, log, np.zeros(len(given.numbers)))[0] == pytest.approx(
+        0.0, abs=1e-9
+    )
+    turning = judge._current(problem(boat[:1]), boat[0], np.zeros(len(given.numbers)))
+    assert turning == pytest.approx([0.05, -0.03], abs=0.02)
+
+
+def test_a_hull_that_foretells_worse_than_the_prior_gets_a_warning():
+    def scored(identified, prior):
+        scores = [
+            judge.Score("a.csv", "judge", 30.0, who, 1, error, 0.1)
+            for who, error in zip(judge.WHO, (identified, prior, 9.0), strict=True)
+        ]
+        return SimpleNamespace(scores=scores)
+
+    assert worse_words(scored(1.0, 1.0)) == []
+    (line,) = worse_words(scored(2.0, 1.0))
+    assert line.startswith("a.csv: the vessel as it was given foretells this log better")
 
 
 def test_who_keeps_the_velocities_of_an_instant_goes_round_a_circle():

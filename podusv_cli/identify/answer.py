@@ -23,6 +23,7 @@ from podusv_cli.identify.problem import Problem, channels
 from podusv_cli.identify.records import Log
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
+SLOWEST = 0.05  # of the largest speed along the logs: slower is no motion to speak of
 COVERED = (0.1, 0.5, 0.9)  # quantiles of a speed along the logs
 OUTERMOST = 0.995  # quantile of the motion that becomes the envelope
 BEYOND, POINTS = 1.3, 40  # of a curve: how far beyond the fastest that is covered
@@ -73,12 +74,13 @@ class Axis:
     name: str
     unit: str
     speed: str
+    speed_unit: str
     force: Callable[..., float]
 
 
 AXES = (
-    Axis("X(u)", "N", "u [m/s]", surge_force), Axis("Y(v)", "N", "v [m/s]", sway_force),
-    Axis("N(r)", "N m", "r [rad/s]", yaw_moment),
+    Axis("X(u)", "N", "u", "m/s", surge_force), Axis("Y(v)", "N", "v", "m/s", sway_force),
+    Axis("N(r)", "N m", "r", "rad/s", yaw_moment),
 )  # fmt: skip
 
 
@@ -215,7 +217,9 @@ class Answer:
         """Damping forces at speeds of the logs."""
         found = []
         for place, axis in enumerate(AXES):
-            speeds = np.quantile(np.abs(self.motion[:, place]), COVERED)
+            moving = np.abs(self.motion[:, place])
+            moving = moving[moving >= SLOWEST * moving.max()]
+            speeds = np.quantile(moving, COVERED)
             own, after, before = self._damping(place, speeds)
             found += [
                 Force(axis.name, *map(float, numbers))

@@ -10,7 +10,7 @@ import numpy as np
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.identify.estimate import Search, estimated
+from podusv_cli.identify.estimate import Search, directions, estimated
 from podusv_cli.identify.march import DELIVERED, VALUES
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.reading import Whole
@@ -107,7 +107,10 @@ def _free_run(problem: Problem, log: Log, y: Vector, first: int) -> FreeRun:
 
 
 def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
-    """The current that a hull sees along a log [m/s]."""
+    """The current that a hull sees along a log [m/s], as far as the log tells it.
+
+    On a straight track a current along it is the same as a load, and is left to that.
+    """
     if not problem.current:
         return [0.0, 0.0]
 
@@ -117,8 +120,10 @@ def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
         return followed.innovations, followed.variances
 
     blocks = np.zeros(log.record.delivered, np.int64)
-    found = estimated(Search(innovations, 2, blocks)).y
-    return list(problem.current * found)
+    found = estimated(Search(innovations, 2, blocks))
+    ways = directions(found.covariance, 2)
+    told = ways.basis[:, : ways.known]
+    return list(problem.current * (told @ (told.T @ found.y)))
 
 
 def _turning(times: Vector, state: Vector) -> Vector:

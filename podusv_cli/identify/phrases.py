@@ -4,66 +4,103 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.answer import AXES, Answer
 from podusv_cli.identify.estimate import OPEN
+from podusv_cli.identify.judge import WHO
 
 # The manoeuvre that tells the numbers of an axis.
 TELLING = {
-    "X": "straight runs at three speeds tell the surge damping",
-    "Y": "turning circles at two speeds tell the sway damping",
-    "N": "turning circles and zig-zags tell the yaw damping",
-    "m": "zig-zags, and starts and stops, tell the inertia",
-    "t": "thrust is known where one mass is",
+    "X": "straight runs at three speeds would tell it",
+    "Y": "turning circles at two speeds or more would tell it",
+    "N": "turning circles and zig-zags would tell it",
+    "m": "zig-zags, starts and stops would tell it",
 }
+SHOWN = 30.0  # s after the start of a free run
+WORSE = 1.2  # times the prior's error: what is no accident of one log
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
 MOST = 4  # directions that are named
 SHARE = 0.3  # of a direction, from which on a number is named
 
 
 def summary(answer: Answer) -> list[str]:
-    """What came out, a sentence each."""
-    hull, known = answer.problem.hull, answer.directions.known
-    logs = answer.problem.logs
-    lines = [
-        f"{len(logs)} logs of {sum(log.duration for log in logs):.0f} s in all tell {known} of "
-        f"{len(hull)} directions of the hull's numbers (each to less than {OPEN:g} of what was "
-        "known before)."
-    ]
-    for axis, unit in (("X", "m/s"), ("Y", "m/s"), ("N", "rad/s")):
-        own = [f for f in answer.forces if f.force.startswith(axis)]
-        told = [f for f in own if f.width <= OPEN]
-        if told:
-            error = max(0.5 * (f.high - f.low) / abs(f.value) for f in told)
-            ends = f"{min(f.at for f in told):.3g} to {max(f.at for f in told):.3g} {unit}"
-            lines.append(f"{own[0].force} is known to {100.0 * error:.2g} % at {ends}.")
-        elif own:
-            lines.append(
-                f"{own[0].force} is not told by these logs: it is known little better than before."
-            )
+    """What came out, a sentence each, what matters most first."""
+    hull, logs = answer.problem.hull, answer.problem.logs
+    lines = [*_judged(answer), *_forces(answer)]
+    seconds = sum(log.duration for log in logs)
+    lines.append(
+        f"{len(logs)} {'logs' if len(logs) > 1 else 'log'} of {seconds:.0f} s in all: "
+        f"{answer.directions.known} of {len(hull)} directions of the hull's numbers are told, "
+        f"each to less than {OPEN:g} of what was known before."
+    )
     if not answer.estimate.settled:
-        lines.append("The search had not settled when it ended; the numbers may still move.")
-    lines += [note for log, _, _ in answer.judged for note in log.notes]
-    if not answer.judged:
         lines.append(
-            "No log was kept for judging (role: judge): how well it foretells is not known."
+            "The search did not settle, so the numbers are only the best of several tries: give "
+            "the vessel numbers nearer to the boat's, or look for fewer (identify.free)."
         )
+    return [*lines, *(note for log, _, _ in answer.judged for note in log.notes)]
+
+
+def _judged(answer: Answer) -> list[str]:
+    """How well the hull foretells the logs that were not fitted."""
+    judged = [s for s in answer.scores if s.role == "judge" and s.horizon == SHOWN]
+    if not judged:
+        return ["No log was kept for judging (role: judge): how well it foretells is not known."]
+    errors = [f"{who} {max(s.position for s in judged if s.who == who):.2g} m" for who in WHO]
+    return [
+        f"After {SHOWN:g} s of a log that was not fitted, errors are at most: {', '.join(errors)}."
+    ]
+
+
+def _forces(answer: Answer) -> list[str]:
+    """How well each damping force is known."""
+    lines = []
+    for axis in AXES:
+        own = [f for f in answer.forces if f.force == axis.name]
+        known = [f for f in own if f.width <= OPEN]
+        if known:
+            error = max(0.5 * (f.high - f.low) / abs(f.value) for f in known)
+            ends = f"{known[0].at:.2g} to {known[-1].at:.2g} {axis.speed_unit}"
+            lines.append(
+                f"{axis.name} is known to {100.0 * error:.2g} % at {ends}, if thrust and form of "
+                "the model are right."
+            )
+        elif own:
+            lines.append(f"{axis.name} is not told by these logs: {TELLING[axis.name[0]]}.")
     return lines
 
 
 def open_words(answer: Answer) -> list[str]:
-    """Each direction that the logs leave open, by its numbers; the manoeuvres that would tell."""
+    """Each direction that the logs leave open, by its numbers; what would tell the inertia."""
     ways, hull = answer.directions, answer.problem.hull
-    lines, axes = [], set()
+    named: dict[str, float] = {}
     for i in range(ways.known, len(hull)):
         shares = ways.basis[:, i]
-        named = [j for j in np.argsort(-np.abs(shares)) if abs(shares[j]) >= SHARE]
-        axes |= {hull[j].name[0] for j in named}
-        names = ", ".join(hull[j].name for j in named)
-        what = "how these share a force" if len(named) > 1 else "this number"
-        lines.append(f"{what} is open ({ways.widths[i]:.2g} of the prior's width): {names}")
+        own = sorted(hull[j].name for j in np.flatnonzero(np.abs(shares) >= SHARE))
+        named.setdefault(", ".join(own), min(float(ways.widths[i]), 1.0))
+    lines = [
+        f"open ({width:.2g} of the width before): "
+        f"{'how ' + names + ' share a force' if ',' in names else names}"
+        for names, width in named.items()
+    ]
     if len(lines) > MOST:
-        lines[MOST:] = [f"and so are {len(lines) - MOST} more directions"]
-    return [*lines, *(TELLING[axis] for axis in sorted(axes))]
+        lines[MOST:] = [f"and {len(lines) - MOST} more"]
+    inertia = any(p.name[0] == "m" and p.width > OPEN for p in answer.parameters)
+    return [*lines, *([f"inertia: {TELLING['m']}"] if inertia else [])]
+
+
+def worse_words(answer: Answer) -> list[str]:
+    """A sentence for each log that was not fitted and that the prior foretells better."""
+    by = {(s.log, s.horizon, s.who): s for s in answer.scores if s.role == "judge"}
+    names = dict.fromkeys(
+        log
+        for (log, horizon, who), s in by.items()
+        if who == WHO[0] and s.position > WORSE * by[log, horizon, WHO[1]].position
+    )
+    return [
+        f"{name}: the vessel as it was given foretells this log better than the one from the logs; "
+        "do not take that one before you know why (too little was told, or the logs disagree)"
+        for name in names
+    ]
 
 
 def far_words(answer: Answer) -> list[str]:

@@ -43,7 +43,7 @@ CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain,
 AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
 TURNED = 0.05  # rad, of the heading at the start
 FINEST = 1e-4  # of what a sensor measured, its least error
-FLOWING = 0.2  # of the speed at full thrust: a current that nothing is known of
+FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
 BLOCK = 30.0  # s of a log, whose innovations count together
 
 

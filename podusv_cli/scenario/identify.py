@@ -60,7 +60,7 @@ class Identify(Component):
     )  # fmt: skip
     current: float | None = value(
         None, "m/s", "standard deviation of the current north and east, which every log has its "
-        "own of; null: a fifth of the speed at full thrust; 0: no current", ge=0,
+        "own of; null: a tenth of the speed at full thrust; 0: no current", ge=0,
     )  # fmt: skip
     step: Positive = value(0.05, "s", "longest step of the filter along a log")
     draws: int = value(

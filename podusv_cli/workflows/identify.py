@@ -13,7 +13,7 @@ from podusv_cli.identify import estimate, outputs
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import free_runs, scores
-from podusv_cli.identify.phrases import far_words
+from podusv_cli.identify.phrases import far_words, worse_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
 from podusv_cli.process.extras import Extras
@@ -66,7 +66,11 @@ def identify_of(
     ):
         with interrupts_enabled():
             answer = answered(scenario, scenario.identify, logs, progress)
-        warnings = (*(line for log, _ in logs for line in log.warnings), *far_words(answer))
+        warnings = (
+            *(line for log, _ in logs for line in log.warnings),
+            *far_words(answer),
+            *worse_words(answer),
+        )
         for line in warnings:
             request.warn(line)
         extras = Extras()
