@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,10 +15,12 @@ from scipy.optimize import brentq
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.components.vessels.plant import plant
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify import judge
-from podusv_cli.identify.estimate import OPEN, Search, directions, estimated
+from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.estimate import OPEN, Estimate, Search, directions, estimated
 from podusv_cli.identify.march import (
     COMMANDS,
     DELIVERED,
@@ -28,8 +31,8 @@ from podusv_cli.identify.march import (
     Record,
     side_by_side,
 )
-from podusv_cli.identify.phrases import worse_words
-from podusv_cli.identify.problem import Problem
+from podusv_cli.identify.phrases import summary, thrust_words, worse_words
+from podusv_cli.identify.problem import Problem, hull_numbers
 from podusv_cli.identify.reading import Table, delivered
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
@@ -323,6 +326,77 @@ def test_a_hull_that_foretells_worse_than_the_prior_gets_a_warning():
     assert line.startswith("a.csv: the vessel as it was given foretells this log better")
 
 
+def test_a_long_log_is_judged_from_few_instants_and_only_once_to_its_end(boat):
+    given, long = problem(boat[2:], current=0.0), replace(boat[2], times=50.0 * boat[2].times)
+    y = np.zeros(len(given.numbers))
+    short, runs = judge.free_runs(given, boat[2], y), judge.free_runs(given, long, y)
+    assert len(short) == 3
+    assert 15 < len(runs) <= judge.MOST
+    assert [run.times[-1] == long.times[-1] for run in runs[:-1]] == [True] + [False] * 18
+    for run in short:  # what is cut is beyond what any score looks at
+        late = run.times[-1] - run.times[0]
+        assert late > 32.9 or run.times[-1] == boat[2].times[-1]
+
+
+def untold(prior, **wanted):
+    """An answer where no log says anything."""
+    given = problem([], prior=prior, **wanted)
+    size = len(given.hull)
+    found = Estimate(np.zeros(size), 0.0, np.eye(size), 1, True)
+    return Answer(given, found, directions(found.covariance, size), (), ())
+
+
+def test_hulls_are_drawn_from_wide_priors_too():
+    answer = untold(3.0, draws=10)
+    assert len(answer.draws) == len(answer.before) == 10
+    assert all(hull.N_r < 0.0 and hull.Y_v < 0.0 for hull in answer.draws)
+
+
+def test_a_force_that_is_zero_has_no_interval_and_no_log_for_judging_is_said():
+    answer = untold(0.5, draws=10)
+    answer.__dict__["motion"] = np.zeros((4, 3))  # of a boat that lay still
+    assert answer.forces == []
+    lines = " ".join(summary(answer))
+    assert "X(u)" not in lines
+    assert "No log was kept for judging" in lines
+    kept = (*LOGS, LogFile(file="b.csv", role="judge"))
+    judged = replace(answer, problem=replace(answer.problem, wanted=Identify(logs=kept)))
+    judged.__dict__["motion"] = np.zeros((4, 3))
+    assert summary(judged)[0].startswith("No log for judging holds a free run of 30 s")
+
+
+def test_thrust_that_is_found_is_said_since_the_hull_has_no_place_for_it(boat):
+    for free, count in ((("N_r",), 0), (("N_r", "thrust"), 1)):
+        given = problem(boat[2:], free=free, prior=0.5)
+        size = len(given.numbers)
+        y = np.array([math.log(0.8) / n.sd if n.name == "thrust" else 0.0 for n in given.numbers])
+        found = Estimate(y, 0.0, np.eye(size), 1, True)
+        lines = thrust_words(Answer(given, found, directions(np.eye(size), 2), (), ()))
+        assert len(lines) == count
+    assert lines[0].startswith("thrust is 0.8 (")
+    assert "multiply the actuator's thrust" in lines[0]
+
+
+def test_a_search_beside_which_the_filter_breaks_down_ends_with_a_sentence():
+    with pytest.raises(UsageError, match=r"beside the best numbers .* check units and signs"):
+        directions(np.full((2, 2), np.nan), 2)
+
+
+def test_ctrl_c_while_logs_are_judged_keeps_the_hull(boat, monkeypatch):
+    from podusv_cli.workflows import identify as workflow
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(judge, "estimated", interrupted)
+    given = problem(boat[2:], free=("N_r",))
+    logs = [(boat[2], "fit")]
+    answer = workflow.answered(given.scenario, given.wanted, logs, None)
+    assert answer.estimate.interrupted
+    assert answer.estimate.settled
+    assert answer.judged == [(boat[2], "fit", ())]
+
+
 def test_who_keeps_the_velocities_of_an_instant_goes_round_a_circle():
     times = np.linspace(3.0, 11.0, 9)
     state = np.array([1.0, 2.0, 0.3, 0.9, 0.2, 0.25])
@@ -415,6 +489,15 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
         ({"logs": []}, "it is empty; at least one log has to have role: fit"),
         ({"logs": [{"file": "a", "role": "judge"}]}, "all logs are for judging"),
         ({"logs": [{"file": "a", "span": (9.0, 3.0)}]}, "9 s is not before 3 s"),
+        ({"logs": [{"file": "a"}, {"file": "./a", "role": "judge"}]}, "a and ./a have a part in"),
+        (
+            {"logs": [{"file": "a", "span": (0.0, 5.0)}, {"file": "a", "span": (4.0, 9.0)}]},
+            "a from 0 to 5 s and a from 4 to 9 s have a part in common, which would count twice",
+        ),
+        (
+            {"logs": [{"file": "a"}], "noise": {"sigma_gps": 0.1}},
+            "sigma_gps is no sensor's deviation",
+        ),
     ],
 )
 def test_a_section_that_cannot_be_meant_gets_a_sentence(section, sentence):
@@ -431,9 +514,6 @@ def test_a_section_that_cannot_be_meant_gets_a_sentence(section, sentence):
     ],
 )
 def test_names_of_what_is_looked_for(wanted, sentence):
-    from podusv_cli.core.errors import UsageError
-    from podusv_cli.identify.problem import hull_numbers
-
     asked = Identify(logs=LOGS, **wanted)
     if sentence is None:
         assert [n.name for n in hull_numbers(HULL, asked)] == list(wanted["free"])

@@ -15,6 +15,7 @@ from log_files import write_bag, write_dataflash, write_ulog
 from test_identify import HULL, SCENARIO, commands_of, motion, table_of
 
 from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE, TAU
 from podusv_cli.identify.checks import checked
 from podusv_cli.identify.commands import acted, later
@@ -25,6 +26,7 @@ from podusv_cli.identify.listing import listing
 from podusv_cli.identify.march import DELIVERED, HOLDS, VALUES
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.phrases import far_words
+from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.reading import Named, Table, table
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
@@ -294,6 +296,7 @@ MISTAKES = {
     "speed in knots": ({"u": lambda c: c["u"] / 0.514444}, r'u is 1\.9\d .*"COLUMN \[kn\]"'),
     "sway to port": ({"v": lambda c: -c["v"]}, r'write v: "-COLUMN"'),
     "a compass that stands": ({"psi": lambda c: 0 * c["psi"] + 0.7}, "psi is 0.7 throughout"),
+    "a compass of zeros": ({"psi": lambda c: 0 * c["psi"]}, "psi is 0 throughout while"),
 }  # fmt: skip
 
 
@@ -336,6 +339,7 @@ def test_times_in_milliseconds(weaving):
         ({"u": lambda c: 1.7 * c["u"]}, "u is 1.7 times as fast as positions move"),
         ({"tau_u": lambda c: 0 * c["u"] + 2.5}, "tau_u is 2.5 throughout"),
         ({"v": lambda c: np.nan * c["v"]}, "v has no number at all"),
+        ({"tau_r": lambda c: 0 * c["tau_r"]}, "its commands are 0 throughout, so the boat lay"),
     ],
 )
 def test_what_is_only_unlikely_is_a_warning(weaving, changes, sentence):
@@ -408,6 +412,24 @@ def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
     bare = {n: c for n, c in sailed.columns.items() if n != "tau_r"}
     with pytest.raises(LogFault, match="nothing is known of tau_r"):
         log_of(replace(sailed, columns=bare), Ideal(), 0.05)
+
+
+def test_two_parts_of_a_file_are_two_logs_with_currents_of_their_own(tmp_path, sailed):
+    path = written(tmp_path / "a.csv", {"time": sailed.times, **sailed.columns})
+    parts = [LogFile(file="a.csv", span=span, delay=0.0) for span in ((0.0, 40.0), (40.2, 89.0))]
+    given = scenario()
+    logs = [log for part in parts for log in logs_of(path, part, given)]
+    numbers = [number.name for number in Problem(given, given.identify, logs).numbers]
+    assert len(numbers) == len(set(numbers))
+    assert "current_x, a.csv from 40.2 to 89 s" in numbers
+
+
+def test_a_quantity_that_nothing_is_made_of_is_an_error(tmp_path, sailed):
+    path = written(tmp_path / "a.csv", {"time": sailed.times, **sailed.columns})
+    with pytest.raises(UsageError, match=r"identify.columns: 'n_1' is no quantity .* \(taken: lat"):
+        logs_of(path, LogFile(file="a.csv"), scenario(columns={"n_1": "tau_u"}))
+    with pytest.raises(UsageError, match="did you mean 'psi'"):
+        logs_of(path, LogFile(file="a.csv"), scenario(columns={"psi_": "psi"}))
 
 
 def test_all_logs_for_judging():

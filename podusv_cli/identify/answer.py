@@ -27,7 +27,7 @@ SLOWEST = 0.05  # of the largest speed along the logs: slower is no motion to sp
 COVERED = (0.1, 0.5, 0.9)  # quantiles of a speed along the logs
 OUTERMOST = 0.995  # quantile of the motion that becomes the envelope
 BEYOND, POINTS = 1.3, 40  # of a curve: how far beyond the fastest that is covered
-TRIES = 20  # hulls that are drawn for one that is possible
+TRIES = 2000  # hulls that are drawn for one that is possible; of a wide prior few keep all signs
 WARM = 5.0  # s, in which innovations are those of the start
 
 
@@ -150,7 +150,7 @@ class Answer:
         speed = np.quantile(np.hypot(u, v), OUTERMOST)
         drift = np.where(np.hypot(u, v) > 0.1 * speed, np.arctan2(np.abs(v), np.abs(u)), 0.0)
         return Envelope(
-            source="the logs", speed=float(speed),
+            source="the logs", speed=float(max(speed, 1e-6)),
             drift=float(max(np.quantile(drift, OUTERMOST), 1e-3)),
             yaw_rate=float(max(np.quantile(np.abs(r), OUTERMOST), 1e-6)),
         )  # fmt: skip
@@ -208,13 +208,13 @@ class Answer:
             if len(hulls) == self.problem.wanted.draws:
                 return hulls
         raise UsageError(
-            "hardly any hull that is drawn is possible (its mass matrix must be positive "
-            "definite); give the inertia a narrower prior, identify.priors"
+            "hardly any hull that is drawn is possible (numbers keep their sign, the mass matrix "
+            "must be positive definite); give narrower priors, identify.prior or identify.priors"
         )
 
     @cached_property
     def forces(self) -> list[Force]:
-        """Damping forces at speeds of the logs."""
+        """Damping forces at speeds of the logs, but those that are 0."""
         found = []
         for place, axis in enumerate(AXES):
             moving = np.abs(self.motion[:, place])
@@ -224,6 +224,7 @@ class Answer:
             found += [
                 Force(axis.name, *map(float, numbers))
                 for numbers in zip(speeds, own, *after, *before, strict=True)
+                if numbers[1]  # of none there is no interval
             ]
         return found
 

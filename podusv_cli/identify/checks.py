@@ -145,13 +145,14 @@ def _constant(motion: Motion) -> Iterator[str]:
         known = values[np.isfinite(values)]
         if not len(known):
             yield f"{name} has no number at all"
-        elif np.ptp(known) == 0.0 and known[0] != 0.0:
+        elif np.ptp(known) == 0.0:
             if name == "psi" and abs(np.nanmean(np.exp(1j * np.angle(motion.velocity)))) < ALIKE:
                 raise LogFault(
                     f"psi is {known[0]:g} throughout while the track turns; its sensor stood "
                     "still, or identify.columns names another column"
                 )
-            yield f"{name} is {known[0]:g} throughout"
+            if known[0] != 0.0:
+                yield f"{name} is {known[0]:g} throughout"
 
 
 @dataclass(frozen=True)
@@ -308,6 +309,17 @@ def _manoeuvres(motion: Motion) -> Iterator[str]:
         )
 
 
+def _idle(motion: Motion) -> Iterator[str]:
+    """Logs in which nothing was commanded."""
+    columns = motion.table.columns
+    given = [columns[s.name] for s in motion.actuator.replayed if s.name in columns]
+    if not any(np.any(np.abs(values) > 0.0) for values in given):
+        yield (
+            "its commands are 0 throughout, so the boat lay still or drifted, which tells next to "
+            "nothing of the hull; keep the log for judging, or leave it out"
+        )
+
+
 CHECKS: tuple[Callable[[Motion], Iterator[str]], ...] = (
-    _clock, _constant, _courses, _jumps, _yaw_rate, _speeds, _out_of_reach, _manoeuvres,
+    _clock, _constant, _courses, _jumps, _yaw_rate, _speeds, _out_of_reach, _idle, _manoeuvres,
 )  # fmt: skip

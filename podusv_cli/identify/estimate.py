@@ -28,6 +28,11 @@ SETTLED = 2.0
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 OPEN = 0.3  # posterior over prior standard deviation of a direction that logs leave open
 
+BREAKS = (
+    "the filter along the logs leaves the finite numbers; check units and signs of the columns, "
+    "give a vessel nearer to the boat's size, or a shorter identify.step"
+)
+
 # From points to innovations and their variances, a row a value, a column a point.
 Innovations = Callable[[Sequence[Vector]], tuple[Vector, Vector]]
 Tell = Callable[[int, float], None]
@@ -105,11 +110,7 @@ def estimated(search: Search, tell: Tell = lambda i, value: None) -> Estimate:
     """
     best = _estimated(search, np.zeros(search.size), tell)
     if not math.isfinite(best.value):
-        raise UsageError(
-            "with the vessel as it is given the filter along the logs leaves the finite numbers; "
-            "check units and signs of the columns, give a vessel nearer to the boat's size, or a "
-            "shorter identify.step"
-        )
+        raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
     for _ in range(STARTS):
         if best.settled or best.interrupted:
@@ -188,6 +189,8 @@ class Directions:
 
 
 def directions(covariance: Vector, hull: int) -> Directions:
-    """Of the first `hull` coordinates."""
+    """Of the first `hull` coordinates. Raises UsageError where the covariance is not finite."""
+    if not np.all(np.isfinite(covariance)):
+        raise UsageError(f"beside the best numbers that were found {BREAKS}")
     squares, basis = np.linalg.eigh(covariance[:hull, :hull])
     return Directions(basis, np.sqrt(np.maximum(squares, 0.0)))

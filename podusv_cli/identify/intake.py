@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.checks import checked
 from podusv_cli.identify.commands import acted, later
+from podusv_cli.identify.frames import LAT, LON
 from podusv_cli.identify.offsets import Clocks
-from podusv_cli.identify.reading import Named, Table, table
+from podusv_cli.identify.reading import CLOCK, Named, Table, table
 from podusv_cli.identify.records import FEWEST, POSE, Log, log_of
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
@@ -22,11 +25,12 @@ GAP, ROWS = 2.0, 10.0  # s without a row, and usual distances of rows: a gap tha
 
 
 def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
-    """The logs of a file, one for each piece without a gap. Raises LogFault, StorageError."""
+    """The logs of a file, one for each piece without a gap. Raises UsageError, StorageError."""
     wanted, actuator = scenario.identify, scenario.actuator
     assert wanted is not None
     signals = (*STATE, *actuator.replayed, *actuator.lagged)
-    whole = table(path, signals, Named(wanted.columns, wanted.frame), name=given.file)
+    _all_taken(wanted.columns, {signal.name for signal in (*signals, CLOCK, LAT, LON)})
+    whole = table(path, signals, Named(wanted.columns, wanted.frame), name=given.name)
     part = acted(whole.part(*given.span) if given.span else whole, actuator)
     log_of(part, actuator, wanted.step)  # says what is missing before anything else is looked at
     part = replace(part, warnings=(*part.warnings, *checked(part, actuator)))
@@ -38,6 +42,18 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     moved = [later(piece, actuator, delay) for piece in found]
     moved[0] = replace(moved[0], warnings=(*moved[0].warnings, *lines))
     return [log_of(piece, actuator, wanted.step) for piece in moved]
+
+
+def _all_taken(columns: Mapping[str, str], taken: Collection[str]) -> None:
+    """Raises UsageError for a quantity in `identify.columns` that nothing is made of."""
+    for name in columns:
+        if name not in taken:
+            near = difflib.get_close_matches(name, taken, 1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise UsageError(
+                f"identify.columns: {name!r} is no quantity that is taken from a log with this "
+                f"actuator{hint} (taken: {', '.join(sorted(taken))})"
+            )
 
 
 def pieces(log: Table) -> Iterator[Table]:

@@ -17,9 +17,11 @@ from podusv_cli.identify.reading import Whole
 from podusv_cli.identify.records import Log
 
 WARM = 20.0  # s, in which the filter finds velocities and load before the first free run
-EVERY = 30.0  # s, from one start to the next
+EVERY = 30.0  # s, from one start to the next; more in logs that would have more than MOST starts
+MOST = 20
 HORIZONS = (5.0, 30.0, np.inf)  # s after a start; infinite: to the end of the log, from the first
 NEAR = 0.1  # of a horizon: how far from it a measured value may be
+FARTHEST = HORIZONS[-2] * (1.0 + NEAR)  # s after a start: what no score looks beyond
 WHO = ("identified", "prior", "constant velocity")
 
 
@@ -83,10 +85,13 @@ class Score:
 
 
 def free_runs(problem: Problem, log: Log, y: Vector) -> list[FreeRun]:
-    """Free runs from several instants of a log, each to its end."""
-    last = log.times[-1] - HORIZONS[0]
-    starts = np.arange(log.times[0] + min(WARM, 0.5 * log.duration), last, EVERY)
-    return [_free_run(problem, log, y, int(np.searchsorted(log.times, t))) for t in starts]
+    """Free runs from several instants of a log: the first to its end, the others to a horizon."""
+    last, every = log.times[-1] - HORIZONS[0], max(EVERY, log.duration / MOST)
+    starts = np.arange(log.times[0] + min(WARM, 0.5 * log.duration), last, every)
+    rows = np.searchsorted(log.times, starts).tolist()
+    ends = np.searchsorted(log.times, starts + FARTHEST, "right").tolist()
+    ends[:1] = [len(log.times)] * len(ends[:1])
+    return [_free_run(problem, log.until(end), y, row) for row, end in zip(rows, ends, strict=True)]
 
 
 def _free_run(problem: Problem, log: Log, y: Vector, first: int) -> FreeRun:
@@ -109,7 +114,8 @@ def _free_run(problem: Problem, log: Log, y: Vector, first: int) -> FreeRun:
 def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
     """The current that a hull sees along a log [m/s], as far as the log tells it.
 
-    On a straight track a current along it is the same as a load, and is left to that.
+    On a straight track a current along it is the same as a load, and is left to that. An
+    interrupt ends it.
     """
     if not problem.current:
         return [0.0, 0.0]
@@ -121,6 +127,8 @@ def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
 
     blocks = np.zeros(log.record.delivered, np.int64)
     found = estimated(Search(innovations, 2, blocks))
+    if found.interrupted:
+        raise KeyboardInterrupt
     ways = directions(found.covariance, 2)
     told = ways.basis[:, : ways.known]
     return list(problem.current * (told @ (told.T @ found.y)))
@@ -141,7 +149,7 @@ def scores(log: Log, role: str, runs: Sequence[FreeRun]) -> Iterator[Score]:
     """The errors after each horizon, over the runs that reach it."""
     for horizon in HORIZONS:
         chosen = runs[:1] if np.isinf(horizon) else runs
-        errors = np.array([run.errors(horizon) for run in chosen]).reshape(len(chosen), -1, 2)
+        errors = np.array([run.errors(horizon) for run in chosen]).reshape(len(chosen), len(WHO), 2)
         errors = errors[np.isfinite(errors[:, 0, 0])]
         for i, who in enumerate(WHO):
             if len(errors):

@@ -7,6 +7,7 @@ import numpy as np
 from podusv_cli.identify.answer import AXES, Answer
 from podusv_cli.identify.estimate import OPEN
 from podusv_cli.identify.judge import WHO
+from podusv_cli.identify.march import THRUST
 
 # The manoeuvre that tells the numbers of an axis.
 TELLING = {
@@ -42,9 +43,11 @@ def summary(answer: Answer) -> list[str]:
 
 def _judged(answer: Answer) -> list[str]:
     """How well the hull foretells the logs that were not fitted."""
+    if all(log.role == "fit" for log in answer.problem.wanted.logs):
+        return ["No log was kept for judging (role: judge): how well it foretells is not known."]
     judged = [s for s in answer.scores if s.role == "judge" and s.horizon == SHOWN]
     if not judged:
-        return ["No log was kept for judging (role: judge): how well it foretells is not known."]
+        return [f"No log for judging holds a free run of {SHOWN:g} s: judge with a longer one."]
     errors = [f"{who} {max(s.position for s in judged if s.who == who):.2g} m" for who in WHO]
     return [
         f"After {SHOWN:g} s of a log that was not fitted, errors are at most: {', '.join(errors)}."
@@ -100,6 +103,17 @@ def worse_words(answer: Answer) -> list[str]:
         f"{name}: the vessel as it was given foretells this log better than the one from the logs; "
         "do not take that one before you know why (too little was told, or the logs disagree)"
         for name in names
+    ]
+
+
+def thrust_words(answer: Answer) -> list[str]:
+    """A sentence where thrust was looked for, since a hull has no place for it."""
+    return [
+        f"thrust is {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) times what the actuator's numbers "
+        "give. The hull holds with that thrust alone: multiply the actuator's thrust (of pods "
+        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} wherever this hull is used."
+        for p in answer.parameters
+        if p.name == THRUST
     ]
 
 

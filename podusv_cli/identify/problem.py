@@ -21,6 +21,7 @@ from podusv_cli.identify.march import (
     DELAY,
     DELIVERED,
     NAMES,
+    SIGMAS,
     THRUST,
     VALUES,
     Follow,
@@ -36,7 +37,6 @@ from podusv_cli.scenario.model import Scenario
 # Where an entry of the mass matrix is, and what of it stands beside the added mass.
 ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m33": "N_rdot"}
 DAMPINGS = tuple(n for n in COEFFICIENTS if n[1:2] == "_" and n not in ADDED.values())
-SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
 CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain, on the model ship

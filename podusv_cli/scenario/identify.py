@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import os.path
+from itertools import combinations
 from typing import Literal, Self
 
 from pydantic import field_validator, model_validator
@@ -9,6 +12,7 @@ from pydantic import field_validator, model_validator
 from podusv_cli.core.component import Component, Positive, value
 
 DAMPING = {"surge": "X_", "sway": "Y_", "yaw": "N_"}
+SENSORS = ("sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")  # of the ekf
 GROUPS = ("inertia", *(f"damping.{axis}" for axis in DAMPING))
 
 
@@ -31,6 +35,20 @@ class LogFile(Component):
         if self.span and not self.span[0] < self.span[1]:
             raise ValueError(f"span: {self.span[0]:g} s is not before {self.span[1]:g} s")
         return self
+
+    @property
+    def name(self) -> str:
+        """The file, with the part of it that is used."""
+        if not self.span:
+            return self.file
+        return f"{self.file} from {self.span[0]:.10g} to {self.span[1]:.10g} s"
+
+    def shares(self, other: LogFile) -> bool:
+        """Whether both have a part of the same file."""
+        if os.path.normpath(self.file) != os.path.normpath(other.file):
+            return False
+        (a, b), (c, d) = (log.span or (-math.inf, math.inf) for log in (self, other))
+        return a < d and c < b
 
 
 class Identify(Component):
@@ -55,8 +73,8 @@ class Identify(Component):
     )
     priors: dict[str, Positive] = value({}, "", "the same of single numbers, in place of `prior`")
     noise: dict[str, Positive] = value(
-        {}, "", "standard deviations of sensors that are known, by the names of the ekf: sigma_p, "
-        "sigma_psi, sigma_u, sigma_v, sigma_r; all others follow from the logs",
+        {}, "", "standard deviations of sensors that are known, by the names of the ekf: "
+        f"{', '.join(SENSORS)}; all others follow from the logs",
     )  # fmt: skip
     current: float | None = value(
         None, "m/s", "standard deviation of the current north and east, which every log has its "
@@ -74,4 +92,18 @@ class Identify(Component):
         if not any(log.role == "fit" for log in logs):
             what = "all logs are for judging" if logs else "it is empty"
             raise ValueError(f"{what}; at least one log has to have role: fit")
+        for one, other in combinations(logs, 2):
+            if one.shares(other):
+                raise ValueError(
+                    f"{one.name} and {other.name} have a part in common, which would count twice; "
+                    "leave one of them out, or give them spans that do not overlap"
+                )
         return logs
+
+    @field_validator("noise")
+    @classmethod
+    def _of_sensors(cls, noise: dict[str, float]) -> dict[str, float]:
+        for name in noise:
+            if name not in SENSORS:
+                raise ValueError(f"{name} is no sensor's deviation (allowed: {', '.join(SENSORS)})")
+        return noise

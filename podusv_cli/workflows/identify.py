@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,8 +13,8 @@ from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.identify import estimate, outputs
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.intake import logs_of
-from podusv_cli.identify.judge import free_runs, scores
-from podusv_cli.identify.phrases import far_words, worse_words
+from podusv_cli.identify.judge import FreeRun, free_runs, scores
+from podusv_cli.identify.phrases import far_words, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
 from podusv_cli.process.extras import Extras
@@ -68,6 +69,7 @@ def identify_of(
             answer = answered(scenario, scenario.identify, logs, progress)
         warnings = (
             *(line for log, _ in logs for line in log.warnings),
+            *thrust_words(answer),
             *far_words(answer),
             *worse_words(answer),
         )
@@ -96,6 +98,11 @@ def answered(
 
     found = estimate.estimated(search, tell)
     ways = estimate.directions(found.covariance, len(problem.hull))
-    judged = [(log, role, free_runs(problem, log, found.y)) for log, role in logs]
+    judged: list[tuple[Log, str, Sequence[FreeRun]]] = [(log, role, ()) for log, role in logs]
+    try:
+        for i, (log, role) in enumerate(logs):
+            judged[i] = log, role, free_runs(problem, log, found.y)
+    except KeyboardInterrupt:
+        found = replace(found, interrupted=True)
     marks = [score for log, role, runs in judged for score in scores(log, role, runs)]
     return Answer(problem, found, ways, judged, marks)
