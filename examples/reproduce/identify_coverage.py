@@ -10,8 +10,8 @@ sensors. What comes out is compared with the truth: numbers and forces that coun
 from __future__ import annotations
 
 import argparse
-import csv
 import math
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
@@ -20,11 +20,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from pydantic import ValidationError
 
 import podusv
 from podusv_cli.components.facts import Facts
 from podusv_cli.components.vessels.vessel import Vessel
+from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import simulate
@@ -182,7 +184,11 @@ def rows(cell: Cell) -> list[tuple[Any, ...]]:
         return []
     problem = Problem(before, WANTED, given)
     search = Search(problem.innovations, len(problem.numbers), problem.blocks)
-    found = estimated(search)
+    try:
+        found = estimated(search)
+    except UsageError as error:
+        print(f"{cell}: {error}", file=sys.stderr)
+        return []
     ways = directions(found.covariance, len(problem.hull))
     answer = Answer(problem, found, ways, (), ())
     return [
@@ -226,23 +232,38 @@ def of_forces(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
         yield "force", f.force, truth, f.value, f.low, f.high, f.width, off, holds, f.width <= OPEN
 
 
+def summary(made: pd.DataFrame) -> pd.DataFrame:
+    """Of each sea, hull and GNSS what counts as told, and how it stands to the truth."""
+    told = made[made.told & made.settled]
+    by = told.groupby(["sea", "hull", "gnss", "what"], sort=False)
+    sets = made.groupby(["sea", "hull", "gnss", "what"], sort=False)
+    return pd.DataFrame(
+        {
+            "sets": sets.set.nunique(),
+            "settled": sets.apply(lambda cell: cell[cell.settled].set.nunique()),
+            "told": by.size(), "of": sets.settled.sum(), "held": by.holds.mean(),
+            "off_rms": by.off.apply(lambda off: float(np.sqrt(np.mean(off**2)))),
+            "off_median": by.off.apply(lambda off: float(np.median(np.abs(off)))),
+        }
+    ).reset_index()  # fmt: skip
+
+
 def main() -> None:
-    """Write a row a number or force of every set."""
+    """Write what comes out of every cell."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--sets", type=int, default=100)
+    parser.add_argument("--seas", nargs="*", default=[*SEAS])
     parser.add_argument("--workers", type=int, default=0)
     asked = parser.parse_args()
-    cells = [Cell(*cell, i) for cell in product(SEAS, HULLS, GNSS) for i in range(asked.sets)]
+    cells = [Cell(*cell, i) for i in range(asked.sets) for cell in product(asked.seas, HULLS, GNSS)]
+    every: list[tuple[Any, ...]] = []
     asked.out.parent.mkdir(parents=True, exist_ok=True)
-    with ProcessPoolExecutor(asked.workers or None) as pool, asked.out.open("w") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEAD)
+    with ProcessPoolExecutor(asked.workers or None) as pool:
         for made in pool.map(rows, cells):
-            writer.writerows(
-                [f"{c:.6g}" if isinstance(c, float) else c for c in row] for row in made
-            )
-            file.flush()
+            every += made
+            table = summary(pd.DataFrame(every, columns=list(HEAD)))
+            table.to_csv(asked.out, index=False, float_format="%.3g")
 
 
 if __name__ == "__main__":

@@ -21,9 +21,10 @@ SHIFT = 1e-4  # of a point's coordinate, for slopes
 LONGEST = 1.0  # of a coordinate, in one step
 ROUNDS = 100
 DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of the curvature, tried side by side
-STARTS, NEARER = 3, 0.5  # other starts, and their share of the prior's deviations
+STARTS, NEARER = 5, 0.5  # searches at most, and how far from the prior's centre they begin
 # The filter's slopes jump where v or r pass through 0 (|v| r), so -2 log of the posterior is rough
-# by about this much, and no step may gain what is expected; it is little beside 1 a number.
+# by about this much: two searches that differ by less have come to the same. It is little beside
+# 1 for each number.
 SETTLED = 2.0
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 OPEN = 0.3  # posterior over prior standard deviation of a direction that logs leave open
@@ -98,32 +99,36 @@ class Estimate:
     value: float
     covariance: Vector
     rounds: int
-    settled: bool
+    settled: bool = False  # whether two searches have come to it
     interrupted: bool = False
 
 
 def estimated(search: Search, tell: Tell = lambda i, value: None) -> Estimate:
-    """The estimate from the prior's centre, or where that does not settle, the best of several.
+    """The best of several searches: from the prior's centre, then from draws of the prior.
 
-    The others begin at draws from the prior. An interrupt leaves the best so far. Raises UsageError
-    where the filter breaks down at the prior's centre.
+    They end when two have come to the same value. An interrupt leaves the best so far. Raises
+    UsageError where the filter breaks down at the prior's centre.
     """
-    best = _estimated(search, np.zeros(search.size), tell)
-    if not math.isfinite(best.value):
+    found = [_estimated(search, np.zeros(search.size), tell)]
+    if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
-    for _ in range(STARTS):
-        if best.settled or best.interrupted:
-            break
-        other = _estimated(search, NEARER * rng.standard_normal(search.size), tell)
-        best = min(best, other, key=lambda e: e.value)
-        best = replace(best, interrupted=other.interrupted)
-    return best
+    while len(found) < STARTS and not (found[-1].interrupted or _agree(found)):
+        start = NEARER * rng.standard_normal(search.size)
+        found.append(_estimated(search, start, tell))
+    best = min(found, key=lambda e: e.value)
+    return replace(best, settled=_agree(found), interrupted=found[-1].interrupted)
+
+
+def _agree(found: Sequence[Estimate]) -> bool:
+    """Whether two searches have come to the least value so far."""
+    values = sorted(e.value for e in found)
+    return len(values) > 1 and values[1] - values[0] <= SETTLED
 
 
 def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
     """Fisher scoring, damped as Marquardt does; each round tries eight dampings side by side."""
-    i, settled, stopped, at = 0, False, False, search.scored(y)
+    i, stopped, at = 0, False, search.scored(y)
     try:
         for i in range(1, ROUNDS + 1):
             tell(i, at.value)
@@ -131,13 +136,12 @@ def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
             values = search.values([y + step for step in steps])
             best = int(np.argmin(values))
             if expected <= ENOUGH or not values[best] < at.value:
-                settled = expected <= SETTLED
                 break
             y, at = y + steps[best], search.scored(y + steps[best])
     except KeyboardInterrupt:
         stopped = True
     with np.errstate(all="ignore"):  # of a start at which the filter breaks down
-        return Estimate(y, at.value, covariance(at, y), i, settled, stopped)
+        return Estimate(y, at.value, covariance(at, y), i, interrupted=stopped)
 
 
 def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:
