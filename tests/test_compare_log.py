@@ -77,7 +77,7 @@ def test_sensors_may_come_at_different_times_and_the_log_last_longer():
     x, psi = nothing.copy(), nothing.copy()
     x[::4], psi[2::4] = 0.3 * times[::4], 0.1
     log("LOG.csv", "t,x,y,psi", np.column_stack([times, x, 0.0 * x + 1.3, psi]))
-    names = "identify: {logs: [{file: LOG.csv}], columns: {time: t}}"
+    names = "identify: {columns: {time: t}}"
     write("names.yaml", f"extends: task.yaml\n{names}\n")
     done = compared("names.yaml", "LOG.csv")
     for label in ("velocity", "momentum"):
@@ -124,10 +124,44 @@ def test_a_path_that_is_followed_has_no_target_to_be_off(podusv: Command):
     assert not Path("both/missing.json").exists()
 
 
+def test_recorded_commands_have_no_target_and_the_distance_to_the_log_is_the_headline(
+    podusv: Command,
+):
+    """Of a hull at rest in calm water 3 m from the track; the path's target is far away."""
+    write("commands.csv", "t,n_1,n_2\n0,0,0\n7.9,0,0\n")
+    write(
+        "replay.yaml",
+        "vessel: {preset: otter}\nactuator: {kind: pod, preset: otter}\ndisturbance: {kind: none}\n"
+        "path: {kind: line, speed: 9.0}\ncontroller: {kind: schedule, file: commands.csv}\n"
+        "simulation: {duration: 7.9, step: 0.02}\nidentify: {columns: {x: north, y: east}}\n",
+    )
+    log("LOG.csv", "time,north,east,psi", [[0.0, 0.0, 3.0, 0.2], [7.0, 0.0, 3.0, 0.2]])
+    said = podusv("compare", "replay.yaml", "LOG.csv", "--out", "both", "--figure", "all")
+    assert "warning" not in said.out + said.err
+    run = p.open_run(Path("both/schedule"))
+    with pytest.raises(KeyError, match="z_e"):
+        run["z_e"]
+    assert not {"iae", "e_steady", "settling_time"} & {*run.metrics.index}
+    with Path("both/comparison.csv").open() as file:
+        rows = {row["metric"]: row for row in csv.DictReader(file)}
+    assert float(rows["log_distance_rms"]["schedule"]) == pytest.approx(3.0, abs=1e-9)
+    answer = Path("both/report.html").read_text().partition('id="answer"')[2]
+    first = answer.partition("ms distance from the measured track, at equal times: 3 m")
+    assert first[1]
+    assert "target" not in first[0]
+    assert not Path("both/missing.json").exists()
+
+
+def test_columns_alone_are_no_logs_to_identify_from(podusv: Command):
+    write("names.yaml", "extends: task.yaml\nidentify: {columns: {time: t}}\n")
+    said = podusv("identify", "names.yaml")
+    assert "names no logs; write them under identify.logs" in said.err
+
+
 @pytest.mark.parametrize(
     ("items", "head", "says"),
     [
-        (["task.yaml", "LOG.csv"], "time,north,east,heading", "has no quantity that is needed"),
+        (["task.yaml", "LOG.csv"], "time,north,east,heading", "write identify.columns in"),
         (["task.yaml", "LOG.csv"], "clock,x,y,psi", "no column is called time"),
         (["task.yaml", "LOG.csv"], "time [min],x,y,psi [furlong]", "is given in 'furlong'"),
         (["task.yaml", "NO.csv"], "time,x,y,psi", "NO.csv: there is no such file"),

@@ -486,7 +486,6 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
 @pytest.mark.parametrize(
     ("section", "sentence"),
     [
-        ({"logs": []}, "it is empty; at least one log has to have role: fit"),
         ({"logs": [{"file": "a", "role": "judge"}]}, "all logs are for judging"),
         ({"logs": [{"file": "a", "span": (9.0, 3.0)}]}, "9 s is not before 3 s"),
         ({"logs": [{"file": "a"}, {"file": "./a", "role": "judge"}]}, "a and ./a have a part in"),

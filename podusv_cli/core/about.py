@@ -222,7 +222,7 @@ class RunAbout(_Plain):
     follows: bool  # whether the path is followed, and so has no target
     waypoints: tuple[tuple[float, float], ...]  # m, north and east
     circles: tuple[tuple[float, float, float], ...]  # m, of the waypoints: centre and radius
-    trial: bool  # whether this is a manoeuvring trial
+    trial: bool  # whether nothing aims at the target: a manoeuvring trial, or recorded commands
     standoff: float  # m, that the law keeps on purpose
     limits: tuple[float | None, float | None]
     underactuated: bool
@@ -269,7 +269,8 @@ def at_target(numbers: Mapping[str, float], *, follows: bool, trial: bool, radiu
     """Whether a run with these metrics ends at its target.
 
     That is with `e_steady` within the settling radius [m], or with all legs of a path done that is
-    followed. A manoeuvring trial has no target to be at.
+    followed. A manoeuvring trial and recorded
+    commands have no target to be at.
     """
     if follows:
         return numbers.get("path_done", 1.0) >= 1.0

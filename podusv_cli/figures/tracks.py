@@ -28,12 +28,12 @@ class Target:
 
     @property
     def is_ahead(self) -> bool:
-        """Whether it is somewhere at a time: not on a path that is followed, nor in a trial."""
+        """Whether it is somewhere at a time: neither a path nor out of sight."""
         return self.in_sight and not self.runs[0].about.follows
 
     @property
     def in_sight(self) -> bool:
-        """Whether there is one; a manoeuvring trial has none."""
+        """Whether there is one; a manoeuvring trial and recorded commands have none."""
         return not self.runs[0].about.trial
 
     def track(self, span: Span = (0.0, np.inf)) -> tuple[Vector, Vector]:

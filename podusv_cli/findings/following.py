@@ -50,9 +50,9 @@ def short_leg(case: Case) -> Sentences:
     needs=("leg", "e_ct", "along_leg"),
 )  # fmt: skip
 def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
-    """The run ends on its way, or round a waypoint that it missed. Trials follow no path."""
+    """A run that follows its path ends on its way, or round a waypoint that it missed."""
     lengths, leg = _lengths(scenario.path), int(log["leg"][-1])
-    if log.status != "finished" or leg >= len(lengths) or scenario.controller.trial():
+    if log.status != "finished" or leg >= len(lengths) or not scenario.controller.aims():
         return
     beside = f"{abs(log['e_ct'][-1]):.3g} m beside leg {leg}"
     yield (

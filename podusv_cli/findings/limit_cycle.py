@@ -27,7 +27,7 @@ SPREAD = 2  # harmonics to either side of a line that Hann's window and a broken
 def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     """The distance along or across the target's course swings at one frequency, and goes on."""
     late = log["time"] >= scenario.steady_from()
-    if log.status != "finished" or late.sum() < 8 * PERIODS or scenario.controller.trial():
+    if log.status != "finished" or late.sum() < 8 * PERIODS or not scenario.controller.aims():
         return
     time, x, y = (log[name][late] for name in ("time", "x", "y"))
     errors = _turned(x - log["x_d"][late], y - log["y_d"][late], _course(log, late))

@@ -90,7 +90,7 @@ def opposite_start(case: Case) -> Sentences:
     _, _, x_dot, y_dot, *_ = case.scenario.path.targets([0.0])[0].tolist()
     off = start.psi - math.atan2(y_dot, x_dot)
     half = abs(abs(math.remainder(off, 2.0 * math.pi)) - math.pi) < OPPOSITE
-    if half and not start.r and math.hypot(x_dot, y_dot) > STANDING and not law.trial():
+    if half and not start.r and math.hypot(x_dot, y_dot) > STANDING and law.aims():
         yield (
             f"{start.psi:.6g} rad is opposite to the target's course, so rounding decides to which "
             "side the vessel turns, and what follows from that; start a thousandth of a radian to "
@@ -122,7 +122,7 @@ def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
     lost = np.isnan(seen.nu[:, 1])
-    if lost.any() and not case.scenario.controller.trial():  # a trial has no target
+    if lost.any() and case.scenario.controller.aims():
         load = float(seen.load[:, 1].mean())
         speed = abs(drift(case.scenario, load))
         shown = f"at {speed:.2g} m/s" if np.isfinite(speed) else "without limit"
@@ -203,6 +203,8 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
 )  # fmt: skip
 def thrust_short(case: Case) -> Sentences:
     """Following takes more surge force or yaw moment than the actuator delivers."""
+    if not case.scenario.controller.aims():
+        return
     seen = case.reference
     worst = np.abs(seen.demand).argmax(axis=0)
     actuator = case.scenario.actuator

@@ -146,7 +146,7 @@ def _points(case: Case) -> Sentences:
 def _start(case: Case) -> Sentences:
     """A start that is nowhere near the target."""
     start, path, length = case.scenario.start, case.scenario.path, case.scenario.vessel.length
-    if case.scenario.controller.trial():
+    if not case.scenario.controller.aims():
         return
     places = path.waypoints() if path.follows else path.targets((0.0,))[:, :2].tolist()
     north, east = min(

@@ -162,7 +162,11 @@ def _together(name: str, series: Mapping[str, _Series], columns: Columns) -> Tab
         own = {q: s.values for q, s in series.items() if s.clock == clock}
         sound.append(_sound(Table(name, columns[clock], own), clock))
     if not sound:
-        raise LogFault(f"{name}: has no quantity that is needed (columns: {_listed(columns)})")
+        raise LogFault(
+            f"{name}: it has none of x, y (or lat, lon) and psi, which are needed; write "
+            "identify.columns in a scenario beside it, as {x: north, y: east, "
+            f"psi: 'heading [deg]'}} (columns: {_listed(columns)})"
+        )
     times = np.unique(np.concatenate([part.times for part in sound]))
     together = {}
     for part in sound:

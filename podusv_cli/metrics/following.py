@@ -42,8 +42,8 @@ def _rms(seen: Vector, step: float) -> float:
 
 
 def _size(layout: Measured) -> int:
-    """A manoeuvring trial leaves the path aside."""
-    follows = layout.loop.path.places == PLACES and layout.loop.controller.trial() is None
+    """What does not aim at a target leaves the path aside."""
+    follows = layout.loop.path.places == PLACES and layout.loop.controller.aims()
     return SIZE if follows else 0
 
 

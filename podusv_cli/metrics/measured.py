@@ -6,7 +6,7 @@ from functools import partial
 
 from podusv_cli.metrics.metric import Metric
 
-_metric = partial(Metric, place=8, headline=True)
+_metric = partial(Metric, place=-1, headline=True)
 log_distance_rms = _metric(
     "log_distance_rms", "m", "rms distance from the measured track, at equal times"
 )

@@ -33,7 +33,7 @@ def _told_by(scenario: Scenario) -> RunAbout:
         **_of_parts(scenario),
         values=scenario.model_dump(mode="json", exclude={*BESIDE_RUNS}),
         metrics={n: m.about for n, m in scenario.known_metrics().items() if n not in METRICS},
-        trial=law.trial() is not None, standoff=approach.standoff if approach else 0.0,
+        trial=not law.aims(), standoff=approach.standoff if approach else 0.0,
         polar=isinstance(law, PolarBackstepping), optimum_of=law.optimum_of(),
         duration=scenario.simulation.duration, step=scenario.simulation.step,
         every=scenario.time_grid().log_every, steady_from=scenario.steady_from(),

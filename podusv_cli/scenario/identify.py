@@ -54,7 +54,9 @@ class LogFile(Component):
 class Identify(Component):
     """Which logs there are, what their columns mean, and which numbers are looked for."""
 
-    logs: tuple[LogFile, ...] = value(..., "", "the logs", strict=False)
+    logs: tuple[LogFile, ...] = value(
+        (), "", "the logs; podusv compare with a measured track needs none", strict=False
+    )
     columns: dict[str, str] = value(
         {}, "", "what a log calls a quantity, with its unit where that is not podusv's: "
         '{psi: "heading [deg]"}, with a minus before the name if its sign is the other one; a '
@@ -89,9 +91,8 @@ class Identify(Component):
     @field_validator("logs")
     @classmethod
     def _some_to_fit(cls, logs: tuple[LogFile, ...]) -> tuple[LogFile, ...]:
-        if not any(log.role == "fit" for log in logs):
-            what = "all logs are for judging" if logs else "it is empty"
-            raise ValueError(f"{what}; at least one log has to have role: fit")
+        if logs and not any(log.role == "fit" for log in logs):
+            raise ValueError("all logs are for judging; at least one has to have role: fit")
         for one, other in combinations(logs, 2):
             if one.shares(other):
                 raise ValueError(

@@ -297,7 +297,7 @@ class Scenario(Component):
     def at_target(self, numbers: Mapping[str, float]) -> bool:
         """Whether a run with these metrics ends at its target, see `core.about.at_target`."""
         return at_target(
-            numbers, follows=self.path.follows, trial=self.controller.trial() is not None,
+            numbers, follows=self.path.follows, trial=not self.controller.aims(),
             radius=self.metrics.settling_radius,
         )  # fmt: skip
 

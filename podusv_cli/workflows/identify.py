@@ -48,10 +48,10 @@ def identify_of(
 ) -> outputs.Identified:
     """The same for a scenario that is loaded and checked."""
     started, scenario = datetime.now(UTC), loaded.scenario
-    if scenario.identify is None:
+    if scenario.identify is None or not scenario.identify.logs:
         raise UsageError(
-            f"{scenario.name} names no logs; write the section `identify`, as podusv docs identify "
-            "shows"
+            f"{scenario.name} names no logs; write them under identify.logs, as podusv docs "
+            "identify shows"
         )
     source = loaded.root.mark.source
     logs: list[tuple[Log, str]] = []

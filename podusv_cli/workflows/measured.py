@@ -36,8 +36,8 @@ def track(path: Path, identify: Sequence[Identify]) -> Track:
     if lacking := [name for name in POSE if name not in log.columns]:
         raise UsageError(
             f"{path}: nothing is known of {', '.join(lacking)}; call its columns time, x, y, psi, "
-            "with units in brackets where these are not s, m, rad, or compare it with a scenario "
-            "whose identify.columns says what they are called"
+            "with units in brackets where these are not s, m, rad, or write identify.columns in a "
+            "scenario beside it, which says what they are called"
         )
     rows = delivered(log.columns["x"]) & np.isfinite(log.columns["y"])
     if np.count_nonzero(rows) < 2:

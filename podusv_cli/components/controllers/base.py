@@ -127,6 +127,10 @@ class Controller(Component):
         """What the actuator obeys in place of the demand; None for laws."""
         return None
 
+    def aims(self) -> bool:
+        """Whether it steers for a target; trials and recorded commands do not."""
+        return self.trial() is None and self.commands() is None
+
     def optimum_of(self) -> str:
         """The metric that its motion minimises among all motions of the task; empty for laws."""
         return ""

@@ -69,6 +69,7 @@ class Schedule(Controller):
     Rows of t and commands (n_1 or n_cmd_1 [1/s], delta_1 or delta_cmd_1 [rad] and so on: speed and
     angle of every pod) go to the pods themselves, in place of what an allocation makes of a demand.
     Lags, rates and limits act as always, a delay of commands does not; the demand is logged as 0.
+    Nothing aims at the target then, so there is no distance to it.
     """
 
     kind: Literal["schedule"] = "schedule"

@@ -93,7 +93,7 @@ class ClosedLoop:
     @property
     def has_target(self) -> bool:
         """Whether the distance to the target says how good the law is."""
-        return not (self.path.follows or self.controller.trial())
+        return self.controller.aims() and not self.path.follows
 
     def lyapunov(self) -> Any:
         """The law where (46) is its Lyapunov function; None where it sees another target."""
