@@ -551,6 +551,39 @@ def test_columns_are_listed_with_rate_range_and_a_guess(tmp_path):
     assert (heading.least, heading.most) == (columns["Heading"].min(), columns["Heading"].max())
     assert battery.missing == pytest.approx(0.25)
     assert found.mapping()[4] == '  psi: "Heading [deg]"'
+    assert found.mapping()[-1] == "  # columns not guessed: battery"
+
+
+@pytest.mark.parametrize(
+    "sides",
+    [
+        ("n left [rpm]", "n right [rpm]"), ("port [rpm]", "starboard [rpm]"), ("left", "right"),
+        ("thruster left [rpm]", "thruster right [rpm]"), ("n_port", "n_stbd"),
+    ],
+)  # fmt: skip
+def test_sides_and_blanks_are_guessed(tmp_path, sides):
+    """As another simulator writes them; a rudder's side is no propeller."""
+    ramp = np.arange(0.0, 2.0, 0.1)
+    names = ("time", "north", "east", "heading [deg]", "yaw rate [deg/s]", *sides, "rudder left")
+    found = listing(written(tmp_path / "log.csv", dict.fromkeys(names, ramp)))
+    assert [own.quantity for own in found.columns] == [
+        "time", "x", "y", "psi", "r", "n_1", "n_2", "delta_1"
+    ]  # fmt: skip
+    assert not any("#" in line for line in found.mapping())
+
+
+def test_what_a_log_needs_and_nothing_is_guessed_for_stands_in_the_mapping(tmp_path):
+    ramp = np.arange(0.0, 2.0, 0.1)
+    columns = {"time": ramp, "north": ramp, "east": ramp, "way": ramp, "fan": ramp}
+    lines = listing(written(tmp_path / "log.csv", columns)).mapping()
+    assert lines[-3:] == [
+        "  # psi: ?   (not guessed; see podusv docs identify)",
+        "  # n_1: ?   (not guessed; see podusv docs identify)",
+        "  # columns not guessed: way, fan",
+    ]
+    assert yaml.safe_load("\n".join(lines)) == {
+        "columns": {"time": "time", "x": "north", "y": "east"}
+    }
 
 
 def test_the_command_lists_columns_without_a_scenario(podusv, tmp_path):
@@ -558,7 +591,7 @@ def test_the_command_lists_columns_without_a_scenario(podusv, tmp_path):
     said = podusv("identify", "--columns", "log.csv")
     assert said.code == 0
     assert "heading" in said.out
-    assert said.out.rstrip().endswith('psi: "heading [deg]"')
+    assert '    psi: "heading [deg]"\n    # x: ?' in said.out
     listed = json.loads(podusv("identify", "--columns", "log.csv", "--json").out)
     assert listed["columns"][1]["unit"] == "deg"
     assert podusv("identify", "--columns", "none.csv").err == "none.csv: there is no such file\n"

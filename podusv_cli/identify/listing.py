@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.checks import FINER, SLOWEST
 from podusv_cli.identify.formats import TIME, Columns, columns_of
-from podusv_cli.identify.reading import UNITS, clock_of, delivered, parted
+from podusv_cli.identify.reading import UNITS, clock_of, delivered, listed, parted
 
-# What the end of a column's name says of it, the likelier first. "#" stands for 1, 2, ... in the
-# order of the log.
+SIDES = "left|right|port|starboard|stbd"
+# What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
+# stands for 1, 2, ... in the order of the log.
 NAMES = {
     TIME: r"time|t|timestamp|time_?stamp|stamp|timeus|epoch|secs?|seconds",
     "lat": r"lat|latitude", "lon": r"lon|lng|longitude",
@@ -24,11 +26,14 @@ NAMES = {
     "psi": r"psi|heading|hdg|compass|yaw",
     "u": r"u|surge|linear\.x|speed_?x|vx", "v": r"v|sway|linear\.y|speed_?y|vy",
     "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
-    "n_#": r"n_?\d|.*rpm.*|.*rps.*|.*propeller.*|.*motor.*|.*esc.*speed.*",
+    "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
+    ".*propeller.*|.*motor.*|.*esc.*speed.*",
     "delta_#": r"delta_?\d|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
     "tau_u": r"tau_u|surge_?force|force\.x", "tau_v": r"tau_v|sway_?force|force\.y",
     "tau_r": r"tau_r|yaw_?moment|torque\.z",
 }  # fmt: skip
+# Of each of these a log needs one, the first where nothing is known.
+NEEDED = ((TIME,), ("x", "lat"), ("y", "lon"), ("psi",), ("n_1", "delta_1", "tau_u"))
 FORMS = ("^({})$", "([./ ]|_(?=...))({})$")  # the whole name, or its last part
 # Of quantities the unit that the end of a name means, and that which a range means that begins so.
 ENDINGS = {
@@ -70,18 +75,23 @@ class Listing:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "columns": [asdict(listed) for listed in self.columns],
+            "format": 1, "columns": [asdict(own) for own in self.columns],
             "mapping": self.mapping(),
         }  # fmt: skip
 
     def mapping(self) -> list[str]:
-        """Lines to write under `identify`, as far as they can be guessed."""
+        """Lines to write under `identify`; comments say what could not be guessed."""
         lines = ["columns:"]
-        for listed in self.columns:
-            if listed.quantity:
-                own, _ = parted(listed.name)
-                unit = f" [{listed.unit}]" if listed.unit else ""
-                lines.append(f'  {listed.quantity}: "{own}{unit}"')
+        for own in self.columns:
+            if own.quantity:
+                unit = f" [{own.unit}]" if own.unit else ""
+                lines.append(f'  {own.quantity}: "{parted(own.name)[0]}{unit}"')
+        known = {own.quantity for own in self.columns}
+        lacking = [names[0] for names in NEEDED if not known & {*names}]
+        lines += [f"  # {name}: ?   (not guessed; see podusv docs identify)" for name in lacking]
+        left = [visible(own.name) for own in self.columns if not own.quantity]
+        if left:
+            lines.append(f"  # columns not guessed: {listed(left)}")
         if self.turned:
             lines.append("frame: enu  # ROS counts x to the east, y to the north, turns to port")
         return lines
@@ -91,8 +101,10 @@ def listing(path: Path) -> Listing:
     """The columns of a log. Raises LogFault, StorageError."""
     columns = columns_of(path)
     guesses = dict(_guesses(columns))
-    listed = [_listed(name, columns, guesses) for name in columns]
-    return Listing(listed, any(name.endswith("orientation.yaw") for name in guesses))
+    return Listing(
+        [_listed(name, columns, guesses) for name in columns],
+        any(name.endswith("orientation.yaw") for name in guesses),
+    )
 
 
 def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
@@ -115,7 +127,8 @@ def _numbered(quantity: str, name: str, guesses: dict[str, str]) -> str:
 def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
     """Columns and what they are, each quantity once but those that are numbered."""
     taken: set[str] = set()
-    for quantity, pattern in NAMES.items():
+    for quantity, names in NAMES.items():
+        pattern = names.replace("_?", "[_ ]?")
         numbered = "#" in quantity
         likely = [pattern] if numbered else pattern.split("|")
         for form in [form.format(name) for form in FORMS for name in likely]:
@@ -128,8 +141,11 @@ def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
 
 
 def _plain(column: str) -> str:
-    """A name without its unit, in small letters."""
-    name = parted(column)[0].lower().replace("-", "_").removesuffix("_")
+    """A name in small letters, without its unit, but that of a propeller's speed."""
+    own, unit = parted(column)
+    if unit == "rpm":
+        own = f"{own} rpm"
+    name = own.lower().replace("-", "_").removesuffix("_")
     ending = next((e for e in ENDINGS if name.endswith(f"_{e}")), "")
     return name.removesuffix(f"_{ending}") if ending else name
 

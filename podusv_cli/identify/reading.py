@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -99,7 +99,7 @@ def table(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = "")
             if not own:
                 raise LogFault(
                     f"{name}: no column is called time; name the one that has it, as in columns: "
-                    f"{{time: {next(iter(columns), 't')}}} (columns: {_listed(columns)})"
+                    f"{{time: {next(iter(columns), 't')}}} (columns: {listed(columns)})"
                 )
             series[signal.name] = _Series(own, columns[found.column] * found.factor)
     if clock:
@@ -132,7 +132,7 @@ def _found(columns: Columns, signal: Signal, named: Named, name: str) -> _Found 
         return None
     near = difflib.get_close_matches(asked, columns, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise LogFault(f"{name}: no column is called {asked!r}{hint} (columns: {_listed(columns)})")
+    raise LogFault(f"{name}: no column is called {asked!r}{hint} (columns: {listed(columns)})")
 
 
 def parted(name: str) -> tuple[str, str]:
@@ -165,7 +165,7 @@ def _together(name: str, series: Mapping[str, _Series], columns: Columns) -> Tab
         raise LogFault(
             f"{name}: it has none of x, y (or lat, lon) and psi, which are needed; write "
             "identify.columns in a scenario beside it, as {x: north, y: east, "
-            f"psi: 'heading [deg]'}} (columns: {_listed(columns)})"
+            f"psi: 'heading [deg]'}} (columns: {listed(columns)})"
         )
     times = np.unique(np.concatenate([part.times for part in sound]))
     together = {}
@@ -204,7 +204,8 @@ def _sound(log: Table, clock: str) -> Table:
     return replace(log.where(~again), warnings=tuple(warnings))
 
 
-def _listed(columns: Columns) -> str:
+def listed(columns: Iterable[str]) -> str:
+    """The first of the names, and how many more there are."""
     names = list(columns)
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     return ", ".join(names[:LISTED]) + more
