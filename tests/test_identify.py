@@ -225,6 +225,31 @@ def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
     assert np.all(sd >= [0.99 * math.sqrt(variance / 401), 0.99 * math.sqrt(0.5 / 401)])
 
 
+def test_an_interrupt_at_any_time_keeps_what_the_first_search_found():
+    """At every call of the filter in the second search, the first of which no round protects."""
+    z = np.random.default_rng(5).normal(0.7, 0.3, 40)
+    made = []
+
+    def innovations(points):
+        made.append(len(points))
+        if len(made) == interrupted:
+            raise KeyboardInterrupt
+        return np.column_stack([z - y[0] for y in points]), np.full((40, len(points)), 0.09)
+
+    search, interrupted = Search(innovations, 1, np.arange(40) // 20), 0
+    whole = estimated(search, starts=1)
+    first = len(made)
+    made.clear()
+    estimated(search)
+    calls = len(made)
+    assert calls > first + 3
+    for interrupted in range(first + 1, calls + 1):
+        made.clear()
+        found = estimated(search)
+        assert found.interrupted
+        assert found.value <= whole.value
+
+
 def test_a_few_numbers_come_out_of_two_logs(boat):
     """From half to twice the truth; with the current of each log, and no delay."""
     off = {"X_udot": -15.0, "N_rdot": -3.0, "Y_vv": -20.0, "N_r": -3.0}
@@ -385,7 +410,7 @@ def test_a_search_beside_which_the_filter_breaks_down_ends_with_a_sentence():
 def test_ctrl_c_while_logs_are_judged_keeps_the_hull(boat, monkeypatch):
     from podusv_cli.workflows import identify as workflow
 
-    def interrupted(*_):
+    def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(judge, "estimated", interrupted)

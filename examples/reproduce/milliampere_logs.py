@@ -19,7 +19,8 @@ import pandas as pd
 def topic(folder: Path, name: str) -> pd.DataFrame:
     """A topic's rows by time [s]."""
     frame = pd.read_csv(folder / f"{name}.csv")
-    frame.index = pd.to_datetime(frame["time"], format="%Y/%m/%d %H:%M:%S.%f").astype("int64") / 1e9
+    times = pd.to_datetime(frame["time"], format="%Y/%m/%d %H:%M:%S.%f")
+    frame.index = (times - pd.Timestamp(0)) / pd.Timedelta(1, "s")
     return frame[~frame.index.duplicated()].sort_index()
 
 

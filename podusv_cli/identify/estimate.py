@@ -103,7 +103,9 @@ class Estimate:
     interrupted: bool = False
 
 
-def estimated(search: Search, tell: Tell = lambda i, value: None) -> Estimate:
+def estimated(
+    search: Search, tell: Tell = lambda i, value: None, *, starts: int = STARTS
+) -> Estimate:
     """The best of several searches: from the prior's centre, then from draws of the prior.
 
     They end when two have come to the same value. An interrupt leaves the best so far. Raises
@@ -113,9 +115,12 @@ def estimated(search: Search, tell: Tell = lambda i, value: None) -> Estimate:
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
-    while len(found) < STARTS and not (found[-1].interrupted or _agree(found)):
+    while len(found) < starts and not (found[-1].interrupted or _agree(found)):
         start = NEARER * rng.standard_normal(search.size)
-        found.append(_estimated(search, start, tell))
+        try:
+            found.append(_estimated(search, start, tell))
+        except KeyboardInterrupt:  # before its first round
+            found[-1] = replace(found[-1], interrupted=True)
     best = min(found, key=lambda e: e.value)
     return replace(best, settled=_agree(found), interrupted=found[-1].interrupted)
 

@@ -126,7 +126,7 @@ def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
         return followed.innovations, followed.variances
 
     blocks = np.zeros(log.record.delivered, np.int64)
-    found = estimated(Search(innovations, 2, blocks))
+    found = estimated(Search(innovations, 2, blocks), starts=1)
     if found.interrupted:
         raise KeyboardInterrupt
     ways = directions(found.covariance, 2)
