@@ -228,23 +228,24 @@ def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
 def test_an_interrupt_at_any_time_keeps_what_the_first_search_found():
     """At every call of the filter in the second search, the first of which no round protects."""
     z = np.random.default_rng(5).normal(0.7, 0.3, 40)
-    made = []
+    made, last = [], [0]
 
     def innovations(points):
         made.append(len(points))
-        if len(made) == interrupted:
+        if len(made) == last[0]:
             raise KeyboardInterrupt
         return np.column_stack([z - y[0] for y in points]), np.full((40, len(points)), 0.09)
 
-    search, interrupted = Search(innovations, 1, np.arange(40) // 20), 0
+    search = Search(innovations, 1, np.arange(40) // 20)
     whole = estimated(search, starts=1)
     first = len(made)
     made.clear()
     estimated(search)
     calls = len(made)
     assert calls > first + 3
-    for interrupted in range(first + 1, calls + 1):
+    for call in range(first + 1, calls + 1):
         made.clear()
+        last[0] = call
         found = estimated(search)
         assert found.interrupted
         assert found.value <= whole.value
