@@ -37,6 +37,7 @@ from podusv_cli.identify.reading import Table, delivered
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
+from podusv_cli.workflows.identify import answered
 
 LOGS = (LogFile(file="a.csv"),)
 SCENARIO = load(
@@ -408,16 +409,27 @@ def test_a_search_beside_which_the_filter_breaks_down_ends_with_a_sentence():
         directions(np.full((2, 2), np.nan), 2)
 
 
-def test_ctrl_c_while_logs_are_judged_keeps_the_hull(boat, monkeypatch):
-    from podusv_cli.workflows import identify as workflow
+def test_a_log_of_few_seconds_gives_a_hull_without_scores():
+    times = np.arange(0.0, 60.0, 0.1)
+    commands = commands_of(times)
+    states = motion(commands[:41], times[:41], np.array([0.0, 0.0, 0.0, 0.4, 0.0, 0.0]))
+    given = problem(
+        [log_of(table_of(times[:41], states, commands[:41]), Ideal(), 0.05)], free=("N_r",), draws=5
+    )
+    answer = answered(given.scenario, given.wanted, [(given.logs[0], "fit")], None)
+    assert answer.scores == []
+    assert 0.2 < answer.vessel.envelope.speed < 0.6
+    assert len(answer.forces) == 9
 
+
+def test_ctrl_c_while_logs_are_judged_keeps_the_hull(boat, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(judge, "estimated", interrupted)
     given = problem(boat[2:], free=("N_r",))
     logs = [(boat[2], "fit")]
-    answer = workflow.answered(given.scenario, given.wanted, logs, None)
+    answer = answered(given.scenario, given.wanted, logs, None)
     assert answer.estimate.interrupted
     assert answer.estimate.settled
     assert answer.judged == [(boat[2], "fit", ())]

@@ -140,7 +140,7 @@ class Answer:
         tracks = []
         for log in self.problem.logs:
             track = self.problem.followed(log, [self.estimate.y]).track[:, 3:MOVING, 0]
-            tracks.append(track[log.times >= log.times[0] + WARM])
+            tracks.append(track[log.times >= log.times[0] + min(WARM, 0.5 * log.duration)])
         return np.concatenate(tracks)
 
     @cached_property
