@@ -8,6 +8,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -514,6 +515,15 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
     vessel = Vessel(**plain(node))
     assert vessel.N_r == pytest.approx(hull.vessel["N_r"])
     assert vessel.envelope.speed < 1.5
+    numbers = pd.read_csv(tmp_path / "hull/parameters.csv", index_col="name")
+    assert numbers.unit.notna().all()
+    assert numbers.unit[["m11", "m33", "N_r", "q_b", "delay"]].tolist() == [
+        "kg", "kg m2", "kg m2/s", "N/sqrt(s)", "s"
+    ]  # fmt: skip
+    forces = pd.read_csv(tmp_path / "hull/forces.csv", index_col="force")
+    assert {*forces.loc[["N(r)"], "unit of at"]} == {"rad/s"}
+    files = pd.read_csv(tmp_path / "hull/judged.csv")
+    assert files["heading [deg]"].to_numpy() == pytest.approx(np.degrees(hull.scores.heading))
     judged = hull.scores[(hull.scores.role == "judge") & (hull.scores.horizon == 30.0)]
     errors = judged.set_index("who").position
     assert errors["identified"] < 0.5 * errors["constant velocity"]

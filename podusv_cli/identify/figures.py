@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,7 +16,14 @@ from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.judge import WHO, FreeRun
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 
-MEASURED = "#777777"
+MEASURED: dict[str, Any] = {
+    "color": "#777777",
+    "ls": "none",
+    "marker": "o",
+    "mfc": "none",
+    "ms": 3.0,
+}
+POINTS = 60  # of what was measured, about
 HEIGHT = 2.6  # inches
 DRAWN = 1.6  # of the measured track: how far from its middle others are drawn
 
@@ -38,14 +46,18 @@ def sketches(answer: Answer) -> Iterator[Sketch]:
 
 
 def free_run(run: FreeRun) -> Figure:
-    """Track and heading of a free run."""
+    """Track and heading of a free run; of what was measured so many points that runs are seen."""
     figure = new_figure(COLUMNS, HEIGHT)
     track, heading = figure.subplots(1, 2)
     since = run.times - run.times[0]
     seen = np.isfinite(run.measured[:, 2])
     psi = np.unwrap(run.measured[seen, 2])
-    track.plot(*run.measured[:, [1, 0]].T, ".", color=MEASURED, ms=2.0, label="measured")
-    heading.plot(since[seen], np.degrees(psi), ".", color=MEASURED, ms=2.0)
+    for axes, east, north in (
+        (track, *run.measured[np.isfinite(run.measured[:, 0])][:, [1, 0]].T),
+        (heading, since[seen], np.degrees(psi)),
+    ):
+        every = max(1, len(east) // POINTS)
+        axes.plot(east[::every], north[::every], **MEASURED, label="measured")
     middle_of_track = np.nanmean(run.measured[:, :2], axis=0)
     reach = DRAWN * float(np.nanmax(np.abs(run.measured[:, :2] - middle_of_track)))
     for i, (who, pose) in enumerate(zip(WHO, run.poses, strict=True)):
@@ -60,7 +72,7 @@ def free_run(run: FreeRun) -> Figure:
     heading.set_ylim(middle - side - 10.0, middle + side + 10.0)
     track.set(xlabel="east [m]", ylabel="north [m]")
     track.set_aspect("equal", adjustable="datalim")
-    heading.set(xlabel="time since the start [s]", ylabel="heading [deg]")
+    heading.set(xlabel="time since the free run began [s]", ylabel="heading [deg]")
     legend(figure)
     return figure
 

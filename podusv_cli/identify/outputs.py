@@ -9,11 +9,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
+from podusv_cli.core.component import unit_of
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
-from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.answer import AXES, Answer, Force
 from podusv_cli.identify.estimate import OPEN
 from podusv_cli.identify.judge import WHO, Score
+from podusv_cli.identify.march import CURRENT, DELAY, THRUST
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
@@ -27,6 +30,13 @@ HEADING = (
     "# A hull that podusv identify found from logs; posterior.csv has what these leave open.\n"
 )
 DIGITS = "%.9g"
+AXIS = {axis.name: axis for axis in AXES}
+# Units of numbers that neither vessel nor filter has as a key.
+OTHERS = {
+    "m11": "kg", "m22": "kg", "m33": "kg m2", THRUST: "1", DELAY: "s",
+    **dict.fromkeys(CURRENT, "m/s"),
+}  # fmt: skip
+LITTLE = 0.8  # of the prior's width, below which something is told of a number
 
 
 @dataclass(frozen=True)
@@ -61,10 +71,12 @@ def write(
     writer.add("scenario.yaml", text.encode())
     writer.add(IDENTIFIED, (HEADING + yaml_text(given(answer))).encode())
     for name, rows in {
-        "parameters.csv": [asdict(p) for p in answer.parameters],
-        "forces.csv": [{**asdict(f), "width": f.width} for f in answer.forces],
+        "parameters.csv": [
+            {"name": p.name, "unit": unit(answer, p.name), **asdict(p)} for p in answer.parameters
+        ],
+        "forces.csv": [force_record(f) for f in answer.forces],
         "fits.csv": [asdict(w) for w in answer.whiteness],
-        "judged.csv": [asdict(s) for s in answer.scores],
+        "judged.csv": [score_record(s) for s in answer.scores],
         POSTERIOR: drawn(answer),
     }.items():
         writer.add(name, csv_files.records(rows, DIGITS).encode())
@@ -101,22 +113,48 @@ def _pictures(answer: Answer, extras: Extras) -> list[Picture]:
     return rendered(sketches(answer), extras)[1]
 
 
+def unit(answer: Answer, number: str) -> str:
+    """Of a number that was looked for: the hull's, the filter's, or a log's current."""
+    name = number.partition(",")[0]
+    fields = {**ExtendedKalmanFilter.model_fields, **type(answer.vessel).model_fields}
+    return unit_of(fields[name]) if name in fields else OTHERS[name]
+
+
+def force_record(force: Force) -> dict[str, Any]:
+    """A force as forces.csv has it: with the units of it and of the speed at which it is."""
+    axis = AXIS[force.force]
+    return {
+        "force": force.force, "unit": axis.unit, "at": force.at, "unit of at": axis.speed_unit,
+        **asdict(force), "width": force.width,
+    }  # fmt: skip
+
+
+def score_record(score: Score) -> dict[str, Any]:
+    """Errors as judged.csv has them, the heading's in degrees as on the page."""
+    return {
+        "log": score.log, "role": score.role, "horizon [s]": score.horizon, "who": score.who,
+        "runs": score.runs, "position [m]": score.position,
+        "heading [deg]": math.degrees(score.heading),
+    }  # fmt: skip
+
+
 def parameter_rows(answer: Answer) -> Iterator[list[str]]:
-    """Of every number: name, prior, estimate, interval, and how much narrower it has become."""
+    """Of every number: name, unit, prior, estimate, interval, and how much is told."""
     for p in answer.parameters:
-        told = "yes" if p.width <= OPEN else "little" if p.width < 0.8 else "no"
+        told = "yes" if p.width <= OPEN else "little" if p.width < LITTLE else "no"
         yield [
-            p.name, f"{p.prior:.4g}", f"{p.value:.4g}", f"{p.low:.4g} to {p.high:.4g}",
-            f"{p.width:.2g}", told,
+            p.name, unit(answer, p.name), f"{p.prior:.4g}", f"{p.value:.4g}",
+            f"{p.low:.4g} to {p.high:.4g}", f"{p.width:.2g}", told,
         ]  # fmt: skip
 
 
 def force_rows(answer: Answer) -> Iterator[list[str]]:
     """Of every force: where, its value, the interval, and the interval over the prior's."""
     for f in answer.forces:
+        axis = AXIS[f.force]
         yield [
-            f.force, f"{f.at:.3g}", f"{f.value:.4g}", f"{f.low:.4g} to {f.high:.4g}",
-            f"{f.width:.2g}", "yes" if f.width <= OPEN else "no",
+            f.force, f"{f.at:.3g} {axis.speed_unit}", f"{f.value:.4g} {axis.unit}",
+            f"{f.low:.4g} to {f.high:.4g}", f"{f.width:.2g}", "yes" if f.width <= OPEN else "no",
         ]  # fmt: skip
 
 
@@ -129,8 +167,16 @@ def score_rows(scores: Sequence[Score]) -> Iterator[list[str]]:
         yield [log, ways[0].role, after, str(ways[0].runs), *errors]
 
 
-PARAMETERS = ("number", "prior", "estimate", "95 % interval", "width over the prior's", "told")
-FORCES = ("force", "at", "estimate [N, N m]", "95 % interval", "width over the prior's", "told")
+PARAMETERS = (
+    "number",
+    "unit",
+    "prior",
+    "estimate",
+    "95 % interval",
+    "width over the prior's",
+    "told",
+)
+FORCES = ("force", "at", "estimate", "95 % interval", "width over the prior's", "told")
 SCORES = ("log", "role", "after", "runs", *WHO)
 
 
@@ -145,6 +191,7 @@ def page(
         parameters=(PARAMETERS, [*parameter_rows(answer)]), forces=(FORCES, [*force_rows(answer)]),
         scores=(SCORES, [*score_rows(answer.scores)]), whiteness=answer.whiteness,
         widths=[f"{width:.2g}" for width in answer.directions.widths],
-        known=answer.directions.known, pictures=list(enumerate(pictures, 1)),
-        provenance=[(key, value_text(value)) for key, value in flat(origin)],
+        known=answer.directions.known, least=OPEN, little=LITTLE,
+        pictures=list(enumerate(pictures, 1)),
+        provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
     )  # fmt: skip
