@@ -89,6 +89,7 @@ def forces(answer: Answer) -> Figure:
         axes.plot(curve.speeds, curve.value, color=nth_style(0)[0], label="identified")
         for edge in curve.covered:
             axes.axvline(edge, color="black", lw=0.8, ls=":")
+        axes.locator_params(axis="x", nbins=4)
         axes.set(
             xlabel=f"{curve.axis.speed} [{curve.axis.speed_unit}]",
             ylabel=f"{curve.axis.name} [{curve.axis.unit}]",
