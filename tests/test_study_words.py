@@ -21,6 +21,8 @@ from podusv_cli.studies.making.words import WORDS, in_words
         ({"choice": ("line", 2)}, "one of line, 2, all equally likely"),
         ({"integers": (1, 6)}, "a whole number from 1 to 6, all equally likely"),
         ({"angle": "all"}, "any direction, all equally likely"),
+        ({"identified": "found", "rows": "m,I_z\n1,2\n3,4\n5,6"},
+         "one of the 3 rows of found/posterior.csv, hulls, all equally likely"),
         ({"seed": True}, "a new seed for every draw"),
     ],
 )  # fmt: skip

@@ -109,8 +109,9 @@ def _notes(run: Recording, of_run: bool) -> Iterator[str]:
         yield f"the run {run.message}; {SAMPLES} has the samples before"
     if not of_run:
         yield (
-            "the loads change between two samples of this run, which the law by itself is not "
-            f"given; {SAMPLES} has what it says by itself, not what it said in the run"
+            "in the run the law was given loads between its samples, and the exported law has them "
+            f"at its samples alone, so its demands differ from those in log.h5; {SAMPLES} has what "
+            "the exported law answers: check your code by that, not by log.h5"
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from podusv_cli.scenario.distributions import Distribution
-from podusv_cli.scenario.sweep import Quantity
+from podusv_cli.scenario.sweep import POSTERIOR, Quantity
 
 
 def in_words(quantity: Quantity) -> str:
@@ -14,7 +14,11 @@ def in_words(quantity: Quantity) -> str:
     if quantity.seed:
         return "a new seed for every draw"
     if quantity.rows:
-        return f"one of {len(quantity.lines.rows)} rows, all equally likely"
+        count = len(quantity.lines.rows)
+        if quantity.identified:
+            of = f"the {count} rows of {quantity.identified}/{POSTERIOR}, hulls"
+            return f"one of {of}, all equally likely"
+        return f"one of {count} rows, all equally likely"
     drawn = of_distribution(quantity.distribution)
     if quantity.times:
         return f"the scenario's own value times a factor: {drawn}"

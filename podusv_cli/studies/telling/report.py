@@ -143,10 +143,15 @@ def _varied(results: Results) -> list[tuple[str, str, str]]:
         (
             ", ".join(quantity.keys),
             quantity.drawn,
-            ", ".join(value_text(own.get(f"{run}.{key}")) for key in quantity.keys),
+            ", ".join(_own(own.get(f"{run}.{key}")) for key in quantity.keys),
         )
         for quantity in results.about.quantities.values()
     ]
+
+
+def _own(value: Any) -> str:
+    """A scenario's own value, with the digits that a reader looks at."""
+    return f"{value:.5g}" if isinstance(value, float) else value_text(value)
 
 
 def _beside(figures: Sequence[Picture], laws: int) -> list[Picture]:
