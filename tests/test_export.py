@@ -108,7 +108,7 @@ def test_a_law_that_loads_between_samples_change_is_held_against_itself(tmp_path
         tmp_path / "law", changes, fmu=False, platforms=[link.this_machine()], say=said.append
     )
     folder = workflow.export(Path(SOURCE), request)
-    assert any("not what it said in the run" in text for text in said)
+    assert any("check your code by that, not by log.h5" in text for text in said)
     assert not any("the run" in text and "samples before" in text for text in said)
     assert not json.loads((folder / "law.json").read_text())["of_run"]
     if shutil.which("cc"):
