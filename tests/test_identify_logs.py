@@ -625,3 +625,11 @@ def test_what_is_guessed_of_a_ros_bag_can_be_pasted(tmp_path):
     section = yaml.safe_load("\n".join(found.mapping()))
     log = read(tmp_path / "bag", section["columns"], section["frame"])
     assert {"x", "y", "psi", "u", "v", "r"} <= log.columns.keys()
+
+
+def test_a_log_for_judging_is_not_moved_by_what_all_of_it_says(tmp_path, sailed):
+    early = later(sailed, Ideal(), -2.0)
+    path = written(tmp_path / "a.csv", {"time": early.times, **early.columns})
+    (log,) = logs_of(path, LogFile(file="a.csv", role="judge"), scenario())
+    assert log.record.rows == pytest.approx(log_of(early, Ideal(), 0.05).record.rows)
+    assert "A log for judging stays as it is" in log.warnings[0]

@@ -81,9 +81,9 @@ class Clocks:
                 break
             best = nearer
         line = (
-            f"{self.table.name}: its commands act {best.delay:.2f} s later than it says, and are "
-            f"moved by that (its motion is foretold better, by {gain:.0f} in -2 log of the "
-            "posterior). identify.logs[].delay gives another."
+            f"{self.table.name}: its commands act {best.delay:.2f} s later than it says (that "
+            f"foretells its motion better, by {gain:.0f} in -2 log of the posterior); logs for "
+            "fitting are moved by that. identify.logs[].delay gives another."
         )
         return best.delay, [line]
 
@@ -131,7 +131,7 @@ class Clocks:
         search = _search(problem)
         if not np.isfinite(search.values([np.zeros(search.size)])[0]):
             return replace(way, value=np.inf)
-        found = estimate.estimated(search)
+        found = estimate.estimated(search, starts=1)
         delay = way.delay + problem.values(found.y)[DELAY]
         return replace(way, delay=delay, value=found.value)
 
