@@ -222,8 +222,8 @@ def test_a_package_that_is_not_installed_has_no_version(monkeypatch):
         raise PackageNotFoundError(name)
 
     monkeypatch.setattr(provenance, "version", version)
-    origin = provenance.collect([], STARTED, FINISHED)
-    assert set(origin["packages"].values()) == {None}
+    asked_anew = provenance.surroundings.__wrapped__  # it is kept for all results of a process
+    assert set(asked_anew()["packages"].values()) == {None}
 
 
 def git(folder: Path, *words: str) -> str:
