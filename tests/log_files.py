@@ -6,6 +6,9 @@ import struct
 
 import numpy as np
 
+from podusv_cli.core.signal import STATE, TAU
+from podusv_cli.identify.reading import Named, table
+
 
 def write_bag(folder, begin=1_700_000_000_000_000_000):
     """Odometry at 10 Hz, whose stamps are 5 ms older than its arrival, and a thruster at 4 Hz."""
@@ -103,3 +106,18 @@ def write_dataflash(path):
             )
     path.write_bytes(b"".join(out))
     return path
+
+
+WANTED = (*STATE, *TAU)
+
+
+def written(path, columns):
+    """A CSV file of columns by name; NaN is an empty cell."""
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join("" if x != x else repr(float(x)) for x in row) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return path
+
+
+def read(path, columns=None, frame="ned"):
+    return table(path, WANTED, Named(columns or {}, frame))

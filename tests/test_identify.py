@@ -1,4 +1,4 @@
-"""A hull from logs: the filter along a log, the search, what is told and what is left open."""
+"""A hull from logs: the filter along a log, the search, what logs determine and leave open."""
 
 from __future__ import annotations
 
@@ -351,7 +351,7 @@ def test_a_hull_that_foretells_worse_than_the_prior_gets_a_warning():
 
     assert worse_words(scored(1.0, 1.0)) == []
     (line,) = worse_words(scored(2.0, 1.0))
-    assert line.startswith("a.csv: the vessel as it was given foretells this log better")
+    assert line.startswith("a.csv: the vessel as it was given predicts this log better")
 
 
 def test_a_long_log_is_judged_from_few_instants_and_only_once_to_its_end(boat):

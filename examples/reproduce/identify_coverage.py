@@ -3,8 +3,8 @@
     python examples/reproduce/identify_coverage.py results/identify/coverage.csv [--sets 100]
 
 For each hull and each GNSS: so many true hulls, drawn as the prior has it; each does two zig-zags
-and two turning circles in a current and in wind that the filter is not told of, through noisy
-sensors. What comes out is compared with the truth: numbers and forces that count as told.
+and two turning circles in a current and under loads that the filter does not know, through
+noisy sensors. What comes out is compared with the truth, where the logs determine it.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ LASTING, SINES = 10.0, 8  # s on the model ship: how long a gust's load lasts; o
 WANTED = Identify(logs=(LogFile(file="-"),))
 HEAD = (
     "sea", "hull", "gnss", "set", "what", "name", "truth", "value", "low", "high", "width", "off",
-    "holds", "told", "settled",
+    "holds", "determined", "settled",
 )  # fmt: skip
 
 
@@ -233,15 +233,15 @@ def of_forces(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
 
 
 def summary(made: pd.DataFrame) -> pd.DataFrame:
-    """Of each sea, hull and GNSS what counts as told, and how it stands to the truth."""
-    told = made[made.told & made.settled]
-    by = told.groupby(["sea", "hull", "gnss", "what"], sort=False)
+    """Of each sea, hull and GNSS what the logs determine, and how it stands to the truth."""
+    determined = made[made.determined & made.settled]
+    by = determined.groupby(["sea", "hull", "gnss", "what"], sort=False)
     sets = made.groupby(["sea", "hull", "gnss", "what"], sort=False)
     return pd.DataFrame(
         {
             "sets": sets.set.nunique(),
             "settled": sets.apply(lambda cell: cell[cell.settled].set.nunique()),
-            "told": by.size(), "of": sets.settled.sum(), "held": by.holds.mean(),
+            "determined": by.size(), "of": sets.settled.sum(), "held": by.holds.mean(),
             "off_rms": by.off.apply(lambda off: float(np.sqrt(np.mean(off**2)))),
             "off_median": by.off.apply(lambda off: float(np.median(np.abs(off)))),
         }

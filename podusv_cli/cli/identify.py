@@ -58,7 +58,7 @@ def identify(
     """Find the numbers of a hull, and how far off they may be, from logs of the boat.
 
     The section `identify` of the scenario names the logs and their columns; `vessel` is what is
-    known before. What the logs do not tell stays as it was, and is named.
+    known before. What the logs do not determine is named.
     """
     if columns:
         return _show_columns(columns, as_json)

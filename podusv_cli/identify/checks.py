@@ -304,8 +304,8 @@ def _manoeuvres(motion: Motion) -> Iterator[str]:
     if turned < STEADY and len(fast) and np.nanstd(fast) < STEADY * np.nanmean(fast):
         yield (
             f"its heading stays within {math.degrees(2.0 * turned):.1f} deg and its speed within "
-            f"{200.0 * np.nanstd(fast) / np.nanmean(fast):.0f} %, which tells the drag at one "
-            "speed and little else; zig-zags, turning circles and stops tell more"
+            f"{200.0 * np.nanstd(fast) / np.nanmean(fast):.0f} %, which determines the drag at one "
+            "speed and little else; zig-zags, turning circles and stops determine more"
         )
 
 
@@ -315,7 +315,7 @@ def _idle(motion: Motion) -> Iterator[str]:
     given = [columns[s.name] for s in motion.actuator.replayed if s.name in columns]
     if not any(np.any(np.abs(values) > 0.0) for values in given):
         yield (
-            "its commands are 0 throughout, so the boat lay still or drifted, which tells next to "
+            "its commands are 0 throughout, so the boat lay still or drifted, which says next to "
             "nothing of the hull; keep the log for judging, or leave it out"
         )
 

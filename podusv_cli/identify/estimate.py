@@ -193,7 +193,7 @@ class Directions:
 
     @property
     def known(self) -> int:
-        """How many of them the logs tell."""
+        """How many of them the logs determine."""
         return int(np.sum(self.widths <= OPEN))
 
 

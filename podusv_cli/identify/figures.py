@@ -29,12 +29,12 @@ DRAWN = 1.6  # of the measured track: how far from its middle others are drawn
 
 
 def sketches(answer: Answer) -> Iterator[Sketch]:
-    """For every log its free run from the first start, measured and foretold; then the forces."""
+    """For every log its free run from the first start, measured and predicted; then the forces."""
     for i, (log, role, runs) in enumerate(answer.judged, 1):
         if runs:
             yield Sketch(
                 f"free-run-{i}",
-                f"{log.name} ({role}): measured, and foretold from its commands alone from "
+                f"{log.name} ({role}): measured, and predicted from its commands alone from "
                 f"{runs[0].times[0] - log.times[0]:.0f} s on",
                 partial(free_run, runs[0]),
             )

@@ -39,7 +39,7 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
     )
-    if lines and given.role == "judge":  # what the whole log says must not help to foretell it
+    if lines and given.role == "judge":  # what the whole log says must not help to predict it
         lines = [f"{line} A log for judging stays as it is without that." for line in lines]
         delay = 0.0
     moved = [later(piece, actuator, delay) for piece in found]

@@ -1,4 +1,4 @@
-"""How well a hull foretells a log that it has not seen: free runs from the log's commands."""
+"""How well a hull predicts a log that it has not seen: free runs from the log's commands."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ WHO = ("identified", "prior", "constant velocity")
 
 @dataclass(frozen=True)
 class FreeRun:
-    """A motion foretold from one instant on, beside what was measured.
+    """A motion predicted from one instant on, beside what was measured.
 
-    `poses` has an array a way to foretell (`WHO`): x, y, psi at each of `times`; `measured` is NaN
+    `poses` has an array a way to predict (`WHO`): x, y, psi at each of `times`; `measured` is NaN
     where nothing was delivered.
     """
 
@@ -73,7 +73,7 @@ def _wrapped(angles: Vector) -> Vector:
 
 @dataclass(frozen=True)
 class Score:
-    """Root mean square error over the free runs of a log, of one way to foretell it."""
+    """Root mean square error over the free runs of a log, of one way to predict it."""
 
     log: str
     role: str
@@ -112,7 +112,7 @@ def _free_run(problem: Problem, log: Log, y: Vector, first: int) -> FreeRun:
 
 
 def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
-    """The current that a hull sees along a log [m/s], as far as the log tells it.
+    """The current that a hull sees along a log [m/s], as far as the log determines it.
 
     On a straight track a current along it is the same as a load, and is left to that. An
     interrupt ends it.
@@ -130,8 +130,8 @@ def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
     if found.interrupted:
         raise KeyboardInterrupt
     ways = directions(found.covariance, 2)
-    told = ways.basis[:, : ways.known]
-    return list(problem.current * (told @ (told.T @ found.y)))
+    determined = ways.basis[:, : ways.known]
+    return list(problem.current * (determined @ (determined.T @ found.y)))
 
 
 def _turning(times: Vector, state: Vector) -> Vector:

@@ -1,7 +1,7 @@
 """Commands whose clock is not that of the motion, or that are exchanged: by the filter itself.
 
 The filter follows a log with its commands acting later or earlier, and with the motion mirrored.
-Where that foretells the log much better, also once the hull is fitted to it, the log is so.
+Where that predicts the log much better, also once the hull is fitted to it, the log is so.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ DELAYS = tuple(0.5 * i for i in range(-2, 11))  # s, by which commands may act l
 BETTER = 30.0  # in -2 log of the likelihood, or of the posterior
 REFINED = 4  # times, that a delay is the start of another fit
 QUIET = -2.0  # prior standard deviations
-ENOUGH = 200.0  # s of a log, which tell a delay
+ENOUGH = 200.0  # s of a log, which determine a delay
 MIRRORED = ("y", "psi", "v", "r")
 
 
@@ -67,7 +67,7 @@ class Clocks:
         if best.mirrored and straight - best.value > BETTER:
             raise LogFault(
                 f"{self.table.name}: the boat turns against its commands: with port and starboard "
-                f"exchanged its motion is foretold better, by {straight - best.value:.0f} in -2 "
+                f"exchanged its motion is predicted better, by {straight - best.value:.0f} in -2 "
                 "log of the posterior. Exchange the columns of port and starboard under "
                 'identify.columns, or write "-COLUMN" for what has the other sign; or write '
                 "identify.frame: enu if all of the motion is counted to port"
@@ -82,13 +82,13 @@ class Clocks:
             best = nearer
         line = (
             f"{self.table.name}: its commands act {best.delay:.2f} s later than it says (that "
-            f"foretells its motion better, by {gain:.0f} in -2 log of the posterior); logs for "
+            f"predicts its motion better, by {gain:.0f} in -2 log of the posterior); logs for "
             "fitting are moved by that. identify.logs[].delay gives another."
         )
         return best.delay, [line]
 
     def _likely(self) -> list[Way]:
-        """Ways that the vessel as it was given foretells much better than the log as it is."""
+        """Ways that the vessel as it was given predicts much better than the log as it is."""
         with ThreadPoolExecutor(available_workers()) as pool:
             own, mirrored = (
                 [*pool.map(self._valued, [Way(d, turned) for d in DELAYS])]
@@ -103,7 +103,7 @@ class Clocks:
 
     @cached_property
     def part(self) -> Table:
-        """So much of the log as tells a delay: where the heading turns most."""
+        """So much of the log as determines a delay: where the heading turns most."""
         times, psi = self.table.times, self.table.columns["psi"]
         known = np.flatnonzero(np.isfinite(psi))
         turned = np.zeros(len(times))

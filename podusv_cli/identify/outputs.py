@@ -36,7 +36,7 @@ OTHERS = {
     "m11": "kg", "m22": "kg", "m33": "kg m2", THRUST: "1", DELAY: "s",
     **dict.fromkeys(CURRENT, "m/s"),
 }  # fmt: skip
-LITTLE = 0.8  # of the prior's width, below which something is told of a number
+LITTLE = 0.8  # of the prior's width, below which the logs determine a number a little
 
 
 @dataclass(frozen=True)
@@ -139,12 +139,12 @@ def score_record(score: Score) -> dict[str, Any]:
 
 
 def parameter_rows(answer: Answer) -> Iterator[list[str]]:
-    """Of every number: name, unit, prior, estimate, interval, and how much is told."""
+    """Of every number: name, unit, prior, estimate, interval, and whether the logs determine it."""
     for p in answer.parameters:
-        told = "yes" if p.width <= OPEN else "little" if p.width < LITTLE else "no"
+        determined = "yes" if p.width <= OPEN else "little" if p.width < LITTLE else "no"
         yield [
             p.name, unit(answer, p.name), f"{p.prior:.4g}", f"{p.value:.4g}",
-            f"{p.low:.4g} to {p.high:.4g}", f"{p.width:.2g}", told,
+            f"{p.low:.4g} to {p.high:.4g}", f"{p.width:.2g}", determined,
         ]  # fmt: skip
 
 
@@ -159,7 +159,7 @@ def force_rows(answer: Answer) -> Iterator[list[str]]:
 
 
 def score_rows(scores: Sequence[Score]) -> Iterator[list[str]]:
-    """Of every log and horizon: the errors of every way to foretell it."""
+    """Of every log and horizon: the errors of every way to predict it."""
     for (log, horizon), of in groupby(scores, lambda s: (s.log, s.horizon)):
         ways = list(of)
         after = "whole log" if math.isinf(horizon) else f"{horizon:g} s"
@@ -174,9 +174,9 @@ PARAMETERS = (
     "estimate",
     "95 % interval",
     "width over the prior's",
-    "told",
+    "determined",
 )
-FORCES = ("force", "at", "estimate", "95 % interval", "width over the prior's", "told")
+FORCES = ("force", "at", "estimate", "95 % interval", "width over the prior's", "determined")
 SCORES = ("log", "role", "after", "runs", *WHO)
 
 

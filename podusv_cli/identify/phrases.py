@@ -9,16 +9,17 @@ from podusv_cli.identify.estimate import OPEN
 from podusv_cli.identify.judge import WHO
 from podusv_cli.identify.march import THRUST
 
-# The manoeuvre that tells the numbers of an axis.
-TELLING = {
-    "X": "straight runs at three speeds would tell it",
-    "Y": "turning circles at two speeds or more would tell it",
-    "N": "turning circles and zig-zags would tell it",
-    "m": "zig-zags, starts and stops would tell it",
+# The manoeuvre that determines the numbers of an axis.
+MANOEUVRES = {
+    "X": "straight runs at three speeds would",
+    "Y": "turning circles at two speeds or more would",
+    "N": "turning circles and zig-zags would",
+    "m": "zig-zags, starts and stops would",
 }
 SHOWN = 30.0  # s after the start of a free run
 WORSE = 1.2  # times the prior's error: what is no accident of one log
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
+FINEST = 1.0  # %, since what an interval leaves out is hardly ever less
 MOST = 4  # directions that are named
 SHARE = 0.3  # of a direction, from which on a number is named
 
@@ -30,8 +31,8 @@ def summary(answer: Answer) -> list[str]:
     seconds = sum(log.duration for log in logs)
     lines.append(
         f"{len(logs)} {'logs' if len(logs) > 1 else 'log'} of {seconds:.0f} s in all: "
-        f"{answer.directions.known} of {len(hull)} directions of the hull's numbers are told, "
-        f"each to less than {OPEN:g} of what was known before."
+        f"{answer.directions.known} of {len(hull)} directions of the hull's numbers are "
+        f"determined, each to less than {OPEN:g} of what was known before."
     )
     if not answer.estimate.settled:
         lines.append(
@@ -42,9 +43,9 @@ def summary(answer: Answer) -> list[str]:
 
 
 def _judged(answer: Answer) -> list[str]:
-    """How well the hull foretells the logs that were not fitted."""
+    """How well the hull predicts the logs that were not fitted."""
     if all(log.role == "fit" for log in answer.problem.wanted.logs):
-        return ["No log was kept for judging (role: judge): how well it foretells is not known."]
+        return ["No log was kept for judging (role: judge): how well it predicts is not known."]
     judged = [s for s in answer.scores if s.role == "judge" and s.horizon == SHOWN]
     if not judged:
         return [f"No log for judging holds a free run of {SHOWN:g} s: judge with a longer one."]
@@ -64,16 +65,18 @@ def _forces(answer: Answer) -> list[str]:
             error = max(0.5 * (f.high - f.low) / abs(f.value) for f in known)
             ends = f"{known[0].at:.2g} to {known[-1].at:.2g} {axis.speed_unit}"
             lines.append(
-                f"{axis.name} is known to {100.0 * error:.2g} % at {ends}, if thrust and form of "
-                "the model are right."
+                f"{axis.name} is known to {max(100.0 * error, FINEST):.2g} % at {ends}, if thrust "
+                "and form of the model are right and no wind drags."
             )
         elif own:
-            lines.append(f"{axis.name} is not told by these logs: {TELLING[axis.name[0]]}.")
+            lines.append(
+                f"{axis.name} is not determined by these logs: {MANOEUVRES[axis.name[0]]}."
+            )
     return lines
 
 
 def open_words(answer: Answer) -> list[str]:
-    """Each direction that the logs leave open, by its numbers; what would tell the inertia."""
+    """Each direction that the logs leave open, by its numbers; what would determine the inertia."""
     ways, hull = answer.directions, answer.problem.hull
     named: dict[str, float] = {}
     for i in range(ways.known, len(hull)):
@@ -88,11 +91,11 @@ def open_words(answer: Answer) -> list[str]:
     if len(lines) > MOST:
         lines[MOST:] = [f"and {len(lines) - MOST} more"]
     inertia = any(p.name[0] == "m" and p.width > OPEN for p in answer.parameters)
-    return [*lines, *([f"inertia: {TELLING['m']}"] if inertia else [])]
+    return [*lines, *([f"inertia: {MANOEUVRES['m']}"] if inertia else [])]
 
 
 def worse_words(answer: Answer) -> list[str]:
-    """A sentence for each log that was not fitted and that the prior foretells better."""
+    """A sentence for each log that was not fitted and that the prior predicts better."""
     by = {(s.log, s.horizon, s.who): s for s in answer.scores if s.role == "judge"}
     names = dict.fromkeys(
         log
@@ -100,8 +103,8 @@ def worse_words(answer: Answer) -> list[str]:
         if who == WHO[0] and s.position > WORSE * by[log, horizon, WHO[1]].position
     )
     return [
-        f"{name}: the vessel as it was given foretells this log better than the one from the logs; "
-        "do not take that one before you know why (too little was told, or the logs disagree)"
+        f"{name}: the vessel as it was given predicts this log better than the one from the logs; "
+        "do not take that one before you know why (the logs determine too little, or disagree)"
         for name in names
     ]
 

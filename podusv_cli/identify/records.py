@@ -118,7 +118,7 @@ def _held(times: Vector, values: Vector, kept: Whole) -> Vector:
 def _state(table: Table, new: Marks) -> Vector:
     """Pose and velocities at the start, by straight lines through the first seconds.
 
-    Sway is not guessed: a few seconds of GNSS tell less of it than that hulls hardly slip.
+    Sway is not guessed: a few seconds of GNSS say less of it than that hulls hardly slip.
     """
     state = np.zeros(MOVING)
     slopes = np.zeros(MOVING)

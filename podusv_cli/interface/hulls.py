@@ -21,9 +21,9 @@ class IdentifiedHull:
     _answer: Answer
 
     def __repr__(self) -> str:
-        """How many directions of the hull's numbers the logs tell."""
+        """How many directions of the hull's numbers the logs determine."""
         known, whole = self._answer.directions.known, len(self._answer.problem.hull)
-        return f"<podusv hull: {known} of {whole} directions told, {self.folder}>"
+        return f"<podusv hull: {known} of {whole} directions determined, {self.folder}>"
 
     @property
     def vessel(self) -> dict[str, Any]:
@@ -42,7 +42,7 @@ class IdentifiedHull:
 
     @cached_property
     def scores(self) -> pd.DataFrame:
-        """A row a log, a horizon and a way to foretell: errors of free runs [m, rad]."""
+        """A row a log, a horizon and a way to predict: errors of free runs [m, rad]."""
         return pd.DataFrame([asdict(row) for row in self._answer.scores])
 
     @cached_property
