@@ -341,7 +341,22 @@ def test_on_a_straight_track_a_current_along_it_is_left_to_the_load(boat):
     assert turning == pytest.approx([0.05, -0.03], abs=0.02)
 
 
-def test_a_hull_that_foretells_worse_than_the_prior_gets_a_warning():
+def test_draws_keep_what_is_determined_and_spread_as_before_where_nothing_is():
+    """Of two numbers only a weighted sum is known; a third is as open as its prior."""
+    wanted = Identify(logs=LOGS, free=("X_u", "Y_v", "N_r"), draws=4000, prior=0.8)
+    given = Problem(SCENARIO, wanted, [])
+    sum_of = np.array([0.6, 0.8, 0.0])
+    covariance = np.eye(3) - (1.0 - 1e-4) * np.outer(sum_of, sum_of)
+    found = Estimate(np.zeros(3), 0.0, covariance, 1)
+    hulls = Answer(given, found, directions(covariance, 3), (), ()).draws
+    factors = np.array([[getattr(h, n) / getattr(HULL, n) for n in wanted.free] for h in hulls])
+    sd = given.sd[0]
+    assert np.std((factors - 1.0) / sd @ sum_of) == pytest.approx(0.01, rel=0.05)
+    ends = np.quantile(factors[:, 2], (0.025, 0.5, 0.975))
+    assert ends == pytest.approx(np.exp(sd * np.array([-1.96, 0.0, 1.96])), rel=0.08)
+
+
+def test_a_hull_that_predicts_worse_than_the_prior_gets_a_warning():
     def scored(identified, prior):
         scores = [
             judge.Score("a.csv", "judge", 30.0, who, 1, error, 0.1)

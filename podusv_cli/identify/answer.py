@@ -27,7 +27,7 @@ SLOWEST = 0.05  # of the largest speed along the logs: slower is no motion to sp
 COVERED = (0.1, 0.5, 0.9)  # quantiles of a speed along the logs
 OUTERMOST = 0.995  # quantile of the motion that becomes the envelope
 BEYOND, POINTS = 1.3, 40  # of a curve: how far beyond the fastest that is covered
-TRIES = 2000  # hulls that are drawn for one that is possible; of a wide prior few keep all signs
+TRIES = 100  # hulls that are drawn for one that is possible
 WARM = 5.0  # s, in which innovations are those of the start
 
 
@@ -174,17 +174,20 @@ class Answer:
     def draws(self) -> list[Vessel]:
         """Hulls that the logs leave possible, drawn jointly.
 
-        Departures are linear in the numbers, as forces are: what the logs say of a sum of terms
-        then holds however a draw divides it among them.
+        In directions that are open the numbers' logarithms are normal, as they were before. Then
+        the directions that are determined are put where they belong, in straight lines: forces are
+        sums of the numbers themselves, however a draw divides them.
         """
-        size, sd = len(self.problem.hull), self.problem.sd
-        values, basis = np.linalg.eigh(self.estimate.covariance[:size, :size])
-        root = basis * np.sqrt(np.maximum(values, 0.0))
+        ways, sd = self.directions, self.problem.sd
+        centre = self.estimate.y[: len(sd)]
+        determined, open_ways = np.split(ways.basis, [ways.known], axis=1)
 
         def point(normal: Vector) -> Vector:
-            factors = 1.0 + sd * (root @ normal)
+            near, far = np.split(ways.widths * normal, [ways.known])
+            off = np.expm1(sd * (open_ways @ far)) / sd
+            off += determined @ (near - determined.T @ off)
             with np.errstate(invalid="ignore", divide="ignore"):  # a number that would change sign
-                return np.asarray(self.estimate.y[:size] + np.log(factors) / sd)
+                return np.asarray(centre + np.log1p(sd * off) / sd)
 
         return self._hulls(point)
 
