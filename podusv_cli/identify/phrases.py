@@ -51,7 +51,8 @@ def _judged(answer: Answer) -> list[str]:
         return [f"No log for judging holds a free run of {SHOWN:g} s: judge with a longer one."]
     errors = [f"{who} {max(s.position for s in judged if s.who == who):.2g} m" for who in WHO]
     return [
-        f"After {SHOWN:g} s of a log that was not fitted, errors are at most: {', '.join(errors)}."
+        f"Rms error of the position {SHOWN:g} s on, in the worst log that was not fitted: "
+        f"{', '.join(errors)}."
     ]
 
 
@@ -64,14 +65,13 @@ def _forces(answer: Answer) -> list[str]:
         if known:
             error = max(0.5 * (f.high - f.low) / abs(f.value) for f in known)
             ends = f"{known[0].at:.2g} to {known[-1].at:.2g} {axis.speed_unit}"
-            lines.append(
-                f"{axis.name} is known to {max(100.0 * error, FINEST):.2g} % at {ends}, if thrust "
-                "and form of the model are right and no wind drags."
-            )
+            lines.append(f"{axis.name} is known to {max(100.0 * error, FINEST):.2g} % at {ends}.")
         elif own:
             lines.append(
                 f"{axis.name} is not determined by these logs: {MANOEUVRES[axis.name[0]]}."
             )
+    if any(f.width <= OPEN for f in answer.forces):
+        lines.append("The percentages hold if thrust and form of the model are right without wind.")
     return lines
 
 

@@ -49,12 +49,15 @@ SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
 @kernel
-def act(state: Vector, flows: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector) -> None:
-    """Loads (9) of all pods as they stand, and the thrust of each."""
+def act(
+    x: Vector, state: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector, flows: Vector
+) -> None:
+    """Loads (9) of all pods as they stand; the thrust of each, and its advance speed in `flows`."""
     count = int(k.count)
     tau[0] = tau[1] = tau[2] = 0.0
     for i in range(count):
         pod, delta = tail(table, i * WIDTH), state[count + i]
+        flows[i] = inflow(x, pod, delta, k)
         T = thrust(state[i], flows[i], pod, k)
         along, across = force(T, delta)
         thrusts[i] = T
@@ -300,11 +303,7 @@ class Pods(Actuator):
     @kernel
     def replay(x: Vector, demand: Vector, k: Any, table: Vector, tau: Vector) -> None:
         """Loads of the pods as they stand."""
-        count = int(k.count)
-        flows, thrusts = scratch(MOST_PODS), scratch(MOST_PODS)
-        for i in range(count):
-            flows[i] = inflow(x, tail(table, i * WIDTH), demand[count + i], k)
-        act(demand, flows, k, table, tau, thrusts)
+        act(x, demand, k, table, tau, scratch(MOST_PODS), scratch(MOST_PODS))
 
     @staticmethod
     @kernel
@@ -332,9 +331,7 @@ class Pods(Actuator):
         count = int(k.count)
         command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
         flows, T = scratch(MOST_PODS), scratch(MOST_PODS)
-        for i in range(count):
-            flows[i] = inflow(x, tail(table, i * WIDTH), state[count + i], k)
-        act(state, flows, k, table, tau, thrusts)
+        act(x, state, k, table, tau, thrusts, flows)
         met = allocate(state, demand, flows, k, table, T, tail(command, count))
         speeds(count, T, flows, k, table, command)
         # What is no number must not get lost between limits.
@@ -353,14 +350,12 @@ class Pods(Actuator):
         """Loads from the pods' states; rates towards the speeds and angles, cut at their limits."""
         count, met = int(k.count), True
         command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
-        flows = scratch(MOST_PODS)
         for i in range(count):
             pod = tail(table, i * WIDTH)
-            flows[i] = inflow(x, pod, state[count + i], k)
             command[i] = within(demand[i], -pod[N_ASTERN], pod[N_AHEAD])
             command[count + i] = within(demand[count + i], -pod[ANGLE], pod[ANGLE])
             if command[i] != demand[i] or command[count + i] != demand[count + i]:
                 met = False
-        act(state, flows, k, table, tau, thrusts)
+        act(x, state, k, table, tau, thrusts, scratch(MOST_PODS))
         signals[SATURATED] = 0.0 if met else 1.0
         pursue(state, k, table, rate, signals)
