@@ -13,8 +13,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from podusv_cli.core import units
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
+from podusv_cli.core.units import allowed, spelled
 from podusv_cli.identify.formats import TIME, Columns, LogFault, columns_of
 from podusv_cli.identify.frames import LAT, LON, local_plane, turned
 
@@ -23,22 +25,16 @@ Whole = npt.NDArray[np.int64]
 CLOCK = Signal(TIME, "s", "time")
 SELDOM = 0.05  # of a sensor's values, that may come at another time than the others
 LISTED = 30  # columns that a message names
-# Of units that logs have, what one of them is in podusv's own units.
-UNITS: dict[str, dict[str, float]] = {
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 0.01, "km": 1e3, "ft": 0.3048, "nmi": 1852.0},
-    "rad": {"rad": 1.0, "deg": math.pi / 180.0},
+# What logs have beside the units that people write: propellers in rad/s, positions as integers.
+OF_LOGS = {
+    "1/s": {"rad/s": 0.5 / math.pi},
     "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7},
-    "m/s": {
-        "m/s": 1.0, "cm/s": 0.01, "mm/s": 1e-3, "ft/s": 0.3048, "km/h": 1.0 / 3.6,
-        "kn": 1852.0 / 3600.0,
-    },
-    "rad/s": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
-    "N": {"N": 1.0, "kN": 1e3, "kgf": 9.80665},
-    "N m": {"N m": 1.0, "kN m": 1e3},
-    "1/s": {"1/s": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
-    "1": {"1": 1.0, "%": 0.01},
-}  # fmt: skip
+}
+# Of each of podusv's units, what one of those that logs have is in it.
+UNITS: dict[str, dict[str, float]] = {
+    unit: {name: float(factor) for name, factor in allowed(unit).items()} | OF_LOGS.get(unit, {})
+    for unit in (*units.UNITS, *OF_LOGS)
+}
 
 
 @dataclass(frozen=True)
@@ -143,9 +139,9 @@ def parted(name: str) -> tuple[str, str]:
 
 def _factor(signal: Signal, unit: str, name: str) -> float:
     known = UNITS.get(signal.unit, {signal.unit: 1.0})
-    if unit and unit not in known:
+    if unit and spelled(unit) not in known:
         raise LogFault(f"{name}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}")
-    return known[unit] if unit else 1.0
+    return known[spelled(unit)] if unit else 1.0
 
 
 def clock_of(column: str, columns: Columns) -> str | None:
