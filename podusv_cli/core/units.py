@@ -11,8 +11,8 @@ from podusv_cli.core.timed_rows import NUMBER
 
 PI = Fraction(math.pi)
 PURE = "1"  # stands for no unit
-# Of each of podusv's units, those that may stand in its place, and what one of them is in it, exact:
-# 57 cm are 0.57 m, and 180 deg are math.pi to the last digit.
+# Of each of podusv's units, those that may stand in its place, and what one of them is in it.
+# They are exact: 57 cm are 0.57 m, and 180 deg are math.pi to the last digit.
 UNITS: dict[str, dict[str, Fraction]] = {
     "s": {
         "ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "ns": Fraction(1, 10**9),
