@@ -13,7 +13,7 @@ import podusv
 from podusv_cli.export import link
 from podusv_cli.workflows import export as workflow
 
-SOURCE = "podusv:mu_2017/corrected.yaml"
+SOURCE, OTTER = "podusv:mu_2017/corrected.yaml", "podusv:pod/vessels/otter.yaml"
 CC = "cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -ffp-contract=off"
 HARDWARE = ROOT / "examples/hardware_in_the_loop"
 needs_cc = pytest.mark.skipif(not shutil.which("cc"), reason="needs a C compiler")
@@ -36,7 +36,11 @@ def task(kind: str, seconds: int = 300) -> tuple[str, str, str]:
     return "control.period=0.1", f"simulation.duration={seconds}", given
 
 
-def exported(to: Path, kind: str = "pid", **options: Any) -> Path:
-    """The folder of a small export for this machine."""
+def exported(
+    to: Path, kind: str = "pid", source: str = SOURCE, changes: dict[str, Any] | None = None,
+    **options: Any,
+) -> Path:  # fmt: skip
+    """The folder of a small export for this machine; of other changes in place of the `kind`."""
     options = {"fmu": False, "platforms": [link.this_machine()]} | options
-    return workflow.export(Path(SOURCE), workflow.Request(to, task(kind, 5), **options))
+    given = [f"{key}={json.dumps(value)}" for key, value in (changes or {}).items()]
+    return workflow.export(Path(source), workflow.Request(to, given or task(kind, 5), **options))

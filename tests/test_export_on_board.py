@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_samples import ROOT
-from export_samples import CC, HARDWARE, SOURCE, exported, needs_cc, scenario
+from export_samples import CC, HARDWARE, OTTER, SOURCE, exported, law, needs_cc, scenario
 
 import podusv
 from podusv_cli.export import link
@@ -48,31 +49,54 @@ def test_the_program_in_the_documentation_runs(tmp_path):
     assert (demands[:, 0] > 0.0).all()  # towards the target
 
 
-@pytest.fixture
-def boat(sound, tmp_path):
-    """The port of the example's program with the exported law, while it runs."""
-    program = tmp_path / "boat"
-    sources = [HARDWARE / "boat.c", "law.c", f"{link.this_machine()}/law.o"]
-    subprocess.run([*CC.split(), "-I.", *sources, "-lm", "-o", program], cwd=sound, check=True)
-    with subprocess.Popen([program], stdout=subprocess.PIPE, text=True) as running:
+@contextmanager
+def boat(folder, text=None):
+    """The port of the example's program, or of this one, with an exported law, while it runs."""
+    (folder / "boat.c").write_text(text or (HARDWARE / "boat.c").read_text())
+    sources = ["boat.c", "law.c", f"{link.this_machine()}/law.o"]
+    subprocess.run([*CC.split(), "-I.", *sources, "-lm", "-o", "boat"], cwd=folder, check=True)
+    with subprocess.Popen([folder / "boat"], stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout
         yield int(running.stdout.readline())
         running.kill()
 
 
+def steered(port, source, changes):
+    """The log of a scenario whose demands come from this port; none is lost."""
+    session = podusv.open_session(source, changes)
+    assert steer(session, ("127.0.0.1", port), wait=30.0) == 0
+    return session.log
+
+
 @needs_cc
-def test_the_law_on_another_computer_has_the_demands_of_the_law_inside(boat):
-    """So it has in a second run, which begins anew."""
-    changes = {"control.period": 0.1, "simulation.duration": 5.0, "controller": {"kind": "pid"}}
-    inside = podusv.simulate(SOURCE, changes)
-    for _ in range(2):
-        session = podusv.open_session(SOURCE, changes)
-        assert steer(session, ("127.0.0.1", boat), wait=30.0) == 0
-        log = session.log
-        for name in ("tau_u_cmd", "tau_r_cmd", "x", "y", "psi", "u", "v", "r"):
-            # At the last instant the law inside takes a sample more.
-            np.testing.assert_array_equal(log[name][:-1], inside[name][:-1], name)
-    assert len(set(log["tau_r_cmd"])) == 50
+def test_the_law_on_another_computer_has_the_demands_of_the_law_inside(tmp_path):
+    """So it has in a second run, which begins anew; of a law against windup, too."""
+    for kind in ("pid", "momentum_vector"):
+        changes = {"control.period": 0.1, "simulation.duration": 5.0, "controller": law(kind)}
+        inside = podusv.simulate(SOURCE, changes)
+        with boat(exported(tmp_path / kind, kind)) as port:
+            logs = [steered(port, SOURCE, changes) for _ in range(2)]
+        for log in logs:
+            for name in ("tau_u_cmd", "tau_r_cmd", "x", "y", "psi", "u", "v", "r"):
+                # At the last instant the law inside takes a sample more.
+                np.testing.assert_array_equal(log[name][:-1], inside[name][:-1], name)
+        assert len(set(log["tau_r_cmd"])) == 50
+
+
+@needs_cc
+def test_a_law_behind_pods_hears_their_loads_and_does_not_wind_up(tmp_path):
+    """It stays as near to the law inside as the vessel moves in a period; with NULL it does not."""
+    period = 0.15
+    changes = {"control.period": period, "simulation.duration": 30.0, "controller": law("alos")}
+    folder = exported(tmp_path / "law", source=OTTER, changes=changes)
+    inside, far = podusv.simulate(OTTER, changes), {}
+    for loads in ("given + 13", "NULL"):
+        program = (HARDWARE / "boat.c").read_text().replace("given + 13", loads)
+        with boat(folder, program) as port:
+            log = steered(port, OTTER, changes)
+        far[loads] = np.hypot(log["x"] - inside["x"], log["y"] - inside["y"]).max()
+    moved = period * np.abs(inside["u"]).max()
+    assert far["given + 13"] < moved < 5.0 * moved < far["NULL"]
 
 
 class Network:

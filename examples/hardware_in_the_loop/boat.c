@@ -10,7 +10,7 @@
 
 int main(int count, char **words)
 {
-    double given[13], answer[3]; /* time, state, target; time, demand */
+    double given[16], answer[3]; /* time, state, target, loads; time, demand */
     struct sockaddr_in address = {0};
     struct sockaddr *peer = (struct sockaddr *)&address;
     socklen_t size = sizeof address;
@@ -31,7 +31,7 @@ int main(int count, char **words)
             continue;
         if (given[0] == 0.0) /* another run begins */
             podusv_law_start(&law);
-        podusv_law_step(&law, given + 1, given + 7, NULL, answer + 1);
+        podusv_law_step(&law, given + 1, given + 7, given + 13, answer + 1);
         answer[0] = given[0];
         sendto(link, answer, sizeof answer, 0, peer, size);
     }

@@ -15,7 +15,8 @@ def steer(session, address, wait=None):
     seen, demand, lost, due = session.observe(), (0.0, 0.0), 0, monotonic()
     while seen.status == "running":
         due = due + session.period if wait is None else monotonic() + wait
-        link.sendto(struct.pack("<13d", seen.time, *seen.state, *seen.target), address)
+        given = (seen.time, *seen.state, *seen.target, *seen.loads)
+        link.sendto(struct.pack("<16d", *given), address)
         stamp = None  # the instant that a demand is for: one that comes too late is lost
         while stamp != seen.time and select([link], [], [], max(0.0, due - monotonic()))[0]:
             stamp, *answer = struct.unpack("<3d", link.recv(24))

@@ -35,13 +35,16 @@ class Observation(NamedTuple):
     `state` is (x, y, psi, u, v, r) in m, rad, m/s and rad/s: the vessel's own, or the estimate
     where the scenario has sensors; it has not seen what they measure at this very instant. `target`
     is position, velocity and acceleration, north and east, in m, m/s and m/s2. `status` is
-    "running" until the duration is over or a number is not finite.
+    "running" until the duration is over or a number is not finite. `loads` are (tau_u, tau_v,
+    tau_r) in N and N m, which the actuator made of the demand as the period before ended; zeros at
+    the begin. A law against windup asks for them.
     """
 
     time: float
     state: Vector
     target: Vector
     status: Status
+    loads: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +141,7 @@ class Session:
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""
         march = self._march
-        return Observation(march.time, march.state(), march.target(), self._status)
+        return Observation(march.time, march.state(), march.target(), self._status, march.loads())
 
     @explained
     def step(self, demand: Sequence[float] | Vector) -> Observation:

@@ -73,7 +73,7 @@ def export(config: Path, request: Request) -> Path:
         seen = law.samples(run)
         samples = law.by_itself(seen)
         of_run = np.array_equal(samples, seen)
-        for note in _notes(run, of_run):
+        for note in _notes(law, run, of_run):
             request.say(note)
         request.say(f"compiling {law.loop.controller.label} for {', '.join(platforms)}")
         text = objects.together(law.pieces)
@@ -103,10 +103,16 @@ def _platforms(request: Request) -> Sequence[str]:
     return tuple(dict.fromkeys(request.platforms)) or tuple(objects.PLATFORMS)
 
 
-def _notes(run: Recording, of_run: bool) -> Iterator[str]:
+def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
     """What somebody should know of the run and of the law by itself."""
     if run.status != "finished":
         yield f"the run {run.message}; {SAMPLES} has the samples before"
+    if law.needs_loads:
+        yield (
+            f"{law.loop.controller.label} asks which loads acted: pass them to podusv_law_step; "
+            "with NULL it takes it that all of its demand acted, and winds up where the actuator "
+            "gives less"
+        )
     if not of_run:
         yield (
             "in the run the law was given loads between its samples, and the exported law has them "

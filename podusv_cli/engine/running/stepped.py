@@ -95,6 +95,11 @@ class SteppedRun:
         """
         return self._given[: len(STATE)].copy()
 
+    def loads(self) -> Vector:
+        """(tau_u, tau_v, tau_r) that acted as the step before the next instant ended."""
+        first = self._layout.tau
+        return self.vectors.row[first : first + 3].copy()
+
     def target(self) -> Vector:
         """The target at the next instant, as `TARGET`."""
         self._aim(self.time)
