@@ -21,7 +21,7 @@ from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Answer
-from podusv_cli.identify.estimate import OPEN, Estimate, Search, directions, estimated
+from podusv_cli.identify.estimate import OPEN, Estimate, Search, directions, estimated, prior_kept
 from podusv_cli.identify.march import (
     COMMANDS,
     DELIVERED,
@@ -123,8 +123,7 @@ def problem(logs, vessel=HULL, **wanted):
 
 
 def fitted(given):
-    search = Search(given.innovations, len(given.numbers), given.blocks)
-    return estimated(search)
+    return prior_kept(given.search, estimated(given.search))
 
 
 def test_the_filter_along_a_log_is_that_of_plain_python():
@@ -295,26 +294,43 @@ def test_a_hull_comes_out_of_its_logs_with_its_error(boat):
     assert 6 <= ways.known < len(given.hull)
 
 
-def test_straight_runs_leave_sway_and_yaw_as_they_were():
-    """With a gyro that does not see how the hull answers to the last ripple."""
+STILL = np.zeros(300)
+PUSHED = np.repeat([10.0, 30.0, 50.0], 100)  # N
+
+
+@pytest.mark.parametrize(
+    ("push", "noise", "determined"),
+    [
+        (PUSHED, (0.1, 0.02, 0.01), {"m11", "X_u"}),
+        (PUSHED, (0.0, 0.0, 0.0), {"m11", "X_u"}),  # as only simulators make it
+        (STILL, (0.01, 0.005, 0.002), set()),  # moored
+    ],
+)
+def test_a_straight_or_moored_boat_leaves_what_it_does_not_show_as_it_was(push, noise, determined):
+    """The noiseless one leaves no error that a sensor of podusv's own could have."""
     times = np.arange(0.0, 60.0, 0.2)
     commands = np.zeros((len(times), 3))
-    commands[:, 0] = np.repeat([1.0, 3.0, 5.0], 100)
-    commands *= 10.0
+    commands[:, 0] = push
     otter = load("podusv:trials/base.yaml", ["controller={kind: pid}", "name=boat"]).scenario.vessel
-    states = motion(commands, times, np.array([0.0, 0.0, 0.5, 0.3, 0.0, 0.0]), otter)
-    log = log_of(table_of(times, states, commands, noise=(0.1, 0.02, 0.01)), Ideal(), 0.1)
+    start = np.array([0.0, 0.0, 0.5, 0.3 if determined else 0.0, 0.0, 0.0])
+    log = log_of(
+        table_of(times, motion(commands, times, start, otter), commands, noise=noise), Ideal(), 0.1
+    )
     given = problem([log], otter.changed({"X_u": -50.0}), current=0.0)
     found = fitted(given)
     ways = directions(found.covariance, len(given.hull))
-    sd = dict(zip([n.name for n in given.numbers], np.sqrt(np.diag(found.covariance)), strict=True))
-    y = dict(zip([n.name for n in given.numbers], found.y, strict=True))
-    assert sd["m11"] < OPEN
-    for name in ("m22", "Y_vv", "Y_v", "N_r", "N_rr", "N_vr"):
-        assert sd[name] > OPEN
-        assert abs(y[name]) < 2.0 * sd[name]  # from the truth, which is the prior's own value
-    assert given.values(found.y)["X_u"] == pytest.approx(otter.X_u, rel=0.03)
-    assert ways.known == 2  # m11 and X_u
+    assert ways.known == len(determined)
+    sd = np.sqrt(np.diag(found.covariance))
+    for number, y, width in zip(given.hull, found.y, sd, strict=False):
+        if number.name in determined:
+            assert width < OPEN
+        elif (
+            number.name != "m22"
+        ):  # noise that the filter follows is sway, of which inertia is a part
+            assert abs(y) < 0.25
+            assert width > 0.85
+    if determined:
+        assert given.values(found.y)["X_u"] == pytest.approx(otter.X_u, rel=0.03)
 
 
 def test_a_free_run_of_the_true_hull_stays_with_the_boat(boat):

@@ -31,7 +31,7 @@ from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.identify.answer import AXES, SIDE, Answer
-from podusv_cli.identify.estimate import OPEN, Search, directions, estimated
+from podusv_cli.identify.estimate import OPEN, directions, estimated, prior_kept
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.reading import Table
 from podusv_cli.identify.records import Log, log_of
@@ -183,9 +183,8 @@ def rows(cell: Cell) -> list[tuple[Any, ...]]:
     if not given:
         return []
     problem = Problem(before, WANTED, given)
-    search = Search(problem.innovations, len(problem.numbers), problem.blocks)
     try:
-        found = estimated(search)
+        found = prior_kept(problem.search, estimated(problem.search))
     except UsageError as error:
         print(f"{cell}: {error}", file=sys.stderr)
         return []

@@ -27,7 +27,9 @@ STARTS, NEARER = 5, 0.5  # searches at most, and how far from the prior's centre
 # 1 for each number.
 SETTLED = 2.0
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
-OPEN = 0.3  # posterior over prior standard deviation of a direction that logs leave open
+# Posterior over prior standard deviation of a direction: above OPEN the logs do not determine it,
+# above SILENT they say next to nothing of it, and it stays as it was.
+OPEN, SILENT = 0.3, 0.8
 
 BREAKS = (
     "the filter along the logs leaves the finite numbers; check units and signs of the columns, "
@@ -41,23 +43,30 @@ Tell = Callable[[int, float], None]
 
 @dataclass(frozen=True)
 class Scored:
-    """-2 log of the posterior at a point, but a constant; the slopes of what each block adds."""
+    """-2 log of the posterior at a point, but a constant; the slopes of what each block adds.
+
+    Fisher's matrix is the sum of `by_values`, what is known by the values that the filter expects,
+    and `by_sizes`, by how far it expects to be off.
+    """
 
     value: float
     slopes: Vector
-    information: Vector
+    by_values: Vector
+    by_sizes: Vector
 
 
 @dataclass(frozen=True)
 class Search:
     """What is searched: `innovations` at points whose prior is normal, with covariance 1.
 
-    `blocks` has the part of the logs that every delivered value belongs to.
+    `blocks` has the part of the logs that every delivered value belongs to. The first `hull`
+    coordinates are numbers of a hull.
     """
 
     innovations: Innovations
     size: int
     blocks: Whole
+    hull: int = 0
 
     def values(self, points: Sequence[Vector]) -> list[float]:
         """-2 log of the posterior at points; infinite where the filter breaks down."""
@@ -77,8 +86,8 @@ class Search:
         slopes = 2.0 * nu * d_nu / s + d_s * (1.0 - nu * nu / s) / s
         each = np.array([np.bincount(self.blocks, column) for column in slopes.T], float).T
         # Not by BLAS, whose threads wait for each other longer than this takes.
-        information = 2.0 * _squares(d_nu / np.sqrt(s)) + _squares(d_s / s)
-        return Scored(_value(nu[:, 0], s[:, 0], y), each, information)
+        by_values, by_sizes = 2.0 * _squares(d_nu / np.sqrt(s)), _squares(d_s / s)
+        return Scored(_value(nu[:, 0], s[:, 0], y), each, by_values, by_sizes)
 
 
 def _squares(rows: Vector) -> Vector:
@@ -146,38 +155,48 @@ def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
     except KeyboardInterrupt:
         stopped = True
     with np.errstate(all="ignore"):  # of a start at which the filter breaks down
-        return Estimate(y, at.value, covariance(at, y), i, interrupted=stopped)
+        return Estimate(y, at.value, covariance(at, search.hull), i, interrupted=stopped)
 
 
 def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:
     """Steps of growing damping, none longer than LONGEST, and what the first should gain."""
     gradient = at.slopes.sum(axis=0) + 2.0 * y
-    curvature = at.information + 2.0 * np.eye(len(y))
+    curvature = at.by_values + at.by_sizes + 2.0 * np.eye(len(y))
     damped = (curvature + part * np.diag(np.diag(curvature)) for part in DAMPINGS)
     steps = [-np.linalg.solve(matrix, gradient) for matrix in damped]
     short = [step * min(1.0, LONGEST / max(np.abs(step).max(), SHIFT)) for step in steps]
     return short, float(-0.5 * gradient @ steps[0])
 
 
-def _by_curvature(at: Scored) -> Vector:
-    curvature = at.information + 2.0 * np.eye(len(at.information))
-    return np.asarray(2.0 * np.linalg.inv(curvature), float)
+def _by_curvature(at: Scored, hull: int) -> Vector:
+    """A hull is known by what it does alone.
+
+    A hull that brakes more makes the filter surer, too, and all the surer on a track that is
+    smoother than it expects; that says nothing of how the boat brakes.
+    """
+    sizes = at.by_sizes.copy()
+    sizes[:hull] = sizes[:, :hull] = 0.0
+    return np.asarray(2.0 * np.linalg.inv(at.by_values + sizes + 2.0 * np.eye(len(sizes))), float)
 
 
-def covariance(at: Scored, y: Vector) -> Vector:
+def covariance(at: Scored, hull: int = 0) -> Vector:
     """Of the estimate's errors: by the curvature, or where that is wider by how blocks differ.
 
     The second is White's (Econometrica 50, 1982), with blocks in place of single values: it stays
     right where innovations are not white, as a bootstrap over blocks would.
     """
-    curved = _by_curvature(at)
+    curved = _by_curvature(at, hull)
+    # No number is less known than before the logs, where its variance is 1.
+    wide = np.clip(np.diag(_by_blocks(at, curved)), np.diag(curved), 1.0)
+    factor = np.sqrt(wide / np.diag(curved))
+    return np.asarray(curved * np.outer(factor, factor))
+
+
+def _by_blocks(at: Scored, curved: Vector) -> Vector:
     count = len(at.slopes)
     apart = at.slopes - at.slopes.mean(axis=0)
-    spread = apart.T @ apart * (count / max(count - 1, 1)) + 4.0 * np.eye(len(y))
-    half = 0.5 * curved
-    wide = half @ spread @ half
-    factor = np.sqrt(np.maximum(1.0, np.diag(wide) / np.diag(curved)))
-    return np.asarray(curved * np.outer(factor, factor))
+    spread = apart.T @ apart * (count / max(count - 1, 1)) + 4.0 * np.eye(len(curved))
+    return np.asarray(0.25 * curved @ spread @ curved)
 
 
 @dataclass(frozen=True)
@@ -203,3 +222,40 @@ def directions(covariance: Vector, hull: int) -> Directions:
         raise UsageError(f"beside the best numbers that were found {BREAKS}")
     squares, basis = np.linalg.eigh(covariance[:hull, :hull])
     return Directions(basis, np.sqrt(np.maximum(squares, 0.0)))
+
+
+def prior_kept(search: Search, found: Estimate, tell: Tell = lambda i, value: None) -> Estimate:
+    """The estimate with those directions of the hull as before that the logs say nothing of.
+
+    All else is looked for again beside them. An interrupt leaves the best so far.
+    """
+    try:
+        whole, silent = _silent(search, found.y)
+        if found.interrupted or not len(silent):
+            return found
+        rest, before = np.delete(whole, silent, axis=1), whole[:, silent]
+
+        def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
+            return search.innovations([rest @ point for point in points])
+
+        within = Search(innovations, rest.shape[1], search.blocks, search.hull - len(silent))
+        again = _estimated(within, rest.T @ found.y, tell)
+    except KeyboardInterrupt:  # before the first round
+        return replace(found, interrupted=True)
+    covered = rest @ again.covariance @ rest.T + before @ before.T
+    rounds = found.rounds + again.rounds
+    return replace(
+        again, y=rest @ again.y, covariance=covered, rounds=rounds, settled=found.settled
+    )
+
+
+def _silent(search: Search, y: Vector) -> tuple[Vector, Whole]:
+    """An orthonormal basis, the hull's directions first, and which of these the logs are silent of.
+
+    They are silent, too, where what they say differs from block to block.
+    """
+    hull, whole, at = search.hull, np.eye(search.size), search.scored(y)
+    curved = _by_curvature(at, hull)
+    whole[:hull, :hull] = directions(curved, hull).basis
+    along = [np.diag(whole.T @ c @ whole)[:hull] for c in (curved, _by_blocks(at, curved))]
+    return whole, np.flatnonzero(np.max(along, axis=0) > SILENT**2)

@@ -124,20 +124,16 @@ class Clocks:
         """With loads that hardly wander, so that the commands have to explain the motion."""
         problem = self._problem(way)
         y = np.array([QUIET * (number.name in WALKS) for number in problem.numbers])
-        return replace(way, value=float(_search(problem).values([y])[0]))
+        return replace(way, value=float(problem.search.values([y])[0]))
 
     def _fitted(self, way: Way) -> Way:
         problem = self._problem(way)
-        search = _search(problem)
+        search = problem.search
         if not np.isfinite(search.values([np.zeros(search.size)])[0]):
             return replace(way, value=np.inf)
         found = estimate.estimated(search, starts=1)
         delay = way.delay + problem.values(found.y)[DELAY]
         return replace(way, delay=delay, value=found.value)
-
-
-def _search(problem: Problem) -> estimate.Search:
-    return estimate.Search(problem.innovations, len(problem.numbers), problem.blocks)
 
 
 def _mirrored(table: Table) -> Table:

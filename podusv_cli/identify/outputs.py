@@ -14,7 +14,7 @@ from podusv_cli.core.component import unit_of
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Answer, Force
-from podusv_cli.identify.estimate import OPEN
+from podusv_cli.identify.estimate import OPEN, SILENT
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.march import CURRENT, DELAY, THRUST
 from podusv_cli.identify.phrases import open_words, summary
@@ -36,7 +36,6 @@ OTHERS = {
     "m11": "kg", "m22": "kg", "m33": "kg m2", THRUST: "1", DELAY: "s",
     **dict.fromkeys(CURRENT, "m/s"),
 }  # fmt: skip
-LITTLE = 0.8  # of the prior's width, below which the logs determine a number a little
 
 
 @dataclass(frozen=True)
@@ -141,7 +140,7 @@ def score_record(score: Score) -> dict[str, Any]:
 def parameter_rows(answer: Answer) -> Iterator[list[str]]:
     """Of every number: name, unit, prior, estimate, interval, and whether the logs determine it."""
     for p in answer.parameters:
-        determined = "yes" if p.width <= OPEN else "little" if p.width < LITTLE else "no"
+        determined = "yes" if p.width <= OPEN else "little" if p.width < SILENT else "no"
         yield [
             p.name, unit(answer, p.name), f"{p.prior:.4g}", f"{p.value:.4g}",
             f"{p.low:.4g} to {p.high:.4g}", f"{p.width:.2g}", determined,
@@ -191,7 +190,7 @@ def page(
         parameters=(PARAMETERS, [*parameter_rows(answer)]), forces=(FORCES, [*force_rows(answer)]),
         scores=(SCORES, [*score_rows(answer.scores)]), whiteness=answer.whiteness,
         widths=[f"{width:.2g}" for width in answer.directions.widths],
-        known=answer.directions.known, least=OPEN, little=LITTLE,
+        known=answer.directions.known, least=OPEN, little=SILENT,
         pictures=list(enumerate(pictures, 1)),
         provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
     )  # fmt: skip

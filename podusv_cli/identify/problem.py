@@ -16,6 +16,7 @@ from podusv_cli.components.facts import Facts
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, INERTIA, Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
+from podusv_cli.identify.estimate import Search
 from podusv_cli.identify.march import (
     CURRENT,
     DELAY,
@@ -39,6 +40,7 @@ ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m3
 DAMPINGS = tuple(n for n in COEFFICIENTS if n[1:2] == "_" and n not in ADDED.values())
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
+LEAST = -3.0  # of these deviations: a log without any noise would make a filter without any
 CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain, on the model ship
 AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
 TURNED = 0.05  # rad, of the heading at the start
@@ -51,17 +53,19 @@ BLOCK = 30.0  # s of a log, whose innovations count together
 class Number:
     """One number that is looked for: its logarithm is normal about that of `prior`, with `sd`.
 
-    Without a `ratio` it is normal itself.
+    Without a `ratio` it is normal itself. It is never more than `least` standard deviations below.
     """
 
     name: str
     prior: float
     sd: float
     ratio: bool = True
+    least: float = -math.inf
 
     def at(self, e: float) -> float:
         """The number so many standard deviations from its prior."""
-        return self.prior * math.exp(self.sd * e) if self.ratio else self.prior + self.sd * e
+        step = self.sd * max(e, self.least)
+        return self.prior * math.exp(step) if self.ratio else self.prior + step
 
 
 def hull_numbers(vessel: Vessel, wanted: Identify) -> list[Number]:
@@ -174,7 +178,9 @@ class Problem:
     def numbers(self) -> list[Number]:
         """All numbers that are looked for: the hull's, the noises, the current of every log."""
         guessed = [name for name in self._sensed if name not in self.wanted.noise]
-        noises = [Number(n, getattr(self.filter, n), UNSURE) for n in (*guessed, *WALKS)]
+        noises = [
+            Number(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in (*guessed, *WALKS)
+        ]
         currents = [
             Number(f"{axis}, {log.name}", 0.0, self.current, ratio=False)
             for log in self.logs for axis in (CURRENT if self.current else ())
@@ -263,6 +269,11 @@ class Problem:
             np.concatenate([run.innovations for run in runs]),
             np.concatenate([run.variances for run in runs]),
         )
+
+    @cached_property
+    def search(self) -> Search:
+        """What is searched."""
+        return Search(self.innovations, len(self.numbers), self.blocks, len(self.hull))
 
     @cached_property
     def blocks(self) -> Whole:

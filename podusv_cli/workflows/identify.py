@@ -90,13 +90,13 @@ def answered(
 ) -> Answer:
     """The hull, and what is known of its errors."""
     problem = Problem(scenario, wanted, [log for log, role in logs if role == "fit"])
-    search = estimate.Search(problem.innovations, len(problem.numbers), problem.blocks)
+    search = problem.search
 
     def tell(i: int, value: float) -> None:
         if progress:
             progress(f"fitting, round {i}", min(i / SETTLES, 0.99))
 
-    found = estimate.estimated(search, tell)
+    found = estimate.prior_kept(search, estimate.estimated(search, tell), tell)
     ways = estimate.directions(found.covariance, len(problem.hull))
     judged: list[tuple[Log, str, Sequence[FreeRun]]] = [(log, role, ()) for log, role in logs]
     try:
