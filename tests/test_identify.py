@@ -32,6 +32,7 @@ from podusv_cli.identify.march import (
     Record,
     side_by_side,
 )
+from podusv_cli.identify.outputs import drawn
 from podusv_cli.identify.phrases import summary, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem, hull_numbers
 from podusv_cli.identify.reading import Table, delivered
@@ -436,6 +437,31 @@ def test_thrust_that_is_found_is_said_since_the_hull_has_no_place_for_it(boat):
     assert "multiply the actuator's thrust" in lines[0]
 
 
+def test_a_hull_times_a_factor_under_thrust_times_it_moves_as_before():
+    times = np.arange(0.0, 20.0, 0.2)
+    commands, start = commands_of(times), np.array([0.0, 0.0, 0.0, 0.4, 0.1, 0.0])
+    double = problem([], free=("N_r", "thrust"), prior=0.5).scaled(np.zeros(2), 2.0)
+    assert double.m == 2.0 * HULL.m
+    assert double.m23 == pytest.approx(2.0 * HULL.m23)
+    twice = motion(2.0 * commands, times, start, double)
+    assert twice == pytest.approx(motion(commands, times, start), abs=1e-8)
+
+
+def test_draws_move_as_the_logs_leave_possible_with_the_one_thrust_that_is_said():
+    """The logs tell N_r over thrust; so N_r of the draws stays, and all else goes with thrust."""
+    given = problem([], free=("N_r", "thrust"), prior=0.5, draws=1000)
+    ratio = np.array([1.0, -1.0]) / math.sqrt(2.0)
+    covariance = np.eye(2) - (1.0 - 1e-6) * np.outer(ratio, ratio)
+    found = Estimate(np.zeros(2), 0.0, covariance, 1)
+    rows = pd.DataFrame(drawn(Answer(given, found, directions(covariance, 2), (), ())))
+    assert (rows.N_r / HULL.N_r).to_numpy() == pytest.approx(np.ones(1000), abs=0.01)
+    thrust = np.quantile(HULL.m / rows.m, (0.025, 0.5, 0.975))
+    assert thrust == pytest.approx(
+        np.exp(given.sd[0] / math.sqrt(2.0) * np.array([-1.96, 0.0, 1.96])), rel=0.08
+    )
+    assert (rows.Y_v / HULL.Y_v).to_numpy() == pytest.approx((rows.m / HULL.m).to_numpy())
+
+
 def test_a_search_beside_which_the_filter_breaks_down_ends_with_a_sentence():
     with pytest.raises(UsageError, match=r"beside the best numbers .* check units and signs"):
         directions(np.full((2, 2), np.nan), 2)
@@ -589,6 +615,8 @@ def test_a_section_that_cannot_be_meant_gets_a_sentence(section, sentence):
         ({"free": ("damping.roll",)}, "is no group .* did you mean .damping.surge."),
         ({"free": ("X_u",), "priors": {"Y_v": 0.1}}, "Y_v is not looked for"),
         ({"free": ("N_rv", "Y_vr")}, None),
+        ({"free": ("inertia", "damping.surge", "damping.sway", "damping.yaw", "thrust")}, "ratios"),
+        ({"free": ("m22", "m33", "thrust")}, None),
     ],
 )
 def test_names_of_what_is_looked_for(wanted, sentence):

@@ -172,7 +172,18 @@ class Answer:
 
     @cached_property
     def draws(self) -> list[Vessel]:
-        """Hulls that the logs leave possible, drawn jointly.
+        """Hulls that the logs leave possible, drawn jointly."""
+        return [self.problem.vessel(y) for y in self._draws]
+
+    @cached_property
+    def onward(self) -> list[Vessel]:
+        """Hulls that move under one thrust, that of the estimate, as the draws do under theirs."""
+        thrust = self.problem.thrust(self.estimate.y)
+        return [self.problem.scaled(y, thrust) for y in self._draws]
+
+    @cached_property
+    def _draws(self) -> list[Vector]:
+        """Of hulls that the logs leave possible.
 
         In directions that are open the numbers' logarithms are normal, as they were before. Then
         the directions that are determined are put where they belong, in straight lines: forces are
@@ -189,27 +200,28 @@ class Answer:
             with np.errstate(invalid="ignore", divide="ignore"):  # a number that would change sign
                 return np.asarray(centre + np.log1p(sd * off) / sd)
 
-        return self._hulls(point)
+        return self._possible(point)
 
     @cached_property
     def before(self) -> list[Vessel]:
         """Hulls that were possible before the logs were read."""
-        return self._hulls(lambda normal: normal)
+        return [self.problem.vessel(y) for y in self._possible(lambda normal: normal)]
 
-    def _hulls(self, point: Callable[[Vector], Vector]) -> list[Vessel]:
-        """A hull of each draw of normal numbers, but for draws of which none can be made.
+    def _possible(self, point: Callable[[Vector], Vector]) -> list[Vector]:
+        """A point of each draw of normal numbers, but for draws of which no hull can be made.
 
         Raises UsageError where hardly any can.
         """
         rng = np.random.Generator(np.random.PCG64(self.problem.wanted.seed))
-        hulls: list[Vessel] = []
+        points: list[Vector] = []
         for _ in range(TRIES * self.problem.wanted.draws):
             y = point(rng.standard_normal(len(self.problem.hull)))
             if np.all(np.isfinite(y)):
                 with suppress(ValidationError):
-                    hulls.append(self.problem.vessel(y))
-            if len(hulls) == self.problem.wanted.draws:
-                return hulls
+                    self.problem.vessel(y)
+                    points.append(y)
+            if len(points) == self.problem.wanted.draws:
+                return points
         raise UsageError(
             "hardly any hull that is drawn is possible (numbers keep their sign, the mass matrix "
             "must be positive definite); give narrower priors, identify.prior or identify.priors"

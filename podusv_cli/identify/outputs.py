@@ -99,8 +99,8 @@ def given(answer: Answer) -> dict[str, Any]:
 
 def drawn(answer: Answer) -> list[dict[str, float]]:
     """A row a hull, with those of its numbers that differ between hulls."""
-    rows = [hull.constants() for hull in answer.draws]
-    own = {name for name in rows[0] if name in type(answer.vessel).model_fields}
+    rows = [hull.constants() for hull in answer.onward]
+    own = {name for name in rows[0] if name in type(answer.onward[0]).model_fields}
     moving = [n for n in rows[0] if n in own and len({row[n] for row in rows}) > 1]
     return [{name: row[name] for name in moving} for row in rows]
 

@@ -114,7 +114,8 @@ def thrust_words(answer: Answer) -> list[str]:
     return [
         f"thrust is {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) times what the actuator's numbers "
         "give. The hull holds with that thrust alone: multiply the actuator's thrust (of pods "
-        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} wherever this hull is used."
+        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} wherever this hull is used, or a draw of "
+        "posterior.csv: draws of another thrust are scaled so that they move as under their own."
         for p in answer.parameters
         if p.name == THRUST
     ]

@@ -37,7 +37,9 @@ from podusv_cli.scenario.model import Scenario
 
 # Where an entry of the mass matrix is, and what of it stands beside the added mass.
 ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m33": "N_rdot"}
-DAMPINGS = tuple(n for n in COEFFICIENTS if n[1:2] == "_" and n not in ADDED.values())
+# Numbers that a force is proportional to; those of the damping.
+FORCES = ("m", "I_z", *(n for n in COEFFICIENTS if n[:2] in DAMPING.values()))
+DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
 LEAST = -3.0  # of these deviations: a log without any noise would make a filter without any
@@ -69,14 +71,22 @@ class Number:
 
 
 def hull_numbers(vessel: Vessel, wanted: Identify) -> list[Number]:
-    """The vessel's numbers that are looked for. Raises UsageError for names that it has not.
+    """The vessel's numbers that are looked for. A number that is 0 stays 0.
 
-    A number that is 0 stays 0, since its prior is relative.
+    Raises UsageError for names that it has not, and where logs can give ratios alone.
     """
     names: dict[str, None] = {}
     constants = vessel.constants()
     for name in wanted.free:
         names |= dict.fromkeys(_members(name, constants))
+    every = {n for group in GROUPS for n in _members(group, constants)}
+    if THRUST in names and every <= names.keys():
+        raise UsageError(
+            "identify.free: thrust, inertia and damping times one factor give the same motion, so "
+            "that with all of them free logs tell ratios alone; leave thrust out, or hold what is "
+            "known otherwise, as m11 of a boat that was weighed: "
+            f"free: [m22, m33, {', '.join(GROUPS[1:])}, thrust]"
+        )
     unknown = [name for name in wanted.priors if name not in names]
     if unknown:
         raise UsageError(
@@ -229,6 +239,19 @@ class Problem:
         beside = {n: getattr(own, n) + getattr(own, ADDED[n]) for n in ADDED}
         added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}
         return own.changed(new | added)
+
+    def thrust(self, y: Vector) -> float:
+        """What part of the loads that the actuator's numbers give acts on the hull at a point."""
+        own = zip(self.hull, y.tolist(), strict=False)
+        return next((n.at(e) for n, e in own if n.name == THRUST), 1.0)
+
+    def scaled(self, y: Vector, thrust: float) -> Vessel:
+        """The hull that moves under this thrust as the one at a point does under its own.
+
+        A motion stays as it is where all forces, inertia's and thrust's too, are times one factor.
+        """
+        hull, factor = self.vessel(y), thrust / self.thrust(y)
+        return hull.changed({name: factor * getattr(hull, name) for name in FORCES})
 
     @cached_property
     def _follow(self) -> Follow:
