@@ -42,7 +42,7 @@ FORCES = ("m", "I_z", *(n for n in COEFFICIENTS if n[:2] in DAMPING.values()))
 DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
-LEAST = -3.0  # of these deviations: a log without any noise would make a filter without any
+LEAST = -3.0  # of these deviations, of a sensor: a log without noise would make a singular filter
 CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain, on the model ship
 AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
 TURNED = 0.05  # rad, of the heading at the start
@@ -188,9 +188,8 @@ class Problem:
     def numbers(self) -> list[Number]:
         """All numbers that are looked for: the hull's, the noises, the current of every log."""
         guessed = [name for name in self._sensed if name not in self.wanted.noise]
-        noises = [
-            Number(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in (*guessed, *WALKS)
-        ]
+        noises = [Number(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
+        noises += [Number(n, getattr(self.filter, n), UNSURE) for n in WALKS]
         currents = [
             Number(f"{axis}, {log.name}", 0.0, self.current, ratio=False)
             for log in self.logs for axis in (CURRENT if self.current else ())
