@@ -13,6 +13,7 @@ PATHS, LAWS, SEAS = ([*kinds(room)] for room in ("paths", "controllers", "distur
 A_PATH, A_LAW, A_SEA = (f"{', '.join(known[:-1])} or {known[-1]}" for known in (PATHS, LAWS, SEAS))
 NUMBER = "step: must be a number above 0 [s], found"
 TRUTH = "compiled: must be true or false, found"
+CENTER = "must be a list of 3 numbers [m/s, m/s, rad/s]"
 NETWORK = "    network:\n      "
 
 
@@ -40,8 +41,8 @@ def test_a_preset_that_is_no_word_is_unknown(preset):
         ("step: 1:30", f"8: {NUMBER} '1:30'; write the number out, colons are not read as minutes"),
         ("step: '0.5'", f"8: {NUMBER} '0.5'; leave out the quotes"),
         ("step: 0,5", f"8: {NUMBER} '0,5'; write a decimal point"),
-        ("step: 0.5 s", f"8: {NUMBER} '0.5 s'; convert it to that unit and leave the unit out"),
-        ("step: 35°", f"8: {NUMBER} '35°'; convert it to that unit and leave the unit out"),
+        ("step: 35°", f"8: {NUMBER} '35°'; ° does not fit (units here: s, ms, us, ns, min, h)"),
+        ("step: -5 ms", f"8: {NUMBER} -5 ms"),
         ("step: 1_0", f"8: {NUMBER} '1_0'; leave out the underscores"),
         ("step: 0x10", f"8: {NUMBER} '0x10'; write it in decimal"),
         ("step: nan", f"8: {NUMBER} 'nan'; numbers must be finite"),
@@ -202,7 +203,7 @@ def test_a_law_among_several_is_wrong_once():
         (
             "{kind: none}",
             "{kind: harmonic, b_u: {mean: x}}",
-            "3:43: disturbance.b_u.mean: must be a number [N or N m], found 'x'",
+            "3:43: disturbance.b_u.mean: must be a number [N], found 'x'",
         ),
     ],
 )
@@ -244,10 +245,10 @@ def test_a_wrong_component_is_one_sentence_at_its_place(sound, wrong, says):
         (
             "network: {centers: [[1, 2], [1, 2, 3, 4], 5, [1, 2, x]]}",
             [
-                "23: network.centers[0]: must be a list of 3 numbers, found a list of 2",
-                "31: network.centers[1]: must be a list of 3 numbers, found a list of 4",
-                "45: network.centers[2]: must be a list of 3 numbers, found 5",
-                "55: network.centers[3][2]: must be a number, found 'x'",
+                f"23: network.centers[0]: {CENTER}, found a list of 2",
+                f"31: network.centers[1]: {CENTER}, found a list of 4",
+                f"45: network.centers[2]: {CENTER}, found 5",
+                "55: network.centers[3][2]: must be a number [rad/s], found 'x'",
             ],
         ),
         (

@@ -159,6 +159,7 @@ def test_a_key_says_everything_that_its_field_says():
             unit="s",
             range="> 0",
             default="0.1",
+            others=("ms", "us", "ns", "min", "h"),
             kinds=("pid",),
         )
     ]

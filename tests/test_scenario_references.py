@@ -251,7 +251,7 @@ def test_the_header_of_a_route_says_which_column_is_which():
         ("nan,0\n1,1\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
         ("0,0\n017,1\n", ["route.csv:2:1: must be two numbers x,y [m]; the first is no number"]),
         ("0,0\n1,\n", ["route.csv:2:1: must be two numbers x,y [m]; the second is no number"]),
-        ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number, found 1e999"]),
+        ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number [m], found 1e999"]),
         ("O,5\n1,1\n2,2\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
         ("lat,lon\n0,0\n1,1\n", [
             "route.csv:1:1: line 1 of the file names columns that are not x [m], y [m] (in any "

@@ -1,10 +1,35 @@
 """Numbers with units: the table, and every place where a scenario takes them."""
 
 import math
+import re
 
+import jsonschema
 import pytest
+import yaml
+from scenario_samples import SOUND, loaded, told, write
 
+import podusv
 from podusv_cli.core import units
+from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.schema import json_schema
+from podusv_cli.studies.making.cells import cells
+
+SENSORS = "measurement: {kind: sensors, heading: {noise: 0.5 deg, outages: [[1 min, 2 min]]}}\n"
+ROUTE = SOUND.replace(
+    "{kind: line}", "{kind: legs, points: [[0, 0], [0.1 km, -20 ft]], speed: 36 km/h}"
+)
+STUDY = """\
+sweep:
+  grid: {simulation.step: [10 ms, 20 ms], start.x: [1 ft]}
+  vary:
+    start.psi: {uniform: [-30 deg, 30 deg]}
+    path.course: {plus: {normal: {mean: 0, sigma: 5 deg, within: [-10 deg, 10 deg]}}}
+    mass: {keys: [vessel.m], triangular: [20000 g, 23, 25 kg]}
+    vessel.I_z: {times: {uniform: [90 %, 110 %]}}
+tune: {space: {omega_psi: {log: [1 deg/s, 1]}, pid.T_d: {uniform: [100 ms, 1 s]}}}
+doubt: {vary: {start.u: {uniform: [0, 1 kn]}}}
+identify: {noise: {sigma_psi: 1 deg}}
+"""
 
 
 @pytest.mark.parametrize(
@@ -62,3 +87,114 @@ def test_every_unit_of_the_table_is_exact():
 )
 def test_what_does_not_fit_is_said(text, unit, told):
     assert units.misfit(text, unit) == told
+
+
+# --- in scenarios
+
+
+def test_sections_lists_and_settings_take_units():
+    scenario = loaded(ROUTE + SENSORS, ["start.psi=45deg", "start={u: 5 kn, psi: 90 deg}"]).scenario
+    assert scenario.path.points == ((0.0, 0.0), (100.0, -6.096))
+    assert scenario.path.speed == 10.0
+    assert scenario.measurement.heading.noise == math.radians(0.5)
+    assert scenario.measurement.heading.outages == ((60.0, 120.0),)
+    assert (scenario.start.u, scenario.start.psi) == (5 * 1852 / 3600, math.pi / 2)
+
+
+def test_the_scenario_written_out_has_podusv_s_units_alone():
+    written = resolved_yaml(loaded(ROUTE + SENSORS).scenario)
+    assert not re.search(r"\d ?(deg|km|ft|min)", written)
+    assert load_again(written) == loaded(ROUTE + SENSORS).scenario
+
+
+def load_again(text):
+    write("resolved.yaml", text)
+    return load("resolved.yaml").scenario
+
+
+def test_ranges_have_the_unit_of_the_key_they_are_about():
+    scenario = loaded(SOUND + STUDY).scenario
+    vary = scenario.sweep.vary
+    assert vary["start.psi"].uniform == (-math.pi / 6, math.pi / 6)
+    assert vary["path.course"].plus.normal.sigma == math.radians(5)
+    assert vary["path.course"].plus.normal.within == (-math.pi / 18, math.pi / 18)
+    assert vary["mass"].triangular == (20.0, 23.0, 25.0)
+    assert vary["vessel.I_z"].times.uniform == (0.9, 1.1)
+    assert scenario.tune.space["omega_psi"].log == (math.radians(1), 1.0)
+    assert scenario.tune.space["pid.T_d"].uniform == (0.1, 1.0)
+    assert scenario.doubt.vary["start.u"].uniform == (0.0, 1852 / 3600)
+    assert scenario.identify.noise == {"sigma_psi": math.radians(1)}
+
+
+def test_cells_of_a_grid_are_those_of_plain_numbers():
+    plain = (SOUND + STUDY).replace("[10 ms, 20 ms]", "[0.01, 0.02]").replace("[1 ft]", "[0.3048]")
+    assert cells(loaded(SOUND + STUDY)) == cells(loaded(plain))
+
+
+def test_a_vessel_s_file_takes_units():
+    write("boat.yaml", yaml.safe_dump(OWN | {"length": "600 cm", "m": "0.1 t"}))
+    vessel = loaded(SOUND.replace("preset: paper", "preset: boat.yaml, beam: 1 ft")).scenario.vessel
+    assert (vessel.length, vessel.beam, vessel.m) == (6.0, 0.3048, 100.0)
+
+
+OWN = {"source": "a test", "validity": "a test", "I_z": 20.0, "X_u": -5.0, "Y_v": -5.0, "N_r": -5.0}
+
+
+def test_text_stays_text():
+    text = SOUND + "name: 5-m\ndescription: 45 deg\n"
+    assert loaded(text).scenario.description == "45 deg"
+
+
+@pytest.mark.parametrize(
+    ("override", "says"),
+    [
+        ("start.u=5 kg", "a number [m/s], found '5 kg'; kg does not fit (units here: m/s, cm/s, "
+         "mm/s, ft/s, km/h, kn)"),
+        ("simulation.step=-5 ms", "a number above 0 [s], found -5 ms"),
+        ("sweep.vary.start.psi.plus.uniform[1]=3 dge", "a number [rad], found '3 dge'; dge does "
+         "not fit; did you mean 'deg'? (units here: rad, deg)"),
+        ("metrics.steady_fraction=0.5 m", "a number above 0 and not above 1, found '0.5 m'; it has "
+         "no unit here: write 0.5"),
+        ("sweep.draws=5 runs", "a whole number not below 1 and not above 1e+09, found '5 runs'; it "
+         "has no unit here: write 5"),
+    ],
+)  # fmt: skip
+def test_a_unit_that_does_not_fit_is_one_sentence(override, says):
+    below = SOUND + "sweep: {vary: {start.psi: {plus: {uniform: [0, 1]}}}}"
+    assert told(below, [override]) == [
+        f"--set {override}: {override.partition('=')[0]}: must be {says}"
+    ]
+
+
+# --- elsewhere
+
+
+def test_functions_of_python_take_units():
+    source = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": "0.1 min"})
+    assert source.simulation.duration == 6.0
+    assert podusv.Scenario(vessel={"preset": "paper"}, path={"kind": "line", "course": "90 deg"},
+                           disturbance={"kind": "none"}, actuator={"kind": "ideal"},
+                           controller={"kind": "pid"}).path.course == math.pi / 2  # fmt: skip
+
+
+def test_a_batch_takes_units_and_says_which_do_not_fit():
+    source = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 1.0})
+    runs = podusv.simulate_many(
+        source, {"start.psi": ["90 deg", 0.0], "vessel.m": ["0.05 t", 60.0]}
+    )
+    same = podusv.simulate_many(source, {"start.psi": [math.pi / 2, 0.0], "vessel.m": [50.0, 60.0]})
+    assert runs.equals(same)
+    with pytest.raises(ValueError, match=r"row 0: start.psi = 5 kg; .*kg does not fit"):
+        podusv.simulate_many(source, {"start.psi": ["5 kg"]})
+
+
+def test_editors_take_what_podusv_takes():
+    schema = jsonschema.Draft7Validator(json_schema(()))
+
+    def wrong(text):
+        return [error.json_path for error in schema.iter_errors(yaml.safe_load(text))]
+
+    assert wrong(ROUTE + SENSORS + STUDY) == []
+    assert wrong(SOUND + "start: {psi: 45 kg}") == ["$.start.psi"]
+    assert wrong(SOUND + "start: {psi: 45°, u: 5 knots}") == []
+    assert wrong(SOUND + "sweep: {draws: 5 runs}") == ["$.sweep"]

@@ -86,7 +86,5 @@ def _echo(row: Row) -> None:
         inside = f"{row.type}: {', '.join(row.choices)}" if row.choices else ""
         echo_entry(row.key, row.meaning, inside, where)
         return
-    unit = f"[{row.unit}]" if row.unit else ""
     default = row.default if row.default in ("", "required") else f"default {row.default}"
-    value = " ".join(filter(None, (row.type, row.range, unit)))
-    echo_entry(row.key, row.meaning, where, facts=", ".join(filter(None, (value, default))))
+    echo_entry(row.key, row.meaning, where, facts=", ".join(filter(None, (row.value, default))))

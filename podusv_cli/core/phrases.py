@@ -91,11 +91,10 @@ NUMBER_HINTS = (
     (r"[-+]?0\d+(\.\d*)?", "numbers have no leading zeros"),
     (r"[-+]?[\d.]+([eE][-+]?\d+)?", "leave out the quotes"),
     (r"[-+]?\d+(:\d+)+", "write the number out, colons are not read as minutes"),
-    (r"[-+]?\d+,\d+", "write a decimal point"),
+    (r"[-+]?\d+,\d+(\s*\D.*)?", "write a decimal point"),
     (r"[-+]?\d[\d_]*(\.\d*)?", "leave out the underscores"),
     (r"0[xob][\da-fA-F]+", "write it in decimal"),
     (r"[-+]?\.?(nan|inf|infinity)", "numbers must be finite"),
-    (r"[-+]?\d\S*\s*[a-zA-Z°%][\w/^°%]*", "convert it to that unit and leave the unit out"),
 )
 HINTS: dict[type, tuple[tuple[str, str], ...]] = {
     float: NUMBER_HINTS,

@@ -81,6 +81,15 @@ def number(text: str, unit: str) -> int | float | None:
     return int(parts[0]) if factor == 1 and parts[0].lstrip("+-").isdigit() else float(own)
 
 
+def pattern(unit: str) -> str:
+    """What a number with a unit that fits matches, as a regular expression of JSON schemas."""
+    ways = [way for way in allowed(unit) if way != PURE]
+    ways += [other for other, way in SPELLINGS.items() if way in ways]
+    ways += [sign for sign, way in (("°", "deg"), ("°/s", "deg/s")) if way in ways]
+    words = "|".join(re.sub(r"[().^*]", r"\\\g<0>", way) for way in ways)
+    return rf"^\s*{NUMBER.pattern}\s*({words})\s*$"
+
+
 def misfit(text: str, unit: str) -> str:
     """Why a number with a unit is none in podusv's `unit`, and what would be; else empty."""
     parts = parted(text)

@@ -22,7 +22,7 @@ from podusv_cli.engine.running.check import check_law
 from podusv_cli.findings.finding import Case, postflight
 from podusv_cli.interface.border import ParameterError
 from podusv_cli.interface.hulls import IdentifiedHull
-from podusv_cli.interface.parameters import check_words, columns, scenarios
+from podusv_cli.interface.parameters import check_words, columns, in_si, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
 from podusv_cli.process.extras import Extras
@@ -194,7 +194,8 @@ def simulate_many(
     1      60.0  finished
     """
     base = loaded(source)
-    scenario, given = _single(base), columns(parameters)
+    scenario = _single(base)
+    given = in_si(scenario, columns(parameters))
     if workers < 0:
         raise ParameterError(f"workers = {workers}: must be 0 (one a core) or more")
     plan = base.plan(scenario)

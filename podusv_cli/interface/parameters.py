@@ -51,6 +51,12 @@ def _column(key: str, given: Any) -> list[Any]:
     return [value.item() if isinstance(value, np.generic) else value for value in array.tolist()]
 
 
+def in_si(scenario: Scenario, given: Columns) -> Columns:
+    """The values with numbers in place of texts such as "45 deg". Raises ValueError as below."""
+    keys = {name: described(scenario, _steps(scenario, name)) for name in given}
+    return {name: [keys[name].number(value) for value in column] for name, column in given.items()}
+
+
 def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
     """The scenario of every run. Raises ValueError for unknown keys and values out of range."""
     steps = {key: _steps(scenario, key) for key in given}

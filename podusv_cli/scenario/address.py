@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError, SizingError
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.phrases import hint
 from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import PER_RUN, Scenario
@@ -169,5 +168,5 @@ def _sentence(
         return f"{dotted(at)}: {reason}, with {numbers}"
     key = described(scenario, (*at, *place))
     number = new[place]
-    advice = hint(number.value, key.types) if isinstance(number.value, str) else ""
+    advice = key.advice(number.value) if isinstance(number.value, str) else ""
     return f"{number.source}{dotted(key.path)} = {number}; must be {key.wanted}{advice}"

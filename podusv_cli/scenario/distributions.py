@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import OF_SECTION, Component, value
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.portable import exponential, logarithm, standard_normal
 
@@ -31,7 +31,7 @@ class Bounded(Component):
     """A distribution that may be cut off on both sides; what remains keeps its shape."""
 
     within: Interval | None = value(
-        None, "", "two bounds: only what is between them is drawn; none where left out"
+        None, OF_SECTION, "two bounds: only what is between them is drawn; none where left out"
     )
 
     @abstractmethod
@@ -77,8 +77,8 @@ class Bounded(Component):
 class Normal(Bounded):
     """A normal distribution."""
 
-    mean: float = value(0.0, "", "its mean, in the unit of the key")
-    sigma: float = value(..., "", "its standard deviation, in the unit of the key", gt=0)
+    mean: float = value(0.0, OF_SECTION, "its mean")
+    sigma: float = value(..., OF_SECTION, "its standard deviation", gt=0)
 
     def whole(self, u: Vector) -> Vector:
         """The values without `within`."""
@@ -88,7 +88,7 @@ class Normal(Bounded):
 class LogNormal(Bounded):
     """A distribution whose logarithm is normal: factors, and numbers that are above 0."""
 
-    median: float = value(1.0, "", "its median, in the unit of the key", gt=0)
+    median: float = value(1.0, OF_SECTION, "its median", gt=0)
     sigma: float = value(
         ..., "", "the standard deviation of the logarithm: 0.1 is about 10 %", gt=0, le=5
     )
@@ -193,20 +193,26 @@ WAYS: dict[str, tuple[Callable[[str, Any], None], Callable[[Any, Vector], Number
 class Distribution(Component):
     """A distribution: one of the keys says which."""
 
-    uniform: Interval | None = value(None, "", "[low, high]: all between them are equally likely")
-    normal: Normal | None = value(None, "", "a normal distribution")
-    lognormal: LogNormal | None = value(None, "", "its logarithm is normal; for factors")
+    uniform: Interval | None = value(
+        None, OF_SECTION, "[low, high]: all between them are equally likely"
+    )
+    normal: Normal | None = value(None, OF_SECTION, "a normal distribution")
+    lognormal: LogNormal | None = value(None, OF_SECTION, "its logarithm is normal; for factors")
     log_uniform: Interval | None = value(
-        None, "", "[low, high]: the logarithm is equally likely everywhere between; for factors"
+        None,
+        OF_SECTION,
+        "[low, high]: the logarithm is equally likely everywhere between; for factors",
     )
     triangular: tuple[float, float, float] | None = value(
-        None, "", "[low, mode, high]: likeliest at the mode, falling to both sides"
+        None, OF_SECTION, "[low, mode, high]: likeliest at the mode, falling to both sides"
     )
     choice: tuple[bool | int | float | str, ...] | None = value(
-        None, "", "values to choose from; all are equally likely, one that is written twice twice"
+        None,
+        OF_SECTION,
+        "values to choose from; all are equally likely, one that is written twice twice",
     )
     integers: tuple[int, int] | None = value(
-        None, "", "[low, high]: whole numbers, both ends included"
+        None, OF_SECTION, "[low, high]: whole numbers, both ends included"
     )
     angle: Literal["all"] | None = value(None, "rad", "all: every direction is equally likely")
 

@@ -37,7 +37,8 @@ class Row:
     """A key, kind or signal in words; empty where there is nothing to say.
 
     `type` is what a value may be, or says what `choices` are: the "kinds" of a section or the
-    "keys" in it. `kinds` are those of a section in which the key is the same.
+    "keys" in it. `kinds` are those of a section in which the key is the same. `others` are units
+    that a number may be written with in place of `unit`.
     """
 
     key: str
@@ -48,6 +49,14 @@ class Row:
     default: str = ""
     choices: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+
+    @property
+    def value(self) -> str:
+        """Type, range and units: `a number > 0 [m/s, or with km/h, kn]`."""
+        others = f", or with {', '.join(self.others)}" if self.others else ""
+        unit = f"[{self.unit}{others}]" if self.unit else ""
+        return " ".join(filter(None, (self.type, self.range, unit)))
 
 
 EXTENDS = Row(
@@ -206,7 +215,8 @@ def _row(key: Key) -> Row:
     named = key.name in ("preset", "kind")
     words = [*choices, *([ANY_FILE] if key.name == "preset" else [])]
     kind = either(words) if named else key.type_in_words
-    return Row(path, meaning, kind, key.unit, key.range, _default(key), choices)
+    others = tuple(key.other_units)
+    return Row(path, meaning, kind, key.unit, key.range, _default(key), choices, others=others)
 
 
 def _meaning(key: Key) -> str:

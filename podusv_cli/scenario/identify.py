@@ -75,8 +75,8 @@ class Identify(Component):
     )
     priors: dict[str, Positive] = value({}, "", "the same of single numbers, in place of `prior`")
     noise: dict[str, Positive] = value(
-        {}, "", "standard deviations of sensors that are known, by the names of the ekf: "
-        f"{', '.join(SENSORS)}; all others follow from the logs",
+        {}, "m or rad or m/s or rad/s", "standard deviations of sensors that are known, by the "
+        f"names of the ekf: {', '.join(SENSORS)}; all others follow from the logs",
     )  # fmt: skip
     current: float | None = value(
         None, "m/s", "standard deviation of the current north and east, which every log has its "

@@ -14,11 +14,14 @@ from typing import Annotated, Any, Literal, TypeGuard, Union, get_args, get_orig
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from podusv_cli.core import units
 from podusv_cli.core.component import Component, unit_of
+from podusv_cli.core.phrases import hint
+from podusv_cli.core.units import PURE
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import NAME as PATTERN
 from podusv_cli.scenario.sections import NAME_IN_WORDS
-from podusv_cli.scenario.yaml_tree import Route
+from podusv_cli.scenario.yaml_tree import Route, route
 
 NAME, NUMBER = "NAME", "NUMBER"  # stand for the names in a mapping, the positions in a list
 NO_DEFAULT = PydanticUndefined  # the default of a field that has none
@@ -35,6 +38,12 @@ NOUNS: dict[Any, tuple[str, str]] = {
     Any: ("any value", "any values"),
 }
 SHOWN_KEYS = 6
+# Sections whose entries are about the keys that they are named after, and where these keys are.
+OF_KEYS: dict[Route, Route] = {
+    ("sweep", "vary"): (), ("sweep", "grid"): (), ("doubt", "vary"): (),
+    ("tune", "space"): ("controller",), ("identify", "noise"): ("estimator",),
+}  # fmt: skip
+OF_KEY = "unit of the key"
 
 
 @dataclass(frozen=True)
@@ -75,7 +84,12 @@ class Key:
     @property
     def unit(self) -> str:
         """The unit of the value, "" where it has none."""
-        return unit_of(self.field, self.unit_of_section) if self.field and not self.keys else ""
+        return "" if self.keys else self._inner_unit
+
+    @property
+    def _inner_unit(self) -> str:
+        """The unit of the value, or that of which parts in it are."""
+        return unit_of(self.field, self.unit_of_section) if self.field else self.unit_of_section
 
     @property
     def range(self) -> str:
@@ -123,10 +137,11 @@ class Key:
         parts = {} if self.section else sections(self.annotation)
         return {
             kind: replace(
-                self, annotation=part, field=None, route=(*self.route, kind), kind=kind, model=part
+                self, annotation=part, field=None, route=(*self.route, kind), kind=kind, model=part,
+                unit_of_section=self._inner_unit,
             )
             for kind, part in parts.items()
-        }
+        }  # fmt: skip
 
     @cached_property
     def keys(self) -> dict[str, Key]:
@@ -141,10 +156,9 @@ class Key:
         default = getattr(self.default, name) if given else field.default
         if name in model.rules:
             default = None
-        path, route = (*self.path, name), (*self.route, name)
-        unit = unit_of(self.field) if self.field else ""
         return Key(
-            path, field.annotation, field, default, route, self.kind, model, self.scenario, unit
+            (*self.path, name), field.annotation, field, default, (*self.route, name), self.kind,
+            model, self.scenario, self._inner_unit,
         )  # fmt: skip
 
     def item(self, step: str | int) -> Key | None:
@@ -157,16 +171,52 @@ class Key:
             if get_origin(member) is dict and not is_position:
                 types = parts[1:]
             if types:
-                path, route = (*self.path, step), (*self.route, step)
-                return replace(
-                    self,
-                    path=path,
-                    annotation=types[0],
-                    field=None,
-                    default=NO_DEFAULT,
-                    route=route,
-                )
+                inner = replace(
+                    self, path=(*self.path, step), route=(*self.route, step), annotation=types[0],
+                    field=None, default=NO_DEFAULT, unit_of_section=self._unit_of(types[0], step),
+                )  # fmt: skip
+                return inner.of_keys(str(step)) if self.path in OF_KEYS else inner
         return None
+
+    def _unit_of(self, inner: Any, step: str | int) -> str:
+        """The unit of an item; of "m/s, m/s, rad/s" that at its position in the innermost list."""
+        each = self._inner_unit.split(", ")
+        innermost = isinstance(step, int) and get_origin(inner) is not tuple
+        return each[int(step) % len(each)] if innermost else self._inner_unit
+
+    def of_keys(self, *names: str) -> Key:
+        """This entry of `sweep.vary` (see OF_KEYS), whose numbers are those of the keys `names`."""
+        home = OF_KEYS[self.path[:-1]]
+        places = [(*home, name.rpartition(".")[2]) if home else route(name) for name in names]
+        targets = [key for place in places for key in self.top.follow(place)]
+        units = dict.fromkeys(key.unit or PURE for key in targets)
+        several = bool(targets) and get_args(self.annotation)[1:] == (Ellipsis,)
+        inner = (targets[0].annotation, Ellipsis) if several else ()
+        return replace(
+            self, unit_of_section=" or ".join(units) or OF_KEY,
+            annotation=types.GenericAlias(tuple, inner) if several else self.annotation,
+        )  # fmt: skip
+
+    @cached_property
+    def _numeric(self) -> bool:
+        """Whether the value may be a number, or a list of some."""
+        return not {*_scalars(self.annotation)}.isdisjoint((int, float))
+
+    @property
+    def other_units(self) -> list[str]:
+        """The units that its numbers may be written with, beside its own."""
+        return [*units.allowed(self.unit)][1:] if self.unit and self._numeric else []
+
+    def number(self, content: Any) -> Any:
+        """What a number with a unit is in podusv's, where the key takes it; else the content."""
+        if not (isinstance(content, str) and self._numeric):
+            return content
+        made = units.number(content, self.unit)
+        return content if made is None else made
+
+    def advice(self, text: str) -> str:
+        """How to write a text that the key does not take, if it shows what was meant."""
+        return hint(text, self.types) or (units.misfit(text, self.unit) if self._numeric else "")
 
     @cached_property
     def item_keys(self) -> list[Key]:
@@ -192,6 +242,14 @@ class Key:
         for key in (*self.keys.values(), *self.item_keys):
             yield key
             yield from key.all()
+
+
+def _scalars(annotation: Any) -> Iterator[Any]:
+    for member in members(annotation):
+        if get_origin(member) is tuple:
+            yield from (scalar for part in get_args(member) for scalar in _scalars(part))
+        else:
+            yield member
 
 
 def members(annotation: Any) -> tuple[Any, ...]:

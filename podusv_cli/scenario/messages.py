@@ -190,7 +190,7 @@ def _hint(node: Node, key: Key) -> str:
         return hint(node.text, (bool,) if bool in key.types else ())
     if node.content and node.content in key.kinds:
         return f"; write {{kind: {node.content}}}"
-    return hint(node.content, key.types) or did_you_mean(node.content, key.choices)
+    return key.advice(node.content) or did_you_mean(node.content, key.choices)
 
 
 SENTENCES = {

@@ -13,6 +13,7 @@ from podusv_cli.components.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 from podusv_cli.core.component import Component, Presets
 from podusv_cli.core.phrases import found, quoted, unknown
 from podusv_cli.core.plugins import Plugins
+from podusv_cli.scenario.in_si import in_si
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.kinds import over
 from podusv_cli.scenario.named_files import ANY_FILE, with_contents
@@ -93,12 +94,12 @@ def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Preset
 
 
 def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
-    """The tree with presets, CSV files, `name`, `nominal` and `controllers` filled in.
+    """The tree in podusv's units, with presets, files, `name`, `nominal`, `controllers` filled in.
 
     `top` are the scenario's keys.
     """
     plugins = top.scenario.plugged
-    root = with_contents(_name(_without_null(root), faults), top, faults)
+    root = in_si(with_contents(_name(_without_null(root), faults), top, faults), top)
     root = _nominal(_vessel(root, plugins, faults), plugins, faults)
     return _controllers(_sections(root, top, faults), top)
 

@@ -8,8 +8,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import OF_SECTION, Component, unit_of
 from podusv_cli.core.plugins import Plugins
+from podusv_cli.core.timed_rows import NUMBER
+from podusv_cli.core.units import pattern
 from podusv_cli.scenario.explain import EXTENDS
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import scenario_class
@@ -56,6 +58,8 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
     meaning = named.pop("description")
     scenario["properties"]["plugins"] = {"anyOf": [*either, named], "description": meaning}
     scenario["properties"] = {"extends": extends} | scenario["properties"]
+    units = dict.fromkeys(unit_of(key.field) for key in top.all() if key.field)
+    definitions |= {_in(unit): _number_in(unit) for unit in units}
     return {"$schema": DIALECT, "title": TITLE} | scenario | {"definitions": definitions}
 
 
@@ -93,6 +97,8 @@ def _converted(schema: dict[str, Any]) -> dict[str, Any]:
         made["description"] = " ".join(made["description"].split()) + (f" [{unit}]" if unit else "")
     if "const" in made:
         made.pop("default", None)
+    if "unit" in schema:
+        made = _or_with_unit(made, schema["unit"])
     if "prefixItems" in made:
         made["items"], made["additionalItems"] = made.pop("prefixItems"), False
     if "oneOf" in made:
@@ -103,6 +109,34 @@ def _converted(schema: dict[str, Any]) -> dict[str, Any]:
     if "$ref" in made and len(made) > 1:
         # Draft-07 ignores whatever stands beside a reference.
         made["allOf"] = [{"$ref": made.pop("$ref")}]
+    return made
+
+
+def _in(unit: str) -> str:
+    """The name of the definition of a number with a unit."""
+    return "number_in_" + re.sub(r"\W+", "_", unit.replace("/", " per ") or "per cent")
+
+
+def _number_in(unit: str) -> dict[str, Any]:
+    """A number with a unit that may stand in place of one in podusv's `unit`."""
+    of_another = unit == OF_SECTION  # which fields of several sections have
+    fits = rf"^\s*{NUMBER.pattern}\s*\D" if of_another else pattern(unit.replace(", ", " or "))
+    return {"type": "string", "pattern": fits}
+
+
+def _or_with_unit(schema: dict[str, Any], unit: str) -> dict[str, Any]:
+    """The schema whose numbers may also be written with a unit."""
+    made = dict(schema)
+    if made.get("type") == "number":
+        outside = {word: made.pop(word) for word in ("default", "description") if word in made}
+        return outside | {"anyOf": [made, {"$ref": f"#/definitions/{_in(unit)}"}]}
+    for word in ("items", "anyOf"):
+        if isinstance(made.get(word), list):
+            parts = [_or_with_unit(part, unit) for part in made[word]]
+            made[word] = parts if word == "items" else [c for part in parts for c in _choices(part)]
+    for word in ("items", "additionalProperties"):
+        if isinstance(made.get(word), dict):
+            made[word] = _or_with_unit(made[word], unit)
     return made
 
 

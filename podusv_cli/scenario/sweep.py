@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import field_validator, model_validator
 
 from podusv_cli.core.about import Keep, StudyClaim
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import OF_SECTION, Component, value
 from podusv_cli.core.timed_rows import Named, named_rows
 from podusv_cli.scenario.distributions import WAYS, Distribution
 from podusv_cli.scenario.yaml_tree import bracketed
@@ -29,7 +29,7 @@ class Quantity(Distribution):
         (), "", "keys that all get the same draw; where left out, the quantity's name is the key"
     )
     times: Distribution | None = value(None, "", "a factor on the scenario's own value")
-    plus: Distribution | None = value(None, "", "a summand to the scenario's own value")
+    plus: Distribution | None = value(None, OF_SECTION, "a summand to the scenario's own value")
     seed: bool = value(False, "", "true: a whole number from 0 to 2^53 - 1, as seed of something")
     identified: str | None = value(
         None, "", "folder of `podusv identify`, beside the scenario; the hulls that its logs leave "

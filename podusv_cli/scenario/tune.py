@@ -8,7 +8,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import OF_SECTION, Component, value
 
 WORDS = tuple[bool | int | float | str, ...]
 AROUND = "around"  # in `space`: of every gain that is not named
@@ -18,15 +18,15 @@ class Range(Component):
     """What a gain may be: one of the keys says how."""
 
     log: tuple[float, float] | None = value(
-        None, "", "[low, high]: between them, on a logarithmic scale"
+        None, OF_SECTION, "[low, high]: between them, on a logarithmic scale"
     )
     uniform: tuple[float, float] | None = value(
-        None, "", "[low, high]: between them, on a linear scale"
+        None, OF_SECTION, "[low, high]: between them, on a linear scale"
     )
     integers: tuple[int, int] | None = value(
-        None, "", "[low, high]: whole numbers, both ends included"
+        None, OF_SECTION, "[low, high]: whole numbers, both ends included"
     )
-    choice: WORDS | None = value(None, "", "values to choose from")
+    choice: WORDS | None = value(None, OF_SECTION, "values to choose from")
     around: float | None = value(
         None, "", "a factor to either side of the scenario's value, on a logarithmic scale", gt=1
     )

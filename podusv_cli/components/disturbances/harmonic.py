@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import OF_SECTION, Component, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import LANES, Vector, kernel, padded_rounds, scratch, whole_lanes
 
@@ -31,11 +31,11 @@ class Harmonic(Component):
     In N, in yaw N m.
     """
 
-    mean: float = value(0.0, "N or N m", "constant part")
-    sin: float = value(0.0, "N or N m", "amplitude of the sine")
+    mean: float = value(0.0, OF_SECTION, "constant part")
+    sin: float = value(0.0, OF_SECTION, "amplitude of the sine")
     sin_rate: float = value(0.2, "rad/s", "angular frequency of the sine", ge=0)
     sin_phase: float = value(0.0, "rad", "angle of the sine at t = 0", ge=-1e6, le=1e6)
-    cos: float = value(0.0, "N or N m", "amplitude of the cosine")
+    cos: float = value(0.0, OF_SECTION, "amplitude of the cosine")
     cos_rate: float = value(0.2, "rad/s", "angular frequency of the cosine", ge=0)
     cos_phase: float = value(0.0, "rad", "angle of the cosine at t = 0", ge=-1e6, le=1e6)
 

@@ -72,8 +72,8 @@ def _within(check: Check, label: str) -> Check:
 
 
 def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:
-    """The values of each key, with their places in the scenario's file."""
-    grid = find(loaded.root, ("sweep", "grid"))
+    """The values of each key in podusv's units, with their places in the scenario's file."""
+    grid = find(loaded.filled, ("sweep", "grid"))
     entries = grid.mapping.items() if grid else ()
     return {key: node.content for key, node in entries if node.content is not None}
 
