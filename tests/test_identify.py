@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import tracemalloc
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -17,9 +18,9 @@ from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.kernel import bundle
+from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify import judge
+from podusv_cli.identify import estimate, judge
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.estimate import OPEN, Estimate, Search, directions, estimated, prior_kept
 from podusv_cli.identify.march import (
@@ -154,7 +155,7 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
     start = np.concatenate([x, P[np.triu_indices(size)], np.zeros(12)])
     count = int(rows[:, DELIVERED : DELIVERED + 6].sum())
     run = side_by_side(Ideal())(
-        Record(rows, count), [np.array([constants[n] for n in NAMES])], [start]
+        Record(rows, count), [np.array([constants[n] for n in NAMES])], [start], False
     )
     expected = filtered(rows, x, P, bundle(constants), filter_, current)
     assert np.column_stack([run.innovations, run.variances]) == pytest.approx(
@@ -270,6 +271,21 @@ def test_a_few_numbers_come_out_of_two_logs(boat):
     assert given.currents(boat[1], found.y) == pytest.approx([0.0, 0.04], abs=0.01)
     assert values["delay"] == pytest.approx(0.0, abs=0.03)
     assert values["sigma_p"] == pytest.approx(0.01, rel=0.1)
+
+
+def test_slopes_take_the_room_of_innovations_and_variances(boat, monkeypatch):
+    """Tracks of all runs, or slopes of all values at once, would each take more than this."""
+    given = problem(boat[:1])
+    size, values = len(given.numbers), boat[0].record.delivered
+    whole = given.search.scored(np.zeros(size))
+    monkeypatch.setattr(estimate, "ROWS", 64)
+    tracemalloc.start()
+    parts = given.search.scored(np.zeros(size))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.5 * 2 * 8 * values * (size + 1 + LANES)
+    assert parts.by_values == pytest.approx(whole.by_values, rel=1e-9, abs=1e-9)
+    assert parts.slopes == pytest.approx(whole.slopes, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.reading import Whole
 
+ROWS = 2**15  # values whose slopes are computed at once
 SHIFT = 1e-4  # of a point's coordinate, for slopes
 LONGEST = 1.0  # of a coordinate, in one step
 ROUNDS = 100
@@ -81,13 +82,19 @@ class Search:
 
     def _scored(self, y: Vector) -> Scored:
         nus, variances = self.innovations([y, *(y + SHIFT * np.eye(self.size))])
-        nu, s = nus[:, :1], variances[:, :1]
-        d_nu, d_s = (nus[:, 1:] - nu) / SHIFT, (variances[:, 1:] - s) / SHIFT
-        slopes = 2.0 * nu * d_nu / s + d_s * (1.0 - nu * nu / s) / s
-        each = np.array([np.bincount(self.blocks, column) for column in slopes.T], float).T
-        # Not by BLAS, whose threads wait for each other longer than this takes.
-        by_values, by_sizes = 2.0 * _squares(d_nu / np.sqrt(s)), _squares(d_s / s)
-        return Scored(_value(nu[:, 0], s[:, 0], y), each, by_values, by_sizes)
+        value = _value(nus[:, 0], variances[:, 0], y)
+        each = np.zeros((int(self.blocks[-1]) + 1, self.size))
+        by_values, by_sizes = np.zeros((2, self.size, self.size))
+        for i in range(0, len(nus), ROWS):  # not at once, for the room that all slopes would take
+            rows = slice(i, i + ROWS)
+            nu, s = nus[rows, :1], variances[rows, :1]
+            d_nu, d_s = (nus[rows, 1:] - nu) / SHIFT, (variances[rows, 1:] - s) / SHIFT
+            slopes = 2.0 * nu * d_nu / s + d_s * (1.0 - nu * nu / s) / s
+            np.add.at(each, self.blocks[rows], slopes)
+            # Not by BLAS, whose threads wait for each other longer than this takes.
+            by_values += 2.0 * _squares(d_nu / np.sqrt(s))
+            by_sizes += _squares(d_s / s)
+        return Scored(value, each, by_values, by_sizes)
 
 
 def _squares(rows: Vector) -> Vector:

@@ -54,9 +54,9 @@ class Record(NamedTuple):
 class Followed(NamedTuple):
     """What the filter says along a record; the last axis is that of the runs.
 
-    `innovations` and `variances` have a row a delivered value, `track` one a row of the record: the
-    nine numbers that are estimated, before what the row delivers is taken in. Its velocities are
-    those through the water.
+    `innovations` and `variances` have a row a delivered value, `track` one a row of the record, or
+    one alone where no track was asked for: the nine numbers that are estimated, before what the row
+    delivers is taken in. Its velocities are those through the water.
     """
 
     innovations: Vector
@@ -108,17 +108,20 @@ def corrected(line: Vector, since: float, state: Vector, k: Any, out: Vector) ->
 
 @kernel
 def filtered(
-    loads: Function, follow: Function, count: int, width: int, record: Vector, actuator: Vector,
-    table: Vector, p: Vector, state: Vector, out: Vector, track: Vector,
+    loads: Function, follow: Function, count: int, width: int, apart: int, record: Vector,
+    actuator: Vector, table: Vector, p: Vector, state: Vector, out: Vector, track: Vector,
 ) -> None:  # fmt: skip
-    """The filter along the rows of a record: classical RK4 between them, with commands held."""
+    """The filter along the rows of a record: classical RK4 between them, with commands held.
+
+    Rows of the track are so far `apart`; with 0 the last one alone is left.
+    """
     k = named(p)
     tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
     at, since, inputs = 0, 0.0, (width - COMMANDS) // 2
     for row in range(count):
         line = tail(record, row * width)
         for i in range(N):
-            track[N * row + i] = state[i]
+            track[apart * row + i] = state[i]
         at += corrected(line, since, state, k, tail(out, at))
         for i in range(inputs):
             commands[i] = line[COMMANDS + i] - k.delay * line[COMMANDS + inputs + i]
@@ -138,20 +141,21 @@ def filtered(
                 state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
 
 
-FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], WHOLE, WHOLE, *[PLAIN] * 7)
+FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 3, *[PLAIN] * 7)
 FILTERED_LANES = (
-    LANE_PROTOTYPES["actuator"], LANE_PROTOTYPES["follow"], WHOLE, WHOLE, PLAIN, *[LANE_VECTOR] * 6,
+    LANE_PROTOTYPES["actuator"], LANE_PROTOTYPES["follow"], *[WHOLE] * 3, PLAIN, *[LANE_VECTOR] * 6,
 )  # fmt: skip
 
 
-Follow = Callable[[Record, Sequence[Vector], Sequence[Vector]], Followed]
+Follow = Callable[[Record, Sequence[Vector], Sequence[Vector], bool], Followed]
 
 
 def side_by_side(actuator: Actuator) -> Follow:
     """A function that follows a record with several constants and starts, in compiled code.
 
     Of each run it takes the constants, in the order of `NAMES`, and the filter's state at the
-    start. Raises LawError, and TypeError where the actuator's kernel cannot go side by side.
+    start; then whether their tracks are wanted. Raises LawError, and TypeError where the actuator's
+    kernel cannot go side by side.
     """
     from podusv_cli.engine.machine import compile
 
@@ -167,17 +171,20 @@ def side_by_side(actuator: Actuator) -> Follow:
     a = _in_lanes([np.array([*constants.values(), 0.0])])
     table = _in_lanes([actuator.table()])
 
-    def followed(record: Record, constants: Sequence[Vector], starts: Sequence[Vector]) -> Followed:
+    def followed(
+        record: Record, constants: Sequence[Vector], starts: Sequence[Vector], tracked: bool
+    ) -> Followed:
         count, width = record.rows.shape
-        out, track = room(2 * record.delivered * LANES), room(N * count * LANES)
+        rows, apart = (count, N) if tracked else (1, 0)
+        out, track = room(2 * record.delivered * LANES), room(N * rows * LANES)
         p, state = _in_lanes(constants), _in_lanes(starts)
         march(
-            loads, follow, count, width, signatures.pointer(record.rows),
+            loads, follow, count, width, apart, signatures.pointer(record.rows),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],
         )  # fmt: skip
         runs = len(constants)
         pairs = out.reshape(record.delivered, 2, LANES)[..., :runs]
-        return Followed(pairs[:, 0], pairs[:, 1], track.reshape(count, N, LANES)[..., :runs])
+        return Followed(pairs[:, 0], pairs[:, 1], track.reshape(rows, N, LANES)[..., :runs])
 
     return followed
 

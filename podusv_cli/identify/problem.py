@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -274,23 +274,39 @@ class Problem:
     ) -> Followed:
         """The filter along a log, for every point, in the current of the point or another."""
         flows = currents or [self.currents(log, y) for y in points]
-        constants = [self.constants(y, flow) for y, flow in zip(points, flows, strict=True)]
-        starts = [self.start(log, flow) for flow in flows]
-        parts = [slice(i, i + LANES) for i in range(0, len(points), LANES)]
-        runs = [self._follow(log.record, constants[part], starts[part]) for part in parts]
+        runs = self._runs(log, points, flows, tracked=True)
         whole = Followed(*(np.concatenate(arrays, axis=-1) for arrays in zip(*runs, strict=True)))
         since = log.times - log.times[0]
         whole.track[:, :2] += since[:, None, None] * np.array(flows).T
         return whole
 
+    def _runs(
+        self, log: Log, points: Sequence[Vector], flows: Sequence[Sequence[float]], *, tracked: bool
+    ) -> Iterator[Followed]:
+        """The filter along a log for a few points after another, in currents [m/s]."""
+        for i in range(0, len(points), LANES):
+            part = slice(i, i + LANES)
+            constants = map(self.constants, points[part], flows[part])
+            starts = [self.start(log, flow) for flow in flows[part]]
+            yield self._follow(log.record, [*constants], starts, tracked)
+
     def innovations(self, points: Sequence[Vector]) -> tuple[Vector, Vector]:
-        """Innovations and their variances of all logs, a row a value, a column a point."""
+        """Innovations and their variances of all logs, a row a value, a column a point.
+
+        Tracks would take several times the room of these.
+        """
+        ends = np.cumsum([0, *(log.record.delivered for log in self.logs)]).tolist()
+        nu, s = (np.empty((ends[-1], len(points))) for _ in range(2))
+
+        def fill(log: Log, begin: int, end: int) -> None:
+            flows, at = [self.currents(log, y) for y in points], 0
+            for run in self._runs(log, points, flows, tracked=False):
+                columns = slice(at, at := at + run.innovations.shape[1])
+                nu[begin:end, columns], s[begin:end, columns] = run.innovations, run.variances
+
         with ThreadPoolExecutor(available_workers()) as pool:
-            runs = list(pool.map(lambda log: self.followed(log, points), self.logs))
-        return (
-            np.concatenate([run.innovations for run in runs]),
-            np.concatenate([run.variances for run in runs]),
-        )
+            list(pool.map(fill, self.logs, ends[:-1], ends[1:]))
+        return nu, s
 
     @cached_property
     def search(self) -> Search:
