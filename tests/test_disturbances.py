@@ -221,7 +221,7 @@ def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch)
         ("s3cret,b_u,b_v\n0,0,0,0\n1,1,1,1\n", "line 1 of the record names columns that are not "
          "t [s], b_u [N], b_v [N], b_r [N m] (in any order, units may be left out): column 1 is "),
         ("t,b_u,b_v,s3cret\n0,0,0,0\n1,1,1,1\n", "column 4 is none of these"),
-        ("t,b_u [kN],b_v,b_r\n0,0,0,0\n1,1,1,1\n", "column 2 is none of these"),
+        ("t,b_u [kg],b_v,b_r\n0,0,0,0\n1,1,1,1\n", "column 2 is none of these"),
         ("t,b_u,b_u,b_r\n0,0,0,0\n1,1,1,1\n", "one is missing or twice"),
         ("t,b_u,b_v\n0,0,0,0\n1,1,1,1\n", "one is missing or twice"),
     ],

@@ -12,10 +12,12 @@ import yaml
 from log_files import read, write_bag, write_dataflash, write_ulog, written
 
 from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.core.signal import Signal
 from podusv_cli.identify.formats import LogFault, columns_of
 from podusv_cli.identify.frames import LAT, LON, local_plane, radii
 from podusv_cli.identify.listing import listing
 from podusv_cli.identify.march import DELIVERED, HOLDS, VALUES
+from podusv_cli.identify.reading import Named, table
 from podusv_cli.identify.records import log_of
 
 
@@ -98,6 +100,18 @@ def test_a_column_may_have_units_in_brackets_another_sign_and_dates_for_times(tm
     assert np.diff(log.times) == pytest.approx([0.5])
     assert log.columns["x"] == pytest.approx([3.048, 6.096])
     assert np.degrees(log.columns["psi"]) == pytest.approx([-7.0, -8.0])
+
+
+def test_propellers_may_be_in_turns_a_second_or_a_minute_and_in_radians(tmp_path):
+    path = written(
+        tmp_path / "log.csv",
+        {"time": [0, 1], "n_1 [rps]": [3, 4], "n_2 [rpm]": [180, 60], "n_3 [rad/s]": [math.pi, 0]},
+    )
+    speeds = [Signal(f"n_{i}", "1/s", "") for i in (1, 2, 3)]
+    log = table(path, speeds, Named())
+    assert log.columns["n_1"].tolist() == [3.0, 4.0]
+    assert log.columns["n_2"].tolist() == [3.0, 1.0]
+    assert log.columns["n_3"] == pytest.approx([0.5, 0.0])
 
 
 @pytest.mark.parametrize(

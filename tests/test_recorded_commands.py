@@ -8,6 +8,7 @@ import pytest
 from scenario_samples import findings, write
 
 import podusv
+from podusv_cli.components.actuators.recorded import Recorded
 from podusv_cli.core.errors import UsageError
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.scenario.load import load, load_stored, resolved_yaml
@@ -230,6 +231,15 @@ controller: {kind: schedule, file: commands.csv}
 """
 
 
+def test_columns_of_commands_may_have_the_units_that_logs_have():
+    actuator = load("podusv:pod/vessels/otter.yaml", [f"actuator={{pods: {list(PODS)}}}"])
+    pods = actuator.scenario.actuator
+    names = ("n_2 [rps]", "t [ms]", "delta_1 [°]", "n_1 [rpm]")
+    rows = ROWS[:, [2, 0, 3, 1]] * [1.0, 1e3, 180.0 / math.pi, 60.0]
+    own = pods.commands(Recorded(text(), held=False))
+    assert pods.commands(Recorded(text(names, rows), held=False)) == pytest.approx(own, rel=1e-14)
+
+
 def test_what_is_wrong_with_commands_is_one_sentence_at_their_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("task.yaml", TASK)
@@ -246,7 +256,7 @@ def test_what_is_wrong_with_commands_is_one_sentence_at_their_file(tmp_path, mon
     )
     three = "columns that are not t [s], n_1 [1/s], n_2 [1/s]"
     assert three in said(["t", "n_1", "n_3"], sound)
-    assert three in said(["t", "n_1 [rpm]", "n_2 [rpm]"], sound)
+    assert three in said(["t", "n_1 [knots]", "n_2 [rpm]"], sound)
     assert "every line must have 5" in said(["t", "n_1"], [[0.0, 1.3], [1.0, 2.1]])
     assert "its time is not after that of the line before" in said(
         ["t", "n_1", "n_2"], [sound[1], sound[0]]

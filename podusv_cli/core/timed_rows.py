@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.units import NUMBER, allowed, spelled
 
 LARGEST = 900_000  # characters: the resolved scenario, which has the rows, must be readable
-# A number as scenarios and files write it; Python takes 1_0 and digits of other scripts, too.
-NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 Layouts = Mapping[int, Sequence[str]]  # by count: the columns' names, as `b_u [N]`
 
@@ -27,8 +26,9 @@ class Line(NamedTuple):
 def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
     """The rows, each with as many numbers as one of `layouts`, in the order of its columns.
 
-    The names in a header say which column is which. `noun` is what the text is called. Raises
-    ValueError, which does not repeat the text: a file may hold what its reader may not see.
+    The names in a header say which column is which, and in brackets its unit where that is another
+    one, as `n_1 [rpm]`. `noun` is what the text is called. Raises ValueError, which does not repeat
+    the text: a file may hold what its reader may not see.
     """
     if len(text) > LARGEST:
         raise ValueError(f"{noun} is longer than {LARGEST:,} characters; leave rows out")
@@ -38,7 +38,10 @@ def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
     _counted(lines, noun, layouts)
     rows = _numbers(lines, noun)
     if header:
-        rows = _in_order(rows, columns(header, layouts[rows.shape[1]], noun), header, noun)
+        names = layouts[rows.shape[1]]
+        header, factors = _in_own_units(header, names)
+        rows[:, : len(factors)] *= factors
+        rows = _in_order(rows, columns(header, names, noun), header, noun)
     late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
     if late.size:
         number = lines[late[0] + 1].number
@@ -134,6 +137,24 @@ def _in_order(rows: Vector, order: list[int], header: Line, noun: str) -> Vector
     if len(order) != rows.shape[1]:
         raise ValueError(f"line {header.number} of {noun} names columns in another order")
     return rows[:, order]
+
+
+def _in_own_units(header: Line, names: Sequence[str]) -> tuple[Line, list[float]]:
+    """The header with the units that columns of these names have, and the factor to each."""
+    own = dict(map(_parted, names))
+    cells, factors = list(header.cells), [1.0] * len(header.cells)
+    for i, cell in enumerate(header.cells):
+        name, unit = _parted(cell)
+        factor = allowed(own[name]).get(spelled(unit)) if own.get(name) else None
+        if factor:
+            cells[i], factors[i] = f"{name} [{own[name]}]", float(factor)
+    return Line(header.number, cells), factors
+
+
+def _parted(cell: str) -> tuple[str, str]:
+    """Name and unit of "b_u [N]"; without a unit, none."""
+    name, _, unit = " ".join(cell.split()).partition(" [")
+    return name, unit.removesuffix("]")
 
 
 def columns(header: Line, names: Sequence[str], noun: str) -> list[int]:

@@ -7,8 +7,9 @@ import re
 from fractions import Fraction
 
 from podusv_cli.core.phrases import did_you_mean
-from podusv_cli.core.timed_rows import NUMBER
 
+# A number as scenarios and files write it; Python takes 1_0 and digits of other scripts, too.
+NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 PI = Fraction(math.pi)
 PURE = "1"  # stands for no unit
 # Of each of podusv's units, those that may stand in its place, and what one of them is in it.

@@ -10,8 +10,7 @@ from typing import Any
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import OF_SECTION, Component, unit_of
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.core.timed_rows import NUMBER
-from podusv_cli.core.units import pattern
+from podusv_cli.core.units import NUMBER, pattern
 from podusv_cli.scenario.explain import EXTENDS
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import scenario_class

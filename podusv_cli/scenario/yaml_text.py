@@ -23,7 +23,7 @@ from typing import Any
 import yaml
 
 from podusv_cli.core.phrases import found, quoted
-from podusv_cli.core.timed_rows import NUMBER
+from podusv_cli.core.units import NUMBER
 from podusv_cli.scenario.shipped import PREFIX, file_of, names
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
 
