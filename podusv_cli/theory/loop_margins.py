@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.grid import TimeGrid
@@ -77,14 +76,15 @@ def loop_margins(
     law = loop.controller
     if law.takes_samples():
         raise LawError(
-            f"{describe(law)}: it takes samples, and margins are those of a law that acts "
+            f"{law.noun} {law.label}: it takes samples, and margins are those of a law that acts "
             "continuously; set controller.rate=analytic and controller.hold_below=0 where it has "
             "these keys, or choose another law"
         )
     if loop.path.follows:
         raise LawError(
-            f"{describe(loop.path)}: its target moves with the vessel, and margins are those of a "
-            "law that follows a target with a timetable; take one, as with --set path.kind=line"
+            f"{loop.path.noun} {loop.path.label}: its target moves with the vessel, and margins "
+            "are those of a law that follows a target with a timetable; take one, as with "
+            "--set path.kind=line"
         )
     linear = linearised(
         loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
