@@ -35,7 +35,15 @@ OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simul
 
 
 class LogFault(UsageError):
-    """A log cannot be used as it is; the message says where, why, and what may help."""
+    """Logs cannot be used as they are; a sentence each says where, why, and what may help."""
+
+    def __str__(self) -> str:
+        """The sentences below each other."""
+        return "\n".join(self.lines())
+
+    def lines(self) -> list[str]:
+        """A line a sentence."""
+        return [str(sentence) for sentence in self.args]
 
 
 def columns_of(path: Path) -> Columns:

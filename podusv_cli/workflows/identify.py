@@ -12,6 +12,7 @@ from podusv_cli.core.recording import Status
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.identify import estimate, outputs
 from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
 from podusv_cli.identify.phrases import far_words, thrust_words, worse_words
@@ -19,7 +20,7 @@ from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
-from podusv_cli.scenario.identify import Identify
+from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.shipped import relative_to
@@ -53,13 +54,7 @@ def identify_of(
             f"{scenario.name} names no logs; write them under identify.logs, as podusv docs "
             "identify shows"
         )
-    source = loaded.root.mark.source
-    logs: list[tuple[Log, str]] = []
-    for i, given in enumerate(scenario.identify.logs):
-        if progress:
-            progress(f"looking at {given.file}", i / len(scenario.identify.logs))
-        path = Path(relative_to(source, given.file))
-        logs += [(log, given.role) for log in logs_of(path, given, scenario)]
+    logs = _read(loaded, scenario.identify.logs, progress)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with (
         interrupts_deferred(),
@@ -83,6 +78,25 @@ def identify_of(
         status: Status = "interrupted" if answer.estimate.interrupted else "finished"
         folder, missing = writer.finish(status), tuple(extras.missing)
         return outputs.Identified(folder, answer, status, warnings, missing)
+
+
+def _read(
+    loaded: Loaded, wanted: Sequence[LogFile], progress: Progress | None
+) -> list[tuple[Log, str]]:
+    """The logs with their roles. Raises LogFault with what is wrong with all of them."""
+    logs: list[tuple[Log, str]] = []
+    faults: list[str] = []
+    for i, given in enumerate(wanted):
+        if progress:
+            progress(f"looking at {given.file}", i / len(wanted))
+        path = Path(relative_to(loaded.root.mark.source, given.file))
+        try:
+            logs += [(log, given.role) for log in logs_of(path, given, loaded.scenario)]
+        except LogFault as fault:
+            faults += fault.lines()
+    if faults:
+        raise LogFault(*faults)
+    return logs
 
 
 def answered(
