@@ -604,6 +604,23 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
     assert "What the logs leave open" in (tmp_path / "hull/report.html").read_text()
 
 
+def test_the_mass_matrix_stays_symmetric_where_it_was(boat):
+    skewed = HULL.changed({"Y_rdot": HULL.Y_rdot - 0.3})
+    for hull, free, names in (
+        (HULL, ("m23",), ["m23"]), (HULL, ("m32",), ["m23"]), (HULL, ("m32", "m23"), ["m23"]),
+        (skewed, ("m32",), ["m32"]),
+    ):  # fmt: skip
+        given = problem(boat[2:], hull, free=free)
+        assert [number.name for number in given.hull] == names
+        up = given.vessel(np.ones(1))
+        assert up.m32 == pytest.approx(math.exp(given.sd[0]) * hull.m32)
+        assert up.m23 == pytest.approx(up.m32 if hull is HULL else hull.m23)
+        constants = dict(
+            zip(NAMES, given.constants(np.ones(len(given.numbers)), (0.0, 0.0)), strict=True)
+        )
+        assert (constants["m23"], constants["m32"]) == pytest.approx((up.m23, up.m32))
+
+
 @pytest.mark.parametrize(
     ("section", "sentence"),
     [

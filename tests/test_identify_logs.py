@@ -230,7 +230,7 @@ def test_names_that_are_not_there_are_answered_with_near_ones(tmp_path):
 
 
 def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
-    with pytest.raises(LogFault, match="has 11 values of the pose, at least 20"):
+    with pytest.raises(LogFault, match="has 10 values of the pose, at least 20"):
         log_of(sailed.part(0.0, 2.0), Ideal(), 0.05)
     bare = {n: c for n, c in sailed.columns.items() if n != "tau_r"}
     with pytest.raises(LogFault, match="nothing is known of tau_r"):
@@ -239,12 +239,13 @@ def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
 
 def test_two_parts_of_a_file_are_two_logs_with_currents_of_their_own(tmp_path, sailed):
     path = written(tmp_path / "a.csv", {"time": sailed.times, **sailed.columns})
-    parts = [LogFile(file="a.csv", span=span, delay=0.0) for span in ((0.0, 40.0), (40.2, 89.0))]
+    parts = [LogFile(file="a.csv", span=span, delay=0.0) for span in ((0.0, 40.0), (40.0, 89.0))]
     given = scenario()
     logs = [log for part in parts for log in logs_of(path, part, given)]
     numbers = [number.name for number in Problem(given, given.identify, logs).numbers]
     assert len(numbers) == len(set(numbers))
-    assert "current_x, a.csv from 40.2 to 89 s" in numbers
+    assert "current_x, a.csv from 40 to 89 s" in numbers
+    assert np.concatenate([log.times for log in logs]) == pytest.approx(sailed.times[:445])
 
 
 def test_a_quantity_that_nothing_is_made_of_is_an_error(tmp_path, sailed):
@@ -373,6 +374,24 @@ def test_what_is_doubtful_reaches_terminal_and_report(podusv, tmp_path, sailed):
     assert said.code == 0
     assert line in " ".join(said.err.split())
     assert line in (tmp_path / "hull/report.html").read_text()
+
+
+def test_all_logs_are_looked_at_before_one_of_them_ends_the_command(podusv, tmp_path, sailed):
+    columns = {"time": sailed.times, **sailed.columns}
+    written(tmp_path / "deg.csv", columns | {"psi": np.degrees(sailed.columns["psi"])})
+    written(tmp_path / "short.csv", {name: column[:30] for name, column in columns.items()})
+    (tmp_path / "boat.yaml").write_text(
+        "extends: podusv:trials/base.yaml\nvessel: {preset: cybership2}\n"
+        "actuator: {kind: ideal}\ncontroller: {kind: pid}\nidentify:\n"
+        "  logs: [{file: deg.csv}, {file: none.csv}, {file: short.csv, span: [0, 2]}]\n"
+    )
+    said = podusv("identify", "boat.yaml", "--out", "hull")
+    assert said.code == 2
+    assert 'write psi: "COLUMN [deg]"' in said.err
+    assert "none.csv: there is no such file" in said.err
+    assert "short.csv from 0 to 2 s: has 10 values of the pose" in said.err
+    assert len([line for line in said.err.splitlines() if "warning" not in line]) == 3
+    assert not (tmp_path / "hull").exists()
 
 
 def test_a_log_for_judging_is_not_moved_by_what_all_of_it_says(tmp_path, sailed):

@@ -113,12 +113,19 @@ def _members(name: str, constants: Mapping[str, float]) -> list[str]:
             f"identify.free: {name!r} is no group ({', '.join(GROUPS)}) and no number of the "
             f"vessel ({', '.join(sorted(alone))}){hint}"
         )
+    if name == "m32" and symmetric(constants):
+        return ["m23"]
     if constants.get(name, 1.0) == 0.0:
         raise UsageError(
             f"identify.free: {name} of the vessel is 0, and what is known of it is relative to "
             "that, so it would stay 0; give vessel a first guess of it"
         )
     return [name]
+
+
+def symmetric(constants: Mapping[str, float]) -> bool:
+    """Whether the mass matrix is so, as that of a hull at rest in the water: m32 goes with m23."""
+    return constants["m23"] == constants["m32"]
 
 
 def _log_sd(relative: float) -> float:
@@ -218,7 +225,12 @@ class Problem:
 
     def values(self, y: Vector) -> dict[str, float]:
         """The numbers at a point, by name."""
-        return {n.name: n.at(e) for n, e in zip(self.numbers, y.tolist(), strict=True)}
+        values = {n.name: n.at(e) for n, e in zip(self.numbers, y.tolist(), strict=True)}
+        return self._with_m32(values)
+
+    def _with_m32(self, values: dict[str, float]) -> dict[str, float]:
+        tied = "m23" in values and symmetric(self.scenario.vessel.constants())
+        return values | {"m32": values["m23"]} if tied else values
 
     def constants(self, y: Vector, current: Sequence[float]) -> Vector:
         """The filter's constants at a point, in water that flows north and east so fast [m/s]."""
@@ -233,7 +245,7 @@ class Problem:
     def vessel(self, y: Vector) -> Vessel:
         """The hull at a point. Raises ValidationError where no hull can be like that."""
         own = self.scenario.vessel
-        new = {n.name: n.at(e) for n, e in zip(self.hull, y.tolist(), strict=False)}
+        new = self._with_m32({n.name: n.at(e) for n, e in zip(self.hull, y.tolist(), strict=False)})
         new.pop(THRUST, None)
         beside = {n: getattr(own, n) + getattr(own, ADDED[n]) for n in ADDED}
         added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}

@@ -51,8 +51,8 @@ class Table:
     warnings: tuple[str, ...] = ()
 
     def part(self, begin: float, end: float) -> Table:
-        """What lies between two times. Raises LogFault where that is nothing."""
-        inside = (self.times >= begin) & (self.times <= end)
+        """What lies from one time on before another. Raises LogFault where that is nothing."""
+        inside = (self.times >= begin) & (self.times < end)
         if not inside.any():
             raise LogFault(
                 f"{self.name}: nothing lies between {begin:.10g} and {end:.10g} s; the log goes "

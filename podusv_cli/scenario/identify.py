@@ -21,7 +21,7 @@ class LogFile(Component):
 
     file: str = value(..., "", "CSV, log.h5, ROS 2 bag, .ulg or .bin, beside the scenario")
     span: tuple[float, float] | None = value(
-        None, "s", "[from, to]: the part of the log that is used; null: all of it"
+        None, "s", "[from, to]: the part of the log that is used, before `to`; null: all of it"
     )
     delay: float | None = value(
         None, "s", "by how much later than the log says its commands act; null: as the motion says"
