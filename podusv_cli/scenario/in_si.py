@@ -26,6 +26,8 @@ def _converted(node: Node, key: Key, usual: str) -> Node:
     if isinstance(node.content, dict):
         return replace(node, content=dict(_entries(node, key, usual)))
     if isinstance(node.content, tuple):
+        if not _has_text(node):  # as in most lists of thousands of waypoints
+            return node
         return replace(node, content=tuple(_items(node.content, key, usual)))
     return replace(node, content=key.number(node.content))
 
@@ -44,6 +46,13 @@ def _items(items: tuple[Node, ...], key: Key, usual: str) -> Iterator[Node]:
     for place, item in enumerate(items):
         below = key.item(place)
         yield _converted(item, below, usual) if below else item
+
+
+def _has_text(node: Node) -> bool:
+    parts = [*node.mapping.values()] or node.content
+    return (
+        any(map(_has_text, parts)) if isinstance(parts, (list, tuple)) else isinstance(parts, str)
+    )
 
 
 def _words(node: Node | None) -> list[Any]:
