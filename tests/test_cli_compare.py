@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 from command_samples import BASE, PATIENCE, TWO, Said, commanded, under_way, write
 
+from podusv_cli.cli.grid import grid
+from podusv_cli.cli.terminal import Warnings
+from podusv_cli.core.finding import Finding
 from podusv_cli.process.workers import Outcome
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import compare
@@ -221,7 +224,7 @@ def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(podusv, monk
     assert whole[0].split() == ["unit", *labels, "name"]
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("podusv_cli.cli.terminal.sys.stdout.isatty", lambda: True, raising=False)
-    out = podusv(config, "--out", "y").out
+    out = podusv(config, "--out", "y", "-v").out
     assert max(map(len, out.splitlines())) <= 80
     tables = [part.splitlines() for part in out.split("\n\n")]
     assert [word for lines in tables for word in lines[0].split()[1:]] == [*labels, "name"]
@@ -232,6 +235,75 @@ def test_five_runs_are_tables_below_each_other_on_a_narrow_terminal(podusv, monk
         ]
         starts = [lines[0].index(label) for label in lines[0].split()]
         assert all(line[start - 1] == " " for line in lines[:count] for start in starts)
+
+
+def on_a_terminal(monkeypatch, width=80):
+    monkeypatch.setenv("COLUMNS", str(width))
+    for stream in ("stdout", "stderr"):
+        monkeypatch.setattr(
+            f"podusv_cli.cli.terminal.sys.{stream}.isatty", lambda: True, raising=False
+        )
+
+
+@pytest.mark.parametrize("laws", [1, 4, 14])
+def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, monkeypatch, laws):
+    labels = [f"a_long_name_{i}" if i % 3 == 0 else f"law_{i}" for i in range(laws)]
+    several = ", ".join(f"{label}: {{K_Pu: {i + 1.0}}}" for i, label in enumerate(labels))
+    config = write("laws.yaml", f"{SHORT_BASE}controllers: {{{several}}}\n")
+    on_a_terminal(monkeypatch)
+    out = podusv(config, "--out", "x", "--force").out
+    assert max(map(len, out.splitlines())) <= 80
+    table = out.partition("\n* best of those")[0].splitlines()
+    if laws < 5:  # a column each
+        assert len(table) <= 9
+        assert table[-1].startswith("share of time at the actuator's limits")
+        assert len(table[-1].split()) == 7 + laws
+    else:  # a line each
+        assert [line.split()[0] for line in table[-laws:]] == labels
+        assert {len(line.split()) for line in table[-laws:]} == {6}
+    whole = podusv(config, "--out", "y", "-v").out
+    assert "squared surge force" in whole
+    assert "squared" not in out
+
+
+SHORT_BASE = BASE.replace("duration: 1.0", "duration: 0.1, compiled: false")
+
+
+def test_metrics_that_are_asked_for_are_all_that_a_terminal_shows(podusv, monkeypatch):
+    config = write("two.yaml", TWO.replace("duration: 1.0", "duration: 0.1"))
+    on_a_terminal(monkeypatch)
+    out = podusv(config, "--out", "x", "--metric", "rmse", "--metric", "iae").out
+    first, second = (line.split("  ")[0] for line in out.splitlines()[1:3])
+    assert (first, second) == ("distance to the target, rms [m]",
+                               "distance to the target, integrated [m s]")  # fmt: skip
+
+
+def test_findings_of_one_kind_are_one_line_where_runs_go_together(capsys):
+    limited = [
+        Finding("saturated", "actuator", f"{n} % limited", (run,)) for n, run in enumerate("abc")
+    ]
+    bend = Finding("path-bend", "path", "bends", ("b",))
+    Warnings().all_of([*limited[:2], bend], ["a", "b", "c"])
+    assert capsys.readouterr().err.splitlines() == [
+        "warning[saturated]: a, b: actuator: in a, 0 % limited; -v shows it for each",
+        "warning[path-bend]: b: path: bends",
+    ]
+    Warnings().all_of(limited, ["a", "b", "c"])
+    assert capsys.readouterr().err.startswith("warning[saturated]: all 3 runs: actuator: in a, 0 %")
+    Warnings().all_of(limited, [])
+    assert capsys.readouterr().err.splitlines() == [*map(str, limited)]
+
+
+def test_a_table_is_as_narrow_as_its_words_allow():
+    head, rows = ["", "a_head", "b\n[m]"], [["one two three four five six", "1", "2.5"]]
+    assert grid(head, rows, 50) == ["                             a_    b",
+                                    "                             head  [m]",
+                                    "one two three four five six  1     2.5"]  # fmt: skip
+    assert grid(head, rows, 34) == ["                          a_   b",
+                                    "                          head [m]",
+                                    "one two three four five",
+                                    "six                       1    2.5"]  # fmt: skip
+    assert grid(head, rows, 20) == []
 
 
 def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pandas as pd
@@ -54,9 +55,13 @@ def quick(*overrides, out):
 
 
 def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
-    done = run.run(config, quick("simulation.duration=1", out=tmp_path / "x"))
+    said = []
+    asked = replace(quick("simulation.duration=1", out=tmp_path / "x"), say=said.append)
+    done = run.run(config, asked)
     assert done.controller == "adaptive_neural"
-    assert done.others == ("fast", "slow", "pid")
+    assert said[0] == (
+        "runs `controller` (adaptive_neural) only; `podusv compare` runs fast, slow, pid"
+    )
     alone = load(done.folder / "resolved.yaml").scenario
     assert not alone.controllers
     assert not alone.claims

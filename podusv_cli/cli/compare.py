@@ -12,8 +12,10 @@ import typer
 
 from podusv_cli.cli import completion, options
 from podusv_cli.cli.exit_codes import INTERRUPTED
+from podusv_cli.cli.grid import grid
 from podusv_cli.cli.terminal import (
     Warnings,
+    columns,
     echo,
     echo_entry,
     echo_how_to_draw,
@@ -21,6 +23,7 @@ from podusv_cli.cli.terminal import (
     echo_table,
     warn_of_differences,
 )
+from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.compare import Compared
@@ -83,8 +86,8 @@ def compare(
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)
-    for finding in done.warnings():
-        warned(finding)
+    together = [*done.result.warnings] if sys.stderr.isatty() and not verbose else []
+    warned.all_of(done.warnings(), together)
     warn_of_differences(done.result.differences)
     for label, ending in done.result.endings.items():
         if ending:
@@ -105,7 +108,7 @@ def compare(
 
 
 def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
-    echo_comparison(done, metrics)
+    echo_comparison(done, metrics, whole=verbose)
     result = done.result
     if verbose:
         for label, timing in result.timings.items():
@@ -115,8 +118,22 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
     echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
 
 
-def echo_comparison(done: Compared, metrics: Sequence[str] = ()) -> None:
-    """Print the table, or only its rows of some metrics, and what the claims came to."""
+def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool = False) -> None:
+    """Print the table, or only its rows of some metrics, and what the claims came to.
+
+    A terminal gets the headlines, or these metrics, in as many columns as it has; a pipe, and a
+    terminal with `whole`, get all.
+    """
+    if whole or not sys.stdout.isatty() or not _echo_brief(done, metrics):
+        _echo_whole(done, metrics)
+    result = done.result
+    for v in result.verdicts:
+        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
+    if result.doubts:
+        echo_table(list(result.doubts[0]), [list(row) for row in result.doubts[1:]])
+
+
+def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
     from podusv_cli.comparison.table import NOTE, cells, head
 
     result = done.result
@@ -124,10 +141,30 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = ()) -> None:
     chosen = [row for name in metrics for row in rows if row[-1] == name]
     echo_table(head(result.table), chosen if metrics else rows)
     echo(NOTE)
-    for v in result.verdicts:
-        echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
-    if result.doubts:
-        echo_table(list(result.doubts[0]), [list(row) for row in result.doubts[1:]])
+
+
+def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
+    """Print the laws side by side, or a line each; False where the terminal is too narrow."""
+    from podusv_cli.comparison.table import rows
+
+    result = done.result
+    by_name = {
+        row.metric.name: row
+        for row in rows(result.table, result.metrics, result.unsettled, brief=True)
+    }
+    headlines = [n for n, row in by_name.items() if row.metric.headline and {*row.texts} != {"-"}]
+    shown = [by_name[name] for name in metrics or headlines]
+    units = [f"[{row.metric.unit}]" if row.metric.unit != "1" else "" for row in shown]
+    names = [f"{row.metric.name}\n{unit}".strip() for row, unit in zip(shown, units, strict=True)]
+    words = [f"{row.metric.row} {unit}".strip() for row, unit in zip(shown, units, strict=True)]
+    labels = result.table.columns
+    across = [[text, *row.texts] for text, row in zip(words, shown, strict=True)]
+    down = [[label, *(row.texts[i] for row in shown)] for i, label in enumerate(labels)]
+    lines = grid(["", *labels], across, columns()) or grid(["", *names], down, columns())
+    typer.echo("\n".join(map(visible, lines)))
+    if lines:
+        echo("* best of those that end at their target; -v: every metric, with ratios")
+    return bool(lines)
 
 
 def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:

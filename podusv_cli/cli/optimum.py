@@ -85,7 +85,7 @@ def _report(done: Optimum) -> None:
     from podusv_cli.optimum.collocation import TOLERANCE
 
     name = done.minimised
-    _, unit, _ = done.run.rows[name]
+    unit = done.run.rows[name].unit
     rows = [
         [s.start, f"{s.step:.4g} s", f"{s.integral:.7g}", str(s.iterations), f"{s.seconds:.1f} s"]
         for s in done.stages

@@ -16,6 +16,8 @@ from podusv_cli.cli.terminal import Warnings, echo, echo_how_to_draw, echo_resul
 if TYPE_CHECKING:
     from podusv_cli.workflows.execute import Finished
 
+# Widths of what a metric is called and of its number; the narrow ones are for terminals.
+WHOLE, BRIEF = (46, 20), (38, 17)
 EXIT_CODES = {"finished": 0, "diverged": 4, "interrupted": 130}
 
 
@@ -49,6 +51,7 @@ def run(
         request = workflow.Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), controller=controller, trust=trust, compiling=compiling(bars),
+            say=lambda line: warned(f"{config}: {line}"),
         )  # fmt: skip
         done = workflow.run(Path(config), request, partial(bars, str(config)) if bars else None)
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
@@ -60,20 +63,20 @@ def run(
         echo(f"{config}: {part.traced}", err=True)
     if not (figure or quiet or as_json):
         echo_how_to_draw(done.folder, [done.folder])
-    if done.others:
-        names = ", ".join(done.others)
-        echo(f"{config}: ran `controller` only; `podusv compare` runs {names}", err=True)
     raise typer.Exit(EXIT_CODES[done.status])
 
 
 def _report(done: Finished, verbose: bool) -> None:
-    rows = {name: row for name, row in done.rows.items() if name in done.metrics}
-    for name, (words, unit, undefined) in rows.items() if done.status == "finished" else ():
+    """All metrics in a pipe and with `verbose`; on a terminal the headlines."""
+    brief = sys.stdout.isatty() and not verbose
+    words, numbers = BRIEF if brief else WHOLE
+    rows = {n: m for n, m in done.rows.items() if n in done.metrics and (m.headline or not brief)}
+    for name, metric in rows.items() if done.status == "finished" else ():
         number = done.metrics[name]
-        shown = f"{number:>12.6g} {unit if unit != '1' else ''}"
+        shown = f"{number:>12.6g} {metric.unit if metric.unit != '1' else ''}"
         if math.isnan(number):
-            shown = f"{undefined:>12}"
-        echo(f"{words:<46} {shown:<20}  {name}")
+            shown = f"{metric.undefined:>12}"
+        echo(f"{metric.row:<{words}} {shown:<{numbers}}  {name}")
     if verbose:
         for name, seconds in done.timing.items():
             echo(f"{name:<46} {seconds:>12.4f} s")

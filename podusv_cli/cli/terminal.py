@@ -8,12 +8,16 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import typer
 
 from podusv_cli.core.escaping import visible
+
+if TYPE_CHECKING:
+    from podusv_cli.core.finding import Finding
 
 WIDEST = 100
 SPACE = "  "  # between the columns of a table
@@ -159,3 +163,24 @@ class Warnings:
         if line not in self._shown and not self._quiet:
             echo(line, err=True)
         self._shown.add(line)
+
+    def all_of(self, findings: Sequence[Finding], together: Sequence[str]) -> None:
+        """Print findings; those of one kind about one key as one, if runs go `together`."""
+        new = [finding for finding in findings if str(finding) not in self._shown]
+        for finding in _grouped(new, together) if together else new:
+            self(finding)
+
+
+def _grouped(findings: Sequence[Finding], labels: Sequence[str]) -> Iterator[Finding]:
+    """One finding of each kind and key, with all its runs and the sentence of the first."""
+    alike: dict[tuple[str, str], list[Finding]] = {}
+    for finding in findings:
+        alike.setdefault((finding.code, finding.where), []).append(finding)
+    for first, *others in alike.values():
+        if not others or not first.runs:
+            yield from (first, *others)
+            continue
+        runs = tuple(dict.fromkeys(run for finding in (first, *others) for run in finding.runs))
+        text = f"in {first.runs[0]}, {first.text}; -v shows it for each"
+        everywhere = len(runs) == len(labels) > 2
+        yield replace(first, text=text, runs=(f"all {len(runs)} runs",) if everywhere else runs)

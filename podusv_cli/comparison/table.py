@@ -24,6 +24,8 @@ NOTE = (
     "where a law keeps a standoff, for numbers that contain it; in brackets the ratio to the first "
     "run; - not defined, or the run did not finish"
 )
+DIGITS = 5  # of a number
+FEW = 3  # where there is room for the numbers alone
 PACKAGES = "% needs \\usepackage{booktabs}; numbers stand in two columns each, cut at their point"
 NUMBER = re.compile(r"(-?\d+)(\.\d+)?(?:e([+-]\d+))?")
 Names = Collection[str]
@@ -110,11 +112,13 @@ def _ratio(number: float, first: float) -> float:
 
 
 def rows(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
-) -> list[Row]:
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
+    *, brief: bool = False,
+) -> list[Row]:  # fmt: skip
     """All rows, those that a reader sees first before the others; best numbers marked with *.
 
-    `unsettled` are the runs that do not end at their target; they are never the best.
+    `unsettled` are the runs that do not end at their target; they are never the best. `brief`
+    numbers have FEW digits and no ratio.
     """
     of_metrics, unranked, finished = [], _unranked(frame, known), frame.finished
     out = [label in unsettled for label in frame.columns]
@@ -125,6 +129,7 @@ def rows(
         texts = [
             metric.undefined if metric.happens and finished[i] and math.isnan(number) else
             "no limit" if metric.margin and math.isinf(number) else
+            _brief(number, best, out[i]) if brief else
             _cell(number, first, math.nan if out[i] else best, i)
             for i, number in enumerate(numbers)
         ]  # fmt: skip
@@ -182,9 +187,16 @@ def leaders(
     return best
 
 
-def _shown(number: float) -> str:
+def _shown(number: float, digits: int = DIGITS) -> str:
     """As readers see it; numbers are compared as printed."""
-    return f"{number:.5g}"
+    return f"{number:.{digits}g}"
+
+
+def _brief(number: float, best: float, out: bool) -> str:
+    if math.isnan(number):
+        return "-"
+    shown = _shown(number, FEW)
+    return f"{shown}*" if not out and shown == _shown(best, FEW) else shown
 
 
 def _cell(number: float, first: float, best: float, position: int) -> str:

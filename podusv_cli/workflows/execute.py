@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli import __version__
-from podusv_cli.core.about import RunAbout
+from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
@@ -95,11 +95,9 @@ class Finished:
     message: str
     metrics: dict[str, float]
     timing: dict[str, float]
-    others: tuple[str, ...] = ()  # runs of a comparison that the scenario also has
     warnings: tuple[Finding, ...] = ()
     missing: tuple[Failure, ...] = ()
-    # words, unit and what stands where there is none, of all metrics; a reader sees the first first
-    rows: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    rows: Mapping[str, MetricAbout] = field(default_factory=dict)  # headlines before the others
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a run."""
@@ -177,10 +175,7 @@ def execute(
     return Finished(
         final, recording.controller, status, message, metrics, watch.total(),
         warnings=warnings, missing=tuple(extras.missing),
-        rows={
-            m.name: (m.row, m.unit, m.undefined)
-            for m in headlines_first(task.scenario.known_metrics())
-        },
+        rows={m.name: m.about for m in headlines_first(task.scenario.known_metrics())},
     )  # fmt: skip
 
 

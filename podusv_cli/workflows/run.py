@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
+from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.scenario.address import content
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Check, Loaded, load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
+from podusv_cli.scenario.yaml_tree import dotted
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
 
@@ -40,6 +44,7 @@ class Request:
     doubt: bool = False  # whether a comparison also says what its verdicts hang on
     trust: bool = False  # whether plug-in files of a finished run may be executed
     compiling: Progress | None = None  # is called with the fraction compiled, if any is missing
+    say: Callable[[str], None] = lambda line: None  # called with what one run chose, before it
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:
@@ -70,6 +75,8 @@ def run_loaded(
         target = request.out or default_folder(RESULTS, scenario.name, case.resolved_yaml)
     with watch.part("preflight"):
         noticed = examined(case)
+    for line in _choices(scenario, others(loaded, request.controller)):
+        request.say(line)
     for finding in noticed:
         request.warn(finding)
     task = Task(
@@ -77,7 +84,17 @@ def run_loaded(
         figures=request.figures, names=request.names, argv=request.argv, noticed=noticed,
         compiling=request.compiling,
     )  # fmt: skip
-    return replace(execute(task, progress, watch, case), others=others(loaded, request.controller))
+    return execute(task, progress, watch, case)
+
+
+def _choices(scenario: Scenario, others: Sequence[str]) -> Iterator[str]:
+    """What nobody chose: the law of several, and the numbers that follow from hull and actuator."""
+    if others:
+        only = f"runs `controller` ({scenario.controller.label}) only"
+        yield f"{only}; `podusv compare` runs {', '.join(others)}"
+    for section, keys in groupby(scenario.keys_by_rule(), lambda at: at[:-1]):
+        numbers = (f"{at[-1]} {content(scenario, at):.4g}" for at in keys)
+        yield f"{dotted(section)}: defaults {BY_RULE}: {', '.join(numbers)}"
 
 
 def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
