@@ -24,7 +24,7 @@ from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 from podusv_cli.metrics.table import METRICS, metrics_probe
-from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
+from podusv_cli.scenario.address import ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
@@ -63,7 +63,7 @@ def changed(scenario: Scenario, key: str, old: float) -> Scenario | None:
     """The scenario with another number, None where it is refused or changes the structure."""
     new = old + 1 if isinstance(old, int) else 1.07 * old + 0.01
     try:
-        found = with_values(scenario, {route(key): Number("", new)})
+        found = with_values(scenario, {route(key): new})
         found.closed_loop().check_fit(found.simulation.step)
         same = found.plan().structure == scenario.plan().structure
     except (ValueRefused, LawError, ValueError):

@@ -27,7 +27,7 @@ from podusv_cli.export.check import check
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.findings.finding import Case
 from podusv_cli.interface.results import Run
-from podusv_cli.scenario.address import Number, ValueRefused, has, with_values
+from podusv_cli.scenario.address import ValueRefused, has, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import route
@@ -128,9 +128,9 @@ def number_of_a_draw(drawn: Drawn, place: Path) -> None:
             loaded = load_text(text, "resolved.yaml", [f"{key}={number!r}"]).scenario
         except ScenarioError:
             with pytest.raises(ValueRefused):
-                with_values(scenario, {route(key): Number("", number)})
+                with_values(scenario, {route(key): number})
         else:
-            changed = with_values(scenario, {route(key): Number("", number)})
+            changed = with_values(scenario, {route(key): number})
             same_log(marched(loaded), marched(changed))
 
 

@@ -8,11 +8,14 @@ from functools import wraps
 from pathlib import Path
 
 import pytest
+from conftest import corrected
 
 from podusv_cli.cli.validate import validate
+from podusv_cli.components.disturbances.harmonic import HarmonicDisturbance
 from podusv_cli.core.plugins import ROOMS
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Parts, Vectors
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import BASES, Scenario
@@ -128,3 +131,20 @@ def test_a_plan_like_another_sees_every_part_of_another_structure(part, other):
     assert plan.like(again).structure == Plan(again, plan.grid).structure
     with pytest.raises(ValueError, match="another structure than the batch"):
         plan.like(loops[1])
+
+
+class Stormy(HarmonicDisturbance):
+    """It has a constant more where it is scaled up."""
+
+    def constants(self):
+        return super().constants() | ({"gust": 1.0} if self.scale > 1.0 else {})
+
+
+@pytest.mark.parametrize("sea", [Stormy(frame="earth"), Stormy(scale=2.0)])
+def test_a_sea_with_another_kernel_or_other_constants_is_of_another_structure(sea):
+    """Where all parts of the loop but the sea are the same objects."""
+    loop = corrected(disturbance=Stormy())
+    plan = Plan(loop, TimeGrid(0.01, 10))
+    assert plan.like(replace(loop, disturbance=Stormy(scale=0.5))).functions is plan.functions
+    with pytest.raises(ValueError, match="another structure than the batch"):
+        plan.like(replace(loop, disturbance=sea))

@@ -23,7 +23,7 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.random_words import in_unit_interval
-from podusv_cli.scenario.address import Number, ValueRefused, described, with_values
+from podusv_cli.scenario.address import ValueRefused, described, with_values
 from podusv_cli.scenario.load import load_text, resolved_yaml, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
@@ -233,7 +233,7 @@ def answers(scenario: Scenario, key: str, number: float) -> tuple[str, str]:
     except ScenarioError as error:
         said[0] = str(error)
     try:
-        with_values(scenario, {route(key): Number("", number)})
+        with_values(scenario, {route(key): number})
     except ValueRefused as error:
         said[1] = str(error)
     return said[0], said[1]

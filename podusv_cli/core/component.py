@@ -122,9 +122,10 @@ class Component(BaseModel):
         nested component's names get its field's name in front.
         """
         numbers: dict[str, float] = {}
+        own = vars(self)
         for name, choices, may_be_absent in _fields(type(self)):
-            content = getattr(self, name)
-            if isinstance(content, (bool, int, float)):
+            content = own[name]
+            if isinstance(content, (float, int)):
                 numbers[name] = float(content)
             elif isinstance(content, Component):
                 for inner, number in content.constants().items():

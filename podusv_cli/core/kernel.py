@@ -220,7 +220,7 @@ def constants_type(names: tuple[str, ...]) -> type[Any]:
 
 def bundle(constants: Mapping[str, float]) -> Any:
     """Constants as kernels take them: `k.m11` instead of `constants["m11"]`."""
-    return constants_type(tuple(constants))(**constants)
+    return constants_type(tuple(constants))._make(constants.values())
 
 
 def whole_lanes(count: int) -> int:

@@ -14,7 +14,6 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.interface.border import ParameterError
 from podusv_cli.scenario.address import (
-    Number,
     ValueRefused,
     content,
     described,
@@ -64,7 +63,7 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
     made = []
     for row, new in enumerate(zip(*given.values(), strict=True)):
         numbers = {
-            steps[key]: Number("", int(value) if key in whole and _is_integer(value) else value)
+            steps[key]: int(value) if key in whole and _is_integer(value) else value
             for key, value in zip(given, new, strict=True)
         }
         try:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache, reduce
-from typing import Any, NamedTuple
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -20,21 +20,15 @@ from podusv_cli.scenario.model import PER_RUN, Scenario
 from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
 
 
-class Number(NamedTuple):
-    """What a key becomes, and what a message about it starts with: who says so, if anybody."""
-
-    source: str
-    value: Any
-
-    def __str__(self) -> str:
-        """The value, on one line."""
-        return f"{self.value:.6g}" if isinstance(self.value, float) else visible(self.value)
-
-
 class ValueRefused(PodusvError):
-    """A value that the scenario cannot take."""
+    """A value that the scenario cannot take; `steps` lead to it where it is a single one."""
 
     exit_code = 2
+
+    def __init__(self, text: str, steps: Route = ()) -> None:
+        """With a sentence for the reader."""
+        super().__init__(text)
+        self.steps = steps
 
 
 @lru_cache(maxsize=1024)
@@ -97,15 +91,15 @@ def is_whole(key: Key) -> bool:
     return int in key.types and float not in key.types
 
 
-def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
+def with_values(scenario: Scenario, new: Mapping[Route, Any]) -> Scenario:
     """The scenario with new values at these places.
 
     Null defaults follow what they are sized by, as they do when a scenario is loaded. Raises
     ValueRefused for a value that is out of range, or that contradicts another.
     """
-    given: dict[str, dict[Route, Number]] = {}
-    for (section, *rest), number in new.items():
-        given.setdefault(str(section), {})[tuple(rest)] = number
+    given: dict[str, dict[Route, Any]] = {}
+    for steps, number in new.items():
+        given.setdefault(str(steps[0]), {})[steps[1:]] = number
     made = scenario.model_copy(
         update={section: _section(scenario, section, new) for section, new in given.items()}
     )
@@ -113,14 +107,12 @@ def with_values(scenario: Scenario, new: Mapping[Route, Number]) -> Scenario:
         made = made.in_numbers()
     except SizingError as error:
         raise ValueRefused(str(error)) from error
-    for key, fault in of_numbers(made):
-        raise ValueRefused(
-            f"{new[steps].source if (steps := steps_at(key)) in new else ''}{key}: {fault}"
-        )
+    for key, fault in of_numbers(made, scenario):
+        raise ValueRefused(f"{key}: {fault}", steps_at(key))
     return made
 
 
-def _section(scenario: Scenario, section: str, new: Mapping[Route, Number]) -> Any:
+def _section(scenario: Scenario, section: str, new: Mapping[Route, Any]) -> Any:
     """A section with new values at these places, checked by its own model."""
     old = getattr(scenario, section)
     if not isinstance(old, tuple):
@@ -132,41 +124,46 @@ def _section(scenario: Scenario, section: str, new: Mapping[Route, Number]) -> A
     )
 
 
-def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Number]) -> Component:
+def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Any]) -> Component:
     data: dict[str, Any] = {}
-    for (first, *rest), number in new.items():
-        name = str(first)
-        if rest and name not in data:
+    for steps, number in new.items():
+        name, inside = str(steps[0]), steps[1:]
+        if inside and name not in data:
             data[name] = old.model_dump(include={name})[name]
-        data[name] = _with(data[name], tuple(rest), number.value) if rest else number.value
+        data[name] = _with(data[name], inside, number) if inside else number
     try:
         return old.changed(data)
     except ValidationError as error:
-        raise ValueRefused(_sentence(scenario, at, new, error)) from error
+        raise _refusal(scenario, at, new, error) from error
 
 
 def _with(whole: Any, steps: Route, new: Any) -> Any:
     """Plain data with another value at a place."""
     if not steps:
         return new
-    step, *rest = steps
-    inner = _with(whole[step], tuple(rest), new)
+    step = steps[0]
+    inner = _with(whole[step], steps[1:], new)
     if isinstance(step, int):
         return (*whole[:step], inner, *whole[step + 1 :])
     return {**whole, step: inner}
 
 
-def _sentence(
-    scenario: Scenario, at: Route, new: Mapping[Route, Number], error: ValidationError
-) -> str:
-    """The first complaint, as a sentence with source, key, value and range."""
+def _refusal(
+    scenario: Scenario, at: Route, new: Mapping[Route, Any], error: ValidationError
+) -> ValueRefused:
+    """The first complaint, as a sentence with key, value and range."""
     complaint = error.errors(include_url=False)[0]
     place = next((steps for steps in new if complaint["loc"][: len(steps)] == steps), None)
     if place is None:
         reason = complaint.get("ctx", {}).get("error", complaint["msg"])
-        numbers = ", ".join(f"{dotted((*at, *s))} = {x}" for s, x in new.items())
-        return f"{dotted(at)}: {reason}, with {numbers}"
+        numbers = ", ".join(f"{dotted((*at, *s))} = {_on_a_line(x)}" for s, x in new.items())
+        return ValueRefused(f"{dotted(at)}: {reason}, with {numbers}")
     key = described(scenario, (*at, *place))
     number = new[place]
-    advice = key.advice(number.value) if isinstance(number.value, str) else ""
-    return f"{number.source}{dotted(key.path)} = {number}; must be {key.wanted}{advice}"
+    advice = key.advice(number) if isinstance(number, str) else ""
+    text = f"{dotted(key.path)} = {_on_a_line(number)}; must be {key.wanted}{advice}"
+    return ValueRefused(text, (*at, *place))
+
+
+def _on_a_line(number: Any) -> str:
+    return f"{number:.6g}" if isinstance(number, float) else visible(number)

@@ -16,6 +16,7 @@ from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_
 Conflicts = Iterator[tuple[str, str]]  # key and message
 NO_ESTIMATOR = NoEstimator()
 MOST_INSTANTS = 2**53  # that are distinct numbers
+TIMED = ("simulation", "control", "actuator", "controller", "controllers")  # sections with times
 
 
 def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
@@ -36,8 +37,17 @@ def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
             yield f"controllers.{label}" if scenario.controllers else "controller", str(error)
 
 
-def of_numbers(scenario: Scenario) -> Conflicts:
-    """Those that other numbers can bring into a scenario that has none, as draws do."""
+def of_numbers(scenario: Scenario, sound: Scenario | None = None) -> Conflicts:
+    """Those that other numbers can bring into a scenario that has none, as draws do.
+
+    `sound` is that scenario; times are those of the same sections.
+    """
+    if sound is None or any(getattr(scenario, n) is not getattr(sound, n) for n in TIMED):
+        yield from _of_times(scenario)
+    yield from _seeing(scenario)
+
+
+def _of_times(scenario: Scenario) -> Conflicts:
     laws = scenario.laws()
     sampled = {
         f"{at}.{law.period_key}".rstrip("."): law.sample_period() for at, law in laws.items()
@@ -45,7 +55,6 @@ def of_numbers(scenario: Scenario) -> Conflicts:
     trials = {f"{at}.execute": trial.execute for at, law in laws.items() if (trial := law.trial())}
     yield from _times(scenario, sampled | trials)
     yield from _samples(scenario.control.period, sampled)
-    yield from _seeing(scenario)
 
 
 def _defaults(scenario: Scenario) -> Conflicts:

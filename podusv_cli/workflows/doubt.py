@@ -29,7 +29,7 @@ from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Job, run_shares
-from podusv_cli.scenario.address import Number, with_values
+from podusv_cli.scenario.address import with_values
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, resolved_yaml
@@ -196,9 +196,9 @@ def judging(subject: Subject, entries: Mapping[str, Entry]) -> Judge:
 
 
 def _changed(subject: Subject, label: str, world: World) -> Scenario:
-    new = {at: Number("", value) for (law, at), value in world.items() if law == label}
+    new = {at: value for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
-    single = (subject.hulls[hull.value] if hull else subject.singles)[label]
+    single = (subject.hulls[hull] if hull else subject.singles)[label]
     return with_values(single, new)
 
 

@@ -181,8 +181,8 @@ class PolarBackstepping(TrackingController):
 
     def constants(self) -> dict[str, float]:
         """The fields' numbers, and where xi_u and xi_r are in the memory (0 for nowhere)."""
-        end = sum(size for _, size in self.slots())
-        return super().constants() | {"auxiliary": float(end - 2 if self.wants_loads() else 0)}
+        at = sum(size for _, size in self.slots()) - 2 if self.wants_loads() else 0
+        return super().constants() | {"auxiliary": float(at)}
 
     @staticmethod
     @kernel

@@ -121,7 +121,7 @@ class HarmonicDisturbance(Disturbance):
         axes = (self.b_u.waves(), self.b_v.waves(), self.b_r.waves())
         waves = [sine for sine, _ in axes] + [cosine for _, cosine in axes]
         rows = np.zeros((3, whole_lanes(WAVES)))
-        rows[:, :WAVES] = np.transpose(waves) + 0.0  # no -0.0
+        rows[:, :WAVES] = np.array(waves).T + 0.0  # no -0.0
         return rows.ravel()
 
     def bounds(self) -> tuple[float, float, float]:

@@ -43,12 +43,7 @@ OWNERS = {
 }  # fmt: skip
 
 
-# What follows from these parts of a loop alone, and not from start or vessels.
-FOLLOWS: dict[str, tuple[str, ...]] = {
-    "states": ("controller", "actuator", "measurement", "estimator", "path"),
-    "row": ("path", "controller", "disturbance", "actuator", "measurement"),
-}
-FOLLOWS["layout"] = tuple(dict.fromkeys(FOLLOWS["states"] + FOLLOWS["row"]))
+FOLLOWS = ("states", "row", "layout", "functions")  # from a plan's `outline`
 
 
 class Function(NamedTuple):
@@ -93,10 +88,9 @@ class Plan:
         """
         loop.check_fit(self.grid.step)
         plan = Plan(loop, self.grid, lambda plan: self.probe, self.recall)
-        for name, parts in FOLLOWS.items():
-            if all(getattr(loop, part) is getattr(self.loop, part) for part in parts):
-                vars(plan)[name] = getattr(self, name)
-        if plan.structure != self.structure:
+        if plan.outline == self.outline:
+            vars(plan).update((name, getattr(self, name)) for name in FOLLOWS)
+        elif plan.structure != self.structure:
             raise ValueError(
                 f"it has another structure than the batch: {_kinds(loop)} with {plan.layout}, "
                 f"not {_kinds(self.loop)} with {self.layout}; runs of one batch differ in "
@@ -193,6 +187,15 @@ class Plan:
             Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
             for part, inner in zip(Parts._fields, Parts(**kernels), strict=True)
         )
+
+    @cached_property
+    def outline(self) -> tuple[Any, ...]:
+        """Equal outlines mean equal structures, and are compared sooner."""
+        loop, sea = self.loop, self.loop.disturbance
+        parts = (loop.path, loop.controller, loop.actuator, loop.measurement, loop.estimator)
+        names = [[*constants] for constants in self.constants.values()]
+        of_sea = (sea.signals, sea.of_time, sea.kernel_with(loop.vessel))
+        return (*map(id, parts), *of_sea, names)
 
     @property
     def structure(self) -> tuple[Layout, tuple[Function, ...]]:

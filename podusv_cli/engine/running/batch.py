@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +27,6 @@ from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import Vectors
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import available_workers
-
-T = TypeVar("T")
 
 
 class Loops(Protocol):
@@ -68,7 +66,7 @@ class BatchRun:
     @classmethod
     def of(cls, position: int, plan: Plan) -> BatchRun:
         """At its start."""
-        return cls(position, plan, _apart(plan.vectors()))
+        return cls(position, plan, plan.vectors())
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +82,8 @@ class MarchThread:
 
 
 def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
-    """The thread of one run."""
+    """The thread of one run, over vectors of its own."""
+    run = replace(run, vectors=_apart(run.vectors))
     grid, last = run.plan.grid, run.plan.grid.steps + 1
     function = partial(march(run.vectors, run.plan.layout, grid.step), 0, last)
     work = Work(function, run.vectors.under_way, bell)
@@ -253,12 +252,10 @@ class _Runs:
 
     def _made(self, position: int) -> BatchRun | None:
         """The run, or None and an entry of why there is none."""
-        plan = self._contained(position, partial(self._checked, position))
-        if plan is None:
-            return None
-        if not self._settled:
-            self._settle(plan)
-        return self._contained(position, partial(BatchRun.of, position, plan))
+        run = self._contained(position, lambda: BatchRun.of(position, self._checked(position)))
+        if run and not self._settled:
+            self._settle(run.plan)
+        return run
 
     def _settle(self, plan: Plan) -> None:
         """Have the march compiled, by the first plan."""
@@ -276,8 +273,8 @@ class _Runs:
         except (PodusvError, ValueError) as error:
             raise InvalidLoop(str(error)) from error
 
-    def _contained(self, position: int, make: Callable[[], T]) -> T | None:
-        """What is made for a run; an exception is that run's and no other's."""
+    def _contained(self, position: int, make: Callable[[], BatchRun]) -> BatchRun | None:
+        """A run that is made; an exception is its own and no other's."""
         try:
             with interrupts_enabled():
                 return make()

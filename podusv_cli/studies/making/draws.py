@@ -17,7 +17,7 @@ import numpy.typing as npt
 from podusv_cli.core import random_words
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.random_words import Words, in_unit_interval
-from podusv_cli.scenario.address import Number, content, steps_at, with_values
+from podusv_cli.scenario.address import ValueRefused, content, steps_at, with_values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import Route
@@ -96,19 +96,21 @@ def drawing(scenario: Scenario, vary: Mapping[str, Quantity]) -> Callable[[Draw]
     where a number is out of range. It looks up places and the scenario's own values only once.
     """
     targets = [
-        (steps, f"sweep.vary.{name}: ", name, quantity, _own(scenario, quantity, steps), place)
+        (steps, name, quantity, _own(scenario, quantity, steps), place)
         for name, quantity in vary.items()
         for place, steps in enumerate(map(steps_at, quantity.targets(name)))
     ]
 
     def scenario_of(draw: Draw) -> Scenario:
-        return with_values(
-            scenario,
-            {
-                steps: Number(source, quantity.value(own, draw[name], place))
-                for steps, source, name, quantity, own, place in targets
-            },
-        )
+        new = {
+            steps: quantity.value(own, draw[name], place)
+            for steps, name, quantity, own, place in targets
+        }
+        try:
+            return with_values(scenario, new)
+        except ValueRefused as error:
+            by = next((f"sweep.vary.{t[1]}: " for t in targets if t[0] == error.steps), "")
+            raise ValueRefused(f"{by}{error}") from error
 
     return scenario_of
 

@@ -10,7 +10,7 @@ from podusv_cli.scenario.address import ValueRefused
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.making.check import singles
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import drawing, draws
 from podusv_cli.studies.making.plan import StudyPlan
 
 MOST_TRIED = 2000  # runs, about a second
@@ -50,10 +50,11 @@ def invalid_runs(scenarios: Sequence[Scenario], sweep: Sweep, most: int = MOST_T
     count = min(sweep.draws, most)
     each = min(len(scenarios), most // count)
     pick, reasons = Random(sweep.seed), list[tuple[int, str]]()
+    drawn = [drawing(scenario, sweep.vary) for scenario in scenarios]
     for number, draw in enumerate(draws(sweep, 0, count)):
         for place in sorted(pick.sample(range(len(scenarios)), each)):
             try:
-                drawn(scenarios[place], sweep.vary, draw)
+                drawn[place](draw)
             except ValueRefused as error:
                 reasons.append((number, str(error)))
     first = reasons[0] if reasons else (0, "")
