@@ -17,7 +17,6 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.reading import Whole
 
-ROWS = 2**15  # values whose slopes are computed at once
 SHIFT = 1e-4  # of a point's coordinate, for slopes
 LONGEST = 1.0  # of a coordinate, in one step
 ROUNDS = 100
@@ -44,9 +43,9 @@ Tell = Callable[[int, float], None]
 
 @dataclass(frozen=True)
 class Scored:
-    """-2 log of the posterior at a point, but a constant; the slopes of what each block adds.
+    """-2 log of the posterior at a point, but a constant; slopes and Fisher's matrix of each block.
 
-    Fisher's matrix is the sum of `by_values`, what is known by the values that the filter expects,
+    Fisher's matrix has two parts: `by_values`, what is known by the values that the filter expects,
     and `by_sizes`, by how far it expects to be off.
     """
 
@@ -83,18 +82,18 @@ class Search:
     def _scored(self, y: Vector) -> Scored:
         nus, variances = self.innovations([y, *(y + SHIFT * np.eye(self.size))])
         value = _value(nus[:, 0], variances[:, 0], y)
-        each = np.zeros((int(self.blocks[-1]) + 1, self.size))
-        by_values, by_sizes = np.zeros((2, self.size, self.size))
-        for i in range(0, len(nus), ROWS):  # not at once, for the room that all slopes would take
-            rows = slice(i, i + ROWS)
-            nu, s = nus[rows, :1], variances[rows, :1]
-            d_nu, d_s = (nus[rows, 1:] - nu) / SHIFT, (variances[rows, 1:] - s) / SHIFT
-            slopes = 2.0 * nu * d_nu / s + d_s * (1.0 - nu * nu / s) / s
-            np.add.at(each, self.blocks[rows], slopes)
-            # Not by BLAS, whose threads wait for each other longer than this takes.
-            by_values += 2.0 * _squares(d_nu / np.sqrt(s))
-            by_sizes += _squares(d_s / s)
-        return Scored(value, each, by_values, by_sizes)
+        slopes, by_values, by_sizes = [], [], []
+        for nu, s in zip(self._split(nus), self._split(variances), strict=True):
+            d_nu, d_s = (nu[:, 1:] - nu[:, :1]) / SHIFT, (s[:, 1:] - s[:, :1]) / SHIFT
+            nu, s = nu[:, :1], s[:, :1]
+            slopes.append((2.0 * nu * d_nu / s + d_s * (1.0 - nu * nu / s) / s).sum(axis=0))
+            by_values.append(2.0 * _squares(d_nu / np.sqrt(s)))
+            by_sizes.append(_squares(d_s / s))
+        return Scored(value, np.array(slopes), np.array(by_values), np.array(by_sizes))
+
+    def _split(self, rows: Vector) -> list[Vector]:
+        """Rows by block; a block's come one after the other."""
+        return np.split(rows, np.flatnonzero(np.diff(self.blocks)) + 1)
 
 
 def _squares(rows: Vector) -> Vector:
@@ -168,42 +167,49 @@ def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
 def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:
     """Steps of growing damping, none longer than LONGEST, and what the first should gain."""
     gradient = at.slopes.sum(axis=0) + 2.0 * y
-    curvature = at.by_values + at.by_sizes + 2.0 * np.eye(len(y))
+    curvature = (at.by_values + at.by_sizes).sum(axis=0) + 2.0 * np.eye(len(y))
     damped = (curvature + part * np.diag(np.diag(curvature)) for part in DAMPINGS)
     steps = [-np.linalg.solve(matrix, gradient) for matrix in damped]
     short = [step * min(1.0, LONGEST / max(np.abs(step).max(), SHIFT)) for step in steps]
     return short, float(-0.5 * gradient @ steps[0])
 
 
-def _by_curvature(at: Scored, hull: int) -> Vector:
-    """A hull is known by what it does alone.
+def covariance(at: Scored, hull: int = 0) -> Vector:
+    """Of the estimate's errors: by the curvature, or where that is wider by how blocks differ.
+
+    Where innovations are not white the curvature takes the errors for too small. How the slopes of
+    blocks differ tells their size, once each is freed of what the fit to it hides: CR2 of R. M.
+    Bell and D. F. McCaffrey (Survey Methodology 28, 2002). A few blocks do not tell all directions
+    apart, so in no direction the errors are smaller than by the curvature, and in none larger than
+    before the logs, where the covariance is 1. NaN where the filter breaks down.
+    """
+    each = at.by_values + _alone(at.by_sizes, hull)
+    whole = each.sum(axis=0) + 2.0 * np.eye(at.slopes.shape[1])
+    if not np.all(np.isfinite(whole)):
+        return np.full_like(whole, np.nan)
+    # In coordinates in which the covariance by the curvature is 1.
+    root = np.linalg.cholesky(2.0 * np.linalg.inv(whole))
+    hidden, basis = np.linalg.eigh(0.5 * root.T @ each @ root)
+    freed = np.einsum("bij,bj,bkj,bk->bi", basis, (1.0 - hidden) ** -0.5, basis, at.slopes @ root)
+    by_blocks = 0.25 * freed.T @ freed + root.T @ root
+    return _bounded(root @ _bounded(by_blocks, 1.0, np.inf) @ root.T, 0.0, 1.0)
+
+
+def _alone(by_sizes: Vector, hull: int) -> Vector:
+    """How far the filter expects to be off, of all but the hull's numbers.
 
     A hull that brakes more makes the filter surer, too, and all the surer on a track that is
     smoother than it expects; that says nothing of how the boat brakes.
     """
-    sizes = at.by_sizes.copy()
-    sizes[:hull] = sizes[:, :hull] = 0.0
-    return np.asarray(2.0 * np.linalg.inv(at.by_values + sizes + 2.0 * np.eye(len(sizes))), float)
+    sizes = by_sizes.copy()
+    sizes[:, :hull] = sizes[:, :, :hull] = 0.0
+    return sizes
 
 
-def covariance(at: Scored, hull: int = 0) -> Vector:
-    """Of the estimate's errors: by the curvature, or where that is wider by how blocks differ.
-
-    The second is White's (Econometrica 50, 1982), with blocks in place of single values: it stays
-    right where innovations are not white, as a bootstrap over blocks would.
-    """
-    curved = _by_curvature(at, hull)
-    # No number is less known than before the logs, where its variance is 1.
-    wide = np.clip(np.diag(_by_blocks(at, curved)), np.diag(curved), 1.0)
-    factor = np.sqrt(wide / np.diag(curved))
-    return np.asarray(curved * np.outer(factor, factor))
-
-
-def _by_blocks(at: Scored, curved: Vector) -> Vector:
-    count = len(at.slopes)
-    apart = at.slopes - at.slopes.mean(axis=0)
-    spread = apart.T @ apart * (count / max(count - 1, 1)) + 4.0 * np.eye(len(curved))
-    return np.asarray(0.25 * curved @ spread @ curved)
+def _bounded(matrix: Vector, least: float, most: float) -> Vector:
+    """A symmetric matrix with its eigenvalues between two bounds."""
+    values, basis = np.linalg.eigh(matrix)
+    return np.asarray(basis * np.clip(values, least, most) @ basis.T)
 
 
 @dataclass(frozen=True)
@@ -261,8 +267,7 @@ def _silent(search: Search, y: Vector) -> tuple[Vector, Whole]:
 
     They are silent, too, where what they say differs from block to block.
     """
-    hull, whole, at = search.hull, np.eye(search.size), search.scored(y)
-    curved = _by_curvature(at, hull)
-    whole[:hull, :hull] = directions(curved, hull).basis
-    along = [np.diag(whole.T @ c @ whole)[:hull] for c in (curved, _by_blocks(at, curved))]
-    return whole, np.flatnonzero(np.max(along, axis=0) > SILENT**2)
+    hull, whole = search.hull, np.eye(search.size)
+    ways = directions(covariance(search.scored(y), hull), hull)
+    whole[:hull, :hull] = ways.basis
+    return whole, np.flatnonzero(ways.widths > SILENT)
