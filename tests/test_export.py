@@ -39,6 +39,7 @@ from podusv_cli.core import registry
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.export import c, link, objects
 from podusv_cli.export import check as checking
+from podusv_cli.export import fmu as units
 from podusv_cli.export.check import check
 from podusv_cli.export.fmu import variables
 from podusv_cli.export.law import ExportedLaw
@@ -249,6 +250,24 @@ def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
         assert not actuator.model_copy(update={name: around}).only_cuts
 
 
+def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(monkeypatch):
+    monkeypatch.setattr(link, "find_spec", lambda name: name == "ziglang")
+    assert [*workflow._linked(workflow.Request(Path("law")))] == [link.this_machine()]
+    asked = workflow.Request(Path("law"), platforms=["win64", "linux64"])
+    said: list[str] = []
+    monkeypatch.setattr(
+        units, "shared_library", lambda files, name, platform: said.append(name) or b""
+    )
+    law = ExportedLaw.of(scenario("pid"))
+    inputs = np.zeros(12)
+    units.fmu(law, objects.together(law.pieces), workflow._linked(asked), inputs, said.append)
+    builds = "the first time, zig builds the platform's C library, a minute or two"
+    assert said == [
+        f"linking the FMU for win64; {builds}", "win64",
+        f"linking the FMU for linux64; {builds}", "linux64",
+    ]  # fmt: skip
+
+
 def test_every_platform_gets_object_code_and_nothing_of_this_machine():
     pieces = ExportedLaw.of(scenario("pid")).pieces
     text = objects.together(pieces)
@@ -314,7 +333,6 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     with pytest.raises(UsageError, match=r"exported with --no-c, and FMPy.*podusv\[export\]"):
         check(tmp_path)
     monkeypatch.setattr(workflow, "this_machine", lambda: "")
-    monkeypatch.setattr(workflow, "find_spec", lambda name: None)
     with pytest.raises(UsageError, match=r"no export for this machine.*--no-fmu"):
         workflow.export(Path(SOURCE), workflow.Request(tmp_path / "law"))
     monkeypatch.setattr(link.shutil, "which", lambda name: None)

@@ -37,7 +37,11 @@ def export(
     ] = True,
     platform: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="For this platform; repeatable.", show_default="all"),
+        typer.Option(
+            metavar="NAME",
+            help="For this platform; repeatable.",
+            show_default="all for C, this machine for the FMU",
+        ),
     ] = None,
     check: Annotated[
         bool, typer.Option("--check", help="Step an exported law beside podusv's own run.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from podusv_cli.export import c, objects
@@ -16,7 +16,7 @@ from podusv_cli.export.law import (
     TARGET_NUMBERS,
     ExportedLaw,
 )
-from podusv_cli.export.link import shared_library
+from podusv_cli.export.link import shared_library, waiting
 
 STAMP = (1980, 1, 1, 0, 0, 0)  # of files in the archive: the same law gives the same bytes
 DIGITS = 32  # of the guid
@@ -47,11 +47,13 @@ def variables(law: ExportedLaw, first: Sequence[float]) -> list[Variable]:
 
 
 def fmu(
-    law: ExportedLaw, text: str, platforms: Mapping[str, objects.Platform], first: Sequence[float]
-) -> bytes:
+    law: ExportedLaw, text: str, platforms: Mapping[str, objects.Platform], first: Sequence[float],
+    say: Callable[[str], None] = lambda line: None,
+) -> bytes:  # fmt: skip
     """The archive with a library for each platform, of the law's module `text`.
 
-    `first` as in `variables`. Raises UsageError where a library cannot be linked.
+    `first` as in `variables`; `say` is called before each platform. Raises UsageError where a
+    library cannot be linked.
     """
     shown = variables(law, first)
     starts = [c.literal(float(variable.start)) for variable in shown if variable.start is not None]
@@ -68,6 +70,7 @@ def fmu(
     for name, platform in platforms.items():
         inside = {file: part.encode() for file, part in files.items()}
         inside["law.o"] = objects.object_file(text, platform)
+        say(f"linking the FMU for {name}{waiting(name, platform)}")
         library = shared_library(inside, name, platform)
         members[f"binaries/{name}/law{platform.library}"] = library
     return _archive(members)

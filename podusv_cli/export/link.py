@@ -51,6 +51,14 @@ def this_machine() -> str:
     return MACHINES.get((platform_of_python.system(), platform_of_python.machine()), "")
 
 
+def waiting(name: str, platform: Platform) -> str:
+    """Why linking may take long, "" where it does not."""
+    of_zig = "ziglang" in linker(name, platform)
+    return (
+        "; the first time, zig builds the platform's C library, a minute or two" if of_zig else ""
+    )
+
+
 def linker(name: str, platform: Platform) -> Sequence[str]:
     """The command that links for a platform. Raises UsageError where there is none."""
     if find_spec("ziglang") and platform.zig:

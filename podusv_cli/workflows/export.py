@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +26,6 @@ from podusv_cli.storage import csv_files, provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.workflows.execute import Stopwatch, simulated
 from podusv_cli.workflows.run import others, single
-
-IN_FMU = ("linux64", "win64", "aarch64-linux")  # where none is asked for and zig is there
 
 
 @dataclass(frozen=True)
@@ -83,8 +80,7 @@ def export(config: Path, request: Request) -> Path:
             for name in platforms:
                 writer.add(f"{name}/law.o", objects.object_file(text, objects.PLATFORMS[name]))
         if request.fmu:
-            request.say(f"linking an FMU for {', '.join(linked)}")
-            writer.add(FMU, fmu(law, text, linked, law.inputs(samples)[0]))
+            writer.add(FMU, fmu(law, text, linked, law.inputs(samples)[0], request.say))
         writer.add(SAMPLES, _table(law, samples).encode())
         about = law.as_json(platforms, objects.library_functions(text))
         writer.add_json(ABOUT, {**about, "of_run": of_run})
@@ -123,7 +119,7 @@ def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
 
 def _linked(request: Request) -> Mapping[str, objects.Platform]:
     """The platforms of the FMU. Raises UsageError for one without libraries or a linker."""
-    names = request.platforms or (IN_FMU if find_spec("ziglang") else (this_machine(),))
+    names = request.platforms or (this_machine(),)
     if "" in names:
         raise UsageError(
             "there is no export for this machine, so no FMU without zig: install it with pip "
