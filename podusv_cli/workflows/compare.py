@@ -207,10 +207,9 @@ def make_runs(
 ) -> dict[str, Outcome]:
     """Execute the members that have no run yet, in parallel, each into a folder in `folder`."""
     wanted = [(member, member.case) for member in members if member.case]
-    # once, before the forks
-    provenance.surroundings()
-    import_module("podusv_cli.storage.log_reader")
-    with interrupts_enabled():
+    with interrupts_enabled():  # once, before the forks
+        provenance.surroundings()
+        import_module("podusv_cli.storage.log_reader")
         for _, case in wanted:
             warm_up(case, request.compiling)
     tasks = [
