@@ -2,7 +2,7 @@
 
     python examples/reproduce/doubts.py FOLDER...
 
-A folder is the answer of `podusv doubt`, below results/.doubt/PAPER.
+A folder is what `podusv doubt` wrote, below results/.doubt/PAPER or results/.doubt/studies.
 """
 
 from __future__ import annotations
@@ -51,10 +51,12 @@ KEPT = (
 
 def rows(folder: Path) -> Iterator[dict[str, Any]]:
     """The claims of an answer, with the paper and the scenario that they are of."""
+    studied = folder / "answer"  # beside the studies that were made for it
+    answer = studied if studied.is_dir() else folder
     claims = {
-        claim["claim"]: claim for claim in json.loads((folder / "doubt.json").read_text())["claims"]
+        claim["claim"]: claim for claim in json.loads((answer / "doubt.json").read_text())["claims"]
     }
-    with (folder / "doubt.csv").open(newline="") as file:
+    with (answer / "doubt.csv").open(newline="") as file:
         for row in csv.DictReader(file):
             word = BUILT if row["word"] == "robust" and row["acted"] == "0" else row["word"]
             turns = claims[row["claim"]]["turns"]
@@ -84,7 +86,7 @@ def line(row: dict[str, Any]) -> str:
     """A row of the table."""
     counts = [int(row[name]) for name in ("kept", "turned", "unknown", "failed")]
     open_ = f", {row['unknown']} cannot tell" if int(row["unknown"]) else ""
-    draws = f"{row['kept']} of {sum(counts)}{open_}"
+    draws = f"{row['kept']} of {sum(counts)}{open_}" if any(counts) else ""
     place, far = nearest(row["turns"])
     other, by = row["word_for_neighbours"], " by " + nearest(row["others"])[0]
     beside = f"{other}{by}" if other != row["word"] and row["others"] else ""
