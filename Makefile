@@ -31,6 +31,7 @@ JUDGES := fresh cybership2 otter
 LEFEBER := circle line port load damping
 FOSSEN := course cybership2 damping load limits beside
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
+JUDGED := hull_and_sea unknown_dynamics rivals rivals_earth rivals_cybership2 learned
 DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN))
 
 .DEFAULT_GOAL := help
@@ -81,12 +82,16 @@ sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/
 	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
 	@echo "what was found: results/sea.md; every table and figure: results/.runs/sea/*/report.html"
 
-doubt: $(VENV)/run.done ## what the verdicts on three papers hang on, into results/doubt.md, a quarter of an hour on two cores
+doubt: $(VENV)/run.done ## what the verdicts on papers and studies hang on, into results/doubt.md, an hour on two cores
 	@for name in $(DOUBTED); do \
 	    echo "  $$name" && mkdir -p results/.doubt/$${name%/*} && \
 	    $(BIN)/podusv doubt configs/$$name.yaml --out results/.doubt/$$name --force -q || exit 1; \
 	done
-	@$(BIN)/python examples/reproduce/doubts.py $(addprefix results/.doubt/,$(DOUBTED)) > results/.table && \
+	@for name in $(JUDGED); do \
+	    echo "  studies/$$name" && \
+	    $(BIN)/podusv doubt configs/studies/$$name.yaml --set sweep.draws=200 --out results/.doubt/studies/$$name -q || exit 1; \
+	done
+	@$(BIN)/python examples/reproduce/doubts.py $(addprefix results/.doubt/,$(DOUBTED) $(addprefix studies/,$(JUDGED))) > results/.table && \
 	    mv results/.table results/doubt.md
 	@echo "what was found: results/doubt.md; every turn and figure: results/.doubt/*/*/report.html"
 

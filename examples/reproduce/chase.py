@@ -1,6 +1,6 @@
 """Draw docs/images/chase.png: the three boats of `podusv demo` behind their target, on the water.
 
-    python examples/reproduce/chase.py docs/images/chase.png
+python examples/reproduce/chase.py docs/images/chase.png
 """
 
 from __future__ import annotations
