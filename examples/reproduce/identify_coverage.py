@@ -4,7 +4,9 @@
 
 For each hull and each GNSS: so many true hulls, drawn as the prior has it; each does two zig-zags
 and two turning circles in a current and under loads that the filter does not know, through
-noisy sensors. What comes out is compared with the truth, where the logs determine it.
+noisy sensors. The logs are CSV files and are read as anybody's, but for their clocks: that commands
+are not late is given (`delay`), since to find it out takes 1 to 10 s a set. What comes out is
+compared with the truth, where the logs determine it.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from itertools import product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,9 +35,9 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.identify.answer import AXES, SIDE, Answer
 from podusv_cli.identify.estimate import OPEN, directions, estimated, prior_kept
+from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.problem import Problem
-from podusv_cli.identify.reading import Table
-from podusv_cli.identify.records import Log, log_of
+from podusv_cli.identify.records import Log
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.model import Scenario
 
@@ -71,7 +74,7 @@ def known(hull: str) -> Scenario:
     """The hull as it is known before, with its actuator."""
     return podusv.Scenario(
         name=hull, vessel={"preset": hull}, actuator=HULLS[hull], controller={"kind": "pid"},
-        path={"kind": "line", "speed": 0.0}, disturbance={"kind": "none"},
+        path={"kind": "line", "speed": 0.0}, disturbance={"kind": "none"}, identify=WANTED,
     )  # fmt: skip
 
 
@@ -82,8 +85,8 @@ def true_hull(problem: Problem, rng: np.random.Generator) -> Vessel:
             return problem.vessel(rng.standard_normal(len(problem.hull)))
 
 
-def log(before: Scenario, true: Vessel, cell: Cell, i: int) -> Log | None:
-    """What the sensors deliver in one manoeuvre; None where the run does not end."""
+def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[Log]:
+    """What the sensors deliver in one manoeuvre; none where the run does not end."""
     kind, share, angle = MANOEUVRES[i]
     facts, seed = before.facts, 1 + cell.number
     step = 0.01 * math.sqrt(facts.lam)
@@ -106,10 +109,13 @@ def log(before: Scenario, true: Vessel, cell: Cell, i: int) -> Log | None:
     scenario.ready()
     run = simulate(scenario.closed_loop(), scenario.time_grid())
     if run.status != "finished":
-        return None
-    columns = {q: run[f"{q}_m"] for q in ("x", "y", "psi", "r")}
+        return []
+    columns = {"time": run["time"]} | {q: run[f"{q}_m"] for q in ("x", "y", "psi", "r")}
     columns |= replayed(scenario, run)
-    return log_of(Table(f"{i}", run["time"], columns), before.actuator, WANTED.step)
+    with TemporaryDirectory() as folder:
+        path = Path(folder, f"{i}.csv")
+        pd.DataFrame(columns).to_csv(path, index=False, float_format="%.9g")
+        return logs_of(path, LogFile(file=path.name, delay=0.0), before)
 
 
 def gusts(facts: Facts, seeds: np.random.Generator) -> list[dict[str, Any]]:
@@ -178,12 +184,11 @@ def rows(cell: Cell) -> list[tuple[Any, ...]]:
     before = known(cell.hull)
     rng = np.random.default_rng([1 + cell.number, [*HULLS].index(cell.hull), GNSS.index(cell.gnss)])
     true = true_hull(Problem(before, WANTED, []), rng)
-    logs = [log(before, true, cell, i) for i in range(len(MANOEUVRES))]
-    given = [entry for entry in logs if entry]
-    if not given:
-        return []
-    problem = Problem(before, WANTED, given)
     try:
+        given = [log for i in range(len(MANOEUVRES)) for log in logs(before, true, cell, i)]
+        if not given:
+            return []
+        problem = Problem(before, WANTED, given)
         found = prior_kept(problem.search, estimated(problem.search))
     except UsageError as error:
         print(f"{cell}: {error}", file=sys.stderr)
