@@ -25,6 +25,7 @@ from podusv_cli.components.actuators.allocation_single import YAW, one_pod, with
 from podusv_cli.components.actuators.propeller import (
     ANGLE,
     DELTA_RATE,
+    LIFT,
     N_AHEAD,
     N_ASTERN,
     N_RATE,
@@ -35,6 +36,7 @@ from podusv_cli.components.actuators.propeller import (
     speed_for,
     thrust,
 )
+from podusv_cli.components.actuators.rudder import slant, steered
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import direction
@@ -61,6 +63,7 @@ def reach(n: float, delta: float, flow: float, pod: Vector, k: Any) -> Reach:
         turn, change = pod[DELTA_RATE] * k.horizon, pod[N_RATE] * k.horizon
         low, high = within(delta - turn, low, high), within(delta + turn, low, high)
         n_low, n_high = within(n - change, n_low, 0.0), within(n + change, 0.0, n_high)
+    low, high = slant(low, pod), slant(high, pod)
     ahead, astern = thrust(n_high, flow, pod, k), -thrust(n_low, flow, pod, k)
     return Reach(low, high, max(0.0, astern), max(0.0, ahead))
 
@@ -155,8 +158,18 @@ def made(
 
 
 @kernel
-def speeds(count: int, T: Vector, flows: Vector, k: Any, table: Vector, n: Vector) -> None:
-    """Propeller speeds for these thrusts."""
+def settings(count: int, T: Vector, flows: Vector, k: Any, table: Vector, command: Vector) -> bool:
+    """Propeller speeds for these thrusts, at the angles in `command`, and angles of rudders.
+
+    False where a rudder does not make what was allotted to it.
+    """
+    made_all, answer = True, scratch(2)
     for i in range(count):
         pod = tail(table, i * WIDTH)
-        n[i] = within(speed_for(T[i], flows[i], pod, k), -pod[N_ASTERN], pod[N_AHEAD])
+        if pod[LIFT] > 0.0:
+            if not steered(T[i], command[count + i], flows[i], pod, k, answer):
+                made_all = False
+            command[i], command[count + i] = answer[0], answer[1]
+        else:
+            command[i] = within(speed_for(T[i], flows[i], pod, k), -pod[N_ASTERN], pod[N_AHEAD])
+    return made_all

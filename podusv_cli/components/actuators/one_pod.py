@@ -11,8 +11,17 @@ from podusv_cli.components.actuators.command import Failure
 from podusv_cli.core.component import Component, value
 
 
+class Rudder(Component):
+    """A rudder in the stream of a propeller, whose force is normal to it."""
+
+    lift: float = value(..., "N s2/rad", "force over n^2 times angle; 0 astern", gt=0)
+    stall: float = value(
+        0.5, "rad", "angle above which the force does not grow", gt=0, le=0.5 * math.pi
+    )
+
+
 class Pod(Component):
-    """One propeller and the pod that turns it.
+    """One propeller and the pod that turns it, or the rudder behind it.
 
     `n` counts turns a second, or parts of full speed where the actuator's `counts` says so; units
     with s for it then go without.
@@ -40,12 +49,17 @@ class Pod(Component):
     angle_lag: float | None = value(
         None, "s", "time constant of the angle; needed unless the propeller is fixed", gt=0
     )
+    rudder: Rudder | None = value(
+        None, "", "a rudder at x, y, whose angle has the limits above; the propeller stays straight"
+    )
     power_nnn: float | None = value(
         None, "W s3", "power over |n|^3; without it neither power nor energy is logged", ge=0
     )
 
     @model_validator(mode="after")
     def _turning(self) -> Self:
+        if self.rudder and self.angle_limit == 0.0:
+            raise ValueError("has a rudder that cannot turn; give it an angle_limit above 0")
         missing = [name for name in ("angle_rate", "angle_lag") if getattr(self, name) is None]
         if missing and self.angle_limit > 0.0:
             raise ValueError(
@@ -68,6 +82,7 @@ class Pod(Component):
             self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, astern, self.n_max,
             self.n_max_astern, self.angle_limit, self.n_rate,
             self.angle_rate or 1.0, self.n_lag, self.angle_lag or 1.0, self.power_nnn or 0.0,
+            self.rudder.lift if self.rudder else 0.0, self.rudder.stall if self.rudder else 0.0,
         ]  # fmt: skip
 
 

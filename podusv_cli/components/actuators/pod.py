@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
-from podusv_cli.components.actuators.allocation import allocate, speeds
+from podusv_cli.components.actuators.allocation import allocate, settings
 from podusv_cli.components.actuators.allocation_qp import MOST_PODS
 from podusv_cli.components.actuators.allocation_single import within
 from podusv_cli.components.actuators.base import SATURATION, Actuator
@@ -20,6 +20,7 @@ from podusv_cli.components.actuators.propeller import (
     DELTA_CMD,
     DELTA_LAG,
     DELTA_RATE,
+    LIFT,
     LIMITED,
     N_AHEAD,
     N_ASTERN,
@@ -36,6 +37,7 @@ from podusv_cli.components.actuators.propeller import (
     inflow,
     thrust,
 )
+from podusv_cli.components.actuators.rudder import loads
 from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
@@ -59,7 +61,7 @@ def act(
         pod, delta = tail(table, i * WIDTH), state[count + i]
         flows[i] = inflow(x, pod, delta, k)
         T = thrust(state[i], flows[i], pod, k)
-        along, across = force(T, delta)
+        along, across = loads(state[i], T, delta, pod)
         thrusts[i] = T
         tau[0] += along
         tau[1] += 0.0 if k.neglect_sway_force > 0.0 else across
@@ -310,12 +312,16 @@ class Pods(Actuator):
     def lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
         """Take the lost part of the pod's thrust off the loads; allocation and power are as before.
 
-        The pod's angle is as before, too.
+        The pod's angle is as before, too; a rudder loses as much of its force.
         """
         count, i = int(k.count), int(k.failure_pod)
         thrusts, pod = tail(signals, FLAGS + 2 * count), tail(table, i * WIDTH)
-        lost = (1.0 - k.failure_effectiveness) * thrusts[i]
+        part = 1.0 - k.failure_effectiveness
+        lost = part * thrusts[i]
         along, across = force(lost, state[count + i])
+        if pod[LIFT] > 0.0:
+            along, across = loads(state[i], thrusts[i], state[count + i], pod)
+            along, across = part * along, part * across
         thrusts[i] -= lost
         tau[0] -= along
         tau[1] -= 0.0 if k.neglect_sway_force > 0.0 else across
@@ -333,7 +339,7 @@ class Pods(Actuator):
         flows, T = scratch(MOST_PODS), scratch(MOST_PODS)
         act(x, state, k, table, tau, thrusts, flows)
         met = allocate(state, demand, flows, k, table, T, tail(command, count))
-        speeds(count, T, flows, k, table, command)
+        met = settings(count, T, flows, k, table, command) and met
         # What is no number must not get lost between limits.
         lost = 0.0 * (demand[0] + demand[1])
         for i in range(2 * count):

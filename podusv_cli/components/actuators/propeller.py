@@ -40,8 +40,8 @@ PHYSICAL = 0.0
 # A pod's numbers in the actuator's table, by position.
 (
     X, Y, T_AHEAD, T_ASTERN, T_NV, T_NV_ASTERN, N_AHEAD, N_ASTERN, ANGLE, N_RATE, DELTA_RATE, N_LAG,
-    DELTA_LAG, POWER, WIDTH,
-) = range(15)  # fmt: skip
+    DELTA_LAG, POWER, LIFT, STALL, WIDTH,
+) = range(17)  # fmt: skip
 
 
 @kernel
@@ -54,7 +54,7 @@ def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     """
     if k.thrust_form == PHYSICAL:
         ahead, aside = x[3] - pod[Y] * x[5], x[4] + pod[X] * x[5]
-        cosine, sine = cos_sin(delta)
+        cosine, sine = cos_sin(0.0 if pod[LIFT] > 0.0 else delta)
         return float(-(ahead * cosine + aside * sine))
     return math.sqrt(x[3] * x[3] + x[4] * x[4])
 

@@ -1,0 +1,74 @@
+"""A rudder in the stream of a propeller that does not turn itself, as kernels.
+
+Its force is normal to it: F = lift n^2 a, with the angle a up to `stall`; it is 0 with a propeller
+astern, whose stream goes the other way. Sources: n^2 delta is M. Caccia, G. Bruzzone, R. Bono, "A
+practical approach to modeling and identification of small autonomous surface craft", IEEE J.
+Oceanic Eng. 33 (2008); a normal force that is side force and drag is H. Yasukawa, Y. Yoshimura,
+"Introduction of MMG standard method for ship maneuvering predictions", J. Mar. Sci. Technol. 20
+(2015), whose t_R and a_H are left to lift and hull here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from podusv_cli.components.actuators.propeller import (
+    ANGLE,
+    LIFT,
+    N_AHEAD,
+    N_ASTERN,
+    STALL,
+    T_AHEAD,
+    force,
+    speed_for,
+)
+from podusv_cli.core.elementary import cos_sin
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import direction
+
+LEAST = 1e-300  # N, so that a propeller at rest divides nothing by 0
+ROUNDS = 6  # until angle and propeller speed agree; each leaves a sixth of the error or less
+
+
+@kernel
+def loads(n: float, T: float, delta: float, pod: Vector) -> tuple[float, float]:
+    """Force [N] along and across the vessel of a pod at angle delta [rad], or of its rudder."""
+    if pod[LIFT] <= 0.0:
+        return force(T, delta)
+    if n <= 0.0:
+        return T, 0.0
+    normal = pod[LIFT] * n * n * min(max(delta, -pod[STALL]), pod[STALL])
+    cosine, sine = cos_sin(delta)
+    return T - normal * sine, normal * cosine
+
+
+@kernel
+def slant(delta: float, pod: Vector) -> float:
+    """Angle [rad] of a pod's force at rest; of a rudder, that of thrust and rudder together.
+
+    Beyond the stall there is none.
+    """
+    if pod[LIFT] <= 0.0:
+        return delta
+    along, across = loads(1.0, pod[T_AHEAD], min(max(delta, -pod[STALL]), pod[STALL]), pod)
+    return float(direction(along, across))
+
+
+@kernel
+def steered(T: float, angle: float, flow: float, pod: Vector, k: Any, out: Vector) -> bool:
+    """Propeller speed and rudder angle for a force T [N] at an angle [rad]; whether they make it.
+
+    Thrust makes up for the rudder's drag. Astern there is no force across.
+    """
+    along, across = force(T, angle)
+    most = min(pod[ANGLE], pod[STALL])
+    n, delta = speed_for(along, flow, pod, k), 0.0
+    if along < 0.0 or n <= 0.0:
+        out[0], out[1] = max(n, -pod[N_ASTERN]), 0.0
+        return bool(across == 0.0 and n >= -pod[N_ASTERN])
+    for _ in range(ROUNDS):
+        cosine, sine = cos_sin(delta)
+        n = speed_for(along + across * sine / cosine, flow, pod, k)
+        delta = min(max(across / (pod[LIFT] * n * n * cosine + LEAST), -most), most)
+    out[0], out[1] = min(n, pod[N_AHEAD]), delta
+    return bool(n <= pod[N_AHEAD])
