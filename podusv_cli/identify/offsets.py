@@ -6,6 +6,7 @@ Where that predicts the log much better, also once the hull is fitted to it, the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -63,29 +64,39 @@ class Clocks:
         if not np.isfinite(none.value):  # the fit of all logs says why
             return 0.0, []
         best = min(others, key=lambda way: way.value)
-        straight = min(way.value for way in (none, *others) if not way.mirrored)
-        if best.mirrored and straight - best.value > BETTER:
-            raise LogFault(
-                f"{self.table.name}: the boat turns against its commands: with port and starboard "
-                f"exchanged its motion is predicted better, by {straight - best.value:.0f} in -2 "
-                "log of the posterior. Exchange the columns of port and starboard under "
-                'identify.columns, or write "-COLUMN" for what has the other sign; or write '
-                "identify.frame: enu if all of the motion is counted to port"
-            )
+        if best.mirrored:
+            self._refuse_mirrored(best, (none, *others))
         gain = none.value - best.value
         if best.mirrored or gain <= BETTER:
             return 0.0, []
-        for _ in range(REFINED):
-            nearer = self._fitted(Way(best.delay))
-            if nearer.value > best.value - 1.0:
-                break
-            best = nearer
+        best = self._refined(best)
         line = (
             f"{self.table.name}: its commands act {best.delay:.2f} s later than it says (that "
             f"predicts its motion better, by {gain:.0f} in -2 log of the posterior); logs for "
             "fitting are moved by that. identify.logs[].delay gives another."
         )
         return best.delay, [line]
+
+    def _refuse_mirrored(self, best: Way, ways: Sequence[Way]) -> None:
+        """Raises LogFault where no way without mirroring predicts nearly as well."""
+        gain = min(way.value for way in ways if not way.mirrored) - best.value
+        if gain > BETTER:
+            raise LogFault(
+                f"{self.table.name}: the boat turns against its commands: with port and starboard "
+                f"exchanged its motion is predicted better, by {gain:.0f} in -2 log of the "
+                "posterior. Exchange the columns of port and starboard under identify.columns, or "
+                'write "-COLUMN" for what has the other sign; or write identify.frame: enu if all '
+                "of the motion is counted to port"
+            )
+
+    def _refined(self, best: Way) -> Way:
+        """With the delay that fits best from one fit to the next."""
+        for _ in range(REFINED):
+            nearer = self._fitted(Way(best.delay))
+            if nearer.value > best.value - 1.0:
+                break
+            best = nearer
+        return best
 
     def _likely(self) -> list[Way]:
         """Ways that the vessel as it was given predicts much better than the log as it is."""

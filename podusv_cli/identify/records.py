@@ -59,25 +59,37 @@ def log_of(table: Table, actuator: Actuator, step: float) -> Log:
     A row stands where something is delivered, and otherwise every `step`; the commands of a row are
     the mean until the next. Raises LogFault where pose or commands are missing.
     """
-    commands = actuator.replayed
-    needed = {s.name for s in (*STATE[:POSE], *commands)} - {*actuator.zero_where_missing}
+    nothing = np.full(len(table.times), np.nan)
+    new = np.column_stack([delivered(table.columns.get(s.name, nothing)) for s in STATE])
+    _complete(table, actuator, new)
+    kept = _rows(table.times, np.any(new, axis=1), step)
+    rows = _record(table, actuator, new, kept)
+    rows[:, STEPS] = np.maximum(1.0, np.ceil(rows[:, HOLDS] / step - SLACK))
+    counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
+    record, words = Record(rows, int(counts.sum())), (table.notes, table.warnings)
+    return Log(table.name, table.times[kept], record, _state(table, new), counts, *words)
+
+
+def _complete(table: Table, actuator: Actuator, new: Marks) -> None:
+    """Raises LogFault where pose or commands are missing."""
+    needed = {s.name for s in (*STATE[:POSE], *actuator.replayed)} - {*actuator.zero_where_missing}
     if lacking := sorted(needed - table.columns.keys()):
         raise LogFault(
             f"{table.name}: nothing is known of {', '.join(lacking)}; name the columns that have "
             "them under identify.columns, or choose the actuator whose commands the log has"
         )
-    nothing = np.full(len(table.times), np.nan)
-    new = np.column_stack([delivered(table.columns.get(s.name, nothing)) for s in STATE])
     if min(new[:, :POSE].sum(axis=0)) < FEWEST:
         raise LogFault(
             f"{table.name}: has {min(new[:, :POSE].sum(axis=0))} values of the pose, at least "
             f"{FEWEST} are needed; take a longer part of the log"
         )
-    kept = _rows(table.times, np.any(new, axis=1), step)
+
+
+def _record(table: Table, actuator: Actuator, new: Marks, kept: Whole) -> Vector:
+    """The rows that are kept, but for the number of steps in each."""
+    commands, times = actuator.replayed, table.times[kept]
     rows = np.zeros((len(kept), COMMANDS + 2 * len(commands)))
-    times = table.times[kept]
     rows[:-1, HOLDS] = np.diff(times)
-    rows[:, STEPS] = np.maximum(1.0, np.ceil(rows[:, HOLDS] / step - SLACK))
     for i, signal in enumerate(STATE):
         if signal.name in table.columns:
             marks = np.logical_or.reduceat(new[:, i], kept)
@@ -88,9 +100,7 @@ def log_of(table: Table, actuator: Actuator, step: float) -> Log:
             held = _held(table.times, table.columns[signal.name], kept)
             rows[:, COMMANDS + i] = held
             rows[:, COMMANDS + len(commands) + i] = np.gradient(held, times)
-    counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
-    record, words = Record(rows, int(counts.sum())), (table.notes, table.warnings)
-    return Log(table.name, times, record, _state(table, new), counts, *words)
+    return rows
 
 
 def _rows(times: Vector, new: Marks, step: float) -> Whole:
