@@ -30,7 +30,6 @@ from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.sampler import optuna
 from podusv_cli.studies.tuning.search import Search
 from podusv_cli.studies.tuning.space import with_gains
-from podusv_cli.studies.tuning.trials import best
 from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.many_runs import (
     Config,
@@ -188,8 +187,8 @@ def _leaders(searches: Sequence[Search]) -> str:
     """The best objective so far of every law, in words."""
     best_values: dict[str, float] = {}
     for search in searches:
-        if search.trials:
-            value = best(search.trials).value
+        if search.leader:
+            value = search.leader.value
             best_values[search.law] = min(value, best_values.get(search.law, value))
     leaders = ", ".join(f"{law} {value:.4g}" for law, value in best_values.items())
     return f"best on the training draws: {leaders}" if best_values else "no gains are tried yet"

@@ -55,6 +55,7 @@ class Search:
         seed = [plan.scenario.sweep.seed, number, law]
         self._sampler = Sampler(plan.gains[law], seed)
         self.trials: list[Trial] = []
+        self.leader: Trial | None = None  # of the trials so far
         self._kept = trials.read(folder, self.name)
         self._batch = 0
         self._attempts: list[Attempt] = []
@@ -192,6 +193,7 @@ class Search:
     def _told(self, made: Sequence[Trial]) -> None:
         self._sampler.tell([t.value for t in made], [t.excesses for t in made])
         self.trials += made
+        self.leader = trials.best(self.trials)
         self._batch += 1
 
     def _runs(self, attempt: Attempt) -> Outcomes:
