@@ -18,7 +18,6 @@ from command_samples import ROOT, commanded
 import podusv_cli
 from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import PER_RUN, scenario_class
@@ -119,15 +118,6 @@ def test_every_metric_is_documented_with_its_unit_and_meaning() -> None:
     assert documented == {(f"`{m.name}`", m.unit, m.meaning) for m in METRICS.values()}
     counting = {row[0][1:-1] for row in rows("docs/metrics.md") if "with the standoff" in row[4]}
     assert counting == {m.name for m in METRICS.values() if m.counts_standoff}
-
-
-def test_every_finding_is_documented_as_its_declaration_says():
-    documented = {tuple(row) for row in rows("docs/findings.md")}
-    declared = finding_kinds().values()
-    assert documented == {
-        (f"`{one.name}`", f"`{one.about}`", one.meaning, one.condition, one.remedy)
-        for one in declared
-    }
 
 
 def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
