@@ -21,7 +21,9 @@ from command_samples import ROOT, Command, commanded
 from podusv_cli.engine.running import thread as march
 from podusv_cli.storage.run_folder import open_run
 
-PAGES = ("README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md")
+PAGES = (
+    "README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md", "docs/start.md"
+)  # fmt: skip
 LONG = pytest.param("docs/my_boat.md", marks=pytest.mark.slow)
 LARGEST = 10.0  # N m; four times the yaw moment that the actuator of README's scenario delivers
 

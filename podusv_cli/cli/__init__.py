@@ -23,9 +23,9 @@ from podusv_cli.cli.exit_codes import (
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
-    "init", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins", "optimum",
-    "explain", "list", "schema", "new", "bench", "tune", "doubt", "identify", "docs", "demo",
-    "runs", "export",
+    "init", "start", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins",
+    "optimum", "explain", "list", "schema", "new", "bench", "tune", "doubt", "identify", "docs",
+    "demo", "runs", "export",
 )  # fmt: skip
 
 # What others call it, and the command that does it.
@@ -39,12 +39,12 @@ FIRST_STEPS = """\
 podusv simulates and compares controllers for pod-propelled surface vessels. First steps:
 
   podusv demo                              see what it does: three laws, a chase, a page
+  podusv start mine                        a scenario for your boat, from length, mass and thrust
   podusv init mu_2017/corrected            copy a scenario here, to edit; podusv init lists them
   podusv run corrected.yaml                simulate it: log, metrics and figures in results/
   podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
   podusv sweep --help                      judge laws by thousands of drawn hulls, seas, starts
-  podusv docs                              the pages that come with podusv
-  podusv --help                            all commands"""
+  podusv docs                              the pages of podusv; podusv --help: all commands"""
 OBJECTS_BETWEEN_COLLECTIONS = 500_000
 
 

@@ -20,6 +20,7 @@ RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target
 BESIDE = 1e-9  # s; distance from a break at which the target is evaluated on either side
 STABLE = 2.785  # step over time constant up to which RK4 is stable
 AHEAD = 0.5  # excess surge force, as a fraction of the largest one needed
+ROUNDING = 1e-9  # of the largest load: a moment of 1e-13 N m on a straight leg is none
 DELIVERED = 0.999  # fraction of the demand that counts as all of it
 ROUNDED = 0.99  # of N_m, which has few digits
 BREAKS = {  # what jumps: offset in TARGET, unit
@@ -207,12 +208,12 @@ def thrust_short(case: Case) -> Sentences:
         return
     seen = case.reference
     worst = np.abs(seen.demand).argmax(axis=0)
-    actuator = case.scenario.actuator
+    actuator, rounding = case.scenario.actuator, ROUNDING * float(np.abs(seen.demand).max())
     for axis, (what, unit) in enumerate((("surge force", "N"), ("yaw moment", "N m"))):
         demand = seen.demand[worst[axis]]
         x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[worst[axis]])])
         needed, got = float(demand[axis]), float(actuator.settled(x, demand)[2 * axis])
-        if got * np.sign(needed) < DELIVERED * abs(needed):
+        if got * np.sign(needed) < DELIVERED * abs(needed) - rounding:
             mean = float(seen.demand[:, axis].mean())
             yield (
                 f"keeping up takes a {what} of {needed:.3g} {unit} at "

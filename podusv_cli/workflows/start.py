@@ -1,0 +1,249 @@
+"""`podusv start`: a scenario for a boat that is known by its dimensions, or by a preset."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimated
+from podusv_cli.components.vessels.vessel import VESSELS, Vessel
+from podusv_cli.core import units
+from podusv_cli.core.component import unit_of
+from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.phrases import unknown
+from podusv_cli.core.plugins import installed
+from podusv_cli.findings.finding import finding_kinds
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.presets import preset_names
+from podusv_cli.scenario.schema import schema_text
+from podusv_cli.scenario.yaml_text import resolve
+from podusv_cli.storage import files as storage
+from podusv_cli.workflows.init import SCHEMA
+
+RADIUS = 2.0  # boat lengths, of the turn that is left at full moment
+LEGS = (12.0, 8.0)  # boat lengths: the first and third leg, the second
+TIME = 1.6  # of that for the legs at the wanted speed
+HEIGHT = 0.1  # of what stands above the water, over the length
+AFT = 0.4  # of the length, that thrusters are behind the middle
+BESIDE = "path: {kind: line}\ndisturbance: {kind: none}\ncontroller: {kind: los_pid}\n"
+THRUSTERS = re.compile(r"(\d)\s*x\s*([^@]+)@\s*(.+)")
+EXAMPLE = "2x180N@1.0: two of 180 N each, 1.0 m beside the centre line"
+# What is drawn in a study: a factor on each of these keys, by the name in `SCATTER`.
+FACTORS = {
+    "I_z": ("I_z",), "X_udot": ("X_udot",), "Y_vdot": ("Y_vdot",), "N_rdot": ("N_rdot",),
+    "surge_damping": ("X_u", "X_uu"), "sway_damping": ("Y_v", "Y_vv"),
+    "yaw_damping": ("N_r", "N_rr"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Boat:
+    """What somebody says of a boat, as written: lengths, mass and speed may have units."""
+
+    length: str
+    beam: str
+    mass: str
+    thrusters: str
+    hulls: int = 1
+    hull_beam: str = ""
+    speed: str = ""
+    turn: str = ""
+
+
+@dataclass(frozen=True)
+class Thrusters:
+    """So many alike, each with its largest thrust [N], its lever [m] and its largest angle."""
+
+    count: int
+    thrust: float
+    lever: float
+    turn: float
+
+    @property
+    def levers(self) -> list[float]:
+        """How far each is to starboard [m]."""
+        sides = [-self.lever, self.lever]
+        return [0.0] if self.count == 1 else [sides[i % 2] for i in range(self.count)]
+
+
+def start(boat: Boat, out: Path) -> Path:
+    """Write the scenario of a boat and the schema for editors beside it.
+
+    Raises UsageError for what is no length, mass, speed or set of thrusters, StorageError where
+    the file exists.
+    """
+    hull, thrusters = _hull(boat)
+    return _written(out, _of_dimensions(hull, thrusters, known=bool(boat.speed)))
+
+
+def start_from(preset: str, out: Path) -> Path:
+    """The same for a vessel of podusv whose thrusters are known, too."""
+    known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
+    if preset not in known:
+        raise UsageError(unknown(f"boat {preset!r}", preset, known))
+    return _written(out, _of_preset(preset))
+
+
+def _written(out: Path, text: str) -> Path:
+    if out.exists():
+        raise StorageError(f"{out} exists; name another file with --out")
+    load_text(text, str(out))  # so that nothing is written that does not load
+    plugins, schema = installed(), out.with_name(SCHEMA)
+    storage.make_folder(out.parent)
+    known = schema_text(tuple(finding_kinds(plugins)), plugins)
+    storage.write_all({out: text.encode(), schema: known.encode()})
+    return out
+
+
+def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
+    thrusters = _thrusters(boat)
+    given = {"length": (boat.length, "m"), "beam": (boat.beam, "m"), "mass": (boat.mass, "kg")}
+    if boat.speed:
+        given["speed"] = (boat.speed, "m/s")
+    if boat.hull_beam:
+        given["hull_beam"] = (boat.hull_beam, "m")
+    numbers = {name: _number(name, text, unit) for name, (text, unit) in given.items()}
+    hull = Hull(**numbers, thrust=thrusters.count * thrusters.thrust, hulls=boat.hulls)
+    if boat.hulls > 1 and 2.0 * hull.narrow > hull.beam:
+        raise UsageError(
+            f"two hulls of {hull.narrow:g} m do not fit into a beam of {hull.beam:g} m; give "
+            "--hull-beam, or --hulls 1"
+        )
+    if hull.draught > hull.narrow:
+        raise UsageError(
+            f"{hull.mass:g} kg would make hulls of {hull.length:g} m by {hull.narrow:.3g} m "
+            f"{hull.draught:.3g} m deep, deeper than they are wide; check length, beam and mass"
+        )
+    return hull, thrusters
+
+
+def _number(name: str, text: str, unit: str) -> float:
+    """A number above 0 as in a scenario, with or without a unit. Raises UsageError."""
+    option, plain = f"--{name.replace('_', '-')} {text}", resolve(text.strip())
+    number = units.number(plain, unit) if isinstance(plain, str) else plain
+    if number is None or isinstance(number, bool):
+        wrong = units.misfit(text, unit) or "; write a number, with a unit if it is another one"
+        raise UsageError(f"{option}: is no number in {unit}{wrong}")
+    if not 0.0 < number < math.inf:
+        raise UsageError(f"{option}: must be above 0 [{unit}]")
+    return float(number)
+
+
+def _thrusters(boat: Boat) -> Thrusters:
+    match = THRUSTERS.fullmatch(boat.thrusters.strip())
+    if not match:
+        raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}")
+    count, turn = int(match[1]), _number("turn", boat.turn, "rad") if boat.turn else 0.0
+    lever = 0.0 if match[3].strip() == "0" else _number("thrusters", match[3], "m")
+    made = Thrusters(count, _number("thrusters", match[2].strip(), "N"), lever, turn)
+    if count not in (1, 2, 4) or (count > 1) != (lever > 0.0):
+        raise UsageError(
+            f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
+        )
+    if count == 1 and not turn:
+        raise UsageError("a single thruster that does not turn cannot steer: give --turn 35deg")
+    return made
+
+
+def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
+    numbers = {name: float(f"{x:.3g}") for name, x in estimated(hull).items()}
+    boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
+    title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
+    return _filled(title, boat, "\n".join(_study(numbers)))
+
+
+def _of_preset(preset: str) -> str:
+    boat = (
+        f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
+        f"actuator: {{kind: pod, preset: {preset}}}"
+    )
+    return _filled(f"{preset} of podusv with its thrusters.", boat, "")
+
+
+def _filled(title: str, boat: str, study: str) -> str:
+    scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
+    vessel, facts = scenario.vessel, scenario.facts
+    hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
+    holds = vessel.envelope.speed if vessel.envelope else math.inf
+    speed = float(f"{min(hull.cruise, holds, RADIUS * facts.r_top * hull.length):.2g}")
+    long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
+    words = {
+        "title": title, "schema": SCHEMA, "length": f"{hull.length:g}", "mass": f"{hull.mass:g}",
+        "boat": boat, "speed": f"{speed:g}", "long": f"{long:g}", "wide": f"{wide:g}",
+        "duration": f"{10.0 * math.ceil(0.1 * TIME * (2.0 * long + wide) / speed):g}",
+        "study": study,
+    }  # fmt: skip
+    template = files("podusv_cli.workflows").joinpath("starting_files", "boat.yaml.txt")
+    return Template(template.read_text("utf-8")).substitute(words).rstrip() + "\n"
+
+
+WHY = {
+    "I_z": "radius of gyration 0.25 L",
+    "X_udot": "Soeding (1982)",
+    "Y_vdot": "strip theory: rho pi T^2 / 2 a length",
+    "N_rdot": "the same, and two hulls also in surge",
+    "X_u": "time constant of L seconds, as MSS has it",
+    "X_uu": "full thrust gives top speed",
+    "Y_v": "Clarke et al. (1983), at the speed of the legs",
+    "Y_vv": "cross-flow drag, Hoerner's coefficient",
+    "N_r": "Clarke et al. (1983)",
+    "N_rr": "cross-flow drag",
+}
+
+
+def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]:
+    top = f"{hull.top_speed:.3g} m/s at full thrust{'' if known else ' (a guess, Fn 0.4)'}"
+    yield "vessel: # `estimated` is no measurement; podusv docs start has the errors to expect"
+    yield "  source: estimated from length, beam and mass by podusv start; no number was measured"
+    yield f"  validity: about {hull.cruise:.2g} m/s, of {top}"
+    yield f"  length: {hull.length:g} # m"
+    yield f"  beam: {hull.beam:g} # m"
+    yield f"  m: {hull.mass:g} # kg"
+    for name in WHY:
+        unit = unit_of(Vessel.model_fields[name])
+        yield f"  {name}: {numbers[name]:g} # {unit}, estimated: {WHY[name]}"
+    front, side = (HEIGHT * hull.length * along for along in (hull.beam, hull.length))
+    yield f"  windage: {{A_F: {front:.2g}, A_L: {side:.2g}}} # m2, a guess: 0.1 L high"
+
+
+def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
+    turning = "fixed" if not thrusters.turn else "turning"
+    yield f"actuator: # {turning} thrusters; n from -1 to 1, so T_nn is the largest thrust [N]"
+    yield "  kind: pod"
+    yield "  counts: parts"
+    yield "  # x ahead, y to starboard of the middle [m]; rates, lags and thrust astern are guesses"
+    yield "  pods:"
+    angle = f"angle_limit: {thrusters.turn:.4g}"
+    if thrusters.turn:
+        angle += ", angle_rate: 1.0, angle_lag: 0.2"
+    for lever in thrusters.levers:
+        place = f"x: {-AFT * hull.length:.3g}, y: {lever:g}"
+        force = f"T_nn: {thrusters.thrust:g}, T_nn_astern: {thrusters.thrust:g}"
+        speed = "n_max: 1, n_max_astern: 1, n_rate: 4, n_lag: 0.3"
+        yield f"    - {{{place}, {force}, {speed}, {angle}}}"
+
+
+def _study(numbers: dict[str, float]) -> Iterator[str]:
+    """What a study and `doubt` vary: factors with the scatter that the estimates have."""
+    yield ""
+    yield "sweep: # hulls that such dimensions leave possible; no law is told: podusv sweep run"
+    yield "  draws: 100"
+    yield "  success: finished and path_done >= 1"
+    yield "  vary: # a factor on each estimate, as far off as estimates are on hulls that are known"
+    for name, scatter in SCATTER.items():
+        keys = [f"vessel.{key}" for key in FACTORS[name] if numbers[key]]
+        factor = f"times: {{lognormal: {{sigma: {scatter:g}, within: [0.1, 10]}}}}"
+        yield f"    {name}: {{keys: [{', '.join(keys)}], {factor}}}"
+    yield "doubt: # podusv doubt moves these alone and together"
+    yield "  printed: [vessel.m, measurement] # what was weighed, and what data sheets say"
+    yield "  vary:"
+    for name, scatter in SCATTER.items():
+        for key in filter(numbers.get, FACTORS[name]):
+            low, high = math.exp(-scatter), math.exp(scatter)
+            yield f"    vessel.{key}: {{times: {{log_uniform: [{low:.2g}, {high:.2g}]}}}}"

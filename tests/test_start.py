@@ -1,0 +1,203 @@
+"""A boat from its dimensions: estimates, how far off they are, and what `podusv start` writes."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_samples import ROOT, commanded
+from hull_ratios import ratios, scatter, table
+
+from podusv_cli.components.vessels.estimated import HOERNER, SCATTER, Hull, estimated
+from podusv_cli.scenario.load import load
+from podusv_cli.workflows.init import SCHEMA
+
+BOAT = ("--length", "4.9", "--beam", "2.4", "--mass", "180", "--thrusters", "2x180N@1.0")
+MODEL = ("--length", "1.255", "--beam", "0.29", "--mass", "23.8", "--thrusters", "2x4N@0.07")
+BOATS = {
+    "catamaran": (*BOAT, "--hulls", "2"),
+    "model ship": MODEL,
+    "one azimuth": ("--length", "3", "--beam", "0.72", "--mass", "257", "--thrusters", "1x64N@0",
+                    "--turn", "35deg"),
+    "with units": ("--length", "24ft", "--beam", "2.6", "--mass", "2.1t", "--thrusters",
+                   "2x3kN@50cm", "--turn", "0.5", "--speed", "20kn"),
+    "otter": ("--preset", "otter"), "milliampere": ("--preset", "milliampere"),
+    "revolt": ("--preset", "revolt"), "wamv": ("--preset", "wamv"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def podusv(tmp_path, monkeypatch, capsys):
+    """The command line in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return commanded(monkeypatch, capsys)
+
+
+# --- the formulas
+
+
+def test_added_mass_in_surge_is_that_of_mss_for_the_otter():
+    """otter.m has 5.2815 kg in sea water of 1025 kg/m3: it goes with rho^(-2/3)."""
+    surge = -estimated(Hull(2.0, 1.08, 55.0, 239.0))["X_udot"]
+    assert surge * 1.025 ** (-2 / 3) == pytest.approx(5.2815, rel=1e-4)
+
+
+def test_cross_flow_drag_has_the_coefficient_of_the_otter():
+    """Its source says 0.847 at a beam of 0.25 m and a draught of 0.134 m."""
+    assert np.interp(0.25 / (2 * 0.134), *HOERNER) == pytest.approx(0.847, abs=0.001)
+
+
+@pytest.mark.parametrize("speed", [math.nan, 1.2, 3.0])
+def test_full_thrust_gives_the_top_speed(speed):
+    hull = Hull(4.9, 2.4, 180.0, 360.0, speed=speed)
+    numbers = estimated(hull)
+    u = hull.top_speed
+    assert -(numbers["X_u"] + numbers["X_uu"] * u) * u == pytest.approx(360.0)
+    assert max(numbers["X_u"], numbers["X_uu"]) <= 0.0
+
+
+def test_loads_are_those_of_strips_summed_one_by_one():
+    """Added mass and cross-flow drag of two hulls, in 20 000 strips each."""
+    hull = Hull(4.9, 2.4, 180.0, 360.0, hulls=2, hull_beam=0.4)
+    numbers, count = estimated(hull), 20000
+    draught = 180.0 / (1000.0 * 0.5 * 2 * 4.9 * 0.4)
+    coefficient = float(np.interp(0.4 / (2.0 * draught), *HOERNER))
+    inertia = sway = moment = mass = 0.0
+    for i in range(count):
+        x, dx = (i + 0.5) * 4.9 / count - 2.45, 4.9 / count
+        strip = 2 * 0.5 * math.pi * 1000.0 * draught**2 * dx
+        drag = 2 * 0.5 * 1000.0 * draught * coefficient * dx
+        mass, inertia = mass + strip, inertia + strip * x * x
+        sway, moment = sway + drag, moment + drag * abs(x) * x * x
+    apart = -numbers["X_udot"] * 1.0**2
+    assert -numbers["Y_vdot"] == pytest.approx(mass)
+    assert -numbers["N_rdot"] == pytest.approx(inertia + apart, rel=1e-6)
+    assert (-numbers["Y_vv"], -numbers["N_rr"]) == pytest.approx((sway, moment), rel=1e-6)
+
+
+def test_damping_is_that_of_the_regression_written_out():
+    """Clarke, Gedling and Hine: Y_v' and N_r' in the prime system of rho L^2 U / 2."""
+    hull = Hull(100.0, 16.0, 5.0e6, 1e5, speed=10.0)
+    numbers, T, U = estimated(hull), hull.draught, hull.cruise
+    S, q = math.pi * (T / 100.0) ** 2, 0.5 * 1000.0 * 100.0**2 * U
+    assert pytest.approx(6.25) == T
+    assert numbers["Y_v"] == pytest.approx(-q * S * (1.0 + 0.4 * 0.5 * 16.0 / T))
+    regression = 0.25 + 0.039 * 16.0 / T - 0.56 * 0.16
+    assert numbers["N_r"] == pytest.approx(-q * 100.0**2 * S * regression)
+
+
+# --- how far off
+
+
+def test_scatter_is_that_over_known_hulls():
+    found = {quantity: scatter(over.values()) for quantity, over in ratios().items()}
+    assert {name: float(f"{found[name]:.2g}") for name in SCATTER} == SCATTER
+
+
+def test_the_page_prints_every_ratio():
+    page = (ROOT / "docs/start.md").read_text()
+    assert "\n".join(table()) in page
+    for low, high in (("0.92", "1.7"), ("0.35", "9.6")):
+        assert f"{low} to {high} times" in page
+
+
+# --- the scenario
+
+
+@pytest.mark.parametrize("name", ["catamaran", "one azimuth", "milliampere"])
+def test_the_scenario_runs_as_it_is_and_follows_its_legs(podusv, name):
+    check(podusv, name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted({*BOATS} - {"catamaran", "one azimuth", "milliampere"}))
+def test_other_boats_follow_their_legs(podusv, name):
+    check(podusv, name)
+
+
+def check(podusv, name):
+    said = podusv("start", "boat", *BOATS[name])
+    assert (said.code, said.err) == (0, "")
+    assert said.out.startswith("wrote boat.yaml\nnext: podusv compare boat.yaml\n")
+    assert Path(SCHEMA).is_file()
+    said = podusv("compare", "boat.yaml", "--no-figures", "--json")
+    answer = json.loads(said.out)
+    assert said.code == 0
+    assert "thrust-short" not in said.err + said.out
+    assert [claim["verdict"] for claim in answer["claims"]] == ["reproduced"]
+    assert [*answer["comparison"]["path_done"].values()] == [1.0, 1.0]
+
+
+def test_what_is_estimated_is_marked_and_varied(podusv):
+    podusv("start", "boat", *BOATS["catamaran"])
+    scenario, text = load("boat.yaml").scenario, Path("boat.yaml").read_text()
+    marked = [line.split(":")[0].strip() for line in text.splitlines() if "estimated:" in line]
+    assert sorted(marked) == sorted(estimated(Hull(1.0, 1.0, 100.0, 1.0)))
+    drawn = [key for quantity in scenario.sweep.vary.values() for key in quantity.keys]
+    assert sorted(drawn) == sorted(f"vessel.{name}" for name in marked)
+    assert sorted(scenario.doubt.vary) == sorted(drawn)
+    assert scenario.sweep.vary["yaw_damping"].times.lognormal.sigma == SCATTER["yaw_damping"]
+    assert podusv("validate", "boat.yaml").out.count("invalid runs: 0 of") == 1
+
+
+@pytest.mark.slow
+def test_of_hulls_that_dimensions_leave_possible_laws_fail_as_the_page_says(podusv):
+    podusv("start", "boat", *BOATS["catamaran"])
+    said = podusv("sweep", "run", "boat.yaml", "--no-figures", "--json")
+    rows = json.loads(said.out)["summary"]
+    assert {row["law"]: row["failed"] for row in rows} == {"los_pid": 0.0, "alos": 0.31}
+    said = podusv("doubt", "boat.yaml", "--no-figures", "--set", "doubt.draws=8")
+    assert "8 of 8" in said.out
+
+
+def test_units_are_those_of_scenarios(podusv):
+    podusv("start", "boat", *BOATS["with units"])
+    scenario = load("boat.yaml").scenario
+    assert scenario.vessel.length == 7.3152
+    assert scenario.vessel.m == 2100.0
+    assert scenario.actuator.pods[0].T_nn == 3000.0
+    assert [pod.y for pod in scenario.actuator.pods] == [-0.5, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (BOAT[:-2], "give --thrusters, or --preset"),
+        ((*BOAT[:-1], "two"), "--thrusters two: write them as 2x180N@1.0: two of 180 N each, 1.0 m "
+         "beside the centre line"),
+        ((*BOAT[:-1], "2x180kg@1"), "--thrusters 180kg: is no number in N; kg does not fit; did "
+         "you mean 'kgf'? (units here: N, kN, kgf)"),
+        ((*BOAT[:-1], "1x180N@0"), "a single thruster that does not turn cannot steer: give --turn "
+         "35deg"),
+        ((*BOAT, "--length", "-3"), "--length -3: must be above 0 [m]"),
+        ((*BOAT, "--mass", "18 tons"), "--mass 18 tons: is no number in kg; tons does not fit "
+         "(units here: kg, g, t, lb)"),
+        ((*BOAT, "--mass", "18t"), "18000 kg would make hulls of 4.9 m by 2.4 m 3.06 m deep, "
+         "deeper than they are wide; check length, beam and mass"),
+        ((*BOAT, "--hulls", "2", "--hull-beam", "1.5"), "two hulls of 1.5 m do not fit into a beam "
+         "of 2.4 m; give --hull-beam, or --hulls 1"),
+        (("--preset", "oter"), "unknown boat 'oter'; did you mean 'otter'? (allowed: milliampere, "
+         "otter, revolt, wamv)"),
+        (("--preset", "otter", "--mass", "3"), "--preset has hull and thrusters; leave the "
+         "dimensions out"),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_one_sentence(podusv, words, says):
+    said = podusv("start", "boat", *words)
+    assert (said.code, said.err) == (2, f"{says}\n")
+    assert not Path("boat.yaml").exists()
+
+
+def test_a_file_that_exists_is_not_replaced(podusv):
+    Path("boat.yaml").write_text("mine")
+    said = podusv("start", "boat", *BOAT)
+    assert (said.code, said.err) == (5, "boat.yaml exists; name another file with --out\n")
+
+
+def test_a_terminal_is_asked_for_what_is_missing(podusv, monkeypatch):
+    answers = {"Length": "4.9", "Beam": "2.4", "Mass": "400lb", "Thrusters": "2x180N@1.0"}
+    monkeypatch.setattr("podusv_cli.cli.start.sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("typer.prompt", lambda text: answers[text.split()[0].strip(",")])
+    assert podusv("start", "boat").code == 0
+    assert load("boat.yaml").scenario.vessel.m == pytest.approx(181.437)
