@@ -6,6 +6,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP, explored
-from podusv_cli.doubt.answer import compared
+from podusv_cli.doubt.answer import _word, compared
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import Choice, Range, choices, public
 from podusv_cli.doubt.events import nearest_event
@@ -442,6 +443,19 @@ def test_a_word_is_tried_in_all_its_forms():
     assert not found["controllers.c.k_s"].values
 
 
+def test_a_time_of_whole_steps_is_halved_and_doubled_and_not_drawn():
+    """A drawn period would be no whole number of steps, so that no world could be."""
+    sensors = "measurement={kind: sensors, position: {delay: 0.01}, heading: {period: 0.15}}"
+    several = scenario(ADRIFT.replace("LIMIT", "1"), sensors)
+    found = {choice.name: choice for choice in choices(several.singles())}
+    assert found["measurement.position.period"].values == (0.1, 0.4)
+    assert found["measurement.position.delay"].values == (0.02,)
+    assert found["measurement.heading.period"].values == (0.3,)
+    assert found["measurement.position.bias_time"].range
+    moving = [choice.name for choice in drawn([*found.values()], 1, 20).choices]
+    assert not any(name.endswith(("period", "delay")) for name in moving)
+
+
 def test_the_numbers_of_a_claim_with_their_limits():
     assert compared("max(a.x) <= 0.1 and -3 > a.e") == [
         ("max(a.x)", "", (0.1,)), ("a.e", "", (-3.0,)),
@@ -501,6 +515,13 @@ def test_worlds_that_cannot_be_are_counted():
     turned, known = counted("C", worlds, worlds[0])
     assert turned.tolist() == [False, False, True]
     assert known.tolist() == [True, False, True]
+
+
+def test_where_no_drawn_world_could_be_judged_nothing_is_called_robust():
+    counts = {"kept": 0, "turned": 0, "unknown": 0, "silent": 0}
+    for failed, word in ((3, "robust where it can tell"), (0, "robust")):
+        verdict = SimpleNamespace(answer=True)
+        assert _word(SimpleNamespace(verdict=verdict, failed=failed, **counts), (), 0) == word
 
 
 def logged(leg):

@@ -155,7 +155,8 @@ def _word(answer: Answer, turns: Sequence[Turn], turned: int) -> str:
     if answer.verdict.answer is None:
         return ""
     nearest = min((turn.share for turn in turns), default=math.nan)
-    dumb = answer.silent + answer.unknown > 0
+    judged = answer.kept + answer.turned > 0 or not answer.failed
+    dumb = answer.silent + answer.unknown > 0 or not judged
     reached = (nearest <= KNIFE, nearest <= FRAGILE, bool(turns), turned > 0, dumb, True)
     return WORDS[reached.index(True)]
 

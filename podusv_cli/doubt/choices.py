@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from podusv_cli.core.component import Component
-from podusv_cli.scenario.address import content, described
+from podusv_cli.scenario.address import ValueRefused, content, described, with_values
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.keys import Key, limits
@@ -27,6 +28,7 @@ Singles = Mapping[str, Scenario]  # the scenario of each law, by its label
 Place = tuple[str, Route]  # a law's label, and where the value stands in the scenario of its run
 ITS_OWN = "the scenario's own"
 GRAVITY = 9.81  # m/s2
+BESIDE = 1.0123456789  # a factor on a time: whether it may be any, or whole steps only
 
 
 class Range(NamedTuple):
@@ -255,6 +257,7 @@ def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
     """
     base, key = _base(places, singles)
     tried = TRIED.get(base.name, lambda own: _values(key, own))(base.own)
+    tried = tried or _in_whole_steps(base, singles[places[0][0]], places[0][1])
     way = RANGES.get(str(places[0][1][0]), {})
     known = (*places, *_known(places, singles))
     if tried:
@@ -265,6 +268,21 @@ def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
         and (found := moves(base.own, singles[places[0][0]], key))
     ):
         yield replace(base, places=known, range=found)
+
+
+def _in_whole_steps(base: Choice, scenario: Scenario, route: Route) -> tuple[float, ...]:
+    """Half and twice a time that has to be whole steps, as the period of a sensor; else nothing."""
+    if base.unit != "s" or not isinstance(base.own, float) or not base.own:
+        return ()
+
+    def is_taken(value: float) -> bool:
+        with suppress(ValueRefused):
+            return bool(with_values(scenario, {route: value}))
+        return False
+
+    if is_taken(base.own * BESIDE):
+        return ()
+    return tuple(filter(is_taken, (base.own / 2.0, base.own * 2.0)))
 
 
 def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:

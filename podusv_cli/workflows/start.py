@@ -241,7 +241,7 @@ def _study(numbers: dict[str, float]) -> Iterator[str]:
         factor = f"times: {{lognormal: {{sigma: {scatter:g}, within: [0.1, 10]}}}}"
         yield f"    {name}: {{keys: [{', '.join(keys)}], {factor}}}"
     yield "doubt: # podusv doubt moves these alone and together"
-    yield "  printed: [vessel.m, measurement] # what was weighed, and what data sheets say"
+    yield "  printed: [vessel.m] # it was weighed"
     yield "  vary:"
     for name, scatter in SCATTER.items():
         for key in filter(numbers.get, FACTORS[name]):
