@@ -98,7 +98,9 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_curves_of_different_logs_meet_at_the_same_times"),
 ],
 "study": [
-    ("    for key, fault in of_numbers(made):\n", "    for key, fault in ():\n",
+    ("    for key, fault in of_numbers(made, scenario):\n", "    for key, fault in ():\n",
+     "test_a_draw_is_refused_where_loading_the_scenario_with_it_is"),
+    ("if sound is None or any(", "if sound is None and any(",
      "test_a_draw_is_refused_where_loading_the_scenario_with_it_is"),
     ("TRIED = np.array([0.000871, 0.381966, 0.998713])", "TRIED = np.array([0.0, 0.5, 1.0])",
      "test_a_drawn_time_has_to_fit_the_steps_as_a_given_one"),
@@ -305,6 +307,8 @@ TABLE: dict[str, list[Row]] = {
      "test_a_run_without_any_instant_has_no_numbers"),
 ],
 "engine": [
+    ("(*map(id, parts), *of_sea, names)", "(*map(id, parts), names)",
+     "test_a_sea_with_another_kernel_or_other_constants_is_of_another_structure"),
     ("rows = -(-self.reached // self.grid.log_every)", "rows = self.reached // self.grid.log_every",
      "test_a_place_has_the_last_row_that_was_logged"),
     ('"delay_line": [COUNT],', '"delay_line": [],',
