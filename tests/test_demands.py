@@ -52,30 +52,34 @@ class Sideways(Controller):
         return np.zeros(0)
 
 
-loop = replace(loop_with(Thrusters(OPTIONS)), controller=Sideways())
-plan = Plan(loop, TimeGrid(0.1, 20, hold_every=HOLD))
-check_law(plan)
-log = run(plan, compiled=False)
-assert log.status == "finished", log.message
-for name in ("tau_u", "tau_r", "tau_v"):
-    print(*log[name + "_cmd"], *log[name])
+for options, hold in CASES:
+    loop = replace(loop_with(Thrusters(**options)), controller=Sideways())
+    plan = Plan(loop, TimeGrid(0.1, 20, hold_every=hold))
+    check_law(plan)
+    log = run(plan, compiled=False)
+    assert log.status == "finished", log.message
+    for name in ("tau_u", "tau_r", "tau_v"):
+        print(*log[name + "_cmd"], *log[name])
 """
+LATE = {"command": {"delay": 0.3}}
+OPTIONS = ({}, LATE, {**LATE, "failure": {"time": 1.0, "effectiveness": 0.25}})
+CASES = [(options, hold) for options in OPTIONS for hold in (0, 5)]
 
 
-@pytest.mark.parametrize("hold", [0, 5])
-@pytest.mark.parametrize(
-    ("options", "late"),
-    [
-        ("", 0),
-        ("command={'delay': 0.3}", 3),
-        ("command={'delay': 0.3}, failure={'time': 1.0, 'effectiveness': 0.25}", 3),
-    ],
-)
-def test_a_third_demand_is_held_delayed_and_lost_like_the_others(options, late, hold):
-    program = textwrap.dedent(PROGRAM).replace("OPTIONS", options).replace("HOLD", str(hold))
+@pytest.fixture(scope="module")
+def logged():
+    """Demands asked for and got, shape (case, demand, 2, instant), all from one program."""
+    program = textwrap.dedent(PROGRAM).replace("CASES", repr(CASES))
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    asked, got = np.loadtxt(done.stdout.splitlines()).reshape(3, 2, -1).transpose(1, 0, 2)
+    return np.loadtxt(done.stdout.splitlines()).reshape(len(CASES), 3, 2, -1)
+
+
+@pytest.mark.parametrize("case", range(len(CASES)))
+def test_a_third_demand_is_held_delayed_and_lost_like_the_others(logged, case):
+    options, hold = CASES[case]
+    late = 3 if "command" in options else 0
+    asked, got = logged[case].transpose(1, 0, 2)
     expected = np.zeros_like(asked)
     expected[:, late:] = asked[:, : asked.shape[1] - late]
     expected[:, 10:] *= 0.25 if "failure" in options else 1.0

@@ -128,12 +128,12 @@ def test_a_study_is_complete_in_itself(podusv: Command, tmp_path: Path):
 
 
 def test_a_run_of_a_study_is_a_run_of_that_hull():
-    result = podusv.sweep("task.yaml", out="study")
+    result = podusv.sweep("task.yaml", out="study", figures=False)
     nominal = podusv.load("task.yaml").nominal.model_dump()
     for row in result.table.to_dict("records")[:4]:
         own = dict(zip(NAMES, HULLS[int(row["vessel"])].tolist(), strict=True))
         changes = {"vessel": {"preset": "cybership2", **own}, "nominal": nominal, "sweep": None}
-        assert podusv.run("task.yaml", changes).metrics["iae"] == row["iae"]
+        assert podusv.simulate("task.yaml", changes).metrics["iae"] == row["iae"]
 
 
 def test_an_environment_begins_on_a_drawn_hull():

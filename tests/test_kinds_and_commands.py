@@ -136,6 +136,7 @@ SLOW = {
     *((kind, "tune") for kind in ("pods", "sensors", "legs", "plug-in")),
     ("policy", "margins"), ("plug-in", "margins"),
     *((kind, "doubt") for kind in ("trial", "sensors", "pods")),
+    *((kind, "identify") for kind in ("legs", "policy")),
 }  # fmt: skip
 
 

@@ -110,7 +110,7 @@ def marched(between: str) -> np.ndarray:
 
 @pytest.mark.parametrize("between", ["linear", "hold"])
 def test_the_pods_do_what_a_plain_loop_says(between):
-    run = podusv.run(scenario(between))
+    run = podusv.simulate(scenario(between))
     track = marched(between)
     for i, name in enumerate(("x", "y", "psi", "u", "v", "r")):
         assert np.abs(run[name] - track[:, i]).max() < 1e-10, name
@@ -168,14 +168,14 @@ def test_a_run_s_own_commands_give_its_own_track(tmp_path, monkeypatch, boat, wi
     errors = []
     for step in (0.02, 0.01, 0.005):
         write("task.yaml", boat.replace("step: 0.01", f"step: {step}"))
-        run = podusv.run("task.yaml")
+        run = podusv.simulate("task.yaml")
         write("commands.csv", of_log(run))
         replay = {"kind": "schedule", "file": "commands.csv"}
-        errors.append(off(run, podusv.run("task.yaml", {"controller": replay})))
+        errors.append(off(run, podusv.simulate("task.yaml", {"controller": replay})))
     assert np.hypot(run["x"], run["y"]).max() > 2.0
     assert errors[1] < within
     assert errors[2] < errors[0] / 4.0
-    held = podusv.run("task.yaml", {"controller": {**replay, "between": "hold"}})
+    held = podusv.simulate("task.yaml", {"controller": {**replay, "between": "hold"}})
     assert off(run, held) > errors[2], "commands that are held come half a step late"
 
 
@@ -184,31 +184,31 @@ def test_commands_do_what_they_did_in_a_log_whatever_failed(tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     failing = {"actuator.failure": {"time": 9.1, "pod": 1, "effectiveness": 0.31}}
     write("task.yaml", BOAT)
-    run = podusv.run("task.yaml", failing)
+    run = podusv.simulate("task.yaml", failing)
     law = {"controller": {"kind": "schedule", "rows": of_log(run)}}
-    again = podusv.run("task.yaml", failing | law)
+    again = podusv.simulate("task.yaml", failing | law)
     assert off(run, again) < 1e-3
-    assert off(run, podusv.run("task.yaml", law)) > 0.1, "with a pod that does not fail"
+    assert off(run, podusv.simulate("task.yaml", law)) > 0.1, "with a pod that does not fail"
 
 
 def test_a_study_has_the_bits_of_runs_alone(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     drawn = {"draws": 9, "vary": {"vessel.m": {"times": {"uniform": [0.8, 1.2]}}}}
-    study = podusv.sweep(scenario(sweep=drawn), out="study")
+    study = podusv.sweep(scenario(sweep=drawn), out="study", figures=False)
     nominal = podusv.load(scenario()).nominal.model_dump()
     for row in study.table.to_dict("records")[:3]:
         changes = {"vessel.m": 41.3 * row["vessel.m"], "nominal": nominal}
-        assert podusv.run(scenario(), changes).metrics["energy"] == row["energy"]
+        assert podusv.simulate(scenario(), changes).metrics["energy"] == row["energy"]
 
 
 def test_columns_may_stand_in_any_order_and_fixed_angles_be_there():
-    one = podusv.run(scenario())
+    one = podusv.simulate(scenario())
     order = [2, 0, 3, 1]
     other = text([COMMANDS[i] for i in order], ROWS[:, order])
     asked = text(["t", "n_cmd_1 [1/s]", "n_cmd_2", "delta_cmd_1"])
     whole = text([*COMMANDS, "delta_2 [rad]"], np.column_stack([ROWS, np.zeros(len(ROWS))]))
     for rows in (other, whole, asked):
-        again = podusv.run(scenario(), {"controller.rows": rows})
+        again = podusv.simulate(scenario(), {"controller.rows": rows})
         assert again["x"].tolist() == one["x"].tolist()
 
 
@@ -216,8 +216,8 @@ def test_a_comparison_has_a_law_beside_recorded_commands(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("commands.csv", text())
     laws = {"pid": {"kind": "pid"}, "recorded": {"kind": "schedule", "file": "commands.csv"}}
-    made = podusv.compare(scenario(controllers=laws), out="both")
-    alone = podusv.run(scenario())
+    made = podusv.compare(scenario(controllers=laws), out="both", figures=False)
+    alone = podusv.simulate(scenario())
     assert made["recorded"]["x"].tolist() == alone["x"].tolist()
     assert np.any(made["pid"]["tau_u_cmd"])
 

@@ -51,7 +51,7 @@ def steered(session: Session, count: int = 10_000) -> Observation:
 def test_a_session_has_the_bits_of_the_run_that_it_leaves(name):
     """So does one that ends early, whose run is as long as it was."""
     source, changes = SCENARIOS[name]
-    duration = 0.5 if changes else 4.0
+    duration = 0.5 if changes else 2.0
     for count, end in ((10_000, duration), (3, 3 * PERIOD)):
         session = opened(source, duration, **changes)
         seen = steered(session, count)

@@ -101,7 +101,7 @@ def test_searches_take_the_training_sets_in_turn_and_the_first_set_is_that_of_a_
     optuna, tmp_path
 ):
     """The scenario's own gains, which every search tries first, tell the sets apart."""
-    changes = ("tune.repeats=2", "tune.budget=16", "tune.train=2", "tune.objective=median(iae)")
+    changes = ("tune.budget=8", "tune.batch=2", "tune.train=2", "tune.objective=median(iae)")
     single, several = tmp_path / "single", tmp_path / "several"
     alone = searched(single, *changes)
     sets = searched(several, *changes, "tune.training_sets=3")
