@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import count
+from itertools import count, islice
+from operator import length_hint
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -19,11 +20,12 @@ from podusv_cli.studies.counting.runs import STATUSES, Mask, Unit, UnitResult
 from podusv_cli.studies.counting.runs_file import stretches
 from podusv_cli.studies.making.plan import LawInCell, StudyPlan
 from podusv_cli.studies.making.store import Store
-from podusv_cli.studies.making.unit import crashed, make, prepare
+from podusv_cli.studies.making.unit import Part, alike, crashed, make_together, prepare
 
 FIRST = 8  # draws of a unit before it is known how long a run takes
 AIM = 4.0  # s of computing that a unit is to take
 MOST = 4096  # draws of a unit
+TOGETHER = 16  # units, at most, that are made in one process
 # Causes are part of runs.h5, which has the same bytes whichever executor made it.
 ENDED = "it ended its process, each time that it was made; provenance.json tells how"
 EARLY = 3.0  # s in which a rate says little, as no unit or few are made
@@ -101,21 +103,69 @@ class Processes:
 
     def __call__(self, units: Units, done: Done) -> bool:
         """As `Executor` says."""
-        # `map` asks again after the last unit, as units may be halved; a generator would not.
-        return run_each(map(self._job, units), done, workers=self.workers)
+        shares = _Shares(units, done, self.workers)
+        return run_each(shares, shares.done, workers=self.workers)
 
     @property
     def workers(self) -> int:
         """As asked for, or one a core."""
         return self.count or available_workers()
 
-    def _job(self, numbered: tuple[int, StudyPlan, Unit]) -> tuple[int, Job]:
-        number, plan, unit = numbered
-        return number, partial(timed, plan, unit)
-
     def provenance(self) -> dict[str, Any]:
         """Nothing: the workers are those of the machine."""
         return {}
+
+
+class _Shares:
+    """Jobs, each of a unit or of several that wait at once, numbered by its first.
+
+    A process begins by copying what this one has, which takes as long as a few short runs; and
+    runs of several units march side by side. If it is killed, each of its units has one of its own.
+    """
+
+    def __init__(self, units: Units, done: Done, workers: int) -> None:
+        self._units, self._done, self._workers = units, done, workers
+        self._parts = dict[int, list[tuple[int, StudyPlan, Unit]]]()
+        self._again = deque[tuple[int, StudyPlan, Unit]]()
+
+    def __iter__(self) -> Self:
+        return self
+
+    def __next__(self) -> tuple[int, Job]:
+        parts = [self._again.popleft()] if self._again else self._taken()
+        number = parts[0][0]
+        self._parts[number] = parts
+        return number, partial(_timed_together, [(plan, unit) for _, plan, unit in parts])
+
+    def _taken(self) -> list[tuple[int, StudyPlan, Unit]]:
+        """The next units: a process's share of those that are known to wait."""
+        first, waiting = next(self._units), length_hint(self._units)
+        return [first, *islice(self._units, min(TOGETHER - 1, waiting // self._workers))]
+
+    def done(self, number: int, outcome: Outcome) -> None:
+        """Tell the outcome of each unit."""
+        parts = self._parts.pop(number)
+        if outcome.killed and len(parts) > 1:
+            self._again.extend(parts)
+            return
+        results = outcome.result or [None] * len(parts)
+        for (own, _, _), result in zip(parts, results, strict=True):
+            self._done(own, replace(outcome, result=result))
+
+
+def _timed_together(
+    parts: Sequence[Part], progress: Callable[[float], None]
+) -> list[tuple[UnitResult, float]]:
+    """Units, each with its share of the processor time; those that are alike as one batch."""
+    kinds = [alike(part) for part in parts] if len(parts) > 1 else [""]
+    made: dict[int, tuple[UnitResult, float]] = {}
+    for kind in dict.fromkeys(kinds):
+        own = [i for i, other in enumerate(kinds) if other == kind]
+        began = time.process_time()
+        results = make_together([parts[i] for i in own])
+        each = (time.process_time() - began) / sum(result.unit.count for result in results)
+        made |= {i: (r, each * r.unit.count) for i, r in zip(own, results, strict=True)}
+    return [made[i] for i in range(len(parts))]
 
 
 class Driver:
@@ -199,9 +249,7 @@ def timed(
     plan: StudyPlan, unit: Unit, progress: Callable[[float], None]
 ) -> tuple[UnitResult, float]:
     """A unit, and the processor time that it took [s]."""
-    began = time.process_time()
-    result = make(plan, unit)
-    return result, time.process_time() - began
+    return _timed_together([(plan, unit)], progress)[0]
 
 
 def shard(draws: int, number: int, count: int) -> slice:

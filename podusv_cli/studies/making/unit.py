@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,8 +14,10 @@ from podusv_cli.engine.running.batch import Lazily, simulate_many
 from podusv_cli.engine.running.simulate import ready
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.studies.counting.runs import STATUSES, Unit, UnitResult
-from podusv_cli.studies.making.draws import drawing, draws
+from podusv_cli.studies.making.draws import Draw, drawing, draws
 from podusv_cli.studies.making.plan import StudyPlan
+
+Part = tuple[StudyPlan, Unit]
 
 
 def prepare(
@@ -42,16 +46,20 @@ def make(
 
     Raises KeyboardInterrupt, and then nothing is kept.
     """
+    return make_together([(plan, unit)], progress, grid)[0]
+
+
+def make_together(
+    parts: Sequence[Part], progress: Callable[[float], None] | None = None,
+    grid: TimeGrid | None = None,
+) -> list[UnitResult]:  # fmt: skip
+    """Simulate units whose loops differ in numbers alone, as one batch; otherwise as `make`."""
+    plan, unit = parts[0]
     scenario = plan.single(unit.law, unit.cell)
     grid, probe = grid or scenario.time_grid(), scenario.probe()
-    numbers = list(draws(plan.sweep, unit.first, unit.count, plan.stream))
-    drawn = drawing(scenario, plan.sweep.vary)
-
-    def loop(position: int) -> ClosedLoop:
-        return drawn(numbers[position]).closed_loop()
-
+    loops = [loop for part in parts for loop in _loops(*part)]
     done = simulate_many(
-        Lazily(unit.count, loop),
+        Lazily(len(loops), lambda position: loops[position]()),
         grid,
         probe=probe,
         workers=1,
@@ -60,11 +68,34 @@ def make(
     )
     if "interrupted" in done.status:
         raise KeyboardInterrupt
-    return UnitResult(
-        unit, probe.summaries(done.seen),
-        np.array([STATUSES.index(word) for word in done.status], np.uint8),
-        np.maximum(done.reached - 1, 0) * grid.step, tuple(map(str, done.cause)),
-    )  # fmt: skip
+    ends = np.cumsum([0, *(unit.count for _, unit in parts)]).tolist()
+    rows = [slice(first, stop) for first, stop in pairwise(ends)]
+    return [
+        UnitResult(
+            unit, probe.summaries(done.seen[own]),
+            np.array([STATUSES.index(word) for word in done.status[own]], np.uint8),
+            np.maximum(done.reached[own] - 1, 0) * grid.step, tuple(map(str, done.cause[own])),
+        )
+        for (_, unit), own in zip(parts, rows, strict=True)
+    ]  # fmt: skip
+
+
+def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
+    """What makes the loop of each of a unit's draws."""
+    drawn = drawing(plan.single(unit.law, unit.cell), plan.sweep.vary)
+
+    def loop(draw: Draw) -> ClosedLoop:
+        return drawn(draw).closed_loop()
+
+    numbers = draws(plan.sweep, unit.first, unit.count, plan.stream)
+    return [partial(loop, draw) for draw in numbers]
+
+
+def alike(part: Part) -> str:
+    """What units have in common whose loops differ in numbers alone."""
+    plan, unit = part
+    law = plan.single(unit.law, unit.cell).controller.model_dump()
+    return repr((unit.law, unit.cell, {k: v for k, v in law.items() if not isinstance(v, float)}))
 
 
 def crashed(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:

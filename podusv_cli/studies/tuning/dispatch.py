@@ -40,6 +40,10 @@ class Driver:
         """The units; more may come while some are under way."""
         return self
 
+    def __length_hint__(self) -> int:
+        """How many units wait."""
+        return len(self._waiting)
+
     def __next__(self) -> tuple[int, StudyPlan, Unit]:
         """The next unit, with its number and its study."""
         if self.failure or not self._waiting:
