@@ -26,6 +26,7 @@ from podusv_cli.identify.estimate import (
     OPEN,
     SILENT,
     Estimate,
+    Scored,
     Search,
     covariance,
     directions,
@@ -682,3 +683,14 @@ def test_the_errors_of_a_mean_are_those_of_its_blocks():
     found = covariance(search.scored(np.array([means.mean() / 1e3])), 1)[0, 0] * 1e6
     assert found == pytest.approx(np.var(means, ddof=1) / blocks, rel=1e-3)
     assert found > 20.0 / (blocks * each)  # what the curvature says of independent values is 1 / n
+
+
+def test_errors_are_finite_where_one_block_says_nearly_all_there_is():
+    """Values without noise make numbers sure to ten digits beside others that nothing shows."""
+    rng = np.random.default_rng(1)
+    way, other = rng.standard_normal((2, 12))
+    by_values = np.array([1e13 * np.outer(way, way), 1e3 * np.outer(other, other)])
+    found = covariance(Scored(0.0, np.zeros((2, 12)), by_values, np.zeros((2, 12, 12))), 12)
+    values = np.linalg.eigvalsh(found)
+    assert values[:2] == pytest.approx(np.zeros(2), abs=0.01)
+    assert values[2:] == pytest.approx(np.ones(10), abs=0.02)

@@ -188,9 +188,12 @@ def covariance(at: Scored, hull: int = 0) -> Vector:
     if not np.all(np.isfinite(whole)):
         return np.full_like(whole, np.nan)
     # In coordinates in which the covariance by the curvature is 1.
-    root = np.linalg.cholesky(2.0 * np.linalg.inv(whole))
+    stiffness, axes = np.linalg.eigh(whole)
+    stiffness = np.maximum(stiffness, 2.0)  # but for rounding, as the prior's part is
+    root = axes * np.sqrt(2.0 / stiffness)
     hidden, basis = np.linalg.eigh(0.5 * root.T @ each @ root)
-    freed = np.einsum("bij,bj,bkj,bk->bi", basis, (1.0 - hidden) ** -0.5, basis, at.slopes @ root)
+    left = np.maximum(1.0 - hidden, 2.0 / stiffness[-1])  # at least the prior's part
+    freed = np.einsum("bij,bj,bkj,bk->bi", basis, left**-0.5, basis, at.slopes @ root)
     by_blocks = 0.25 * freed.T @ freed + root.T @ root
     return _bounded(root @ _bounded(by_blocks, 1.0, np.inf) @ root.T, 0.0, 1.0)
 
