@@ -14,7 +14,8 @@ from podusv_cli.figures import drawing
 from podusv_cli.workflows import compare, execute
 
 MINUTES = LONG + TWO.splitlines()[-1] + "\n"
-RUN, COMPARE = ("run", "long.yaml", "--no-figures"), ("compare", "long.yaml", "--no-figures")
+RUN = ("run", "long.yaml", "--no-figures", "--controller", "soft")  # which says nothing more
+COMPARE = ("compare", "long.yaml", "--no-figures")
 RERUNS = [("rerun", "x"), ("rerun", "both")]
 PLACED = [("plot", "x"), ("verify", "long.yaml")]
 
