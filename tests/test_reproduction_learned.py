@@ -58,3 +58,15 @@ def test_the_shipped_policy_follows_the_paper_s_target_without_turning_round(per
     assert run.metrics["z_e_steady"] < 0.1
     assert run.metrics["iae"] < 1.1 * 214.3  # that of velocity_vector
     assert abs(run["psi"][-1]) / math.tau < 2.0
+
+
+def test_the_page_has_the_comparison_with_searched_gains():
+    judged = pd.read_csv(ROOT / "results/tuning/learned/judged.csv")
+    for pair in judged.query("metric == 'iae'").itertuples():
+        row = (
+            f"| {pair.b} | {pair.ratio:.3f} [{pair.ratio_low:.3f}, {pair.ratio_high:.3f}] "
+            f"| {100 * pair.a_wins:.1f} %, {100 * pair.b_wins:.1f} %"
+        )
+        assert row in PAGE
+    beyond = judged.query("metric == 'iae_e'").iloc[0]
+    assert f"beyond it the policy is better in {100 * beyond.a_wins:.1f} % of the draws" in PAGE
