@@ -200,6 +200,26 @@ def test_the_pairs_that_are_named_are_those_of_the_search(case):
         assert told == [f"{row[name]:.3f}" for name in ("ratio", "ratio_low", "ratio_high")]
 
 
+def test_what_training_sets_and_seeds_move_is_that_of_the_searches():
+    found = tuning_table("hull", "spread")
+    medians = found.groupby("law")["median"].median()
+    laws = tuning_table("hull", "laws").set_index("law").repeats_median
+    assert medians.to_dict() == pytest.approx(laws.to_dict(), rel=1e-5)
+    table = np.log(found.set_index(["law", "training_set", "search"])["median"].unstack())
+    within = table.var(axis=1).groupby("law").mean()
+    between = table.mean(axis=1).groupby("law").var() - within / table.shape[1]
+    sets, seeds = (100 * np.sqrt(part.clip(lower=0.0)) for part in (between, within))
+    (named, low, high, most, least, largest) = re.search(
+        r"The training set moves (.*?) by (\d+) to (\d+) % .*? at most (\d+) %; "
+        r"the tuner's seed moves laws by (\d+) to (\d+) % on one set",
+        " ".join(section("hull").split()),
+    ).groups()
+    moved = sets[re.findall(r"`(\w+)`", named)]
+    rest = sets.drop(moved.index).max()
+    told = [moved.min(), moved.max(), rest, seeds.min(), seeds.max()]
+    assert [low, high, most, least, largest] == [f"{share:.0f}" for share in told]
+
+
 # --- gains judged on other hulls
 
 JUDGED = {
