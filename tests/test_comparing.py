@@ -88,7 +88,7 @@ def test_the_table_is_the_same_in_every_form(done):
     assert [label for label, cell in cells.items() if "*" in cell] == [best]
     latex = (done.folder / "comparison.tex").read_text()
     assert r"\toprule" in latex
-    whole, point, rest = f"{iae_e[best]:.5g}".partition(".")
+    whole, point, rest = f"{iae_e[best]:.3g}".partition(".")
     assert rf"\textbf{{{whole}}} & \textbf{{{point}{rest}}}" in latex
     nearer = next(line for line in markdown.splitlines() if line.endswith("| `iae` |"))
     assert "*" not in nearer  # the laws keep a standoff: being nearer is not better

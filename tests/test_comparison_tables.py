@@ -117,9 +117,9 @@ def test_latex_escapes_and_marks():
     frame = table.table({"a_b&~^\\{}": {"iae": 1.0}, "#$%": {"iae": 2.0}})
     lines = table.as_latex(frame).splitlines()
     first = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\}"
-    head = rf"\multicolumn{{2}}{{c}}{{{first}}} & \multicolumn{{3}}{{c}}{{\#\$\%}} \\"
-    assert lines[3].endswith(head)
-    assert lines[5] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} &  & 2 &  & (2) \\"
+    head = rf"\multicolumn{{2}}{{c}}{{{first}}} & \multicolumn{{2}}{{c}}{{\#\$\%}} \\"
+    assert lines[4].endswith(head)
+    assert lines[6] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} &  & 2 &  \\"
 
 
 def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
@@ -128,19 +128,17 @@ def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     runs = {"a": numbers | {"path_time": 7.5}, "b": {"effort_r": 3.25e12, "ise": 4e-2}, "c": lost}
     text = table.as_latex(table.table(runs))
     rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines()]
-    by_row = {row[0]: row[1:] for row in rows[5:-2]}
+    by_row = {row[0]: row[1:] for row in rows[6:-2]}
     assert by_row[r"$\int z_e^2\,\mathrm{d}t$"] == [
         "m$^2$ s", r"\textbf{\boldmath 2}", r"\textbf{\boldmath $\times10^{-9}$}",
-        "0", ".04", r"(2$\times10^{7}$)", "1", "", r"(5$\times10^{8}$)",
+        "0", ".04", "1", "",
     ]  # fmt: skip
-    assert by_row[r"$\int\tau_r^2\,\mathrm{d}t$"][3:6] == [
-        "3", r".25$\times10^{12}$", r"(2.5$\times10^{5}$)",
-    ]  # fmt: skip
+    assert by_row[r"$\int\tau_r^2\,\mathrm{d}t$"][3:5] == ["3", r".25$\times10^{12}$"]
     words = METRICS["saturated_fraction"].row
-    assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.5}", "-", "", "", "-", "", ""]
-    assert by_row[METRICS["path_time"].row][-3:] == ["never", "", ""]
-    columns = text.splitlines()[1].partition("{tabular}")[2].replace("@{}", "").replace("@{ }", "")
-    assert {len(row) for row in rows[5:-2]} == {len(columns) - 2}
+    assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.5}", "-", "", "-", ""]
+    assert by_row[METRICS["path_time"].row][-2:] == ["never", ""]
+    columns = text.splitlines()[2].partition("{tabular}")[2].replace("@{}", "")
+    assert {len(row) for row in rows[6:-2]} == {len(columns) - 2}
     assert "booktabs" in text.splitlines()[0]
 
 

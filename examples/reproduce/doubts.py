@@ -29,7 +29,7 @@ change: a hull with or without Coriolis terms, a hull that laws know wrongly, an
 Made by `make doubt`; [docs/doubt.md](../docs/doubt.md) says what was moved, and \
 how. All of it is simulation.
 
-| paper | claims | {words} |
+| paper, or studies | claims | {words} |
 |---|---|{rule}
 {papers}
 
@@ -38,6 +38,10 @@ further away or by another word (under conditions). In combination only: in some
 numbers at once, and by no single value. Robust where it can tell: some values or draws leave the \
 claim without an answer. By construction: nothing that was moved changes one of its numbers. What \
 a paper prints stays: `doubt` in `configs/*/base.yaml` and `configs/mu_2017/claims.yaml`.
+
+Claims of `studies` are about many draws. Here each study has 200, where its page has 500 to 10 000 \
+([studies.md](studies.md), [learned.md](learned.md)): what cannot tell here may be told there. One value at a time \
+is changed that the study does not draw, the seed of its draws among them.
 
 | claim | verdict | hangs on | in draws | nearest | of its scale | if the task may change |
 |---|---|---|---|---|---|---|

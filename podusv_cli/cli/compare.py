@@ -51,7 +51,7 @@ def compare(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="Show only this in the table here; repeatable.",
+            help="Show only this in tables, here and in .md and .tex; repeatable.",
             autocompletion=completion.metrics,
         ),
     ] = None,

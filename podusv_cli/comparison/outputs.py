@@ -47,6 +47,7 @@ class Result:
     warnings: Mapping[str, Sequence[Finding]]
     metrics: Mapping[str, MetricAbout] = field(default_factory=lambda: METRICS)  # of the table
     peaks: Mapping[str, float] = field(default_factory=dict)  # of signals, as claims name them
+    chosen: Sequence[str] = ()  # metrics that tables for readers are to have; none: all, headlines
     doubts: Sequence[Sequence[str]] = ()  # head and rows of what verdicts hang on, if asked for
     plugins: Plugins = ()  # of all runs
     meanings: Mapping[str, str] = field(default_factory=dict)  # of the codes of warnings
@@ -69,16 +70,20 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
     Clock readings have a file of their own, so that all others come out the same every time.
     """
     lasting = result.table.only(result.table.rows.keys() - CLOCKED)
+    headlines = [name for name in lasting.rows if result.metrics[name].headline]
     times = table.numbers(result.table.only(CLOCKED))
     judged = [verdict for verdict in result.verdicts if not verdict.timed]
     timed = [verdict for verdict in result.verdicts if verdict.timed]
     forms: dict[str, Callable[[], bytes]] = {
         TABLE: lambda: table.as_csv(lasting, result.metrics).encode(),
         "comparison.md": lambda: table.as_markdown(
-            lasting, result.endings, result.metrics, result.unsettled
+            lasting.only(result.chosen or lasting.rows),
+            result.endings,
+            result.metrics,
+            result.unsettled,
         ).encode(),
         "comparison.tex": lambda: table.as_latex(
-            lasting, result.metrics, result.unsettled
+            lasting.only(result.chosen or headlines), result.metrics, result.unsettled
         ).encode(),
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
     }

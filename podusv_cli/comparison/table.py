@@ -26,7 +26,11 @@ NOTE = (
 )
 DIGITS = 5  # of a number
 FEW = 3  # where there is room for the numbers alone
-PACKAGES = "% needs \\usepackage{booktabs}; numbers stand in two columns each, cut at their point"
+PACKAGES = (
+    "% needs \\usepackage{booktabs,graphicx}; numbers stand in two columns each, cut at their point"
+)
+# As wide as it is, and scaled to a column of the text where that is wider.
+FITTED = r"\resizebox{\ifdim\width>\columnwidth\columnwidth\else\width\fi}{!}{%"
 NUMBER = re.compile(r"(-?\d+)(\.\d+)?(?:e([+-]\d+))?")
 Names = Collection[str]
 
@@ -234,37 +238,31 @@ def as_markdown(
 def as_latex(
     frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
 ) -> str:
-    """The table in LaTeX: symbols or words, decimal points aligned, the best of a row in bold.
+    """The table in LaTeX, no wider than a column of the text.
 
-    Every number takes two columns, before and from its decimal point on; a run but the first has a
-    third with the ratio to the first.
+    Symbols or words, numbers of FEW digits with their decimal points aligned, the best of a row in
+    bold. Every number takes two columns, before and from its decimal point on.
     """
-    spans = [2, *[3] * (len(frame.columns) - 1)]
-    labels = (
-        rf"\multicolumn{{{span}}}{{c}}{{{escaping.latex(label)}}}"
-        for span, label in zip(spans, frame.columns, strict=True)
-    )
+    labels = (rf"\multicolumn{{2}}{{c}}{{{escaping.latex(label)}}}" for label in frame.columns)
     lines = [" & ".join([*HEAD, *labels])]
-    for metric, texts in rows(frame, known, unsettled):
+    for metric, texts in rows(frame, known, unsettled, brief=True):
         shown = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
-        parts = [part for span, text in zip(spans, texts, strict=True) for part in _cut(text, span)]
+        parts = [part for text in texts for part in _cut(text)]
         lines.append(" & ".join([shown, quantities.raised(metric.unit), *parts]))
-    columns = "ll" + "".join("r@{}l" if span == 2 else "r@{}l@{ }r" for span in spans)
     top, *body = (rf"{line} \\" for line in lines)
-    opening = [PACKAGES, rf"\begin{{tabular}}{{{columns}}}", r"\toprule", top, r"\midrule"]
-    return "\n".join([*opening, *body, r"\bottomrule", r"\end{tabular}", ""])
+    columns = "ll" + "r@{}l" * len(frame.columns)
+    opening = [PACKAGES, FITTED, rf"\begin{{tabular}}{{{columns}}}", r"\toprule", top, r"\midrule"]
+    return "\n".join([*opening, *body, r"\bottomrule", r"\end{tabular}}", ""])
 
 
-def _cut(text: str, span: int) -> list[str]:
-    """A cell in so many parts: up to the decimal point, the rest of the number, the ratio."""
-    number, _, ratio = text.partition(" ")
-    whole, point, power = _parts(number.removesuffix("*"))
+def _cut(text: str) -> list[str]:
+    """A number up to its decimal point, and the rest."""
+    whole, point, power = _parts(text.removesuffix("*"))
     cut = [whole, point + power]
-    if number.endswith("*"):
+    if text.endswith("*"):
         bold = r"\boldmath " if power else ""
         cut = [part and rf"\textbf{{{bold}{part}}}" for part in cut]
-    ratio = ratio and f"({''.join(_parts(ratio.strip('()')))})"
-    return [*cut, *([ratio] if span > 2 else [])]
+    return cut
 
 
 def _parts(number: str) -> tuple[str, str, str]:
