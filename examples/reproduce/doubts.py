@@ -39,9 +39,10 @@ numbers at once, and by no single value. Robust where it can tell: some values o
 claim without an answer. By construction: nothing that was moved changes one of its numbers. What \
 a paper prints stays: `doubt` in `configs/*/base.yaml` and `configs/mu_2017/claims.yaml`.
 
-Claims of `studies` are about many draws. Here each study has 200, where its page has 500 to 10 000 \
-([studies.md](studies.md), [learned.md](learned.md)): what cannot tell here may be told there. One value at a time \
-is changed that the study does not draw, the seed of its draws among them.
+Claims of `studies` are about many draws. Here each study has 200, where its page has 500 to \
+10 000 ([studies.md](studies.md), [learned.md](learned.md)): what cannot tell here may be told \
+there. One value at a time is changed that the study does not draw, the seed of its draws among \
+them.
 
 | claim | verdict | hangs on | in draws | nearest | of its scale | if the task may change |
 |---|---|---|---|---|---|---|
