@@ -123,6 +123,11 @@ def test_ranges_have_the_unit_of_the_key_they_are_about():
     assert scenario.identify.noise == {"sigma_psi": math.radians(1)}
 
 
+def test_no_unit_stands_for_several_keys_that_have_not_all_of_it():
+    drawn = "sweep.vary.drawn={keys: [start.x, start.u], uniform: [0, 1 kn]}"
+    assert "kn does not fit" in " ".join(told(SOUND, [drawn]))
+
+
 def test_cells_of_a_grid_are_those_of_plain_numbers():
     plain = (SOUND + STUDY).replace("[10 ms, 20 ms]", "[0.01, 0.02]").replace("[1 ft]", "[0.3048]")
     assert cells(loaded(SOUND + STUDY)) == cells(loaded(plain))

@@ -188,8 +188,10 @@ class Key:
         """This entry of `sweep.vary` (see OF_KEYS), whose numbers are those of the keys `names`."""
         home = OF_KEYS[self.path[:-1]]
         places = [(*home, name.rpartition(".")[2]) if home else route(name) for name in names]
-        targets = [key for place in places for key in self.top.follow(place)]
-        units = dict.fromkeys(key.unit or PURE for key in targets)
+        each = [[*self.top.follow(place)] for place in places]
+        targets = [key for keys in each for key in keys]
+        known = [dict.fromkeys(key.unit or PURE for key in keys) for keys in each]
+        units = [unit for unit in known[0] if all(unit in others for others in known)]
         several = bool(targets) and get_args(self.annotation)[1:] == (Ellipsis,)
         inner = (targets[0].annotation, Ellipsis) if several else ()
         return replace(
