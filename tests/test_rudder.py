@@ -67,10 +67,15 @@ def test_demands_in_reach_are_made_with_thrust_for_the_drag(u):
 
 def test_what_a_rudder_cannot_make_is_said():
     own = actuator()
-    for demand, saturated in (((3.0, 0.2), 0.0), ((-1.0, 0.2), 1.0), ((3.0, 9.0), 1.0)):
-        signals = np.zeros(len(own.signals))
+    tried = (
+        (0.0, (3.0, 0.2), 0.0), (0.0, (-1.0, 0.2), 1.0), (0.0, (3.0, 9.0), 1.0),
+        (0.0, (1.0, 0.153), 0.0),
+        (-0.6, (1.0, 0.153), 1.0),  # going astern, when a slower stream makes the thrust
+    )  # fmt: skip
+    for u, demand, saturated in tried:
+        signals, x = np.zeros(len(own.signals)), np.array([0.0, 0.0, 0.0, u, 0.0, 0.0])
         call(
-            own.drive, x=np.zeros(6), state=np.array([12.0, 0.0]), demand=np.array(demand),
+            own.drive, x=x, state=np.array([12.0, 0.0]), demand=np.array(demand),
             k=bundle(own.constants()), table=own.table(), tau=np.zeros(3), rate=np.zeros(2),
             signals=signals,
         )  # fmt: skip

@@ -28,6 +28,7 @@ from podusv_cli.core.kinematics import direction
 
 LEAST = 1e-300  # N, so that a propeller at rest divides nothing by 0
 ROUNDS = 6  # until angle and propeller speed agree; each leaves a sixth of the error or less
+AGREED = 1.001  # of the largest angle: more is out of reach
 
 
 @kernel
@@ -62,13 +63,14 @@ def steered(T: float, angle: float, flow: float, pod: Vector, k: Any, out: Vecto
     """
     along, across = force(T, angle)
     most = min(pod[ANGLE], pod[STALL])
-    n, delta = speed_for(along, flow, pod, k), 0.0
+    n, delta, wanted = speed_for(along, flow, pod, k), 0.0, 0.0
     if along < 0.0 or n <= 0.0:
         out[0], out[1] = max(n, -pod[N_ASTERN]), 0.0
         return bool(across == 0.0 and n >= -pod[N_ASTERN])
     for _ in range(ROUNDS):
         cosine, sine = cos_sin(delta)
         n = speed_for(along + across * sine / cosine, flow, pod, k)
-        delta = min(max(across / (pod[LIFT] * n * n * cosine + LEAST), -most), most)
+        wanted = across / (pod[LIFT] * n * n * cosine + LEAST)
+        delta = min(max(wanted, -most), most)
     out[0], out[1] = min(n, pod[N_AHEAD]), delta
-    return bool(n <= pod[N_AHEAD])
+    return bool(n <= pod[N_AHEAD] and abs(wanted) <= AGREED * most)
