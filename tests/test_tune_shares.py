@@ -52,6 +52,16 @@ def test_gains_that_are_words_part_units():
     assert len({alike(part) for part in with_word}) == 2
 
 
+def test_a_number_that_changes_the_structure_makes_no_run_invalid():
+    """Without `hold_below` full backstepping takes no samples."""
+    parts = [searched({"hold_below": distance}, 2) for distance in (0.0, 0.2)]
+    assert len({alike(part) for part in parts}) == 1
+    for part, result in zip(parts, make_together(parts), strict=True):
+        alone = make(*part)
+        assert (result.causes, result.status.tolist()) == (alone.causes, alone.status.tolist())
+        assert result.metrics["e_steady"].tolist() == alone.metrics["e_steady"].tolist()
+
+
 class Waiting:
     """So many units of two runs, all of which wait."""
 

@@ -53,7 +53,11 @@ def make_together(
     parts: Sequence[Part], progress: Callable[[float], None] | None = None,
     grid: TimeGrid | None = None,
 ) -> list[UnitResult]:  # fmt: skip
-    """Simulate units whose loops differ in numbers alone, as one batch; otherwise as `make`."""
+    """Simulate units that are `alike`, as one batch; otherwise as `make`.
+
+    A unit with runs that the batch refuses is made once more by itself, as a number such as
+    `hold_below` may change the structure of a law.
+    """
     plan, unit = parts[0]
     scenario = plan.single(unit.law, unit.cell)
     grid, probe = grid or scenario.time_grid(), scenario.probe()
@@ -70,7 +74,7 @@ def make_together(
         raise KeyboardInterrupt
     ends = np.cumsum([0, *(unit.count for _, unit in parts)]).tolist()
     rows = [slice(first, stop) for first, stop in pairwise(ends)]
-    return [
+    made = [
         UnitResult(
             unit, probe.summaries(done.seen[own]),
             np.array([STATUSES.index(word) for word in done.status[own]], np.uint8),
@@ -78,6 +82,13 @@ def make_together(
         )
         for (_, unit), own in zip(parts, rows, strict=True)
     ]  # fmt: skip
+    if len(parts) == 1:
+        return made
+    refused = [STATUSES.index("invalid") in result.status for result in made]
+    return [
+        make(*part, progress, grid) if again else result
+        for part, result, again in zip(parts, made, refused, strict=True)
+    ]
 
 
 def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
@@ -92,7 +103,7 @@ def _loops(plan: StudyPlan, unit: Unit) -> list[Callable[[], ClosedLoop]]:
 
 
 def alike(part: Part) -> str:
-    """What units have in common whose loops differ in numbers alone."""
+    """What units have in common whose loops differ in numbers, and hardly ever in structure."""
     plan, unit = part
     law = plan.single(unit.law, unit.cell).controller.model_dump()
     return repr((unit.law, unit.cell, {k: v for k, v in law.items() if not isinstance(v, float)}))
