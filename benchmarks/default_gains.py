@@ -2,7 +2,7 @@
 
     .venv/bin/python -m benchmarks.default_gains [LAW]...
 
-The table of docs/laws.md: hulls that the rules were not made on, at 10 Hz, on a line and on legs.
+A table of results/laws.md: hulls that no rule was made on, at 10 Hz, on a line and on legs.
 """
 
 from __future__ import annotations
