@@ -113,10 +113,17 @@ def rows(page: str) -> list[list[str]]:
     return [[cell.strip().replace(r"\|", "|") for cell in row] for row in cells]
 
 
-def test_every_metric_is_documented_with_its_unit_and_meaning() -> None:
-    documented = {tuple(row[:3]) for row in rows("docs/metrics.md")}
-    assert documented == {(f"`{m.name}`", m.unit, m.meaning) for m in METRICS.values()}
-    counting = {row[0][1:-1] for row in rows("docs/metrics.md") if "with the standoff" in row[4]}
+def test_every_metric_is_documented_with_its_unit_and_definition() -> None:
+    documented = rows("docs/metrics.md")
+    assert len(documented) == len(METRICS)
+    assert {tuple(row[:2]) for row in documented} == {
+        (f"`{m.name}`", m.unit) for m in METRICS.values()
+    }
+    assert all(row[2] for row in documented)
+    margins = {row[0][1:-1]: row[2] for row in documented if len(row) == 3}
+    assert len(margins) > 10
+    assert margins == {m.name: m.meaning for m in METRICS.values() if m.name in margins}
+    counting = {row[0][1:-1] for row in documented if "with the standoff" in row[-1]}
     assert counting == {m.name for m in METRICS.values() if m.counts_standoff}
 
 
