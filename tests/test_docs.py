@@ -175,7 +175,7 @@ def test_every_option_of_the_errata_exists(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     podusv = commanded(monkeypatch, capsys)
-    errata = text_of("docs/model.md").partition("## Errata of the paper")[2]
+    errata = text_of("results/errata.md")
     options = re.findall(r"\| option, (.*) \|$", errata, re.M)
     names = [name for words in options for name in re.findall(r"`([\w.]+)`", words)]
     assert len(names) > 8
