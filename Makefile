@@ -31,7 +31,7 @@ JUDGES := fresh cybership2 otter
 LEFEBER := circle line port load damping
 FOSSEN := course cybership2 damping load limits beside
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
-JUDGED := hull_and_sea unknown_dynamics rivals rivals_earth rivals_cybership2 learned
+JUDGED := hull_and_sea unknown_dynamics rivals learned
 DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN))
 
 .DEFAULT_GOAL := help
