@@ -82,7 +82,7 @@ sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/
 	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
 	@echo "what was found: results/sea.md; every table and figure: results/.runs/sea/*/report.html"
 
-doubt: $(VENV)/run.done ## what the verdicts on papers and studies hang on, into results/doubt.md, an hour on two cores
+doubt: $(VENV)/run.done ## what the verdicts on papers and studies hang on, into results/doubt.md, half an hour on two cores
 	@for name in $(DOUBTED); do \
 	    echo "  $$name" && mkdir -p results/.doubt/$${name%/*} && \
 	    $(BIN)/podusv doubt configs/$$name.yaml --out results/.doubt/$$name --force -q || exit 1; \
