@@ -9,6 +9,7 @@ import pytest
 from command_samples import ROOT, commanded
 from hull_ratios import ratios, scatter, table
 
+import podusv as library
 from podusv_cli.components.vessels.estimated import HOERNER, SCATTER, Hull, estimated
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.init import SCHEMA
@@ -149,6 +150,18 @@ def test_of_hulls_that_dimensions_leave_possible_laws_fail_as_the_page_says(podu
     assert {row["law"]: row["failed"] for row in rows} == {"los_pid": 0.0, "alos": 0.31}
     said = podusv("doubt", "boat.yaml", "--no-figures", "--set", "doubt.draws=8")
     assert "8 of 8" in said.out
+
+
+def test_the_wind_of_the_comment_comes_from_where_it_says(podusv):
+    """A boat that heads north is pushed to port, to the west."""
+    podusv("start", "boat", *BOATS["catamaran"])
+    line = next(x for x in Path("boat.yaml").read_text().splitlines() if "kind: wind" in x)
+    wind, _, says = line.partition(" # ")[2].partition("}: ")
+    assert says == "from the east"
+    scenario = load("boat.yaml", [f"disturbance={wind}}}", "simulation.duration=1"]).scenario
+    run = library.simulate(scenario.singles()["los_pid"])
+    assert run["b_v"][0] < -10.0
+    assert abs(run["psi"][0]) < 1e-9
 
 
 def test_units_are_those_of_scenarios(podusv):
