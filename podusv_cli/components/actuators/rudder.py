@@ -27,7 +27,7 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction
 
 LEAST = 1e-300  # N, so that a propeller at rest divides nothing by 0
-ROUNDS = 6  # until angle and propeller speed agree; of forces 80 deg from ahead they leave 2 % and more
+ROUNDS = 6  # until angle and propeller speed agree; 80 deg from ahead they leave 2 % and more
 AGREED = 1.001  # of the largest angle: more is out of reach
 
 
