@@ -318,9 +318,11 @@ def test_the_sentences_about_other_hulls_are_those_of_the_runs():
     )
     before = 100 * other.failed_before[["adrc", "hand_position", "pid"]]
     assert f"too, in {before.min():.0f} to {before.max():.0f} %" in words
-    laws = ("adaptive_crab", "dsc", "full_backstepping", "adaptive_neural")
-    told = "in {:.0f}, {:.0f}, {:.0f} and {:.0f} % of the draws"
+    laws = ("adaptive_crab", "dsc", "pid", "full_backstepping", "adaptive_neural")
+    told = "in {:.0f}, {:.0f}, {:.0f}, {:.0f} and {:.0f} % of the draws"
     assert told.format(*(100 * otter.failed_after_high[law] for law in laws)) in words
+    usual = 100 * otter.failed_after["full_backstepping"]
+    assert f"the median set of `full_backstepping` in {usual:.0f} %" in words
     held = [one.held_after.sum() for one in (other, fresh, otter)]
     assert f"{held[0]} of the 280 sets hold all of them there" in words
     assert f"{held[1]} of 280 sets do, on the Otter" in words
