@@ -5,7 +5,7 @@ astern, whose stream goes the other way. Sources: n^2 delta is M. Caccia, G. Bru
 practical approach to modeling and identification of small autonomous surface craft", IEEE J.
 Oceanic Eng. 33 (2008); a normal force that is side force and drag is H. Yasukawa, Y. Yoshimura,
 "Introduction of MMG standard method for ship maneuvering predictions", J. Mar. Sci. Technol. 20
-(2015), whose t_R and a_H are left to lift and hull here.
+(2015), whose t_R and a_H are left to lift and hull here. Both are recalled, not read.
 """
 
 from __future__ import annotations
