@@ -31,6 +31,7 @@ ACROSS = 4  # small panels in a row
 PANEL = 1.35  # inches, the height of a small panel
 TOP = 2.0  # times the scenario's objective, where an axis ends
 DECADE = 10.0  # largest over least number, from where an axis is logarithmic
+MIDDLE = (0.25, 0.5, 0.75)  # quantiles of the searches of a law
 WHOLE: dict[str, Any] = {"s": 3.0, "linewidths": 0.0, "zorder": 3.0}
 PRUNED: dict[str, Any] = {"s": 5.0, "linewidths": 0.35, "zorder": 2.0}  # or cut
 SMALL: dict[str, Any] = {"fontsize": 6.5}
@@ -50,8 +51,9 @@ def sketches(results: SearchResults) -> Iterator[Sketch]:
         yield Sketch(
             "effort",
             f"error against effort: the median {results.shown[0]} over the median total variation "
-            "of the surge demand on the fresh draws; hollow before, filled after each search of a "
-            "law, failed runs counted as the worst; down and to the left is better",
+            "of the surge demand on the fresh draws; hollow before, filled after the search, the "
+            "median of a law's searches with lines over their middle half; failed runs count as "
+            "the worst; down and to the left is better",
             partial(effort, results.effort, results.shown[0]),
         )
     if results.winners:
@@ -130,16 +132,20 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
 
 
 def effort(table: pd.DataFrame, metric: str) -> Figure:
-    """Error over variation of the demand: each law before, and after each of its searches."""
+    """Error over variation of the demand: each law before, and the middle half of its searches."""
     figure = new_figure(COLUMNS, 3.4)
     axes = figure.add_subplot()
     for place, (law, rows) in enumerate(table.groupby("law", sort=False)):
         colour, _, marker = nth_style(place)
         look: dict[str, Any] = {"marker": marker, "color": colour, "linestyle": "none"}
         for before, some in rows.groupby("before"):
+            (left, x, right), (low, y, high) = (
+                some[name].quantile(MIDDLE) for name in ("variation", "error")
+            )
+            axes.plot([left, right], [y, y], color=colour, linewidth=0.8)
+            axes.plot([x, x], [low, high], color=colour, linewidth=0.8)
             axes.plot(
-                some.variation, some.error, markersize=4.5,
-                markerfacecolor="none" if before else colour,
+                x, y, markersize=4.5, markerfacecolor="none" if before else colour,
                 label=None if before else escaping.figure(str(law)), **look,
             )  # fmt: skip
     known = table.replace(np.inf, np.nan)
