@@ -1,4 +1,4 @@
-"""A hull from logs: the filter along a log, the search, what logs determine and leave open."""
+"""A hull from logs: the filter along a log, what logs determine, and what is said of it."""
 
 from __future__ import annotations
 
@@ -11,27 +11,31 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from identify_samples import (
+    HULL,
+    LOGS,
+    SCENARIO,
+    commands_of,
+    fitted,
+    made_logs,
+    motion,
+    problem,
+    slope,
+    table_of,
+)
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
-from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, bundle
-from podusv_cli.core.signal import STATE
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.estimate import (
     OPEN,
     SILENT,
     Estimate,
-    Scored,
-    Search,
-    covariance,
     directions,
-    estimated,
-    prior_kept,
 )
 from podusv_cli.identify.march import (
     COMMANDS,
@@ -52,90 +56,11 @@ from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.identify import answered
 
-LOGS = (LogFile(file="a.csv"),)
-SCENARIO = load(
-    "podusv:trials/base.yaml",
-    [
-        "vessel={preset: cybership2}", "actuator={kind: ideal}", "controller={kind: pid}",
-        "name=boat",
-    ],
-).scenario  # fmt: skip
-HULL = SCENARIO.vessel
-
-
-def slope(k, tau, current=(0.0, 0.0)):
-    """The hull's rate over ground, as plain Python: state, then load in the earth's frame."""
-
-    def rate(_, s):
-        c, n = math.cos(s[2]), math.sin(s[2])
-        x = s[:6].copy()
-        x[3] -= c * current[0] + n * current[1]
-        x[4] -= c * current[1] - n * current[0]
-        b = np.array([c * s[6] + n * s[7], c * s[7] - n * s[6], s[8]])
-        out = np.zeros(6)
-        plant(x, np.asarray(tau), b, k, out)
-        out[0] = c * s[3] - n * s[4]
-        out[1] = n * s[3] + c * s[4]
-        # The water's velocity in the hull's frame turns with the hull.
-        r = s[5]
-        out[3] += r * (c * current[1] - n * current[0])
-        out[4] -= r * (c * current[0] + n * current[1])
-        return np.concatenate([out, np.zeros(3)])
-
-    return rate
-
-
-def motion(commands, times, start, hull=HULL, current=(0.0, 0.0)):
-    """States at times, with commands held from each to the next, by another integrator."""
-    k, states = bundle(hull.constants()), [np.concatenate([start, np.zeros(3)])]
-    for i in range(len(times) - 1):
-        span = times[i], times[i + 1]
-        ended = solve_ivp(slope(k, commands[i], current), span, states[-1], rtol=1e-9, atol=1e-11)
-        states.append(ended.y[:, -1])
-    return np.array(states)[:, :6]
-
-
-def commands_of(times, seed=0):
-    """Force and moment that change every 4 s, with some that stay."""
-    rng = np.random.default_rng(seed)
-    count = int(times[-1] // 4.0) + 1
-    u, r = rng.uniform(0.5, 4.0, count), rng.uniform(-0.6, 0.6, count)
-    at = (times // 4.0).astype(int)
-    return np.column_stack([u[at], np.zeros(len(times)), r[at]])
-
-
-def table_of(times, states, commands, *, noise=(0.01, 0.005, 0.002), seed=1, name="a.csv"):
-    """A log with pose and yaw rate measured."""
-    rng = np.random.default_rng(seed)
-    sigma = dict(zip(("x", "y", "psi", "r"), (noise[0], *noise), strict=True))
-    names = [signal.name for signal in STATE]
-    columns = {
-        n: states[:, names.index(n)] + sigma[n] * rng.standard_normal(len(times)) for n in sigma
-    }
-    columns |= {"tau_u": commands[:, 0], "tau_r": commands[:, 2]}
-    return Table(name, times, columns)
-
 
 @pytest.fixture(scope="module")
 def boat():
-    """Three logs at 5 Hz, of different commands, in a current that the first two have."""
-    logs = []
-    for i, current in enumerate([(0.05, -0.03), (0.0, 0.04), (0.0, 0.0)]):
-        times = np.arange(0.0, 90.0, 0.2)
-        commands = commands_of(times, seed=i)
-        states = motion(commands, times, np.array([1.0, -2.0, 3.0, 0.4, 0, 0]), current=current)
-        logs.append(log_of(table_of(times, states, commands, seed=i, name=f"{i}"), Ideal(), 0.1))
-    return logs
-
-
-def problem(logs, vessel=HULL, **wanted):
-    """The problem of logs, by default with the wide prior of a hull that is guessed."""
-    scenario = SCENARIO.model_copy(update={"vessel": vessel, "nominal": vessel})
-    return Problem(scenario, Identify(logs=LOGS, **wanted), logs)
-
-
-def fitted(given):
-    return prior_kept(given.search, estimated(given.search))
+    """Three logs, which no test changes."""
+    return made_logs()
 
 
 def test_the_filter_along_a_log_is_that_of_plain_python():
@@ -215,53 +140,6 @@ def filtered(rows, x, P, k, filter_, current):
         x, P = ended.y[:9, -1], ended.y[9:, -1].reshape(9, 9)
         since += line[HOLDS]
     return found
-
-
-def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
-    """Values z with mean m and deviation e^s: the estimates with a normal prior are known."""
-    z = np.random.default_rng(5).normal(0.7, 0.3, 400)
-
-    def innovations(points):
-        nu = np.column_stack([z - y[0] for y in points])
-        return nu, np.column_stack([np.full(len(z), math.exp(2.0 * y[1])) for y in points])
-
-    found = estimated(Search(innovations, 2, np.arange(400) // 20))
-    m, s = found.y
-    variance = math.exp(2.0 * s)
-    assert found.settled
-    assert m == pytest.approx(z.sum() / (len(z) + variance), abs=0.1 * math.sqrt(variance / 400))
-    # Of the deviation: -N + sum (z - m)^2 / e^2s - s = 0.
-    exact = brentq(lambda s: -len(z) + np.sum((z - m) ** 2) * math.exp(-2.0 * s) - s, -3.0, 1.0)
-    assert s == pytest.approx(exact, abs=0.1 * math.sqrt(0.5 / 400))
-    sd = np.sqrt(np.diag(found.covariance))
-    assert sd == pytest.approx([math.sqrt(variance / 400), math.sqrt(0.5 / 400)], rel=0.35)
-    assert np.all(sd >= [0.99 * math.sqrt(variance / 401), 0.99 * math.sqrt(0.5 / 401)])
-
-
-def test_an_interrupt_at_any_time_keeps_what_the_first_search_found():
-    """At every call of the filter in the second search, the first of which no round protects."""
-    z = np.random.default_rng(5).normal(0.7, 0.3, 40)
-    made, last = [], [0]
-
-    def innovations(points):
-        made.append(len(points))
-        if len(made) == last[0]:
-            raise KeyboardInterrupt
-        return np.column_stack([z - y[0] for y in points]), np.full((40, len(points)), 0.09)
-
-    search = Search(innovations, 1, np.arange(40) // 20)
-    whole = estimated(search, starts=1)
-    first = len(made)
-    made.clear()
-    estimated(search)
-    calls = len(made)
-    assert calls > first + 3
-    for call in range(first + 1, calls + 1):
-        made.clear()
-        last[0] = call
-        found = estimated(search)
-        assert found.interrupted
-        assert found.value <= whole.value
 
 
 def test_a_few_numbers_come_out_of_two_logs(boat):
@@ -666,31 +544,3 @@ def test_names_of_what_is_looked_for(wanted, sentence):
         return
     with pytest.raises(UsageError, match=sentence):
         hull_numbers(HULL, asked)
-
-
-def test_the_errors_of_a_mean_are_those_of_its_blocks():
-    """Values that are alike within a block say no more of their mean than one of them."""
-    rng = np.random.default_rng(3)
-    blocks, each, sd = 40, 25, 3.0
-    means = rng.normal(0.0, sd, blocks)
-    values, of = np.repeat(means, each), np.repeat(np.arange(blocks), each)
-
-    def innovations(points):
-        nu = np.stack([values - 1e3 * y[0] for y in points], axis=1)  # the prior says nothing
-        return nu, np.ones_like(nu)
-
-    search = Search(innovations, 1, of, 1)
-    found = covariance(search.scored(np.array([means.mean() / 1e3])), 1)[0, 0] * 1e6
-    assert found == pytest.approx(np.var(means, ddof=1) / blocks, rel=1e-3)
-    assert found > 20.0 / (blocks * each)  # what the curvature says of independent values is 1 / n
-
-
-def test_errors_are_finite_where_one_block_says_nearly_all_there_is():
-    """Values without noise make numbers sure to ten digits beside others that nothing shows."""
-    rng = np.random.default_rng(1)
-    way, other = rng.standard_normal((2, 12))
-    by_values = np.array([1e13 * np.outer(way, way), 1e3 * np.outer(other, other)])
-    found = covariance(Scored(0.0, np.zeros((2, 12)), by_values, np.zeros((2, 12, 12))), 12)
-    values = np.linalg.eigvalsh(found)
-    assert values[:2] == pytest.approx(np.zeros(2), abs=0.01)
-    assert values[2:] == pytest.approx(np.ones(10), abs=0.02)

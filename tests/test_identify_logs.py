@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from identify_samples import HULL, SCENARIO, commands_of, motion, table_of
 from log_files import read, written
-from test_identify import HULL, SCENARIO, commands_of, motion, table_of
 
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.errors import UsageError
