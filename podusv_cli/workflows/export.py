@@ -106,7 +106,7 @@ def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
     if law.needs_loads:
         yield (
             f"{law.loop.controller.label} asks which loads acted: pass them to podusv_law_step; "
-            "with NULL it takes it that all of its demand acted, and winds up where the actuator "
+            "with NULL it assumes that its whole demand acted, and winds up where the actuator "
             "gives less"
         )
     if not of_run:
