@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_samples import changed, drawn, line, panels, recording, scenario, shown
+from drawn_samples import changed, drawn, line, panels, recording, scenario, shown, title
 from old_results import draw_quickly
 from scenario_samples import SOUND
 
@@ -115,6 +115,36 @@ def test_loads_within_limits_are_on_a_linear_axis_and_what_was_demanded_is_not()
     assert force.get_ylim()[1] < 9.0
     assert inside(demand.get_ylim(), [4e3])
     assert inside(found[0].get_ylim(), [0.0, 8.0])  # constant there, but no panel of 7.6 to 8.4
+
+
+def test_a_constant_demand_with_a_ripple_is_a_flat_line_beside_zero():
+    def ripple(t):
+        return 25.6 + 1e-9 * np.sin(9.0 * t)
+
+    log = recording(tau_u=ripple, tau_u_cmd=ripple)
+    for axes in controls(("a", log))[1][:6]:  # on the hull, and as the law demands it
+        low, high = axes.get_ylim()
+        assert low <= 0.0
+        assert high > 25.0
+
+
+def test_what_is_left_of_a_demand_that_dies_out_is_a_flat_line():
+    def dying(t):
+        return 5.0 * np.exp(-t) + 1e-9 * np.sin(9.0 * t)
+
+    _, found = controls(("a", recording(tau_r=dying, tau_r_cmd=dying)))
+    mean = 0.05  # of 5 exp(-t) over 100 s
+    for axes in found[8], found[11]:  # settled
+        assert np.ptp(axes.get_ylim()) > 0.9e-3 * mean
+    whole = found[10]
+    assert whole.get_yscale() == "symlog"
+    assert whole.yaxis.get_transform().linthresh == pytest.approx(1e-2)  # a tenth of it, rounded up
+
+
+def test_a_heading_that_hardly_moves_is_a_flat_line():
+    log = recording(psi=lambda t: 1.5 + 1e-9 * np.sin(t))
+    axes = panels(drawn("velocities", shown(("a", log))))[r"$\psi$ [rad]"]
+    assert np.ptp(axes.get_ylim()) > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -261,6 +291,22 @@ def test_estimates_stand_beside_truth_and_deliveries_and_their_errors():
     assert dots.get_xdata() == pytest.approx(due)
     rows = np.searchsorted(log["time"], np.array(due) - 0.05)
     assert line(error, "_measured").get_ydata() == pytest.approx(due - log["x"][rows])
+
+
+@pytest.mark.parametrize(("columns", "blocks"), [(2, 1), (1, 2)])
+def test_estimates_of_several_runs_have_a_column_each_on_common_axes(columns, blocks):
+    logs = {label: recording(**ESTIMATED, shift=i) for i, label in enumerate("abc")}
+    found = drawn("estimates", shown(*logs.items()), columns).axes
+    assert len(found) == 18
+    assert found[0].get_subplotspec().get_gridspec().nrows == 6 * blocks
+    for (label, log), mine in zip(logs.items(), np.reshape(found, (3, 6)), strict=True):
+        assert title(mine[0]).endswith(label)
+        for axes, name in zip(mine, ("x", "y", "psi", "u", "v", "r"), strict=True):
+            error = line(axes, label).get_ydata()
+            assert np.array_equal(error, log[f"{name}_est"] - log[name])
+            assert not {*logs} - {label} & {curve.get_label() for curve in axes.lines}
+    for place in range(6):
+        assert len({axes.get_ylim() for axes in found[place::6]}) == 1
 
 
 def test_outages_are_shaded_for_the_quantities_of_the_sensor():

@@ -82,6 +82,8 @@ def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span
     name = LOADS[load][kind]
     draw_signal(axes, runs, name, span=span)
     axes.set_xlim(*span)
+    axes.update_datalim([(span[0], 0.0)])  # forces mean something beside none at all
+    axes.autoscale_view(scalex=False)
     bounded = kind == 0 and all(run.has("saturated") for run in runs)
     if bounded:
         _limits(axes, runs, load, span)
@@ -103,5 +105,3 @@ def _limits(axes: Axes, runs: Sequence[Shown], load: int, span: Span) -> None:
         for side in (limit, -limit):
             line = np.array(span), np.array([side, side])
             draw_curve(axes, line, fitted=False, label="limit of the actuator", **LIMIT)
-    axes.update_datalim([(span[0], 0.0)])  # a load that stays at its limit needs a scale
-    axes.autoscale_view(scalex=False)

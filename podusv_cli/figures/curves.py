@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.scales import Span, linear_up_to, scaling
+from podusv_cli.figures.scales import Span, linear_up_to, mean_size, scaling
 from podusv_cli.figures.shown import Shown
 
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
@@ -20,6 +20,7 @@ CUT: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.2,
 DENSE = 60.0  # ranges that a curve runs through; from there it hides what is below it
 FINE = 0.5  # points, of such a curve
 APART = 1.5  # a curve that goes this many times as far up and down lies below the calmer one
+RIPPLE = 1e-3  # of a signal's mean size over the run; a panel never shows less than this
 
 
 def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
@@ -40,7 +41,8 @@ def draw_signal(
     """Plot a signal of all runs that have it over time, or over a part of it [s].
 
     `beside` another signal it is drawn thin, not in the legend, and only where the two differ.
-    Dense curves are fine; a curve lies below those that are calmer.
+    Dense curves are fine; a curve lies below those that are calmer. The scale does not go down to
+    a ripple: what stays within RIPPLE of the signal's mean size is a flat line.
     """
     having = [run for run in runs if run.has(name)]
     fitted = scaling(having, span)
@@ -58,6 +60,15 @@ def draw_signal(
         elif differ(run, name, beside):
             thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
             draw_curve(axes, curve, fitted=run in fitted, **thin)
+    _widen(axes, max((mean_size(run, name) for run in fitted if run.has(name)), default=0.0))
+
+
+def _widen(axes: Axes, size: float) -> None:
+    """Give what is drawn a range of at least RIPPLE of this size."""
+    low, high = axes.dataLim.intervaly
+    if high - low < RIPPLE * size:
+        ends = 0.5 * (low + high) + 0.5 * RIPPLE * size * np.array([-1.0, 1.0])
+        axes.update_datalim([(axes.dataLim.x0, end) for end in ends])
 
 
 def _way(y: Vector) -> float:

@@ -11,15 +11,18 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.signal import STATE
+from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.figures.curves import draw_curve, draw_run, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown, about, unit
-from podusv_cli.figures.style import legend, new_figure
+from podusv_cli.figures.shown import Shown, shortened, unit
+from podusv_cli.figures.style import WIDTHS, legend, new_figure
 
 PANEL_HEIGHT = 1.15  # inches
+SMALL_HEIGHT = 0.85  # inches, where every run has panels of its own
+ABREAST = {1: 2, 2: 5}  # runs beside each other, by the width in columns
+LETTER = 0.075  # inches, of a run's name above its panels
 TRUE: dict[str, Any] = {"linewidth": 3.5, "alpha": 0.3, "linestyle": "-"}
 MEASURED: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 2.0, "alpha": 0.35}
 ESTIMATE: dict[str, Any] = {"linewidth": 0.6}
@@ -28,27 +31,61 @@ OUTAGE: dict[str, Any] = {"color": "#444444", "alpha": 0.15, "linewidth": 0.0, "
 
 @figure(
     "estimates", place=8, signals=tuple(f"{state.name}_est" for state in STATE),
-    caption="what the law is given in place of the true state: broad and pale the truth, dots what "
-    "the sensors deliver, curves the estimate; on the right, how far estimate and dots are from "
-    "the truth; shaded, the outages of the sensor",
+    caption="what the law is given in place of the true state: dots what the sensors deliver, "
+    "curves the estimate; of a run alone both beside the truth, broad and pale, and how far they "
+    "are from it; of several runs how far, each in its own column on common axes; shaded, the "
+    "outages of the sensor",
 )  # fmt: skip
 def estimates(runs: Sequence[Shown], columns: int) -> Figure:
-    """A row for each quantity of the state: its values, and its errors."""
+    """A row for each quantity of the state: values and errors of one run, errors of several."""
     having = [run for run in runs if run.has("x_est")]
+    return _alone(having[0], columns) if len(having) == 1 else _small_multiples(having, columns)
+
+
+def _alone(run: Shown, columns: int) -> Figure:
+    """The values of a run and, beside them, its errors."""
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * len(STATE))
     panels = figure.subplots(len(STATE), 2, sharex=True)
     for place, (state, (values, errors)) in enumerate(zip(STATE, panels, strict=True)):
-        for run in having:
-            _draw(values, run, state.name, fitted=run in scaling(having), error=False)
-            _draw(errors, run, state.name, fitted=run in scaling(having), error=True)
-        _shade((values, errors), having, place)
-        symbol, unit_of = about(having, state.name).symbol, unit(about(having, state.name))
-        values.set_ylabel(f"${symbol}$ [{unit_of}]")
-        errors.set_ylabel(f"error of ${symbol}$ [{unit_of}]")
+        _draw(values, run, state.name, fitted=True, error=False)
+        _draw(errors, run, state.name, fitted=True, error=True)
+        _shade((values, errors), [run], place)
+        values.set_ylabel(f"${state.symbol}$ [{unit(state)}]")
+        errors.set_ylabel(_error_label(state))
     for axes in panels[-1]:
         axes.set_xlabel(TIME)
     legend(figure)
     return figure
+
+
+def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
+    """The errors of every run in a column of its own; many runs in blocks below each other."""
+    blocks = -(-len(runs) // ABREAST[columns])
+    abreast = -(-len(runs) // blocks)
+    figure = new_figure(columns, 0.7 + 0.4 * blocks + SMALL_HEIGHT * blocks * len(STATE))
+    cells = figure.add_gridspec(blocks * len(STATE), abreast)
+    longest = int(WIDTHS[columns] / abreast / LETTER) - len("(aa) ...")
+    fitted, first = scaling(runs), dict[int, Axes]()
+    for number, run in enumerate(runs):
+        block, column = divmod(number, abreast)
+        for place, state in enumerate(STATE):
+            axes = figure.add_subplot(
+                cells[block * len(STATE) + place, column],
+                sharex=first.get(0), sharey=first.get(place),
+            )  # fmt: skip
+            first.setdefault(place, axes)
+            _draw(axes, run, state.name, fitted=run in fitted, error=True)
+            _shade([axes], [run], place)
+            axes.tick_params(labelbottom=place == len(STATE) - 1, labelleft=column == 0)
+            axes.set_ylabel("" if column else _error_label(state).replace(" $", "\n$"))
+        axes.set_xlabel(TIME)
+        axes.figure.axes[-len(STATE)].set_title(shortened(run.name, longest), loc="left")
+    legend(figure)
+    return figure
+
+
+def _error_label(state: Signal) -> str:
+    return f"error of ${state.symbol}$ [{unit(state)}]"
 
 
 def _draw(axes: Axes, run: Shown, name: str, *, fitted: bool, error: bool) -> None:

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from podusv_cli.core.recording import largest
+from podusv_cli.core.recording import blocks, largest
 from podusv_cli.figures.shown import Shown
 
 TALL = 20.0  # a peak this many times the usual values gets a logarithmic axis
 DECADES = 4  # at most, on the logarithmic axis of runs that finished
+USUAL = 0.1  # of a signal's mean size: where a run settles below this, so much is usual in it
 SAMPLES = 1000  # of a signal, about, for what is usual in it
 DIP = 0.02  # of the run; a distance that is smaller for less than this is a passage
 
@@ -37,12 +38,22 @@ def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
 
 
 def _usual(run: Shown, name: str) -> float:
-    """The largest settled value; of a run that did not get there, the median."""
+    """The largest settled value, or a share of the mean size, below which there is only noise.
+
+    Of a run that did not get there, the median.
+    """
     values = run.signal(name)
     settled = values[np.searchsorted(run.recording["time"], run.steady_from) :]
     if run.whole and len(settled):
-        return largest(len(settled), lambda rows: settled[rows])
+        return max(largest(len(settled), lambda rows: settled[rows]), USUAL * mean_size(run, name))
     return float(np.median(np.abs(values)))
+
+
+def mean_size(run: Shown, name: str) -> float:
+    """The mean of a signal's size over the run, which a short peak hardly raises; 0 for none."""
+    values = run.signal(name)
+    size = sum(float(np.sum(np.abs(values[part]))) for part in blocks(len(values)))
+    return size / values.size if np.isfinite(size) else 0.0
 
 
 def resolved(runs: Sequence[Shown]) -> float:
