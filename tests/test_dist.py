@@ -20,10 +20,12 @@ from installed_sample import LAB
 from podusv_cli import __version__
 from podusv_cli.cli import FIRST_STEPS
 from podusv_cli.scenario import shipped
+from podusv_cli.workflows.examples import examples, texts
 
 pytestmark = pytest.mark.slow  # builds packages, and an environment compiles anew
 PACKAGES = ("podusv", "podusv_cli")
-NEEDED = ("pyproject.toml", "README.md", "LICENSE", *PACKAGES, "configs", "docs", "results")
+ROOMS = ("configs", "docs", "results", "examples")
+NEEDED = ("pyproject.toml", "README.md", "LICENSE", *PACKAGES, *ROOMS)
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{}(sys.argv[1])"
 
 
@@ -113,6 +115,8 @@ def test_the_wheel_has_metadata_types_licence_and_scenarios(
         f"{room}/{path.name}" for room in ("docs", "results") for path in (ROOT / room).glob("*.md")
     }
     assert {f"podusv_cli/{name}" for name in (*pages, "docs/index.rst")} <= names
+    shown = {f"podusv_cli/examples/{place}" for name in examples() for place in texts(name)}
+    assert {name for name in names if name.startswith("podusv_cli/examples/")} == shown
     assert not {
         name for name in names if name.startswith("podusv_cli/docs/") and name.endswith(".py")
     }
@@ -133,6 +137,7 @@ def test_the_wheel_alone_starts_from_an_empty_folder(python: Path, empty: Path) 
     assert podusv("docs resume").startswith("podusv docs studies  Resume a study")
     assert podusv("docs results/README").startswith("# What was found\n")
     assert podusv("init mu_2017/corrected").endswith("next: podusv run corrected.yaml\n")
+    assert podusv("init example/first_run").endswith("next: jupyter notebook first_run.ipynb\n")
     short = "--set simulation.duration=2"
     assert "adaptive_neural finished: " in podusv(f"run corrected.yaml {short}")
     assert "report: " in podusv(f"compare podusv:theory/sign.yaml {short}")

@@ -27,6 +27,7 @@ PAGES = [
     path.relative_to(ROOT).as_posix()
     for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("results/*.md")])
 ]
+EXAMPLES = [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("examples/*/*.md"))]
 Refused = Callable[[str], str]
 
 
@@ -83,12 +84,12 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str])
     return why
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", PAGES + EXAMPLES)
 def test_every_link_leads_somewhere(page: str) -> None:
     assert list(dead_links(page)) == []
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", PAGES + EXAMPLES)
 def test_every_command_shown_exists_with_its_options(page: str, refused: Refused) -> None:
     found = {words: refused(words) for words in commands(text_of(page))}
     assert {words: why for words, why in found.items() if why} == {}

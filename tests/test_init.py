@@ -11,6 +11,7 @@ from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario import shipped
 from podusv_cli.scenario.load import load, values
 from podusv_cli.scenario.schema import schema_text
+from podusv_cli.workflows.examples import examples, texts
 from podusv_cli.workflows.init import FIRST, SCHEMA, starting_points
 
 CONFIGS = ROOT / "configs"
@@ -111,7 +112,10 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     assert first.startswith("to begin with: mu_2017/corrected (a run), own_vessel (a hull of your")
     assert all(f" {name} (" in first for name in FIRST)
     assert " ".join(rest.split()) == " ".join(
-        [*(f"{name} {text}" for name, text in points.items()), "copy one to edit: podusv init NAME"]
+        [
+            *(f"{name} {text}" for name, text in (points | examples()).items()),
+            "copy one to edit: podusv init NAME",
+        ]
     )
 
 
@@ -178,7 +182,7 @@ def test_init_replaces_nothing(podusv):
     assert podusv("init", "mu_2017/corrected").code == 0
     write("corrected.yaml", "mine")
     said = podusv("init", "podusv:mu_2017/corrected.yaml")
-    assert said == (5, "", "corrected.yaml exists; name another file with --out\n")
+    assert said == (5, "", "corrected.yaml exists; name another place with --out\n")
     assert Path("corrected.yaml").read_text() == "mine"
     assert podusv("init", "mu_2017/printed").code == 0  # beside the schema that is there
     write(SCHEMA, "{}")
@@ -207,3 +211,57 @@ def test_the_copy_is_edited_and_resolved_like_any_scenario(podusv):
         values(load("podusv:mu_2017/corrected.yaml").scenario),
     )
     assert {key for key in base if changed[key] != base[key]} == {"actuator.surge_limit"}
+
+
+# --- examples
+
+
+def test_every_folder_with_a_readme_and_every_notebook_is_an_example():
+    folders = {path.parent.name for path in (ROOT / "examples").glob("*/README.md")}
+    notebooks = {path.stem for path in (ROOT / "examples").glob("*.ipynb")}
+    assert set(examples()) == {f"example/{name}" for name in folders | notebooks}
+    assert {"hardware_in_the_loop", "learned", "nmpc", "my_lab"} <= folders
+    assert examples()["example/first_run"] == "A first run"
+
+
+@pytest.mark.parametrize("name", examples())
+def test_an_example_is_written_whole_and_named_in_every_line(podusv, name):
+    said = podusv("init", name)
+    assert (said.code, said.err) == (0, "")
+    *lines, last = said.out.splitlines()
+    names = [line.removeprefix("wrote ") for line in lines]
+    assert names == list(texts(name))
+    assert last in (f"next: read {names[0]}", f"next: jupyter notebook {names[0]}")
+    written = {path.as_posix() for path in Path().rglob("*") if path.is_file()}
+    assert written == {*names}
+    for place in names:
+        if not place.endswith(".md"):
+            assert Path(place).read_text() == (ROOT / "examples" / place).read_text()
+
+
+@pytest.mark.parametrize("page", [*(ROOT / "examples").glob("*/README.md")], ids=str)
+def test_a_readme_elsewhere_names_pages_and_files_that_are_there(podusv, page):
+    podusv("init", f"example/{page.parent.name}", "--out", "mine")
+    text = Path("mine/README.md").read_text()
+    assert not re.search(r"\]\((?!\w+://)", text)  # a link that only a checkout has
+    for name in re.findall(r"\(?`podusv docs ([^`]+)`", text):
+        assert podusv("docs", name).code == 0
+    scripts = re.findall(r"^    (?:python|podusv run|podusv compare) (\w[\w/]*\.\w+)", text, re.M)
+    assert all((Path("mine") / script).is_file() for script in scripts)
+    assert scripts or page.parent.name == "my_lab"  # which has a Makefile
+
+
+def test_an_example_replaces_nothing(podusv):
+    for name, place in (("nmpc", "nmpc"), ("first_run", "first_run.ipynb")):
+        assert podusv("init", f"example/{name}").code == 0
+        said = podusv("init", f"example/{name}")
+        assert said == (5, "", f"{place} exists; name another place with --out\n")
+    assert podusv("init", "example/nmpc", "--out", "deep/er").code == 0
+    assert {path.name for path in Path("deep/er").iterdir()} == {"README.md", "nmpc.py"}
+    assert "did you mean 'example/nmpc'?" in podusv("init", "example/nmcp").err
+
+
+def test_a_page_names_the_command_that_writes_an_example(podusv):
+    assert "hardware in the loop (`podusv init example/hardware_in_the_loop`)" in podusv(
+        "docs", "python"
+    ).out.replace("\n", " ")

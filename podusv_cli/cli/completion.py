@@ -90,9 +90,10 @@ def _state() -> str:
 @cached
 def starting_points(plugins: Plugins) -> Mapping[str, str]:
     """Names that `podusv init` takes."""
+    from podusv_cli.workflows.examples import examples
     from podusv_cli.workflows.init import starting_points
 
-    return starting_points()
+    return starting_points() | examples()
 
 
 def pages(incomplete: str) -> Offered:

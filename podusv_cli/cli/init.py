@@ -1,8 +1,7 @@
-"""`podusv init`: a scenario to start from."""
+"""`podusv init`: a scenario or example to start from."""
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -22,25 +21,28 @@ def init(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File to write.", show_default="NAME.yaml in this folder")
+        Path | None,
+        typer.Option(help="File or folder to write.", show_default="named as it is, here"),
     ] = None,
 ) -> None:
-    """List the scenarios that come with podusv, or copy one of them here to edit.
+    """List what comes with podusv to start from, or copy a scenario or example here to edit.
 
-    The copy extends the same scenarios of podusv. Beside it is the JSON schema, from which editors
-    complete and check keys. Files that exist are not replaced.
+    A scenario's copy extends the same scenarios of podusv. Beside it is the JSON schema, from which
+    editors complete and check keys. An example is a notebook, or a folder with a README. Files that
+    exist are not replaced.
     """
     from podusv_cli.workflows import init as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.examples import examples
 
     if name is None:
         first = ", ".join(f"{point} ({shown})" for point, shown in workflow.FIRST.items())
         echo(f"to begin with: {first}")
-        for point, description in workflow.starting_points().items():
+        for point, description in (workflow.starting_points() | examples()).items():
             echo_entry(point, description)
         echo("copy one to edit: podusv init NAME")
         return
     begun = workflow.init(name, out)
-    echo(f"wrote {begun.config}, and {begun.schema} for editors")
-    for log in begun.logs:
-        echo(f"wrote {log}")
-    echo(f"next: {shlex.join(['podusv', *begun.command, str(begun.config)])}")
+    echo(f"wrote {begun.first}" + (f", and {begun.schema} for editors" if begun.schema else ""))
+    for other in begun.others:
+        echo(f"wrote {other}")
+    echo(f"next: {begun.next}")

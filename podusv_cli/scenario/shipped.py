@@ -11,13 +11,15 @@ from podusv_cli.core.phrases import did_you_mean
 
 PREFIX = "podusv:"
 RENAMED = "renamed.txt"  # beside the scenarios: a folder's old name and its new one, a line each
-FOLDER = "configs"  # a link to the checkout's folder; in an installed package the files themselves
 
 
 @cache
-def folder() -> Path:
-    """Where the shipped scenarios are on this machine."""
-    with as_file(files("podusv_cli") / FOLDER) as path:
+def folder(room: str = "configs") -> Path:
+    """Where the shipped scenarios, or pages or examples, are on this machine.
+
+    It is a link to the checkout's folder, and in an installed package the files themselves.
+    """
+    with as_file(files("podusv_cli") / room) as path:
         return path
 
 

@@ -7,12 +7,12 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import as_file, files
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.phrases import did_you_mean
 from podusv_cli.scenario import shipped
+from podusv_cli.workflows import examples
 
 CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
 CAPTION = re.compile(r"^   :caption: (.+)$")
@@ -56,7 +56,7 @@ def contents() -> dict[str, dict[str, str]]:
     """Titles of the pages by name, below the captions of the site's contents and in its order."""
     captions: dict[str, dict[str, str]] = {}
     caption = ""
-    for line in (_folder("docs") / CONTENTS).read_text("utf-8").splitlines():
+    for line in (shipped.folder("docs") / CONTENTS).read_text("utf-8").splitlines():
         if begun := CAPTION.match(line):
             caption = begun[1]
         elif (entry := ENTRY.match(line)) and _file(entry[1]).is_file():
@@ -73,8 +73,12 @@ def page(name: str) -> str:
     """A page as Markdown; its name may be written as a file's, too (`docs/studies.md`)."""
     short = _short(name)
     there = posixpath.dirname(f"{_place(short)}.md")
-    text = _file(short).read_text("utf-8")
-    return CONFIG.sub(_shipped, LINK.sub(lambda link: _reachable(link, there), text))
+    return reachable(_file(short).read_text("utf-8"), there)
+
+
+def reachable(text: str, folder: str) -> str:
+    """Markdown of a file in this folder of a checkout, with links that lead on without one."""
+    return CONFIG.sub(_shipped, LINK.sub(lambda link: _reachable(link, folder), text))
 
 
 def is_page(name: str) -> bool:
@@ -138,6 +142,9 @@ def _reachable(link: re.Match[str], folder: str) -> str:
         shown = f"`podusv docs {_short(place)}`"
         return shown if words.endswith(".md") else f"{words} ({shown})"
     scenario = shipped.PREFIX + place.removeprefix("configs/")
+    example = examples.name_of(place)
+    if example:
+        return f"{words} (`podusv init {example}`)"
     return f"`{scenario}`" if scenario in shipped.names() else words
 
 
@@ -158,11 +165,4 @@ def _place(name: str) -> str:
 
 def _file(name: str) -> Path:
     room, _, rest = _place(name).partition("/")
-    return _folder(room) / f"{rest}.md"
-
-
-@cache
-def _folder(room: str) -> Path:
-    """Where pages are on this machine: a link to the checkout's folder, or what a wheel has."""
-    with as_file(files("podusv_cli") / room) as path:
-        return path
+    return shipped.folder(room) / f"{rest}.md"

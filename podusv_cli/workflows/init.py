@@ -1,8 +1,9 @@
-"""`podusv init`: the scenarios that come with podusv as starting points of one's own."""
+"""`podusv init`: scenarios and examples that come with podusv as starting points of one's own."""
 
 from __future__ import annotations
 
 import re
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,8 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.schema import TITLE, schema_text
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.storage import files
-from podusv_cli.workflows import example_logs
+from podusv_cli.workflows import docs, example_logs
+from podusv_cli.workflows.examples import ROOM, examples, texts
 
 SCHEMA = "podusv.schema.json"
 # What to begin with, and what each shows.
@@ -31,12 +33,15 @@ EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Begun:
-    """A scenario file that was written, what is beside it, and the words of its command."""
+    """What was written, the file that comes first, and what to do with it.
 
-    config: Path
-    schema: Path
-    command: tuple[str, ...]
-    logs: tuple[Path, ...] = ()
+    `schema` is that of a scenario; `others` are an example's other files or a scenario's logs.
+    """
+
+    first: Path
+    next: str
+    schema: Path | None = None
+    others: tuple[Path, ...] = ()
 
 
 def starting_points() -> dict[str, str]:
@@ -51,20 +56,23 @@ def starting_points() -> dict[str, str]:
 
 
 def init(name: str, out: Path | None = None) -> Begun:
-    """Copy a starting point, and write the schema for editors beside it.
+    """Copy a starting point: a scenario with the schema for editors beside it, or an example.
 
-    The copy has the keys and comments of the shipped file and extends the same shipped files.
-    Raises UsageError for an unknown name, StorageError where the file exists.
+    A scenario's copy has the keys and comments of the shipped file and extends the same shipped
+    files. Raises UsageError for an unknown name, StorageError where a file exists.
     """
-    known = starting_points()
-    if _short(name) not in known:
-        raise UsageError(unknown(f"starting point {name!r}", _short(name), known, "podusv init"))
-    source = f"{shipped.PREFIX}{_short(name)}.yaml"
-    config = out or Path(f"{_short(name)}.yaml".rpartition("/")[2])
+    short, known = _short(name), starting_points() | examples()
+    if short not in known:
+        raise UsageError(unknown(f"starting point {name!r}", short, known, "podusv init"))
+    return (_example if short in examples() else _scenario)(short, out)
+
+
+def _scenario(name: str, out: Path | None) -> Begun:
+    source = f"{shipped.PREFIX}{name}.yaml"
+    config = out or Path(f"{name}.yaml".rpartition("/")[2])
     schema = config.with_name(SCHEMA)
     files.check_places([config, schema])
-    if config.exists():
-        raise StorageError(f"{config} exists; name another file with --out")
+    _check_free(config)
     _spare(schema)
     text = own_copy(source)
     scenario = load_text(text, str(config)).scenario
@@ -73,7 +81,34 @@ def init(name: str, out: Path | None = None) -> Begun:
     known_to_editors = schema_text(tuple(finding_kinds(plugins)), plugins)
     files.write_all({config: text.encode(), schema: known_to_editors.encode()})
     logs = example_logs.write(config, scenario.identify) if scenario.identify else []
-    return Begun(config, schema, _command(scenario), tuple(logs))
+    command = shlex.join(["podusv", *_command(scenario), str(config)])
+    return Begun(config, command, schema, tuple(logs))
+
+
+def _example(name: str, out: Path | None) -> Begun:
+    """A folder or notebook; links of a README to pages, which a checkout has, become words."""
+    given = texts(name)
+    root = out or Path(Path(next(iter(given))).parts[0])
+    _check_free(root)
+    written = {
+        str(root.joinpath(*Path(place).parts[1:])): _readable(text, place)
+        for place, text in given.items()
+    }
+    first, *others = map(Path, written)
+    files.check_places([first, *others])
+    files.write_texts(Path(), written)
+    reading = shlex.join(["jupyter", "notebook", str(first)])
+    return Begun(first, f"read {first}" if others else reading, others=tuple(others))
+
+
+def _readable(text: str, place: str) -> str:
+    is_page = place.endswith(".md")
+    return docs.reachable(text, f"{ROOM}/{Path(place).parent}") if is_page else text
+
+
+def _check_free(path: Path) -> None:
+    if path.exists():
+        raise StorageError(f"{path} exists; name another place with --out")
 
 
 def _command(scenario: Scenario) -> tuple[str, ...]:
