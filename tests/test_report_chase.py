@@ -141,6 +141,8 @@ const look = async (frame) => {
   const hull = () => one(".map polygon").getAttribute("points");
   const told = { wide, width, start: now(), hull: hull() };
   told.scroll = page.documentElement.scrollWidth;
+  told.pictures = [...page.images].map((image) =>
+    [image.naturalWidth, image.width, image.closest(".card").clientWidth]);
   told.images = [...page.images].map((image) => image.naturalWidth);
   await sleep(600);
   told.played = now();
@@ -200,10 +202,10 @@ needs_browser = pytest.mark.skipif(
 )
 
 
-def picture() -> bytes:
-    """A PNG that is wider than a phone."""
+def picture(width: int = 700) -> bytes:
+    """A PNG, by default wider than a phone."""
     file = io.BytesIO()
-    Image.new("P", (700, 300)).save(file, "PNG")
+    Image.new("P", (width, 300)).save(file, "PNG")
     return file.getvalue()
 
 
@@ -213,7 +215,7 @@ def seen(tmp_path_factory):
     wide = table.table(every | {f"a_long_label_of_a_run_{i}": FRAME.of("a") for i in range(8)})
     html = page(
         chase=chase.chase(runs()), theories={"a": theory(2.5, True)},
-        table=wide, figures=[ERRORS._replace(file=picture())] * 4,
+        table=wide, figures=[ERRORS._replace(file=picture(), phone=picture(300))] * 4,
         provenance={"argv": ["podusv", "x" * 300]}, title="long" * 60,
         abouts={"a": about("description=" + "word/" * 90)},
     )  # fmt: skip
@@ -258,6 +260,32 @@ def test_the_animation_moves_pauses_and_scrubs(seen, width):
     assert said["asked"] == 12.5
     assert said["traces"] == 3
     assert not said["bad"]
+
+
+SHAPE = PROBE.replace(
+    "await look(frame)", "frame.contentDocument.querySelector('.map').getAttribute('viewBox')"
+).replace(".catch((error) => ({ error: `${error}` }))", "")
+
+
+@needs_browser
+@pytest.mark.browser
+@pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0, 3.0])
+def test_the_map_has_the_shape_of_the_course(tmp_path, ratio):
+    told = chase.chase(runs()) | {"box": [0.0, 0.0, 10.0 * ratio, 10.0]}
+    said, _ = browsed(tmp_path, page(chase=told), probe=SHAPE)
+    for place, box in said.items():
+        width, height = map(float, box.split()[2:])
+        course = min(width / ratio, height) ** 2 * ratio
+        assert course > 0.74 * width * height, (place, width, height)
+
+
+@needs_browser
+@pytest.mark.browser
+def test_a_phone_has_figures_of_one_column_that_do_not_scroll(seen):
+    for width, phone in zip(WIDTHS, (True, False, False), strict=True):
+        for natural, drawn, room in seen[0][f"w{width}"]["pictures"]:
+            assert natural == (300 if phone else 700)
+            assert drawn <= room
 
 
 @needs_browser

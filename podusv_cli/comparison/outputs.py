@@ -108,12 +108,12 @@ def drawn(
     result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
     names: Sequence[str] = (), formats: Sequence[str] = ("png",), workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
-    """The figures of all runs together by file name: as asked, and as PNG for the report.
+    """The figures of all runs together by file name: as asked, and as PNGs for the report.
 
     `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
     """
     # matplotlib is slow to import
-    from podusv_cli.figures.drawing import chosen, draw_in_parallel
+    from podusv_cli.figures.drawing import PHONE, chosen, draw_in_parallel
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
@@ -121,7 +121,7 @@ def drawn(
         [(e.label, e.recording, e.about, e.plugins) for e in result.entries], result.peaks
     )
     sheets = chosen(names, shown, extras)
-    formats = tuple(dict.fromkeys((*formats, IN_REPORT)))
+    formats = tuple(dict.fromkeys((*formats, IN_REPORT, PHONE)))
     return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
 
 
@@ -132,7 +132,7 @@ def as_report(
     """The HTML report; `figures` as `drawn` gives them."""
     pictures: list[Picture] = []
     if figures:
-        from podusv_cli.figures.drawing import figures_of  # matplotlib is slow to import
+        from podusv_cli.figures.drawing import PHONE, figures_of  # matplotlib is slow to import
 
         # the figures that podusv draws again are those of one paper
         of_paper = any(about.polar for about in result.abouts.values())
@@ -142,6 +142,7 @@ def as_report(
                 sheet.caption,
                 figures[f"{name}.{IN_REPORT}"],
                 sheet.source if of_paper else "",
+                figures[f"{name}.{PHONE}"],
             )
             for name, sheet in figures_of([result.plugins]).items()
             if f"{name}.{IN_REPORT}" in figures

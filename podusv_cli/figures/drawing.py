@@ -35,6 +35,7 @@ FIGURES = figures_with(())
 USUAL = ("trajectory", "errors", "path")  # a run has `errors`, or `path` on one that is followed
 ALL = "all"  # in place of names
 SCREEN = Look()
+PHONE = "phone.png"  # a format of reports: a PNG one column wide
 
 
 def figures_of(plugins: Iterable[Plugins]) -> dict[str, Sheet]:
@@ -66,7 +67,8 @@ def draw(
         for sheet in (sheet for sheet in sheets if sheet.fits(runs)):
             figure = look.given_to(sheet.family(runs, look.columns))
             for form in formats:
-                yield f"{sheet.name}.{form}", image(figure, form)
+                drawn = sheet.family(runs, 1) if form == PHONE else figure
+                yield f"{sheet.name}.{form}", image(drawn, form.rpartition(".")[2])
 
 
 def draw_in_parallel(

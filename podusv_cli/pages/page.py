@@ -17,17 +17,16 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 class Picture(NamedTuple):
-    """A figure of a report: what it shows, its file, and where one of its kind was published."""
+    """A figure of a report: what it shows, its PNGs, and where one of its kind was published.
+
+    `phone` is the PNG for windows that are too narrow for `file`; none: that is scrolled there.
+    """
 
     name: str
     caption: str
     file: bytes
     source: str = ""
-
-    @property
-    def data(self) -> str:
-        """The picture, a PNG, as an address."""
-        return f"data:image/png;base64,{base64.b64encode(self.file).decode()}"
+    phone: bytes = b""
 
     @property
     def title(self) -> str:
@@ -50,7 +49,7 @@ def environment(package: str) -> Environment:
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     made.filters |= {
-        "sentence": sentence, "raised": raised, "number": _number, "label": _label
+        "png": _png, "sentence": sentence, "raised": raised, "number": _number, "label": _label
     }  # fmt: skip
     return made
 
@@ -70,6 +69,11 @@ def sentence(text: str) -> str:
 def raised(unit: str) -> str:
     """The unit with its powers raised."""
     return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(quantities.RAISED), unit)
+
+
+def _png(file: bytes) -> str:
+    """A PNG as an address."""
+    return f"data:image/png;base64,{base64.b64encode(file).decode()}"
 
 
 def _number(text: object) -> str:

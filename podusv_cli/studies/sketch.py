@@ -13,13 +13,14 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import house_style, image
+from podusv_cli.figures.style import Look, house_style, image
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_shares
 
 COLUMNS = 2  # of a journal page, in width
+ON_PHONE = 4.5  # inches; drawn so wide, text can be read in a window of 400 pixels
 
 
 @dataclass(frozen=True)
@@ -40,21 +41,25 @@ def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, byte
     pictures: list[Picture] = []
     wanted = extras.made("the list of figures", lambda: list(sketches)) or []
     outcomes = (
-        () if extras.interrupted else run_shares([partial(_image, sketch) for sketch in wanted])
+        () if extras.interrupted else run_shares([partial(_images, sketch) for sketch in wanted])
     )
     for sketch, outcome in zip(wanted, outcomes, strict=bool(outcomes)):
         extras.interrupted |= outcome.interrupted
         if outcome.result:
-            files[f"{sketch.name}.png"] = outcome.result
-            pictures.append(Picture(sketch.name, sketch.caption, outcome.result))
+            whole, phone = outcome.result
+            files[f"{sketch.name}.png"] = whole
+            pictures.append(Picture(sketch.name, sketch.caption, whole, phone=phone))
         elif not outcome.interrupted:
             extras.missing.append(Failure(f"figure {sketch.name}", outcome.failure))
     return files, pictures
 
 
-def _image(sketch: Sketch, tell: Callable[[float], None]) -> bytes:
+def _images(sketch: Sketch, tell: Callable[[float], None]) -> tuple[bytes, bytes]:
+    """The figure as a PNG, and as one for a phone."""
     with (
         interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
     ):  # fmt: skip
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
-        return image(sketch.draw(), "png")
+        figure = sketch.draw()
+        whole = image(figure, "png")
+        return whole, image(Look(width=ON_PHONE).given_to(figure), "png")

@@ -339,7 +339,7 @@ def _add_report(
         draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
         figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
-        if name.rpartition(".")[2] in request.formats:
+        if name.partition(".")[2] in request.formats:
             writer.add(f"figures/{name}", content)
     heading = f"{title} (interrupted)" if extras.interrupted else title
     page = partial(outputs.as_report, result, heading, figures, origin, extras.missing)

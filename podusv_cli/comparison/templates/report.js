@@ -6,8 +6,9 @@
   const button = one(".play"), speed = one("select"), near = one("input[type=checkbox]");
   const HULL = [[0.5, 0], [0.25, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.25, -0.5]];
   const LEAST = 22; // pixels of a hull's length
-  const LOW = 1e-3, LEFT = 54, RIGHT = 20, TOP = 8, BASE = 20, TALL = 130; // the trace: metres, pixels
-  let now = 0, playing = false, last = 0, width = 0, height = 0;
+  const LEAST_MAP = 120, REST = 340, BELOW = 200; // pixels of the map's sides; width of what may stand beside it, and height below its trace
+  const LOW = 1e-3, LEFT = 54, RIGHT = 20, TOP = 8, BASE = 20, LOWEST = 130; // the trace: metres, pixels
+  let now = 0, playing = false, last = 0, width = 0, height = 0, wide = 0, tall = LOWEST; // wide, tall: the trace
 
   // The last frame that is not after the time.
   const row = (run, t) => {
@@ -82,7 +83,7 @@
       stage.querySelectorAll(".key small")[place].textContent = over ? run.ending : "";
     });
     const x = across(now);
-    set(cursor, "d", `M${x} ${TOP}V${TALL - BASE}`);
+    set(cursor, "d", `M${x} ${TOP}V${tall - BASE}`);
     output.textContent = `t = ${now.toFixed(end < 20 ? 2 : 1)} s`;
     slider.value = now;
   };
@@ -91,28 +92,36 @@
   const tops = (settled.length ? settled : traced).flatMap((run) => run.z_e).filter((z) => z !== null);
   const high = Math.ceil(Math.log10(Math.max(10 * LOW, tops.reduce((a, b) => Math.max(a, b), 0))));
   const low = Math.max(Math.log10(LOW), Math.floor(Math.log10(Math.max(LOW, tops.reduce((a, b) => Math.min(a, Math.abs(b)), Infinity)))));
-  const across = (t) => LEFT + (width - LEFT - RIGHT) * t / end;
-  const up = (z) => TOP + (TALL - TOP - BASE) * (high - Math.log10(Math.min(Math.max(Math.abs(z), LOW), 10 ** (high + 1)))) / (high - low);
+  const across = (t) => LEFT + (wide - LEFT - RIGHT) * t / end;
+  const up = (z) => TOP + (tall - TOP - BASE) * (high - Math.log10(Math.min(Math.max(Math.abs(z), LOW), 10 ** (high + 1)))) / (high - low);
   let cursor;
   const drawTrace = () => {
+    wide = Math.max(200, trace.clientWidth);
     trace.replaceChildren();
-    set(trace, "viewBox", `0 0 ${width} ${TALL}`);
+    set(trace, "viewBox", `0 0 ${wide} ${tall}`);
     for (let power = low; power <= high; power++) {
-      make(trace, "path", { d: `M${LEFT} ${up(10 ** power)}H${width - RIGHT}`, class: "rule" });
+      make(trace, "path", { d: `M${LEFT} ${up(10 ** power)}H${wide - RIGHT}`, class: "rule" });
       make(trace, "text", { x: LEFT - 6, y: up(10 ** power) + 4, "text-anchor": "end" }, `${+(10 ** power).toFixed(3)} m`);
     }
-    const clip = make(make(trace, "clipPath", { id: "inside" }), "rect", { x: LEFT, y: TOP, width: Math.max(0, width - LEFT - RIGHT), height: TALL - TOP - BASE });
+    const clip = make(make(trace, "clipPath", { id: "inside" }), "rect", { x: LEFT, y: TOP, width: Math.max(0, wide - LEFT - RIGHT), height: tall - TOP - BASE });
     const inside = make(trace, "g", { "clip-path": "url(#inside)", fill: "none" });
     for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.z_e.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
-    const tick = round(Math.max(end / 5, 110 * end / width));
-    for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: TALL - 5, "text-anchor": "middle" }, `${+(i * tick).toPrecision(6)} s`);
+    const tick = round(Math.max(end / 5, 110 * end / wide));
+    for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: tall - 5, "text-anchor": "middle" }, `${+(i * tick).toPrecision(6)} s`);
     cursor = make(trace, "path", { class: "cursor" });
     trace.style.display = traced.length ? "" : "none";
   };
+  // The map has the shape of the course: above the rest, or beside it where it comes out nearly as large there.
   const place = () => {
-    width = Math.max(200, map.clientWidth);
-    height = Math.round(Math.min(Math.max(width * (box[3] - box[1]) / (box[2] - box[0]), 260), 0.8 * width, 560));
+    const ratio = (box[2] - box[0]) / (box[3] - box[1]), room = stage.clientWidth - 18, most = Math.min(560, 0.8 * Math.max(innerHeight, 500));
+    const fitting = (free) => Math.min(free, most * ratio), beside = fitting(room - REST);
+    const aside = room > 2 * REST && beside >= 0.85 * fitting(room);
+    stage.classList.toggle("aside", aside);
+    width = Math.max(aside ? beside : room, LEAST_MAP);
+    height = Math.round(Math.min(Math.max(width / ratio, LEAST_MAP), most));
     set(map, "viewBox", `0 0 ${width} ${height}`);
+    set(map, "style", `width: ${width}px; height: ${height}px`);
+    tall = aside ? Math.max(LOWEST, Math.min(height - BELOW, 300)) : LOWEST;
     drawTrace();
     draw();
   };
