@@ -54,7 +54,8 @@ def _report(label: str, difference: RunDifference) -> None:
     _show_changes("scenario", difference.scenario)
     _show_changes("versions", difference.versions)
     _show_metrics(difference)
-    _show_log(difference.log)
+    if difference.log:
+        _show_log(difference.log)
 
 
 def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
@@ -77,7 +78,7 @@ def _show_metrics(difference: RunDifference) -> None:
     ]
     if rows:
         echo_table(["metric", "unit", "first", "second", "relative"], rows)
-    one, other = difference.log.ends
+    one, other = difference.log.ends if difference.log else (0.0, 0.0)
     if rows and one != other:
         echo(
             f"the first run ends at {one:g} s, the second at {other:g} s: their metrics are about "

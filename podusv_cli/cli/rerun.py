@@ -79,8 +79,11 @@ def _verdict(run: Repeated) -> str:
 
 def _lines(run: Repeated) -> Iterator[str]:
     difference = run.found
-    yield from log_in_words(difference.log)
-    if difference.log.largest:
+    if difference.log:
+        yield from log_in_words(difference.log)
+    elif not run.identical:
+        yield "the run's own log is not here, so that only the digests were compared"
+    if difference.log and difference.log.largest:
         widest = max(difference.log.largest, key=lambda deviation: deviation.relative_to_peak)
         share = f"{widest.relative_to_peak:.2g} of its peak"
         yield f"largest difference, {share}: {deviation_in_words(widest)}"

@@ -28,10 +28,10 @@ class RunDifference:
     """The differences between two runs.
 
     `digests` are the SHA-256 of their logs, `sizes` the logs' bytes. `metrics` has the numbers of
-    both runs by name, None where a run has none.
+    both runs by name, None where a run has none. `log` is None where the log of one is missing.
     """
 
-    log: LogDifference
+    log: LogDifference | None
     digests: tuple[str, str]
     sizes: tuple[int, int]
     scenario: Mapping[str, Change]
@@ -44,6 +44,11 @@ class RunDifference:
         return self.digests[0] == self.digests[1]
 
     @property
+    def same_numbers(self) -> bool:
+        """Whether every number of the log is the same, to the last bit."""
+        return self.log.same if self.log else self.same_bytes
+
+    @property
     def changed_metrics(self) -> list[str]:
         """Names of metrics that differ, measured times excepted."""
         return [k for k, (a, b) in self.metrics.items() if k not in CLOCKED and a != b]
@@ -51,12 +56,12 @@ class RunDifference:
     @property
     def same(self) -> bool:
         """Whether scenario, metrics and every number of the log are the same."""
-        return self.log.same and not self.scenario and not self.changed_metrics
+        return self.same_numbers and not self.scenario and not self.changed_metrics
 
     def as_json(self) -> dict[str, Any]:
         """The difference as plain data."""
         return {
-            "same_numbers": self.log.same,
+            "same_numbers": self.same_numbers,
             "same_bytes": self.same_bytes,
             "sha256": list(self.digests),
             "scenario": {key: list(change) for key, change in self.scenario.items()},
@@ -65,7 +70,7 @@ class RunDifference:
                 name: {"values": list(pair), "relative": relative(*pair)}
                 for name, pair in self.metrics.items()
             },
-            "log": self.log.as_json(),
+            "log": self.log and self.log.as_json(),
         }
 
 
@@ -77,13 +82,20 @@ def relative(one: float | None, other: float | None) -> float | None:
 
 
 def difference(one: FinishedRun, other: FinishedRun) -> RunDifference:
-    """Compare two opened run folders. Raises StorageError."""
+    """Compare two opened run folders. Raises StorageError.
+
+    A log that is missing, as it was not packed, is compared by its digest.
+    """
     entries = [manifest.read(run.folder).files[LOG] for run in (one, other)]
-    texts = [log_reader.resolved_yaml(run.folder / LOG) for run in (one, other)]
+    whole = one.has_log and other.has_log
+    texts = [
+        log_reader.resolved_yaml(run.folder / LOG) if whole else run.resolved_yaml
+        for run in (one, other)
+    ]
     given = dict.fromkeys((*one.metrics, *other.metrics))
     names = sorted(given, key=lambda name: [*METRICS, *given].index(name))
     return RunDifference(
-        log=compare(one.recording, other.recording),
+        log=compare(one.recording, other.recording) if whole else None,
         digests=(entries[0].sha256, entries[1].sha256),
         sizes=(entries[0].bytes, entries[1].bytes),
         scenario=scenario_changes(*texts),

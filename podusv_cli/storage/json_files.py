@@ -43,9 +43,14 @@ def _plain(value: Any) -> Any:
 
 def read(path: Path) -> dict[str, Any]:
     """Read a JSON object; raises StorageError for anything that podusv does not write."""
+    return parsed(read_text(path), path)
+
+
+def parsed(text: str, path: Path) -> dict[str, Any]:
+    """As `read`, of the text of the file at `path`."""
     try:
         content = json.loads(
-            read_text(path), object_pairs_hook=_object,
+            text, object_pairs_hook=_object,
             parse_float=_finite, parse_int=_whole, parse_constant=_finite,
         )  # fmt: skip
     except (ValueError, RecursionError) as error:

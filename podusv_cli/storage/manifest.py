@@ -16,6 +16,8 @@ from podusv_cli.storage import json_files
 from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, fingerprint
 
 NAME = "manifest.json"
+# What may be missing for a reason, and what to do then.
+REMEDIES = {"log.h5": "; of a run packed without it, podusv rerun --out NEW makes it anew"}
 FORMAT = 2  # of run folder and log
 
 
@@ -57,8 +59,13 @@ def demand(folder: Path) -> None:
 
 def read(folder: Path) -> Manifest:
     """The manifest of a folder; the files are not checked. Raises StorageError."""
+    return parsed(atomic.read_text(folder / NAME), folder)
+
+
+def parsed(text: str, folder: Path) -> Manifest:
+    """As `read`, of the text of the folder's manifest."""
     path = folder / NAME
-    content = json_files.read(path)
+    content = json_files.parsed(text, path)
     if misfit := other_format(content.get("podusv_format")):
         raise StorageError(f"{path}: {misfit}")
     try:
@@ -79,17 +86,20 @@ def other_format(written: object) -> str:
     return f"written in format {written!r}; this podusv reads format {FORMAT}"
 
 
-def check(folder: Path) -> Manifest:
+def check(folder: Path, optional: str = "") -> Manifest:
     """The manifest of a folder whose files are all present and unchanged.
 
     Raises StorageError naming the first file that is not. Files that the manifest does not list are
-    allowed; `foreign` lists them.
+    allowed; `foreign` lists them. Files that are called `optional` may be missing.
     """
     manifest = read(folder)
     for name, entry in sorted(manifest.files.items()):
         path = place(folder, name)
         if not os.path.lexists(path):
-            raise StorageError(f"{folder} is not a finished folder: {name} is missing")
+            if path.name == optional:
+                continue
+            remedy = REMEDIES.get(path.name, "")
+            raise StorageError(f"{folder} is not a finished folder: {name} is missing{remedy}")
         if entry.bytes > LARGEST_FILE:  # a sparse file may claim any size
             claim = f"{entry.bytes} bytes, at most {LARGEST_FILE} allowed"
             raise StorageError(f"cannot read {path}: {claim}{ELSEWHERE}")

@@ -200,6 +200,11 @@ class FinishedRun:
     theory: dict[str, Any] = field(default_factory=dict)  # empty without a Lyapunov function
     about: RunAbout | None = None
 
+    @property
+    def has_log(self) -> bool:
+        """Whether its log is there; a folder may be packed without."""
+        return (self.folder / LOG).exists()
+
     @cached_property
     def recording(self) -> Recording:
         """The content of log.h5, read on first use. Raises StorageError."""
@@ -220,12 +225,12 @@ class InMemory(FinishedRun):
         return self.kept
 
 
-def open_run(folder: Path) -> FinishedRun:
+def open_run(folder: Path, *, optional: str = "") -> FinishedRun:
     """Open a run folder whose files are unchanged since it was finished.
 
-    Raises StorageError naming the first fault.
+    Raises StorageError naming the first fault. The file `optional` may be missing.
     """
-    contents = manifest.check(folder)
+    contents = manifest.check(folder, optional)
     missing = [name for name in NEEDED if name not in contents.files]
     if missing:
         raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")

@@ -86,18 +86,18 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:
     ]  # fmt: skip
 
 
-def runs_of(path: Path) -> list[FinishedRun]:
+def runs_of(path: Path, *, optional: str = "") -> list[FinishedRun]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
     Their logs and theory.json were checked. Raises UsageError for a folder without finished runs,
-    StorageError for a damaged one.
+    StorageError for a damaged one. Files that are called `optional` may be missing.
     """
     if (path / STUDY).is_file():
         raise UsageError(_about_study(path))
-    inner = _listed(path) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
+    inner = _listed(path, optional) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
     if not inner:
         manifest.demand(path)
-    return [_checked(child) for child in (inner or [path])]
+    return [_checked(child, optional) for child in (inner or [path])]
 
 
 def _about_study(path: Path) -> str:
@@ -116,9 +116,9 @@ def _unlisted(path: Path) -> list[Path]:
     return [c for c in children if not c.is_symlink() and os.path.lexists(c / LOG)]
 
 
-def _listed(path: Path) -> list[Path]:
+def _listed(path: Path, optional: str) -> list[Path]:
     """The runs of a finished comparison in its table's order, else by name; none in a run."""
-    files = manifest.check(path).files
+    files = manifest.check(path, optional).files
     runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
     head = _first_row(path / TABLE) if TABLE in files else []
     runs.sort(key=lambda run: head.index(run) if run in head else len(head))
@@ -132,9 +132,9 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _checked(path: Path) -> FinishedRun:
-    run = open_run(path)
-    if wrong := _fault(run.recording):
+def _checked(path: Path, optional: str) -> FinishedRun:
+    run = open_run(path, optional=optional)
+    if run.has_log and (wrong := _fault(run.recording)):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
     stability.check(run.theory, run.folder / THEORY)
     return run

@@ -23,7 +23,7 @@ from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import loaded
 from podusv_cli.storage import manifest, provenance, run_folder
-from podusv_cli.storage.run_folder import FinishedRun
+from podusv_cli.storage.run_folder import LOG, FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
@@ -48,7 +48,7 @@ class Repeated:
     @property
     def identical(self) -> bool:
         """Whether the log holds the same numbers, to the last bit."""
-        return self.found.log.same
+        return self.found.same_numbers
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of it."""
@@ -99,7 +99,7 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     this podusv does not know a key any more or the run is too large, and StorageError.
     """
     manifest.demand(path)
-    runs = [(run, _scenario(run, request)) for run in runs_of(path)]
+    runs = [(run, _scenario(run, request)) for run in runs_of(path, optional=LOG)]
     for run, _ in runs:
         if run.status == "interrupted":
             raise UsageError(f"{run.folder} was interrupted; there is no whole run to repeat")

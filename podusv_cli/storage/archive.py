@@ -1,0 +1,148 @@
+"""A folder as one zip file: the same files, the same bytes. What others packed is not trusted."""
+
+from __future__ import annotations
+
+import os
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from shutil import copyfileobj
+
+from podusv_cli.core.errors import StorageError
+from podusv_cli.core.quantities import bytes_in_words
+from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
+from podusv_cli.storage import files
+
+EARLIEST = (1980, 1, 1, 0, 0, 0)  # the time of every file: the first that the format has
+PLAIN = stat.S_IFREG | 0o644
+MOST_FILES = 100_000
+# Logs become 1 to 3 times as large; the format reaches 1032, and any ratio where files share bytes.
+LARGEST_RATIO = 100
+READ = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
+ENCRYPTED = 0x1  # a bit of `flag_bits`
+
+
+def write(out: Path, folder: Path, names: Sequence[str]) -> int:
+    """Pack these files of a folder below its name, in place of an older archive; its size in bytes.
+
+    The bytes depend on names and contents alone. Raises StorageError.
+    """
+    remove_abandoned_files(out.parent)
+    part = out.with_name(temporary_name())
+    size = sum((folder / name).stat().st_size for name in names)
+    try:
+        with files.new_file(part, size) as file, zipfile.ZipFile(file, "w") as archive:
+            for name in sorted(names):
+                _add(archive, f"{folder.resolve().name}/{name}", folder / name)
+        with files.storage_errors(f"cannot write {out}"):
+            os.replace(part, out)
+    finally:
+        part.unlink(missing_ok=True)
+    files.sync_folder(out.parent)
+    return out.stat().st_size
+
+
+def _add(archive: zipfile.ZipFile, name: str, path: Path) -> None:
+    entry = zipfile.ZipInfo(name, EARLIEST)
+    entry.create_system, entry.external_attr = 3, PLAIN << 16  # Unix
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    with files.opened(path) as source:
+        entry.file_size = files.file_size(source)
+        with archive.open(entry, "w") as target:
+            copyfileobj(source, target)
+
+
+class Archive:
+    """An open archive whose names lead into one folder, `name`, and whose sizes are bounded.
+
+    `sizes` has the files' bytes by their names in the folder.
+    """
+
+    def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
+        """Raises StorageError for an archive that must not be unpacked."""
+        self.path, self._archive = path, archive
+        entries = archive.infolist()
+        if len(entries) > MOST_FILES:
+            raise self.fault(f"{len(entries)} files, at most {MOST_FILES} are unpacked")
+        for entry in entries:
+            self._check(entry)
+        tops = {entry.filename.partition("/")[0] for entry in entries}
+        if len(tops) != 1:
+            raise self.fault(f"it has files of {len(tops)} folders, must have those of one")
+        (self.name,) = tops
+        within = len(self.name) + 1
+        self._entries = {entry.filename[within:]: entry for entry in entries}
+        self.sizes = {name: entry.file_size for name, entry in self._entries.items()}
+        self._check_whole(len(entries))
+
+    def text(self, name: str) -> str:
+        """A file as text. Raises StorageError."""
+        if name not in self.sizes:
+            raise self.fault(f"it has no {name}")
+        if self.sizes[name] > files.LARGEST_TEXT:
+            raise self.fault(f"{name} has {self.sizes[name]} bytes")
+        try:
+            with self._reading():
+                return self._archive.read(self._entries[name]).decode()
+        except UnicodeDecodeError as error:
+            raise self.fault(f"{name} is not UTF-8 text") from error
+
+    def extract(self, folder: Path) -> None:
+        """Write all files into an empty folder. Raises StorageError."""
+        for name, entry in self._entries.items():
+            target = folder / name
+            files.make_folder(target.parent)
+            with files.new_file(target, entry.file_size) as file, self._reading():
+                copyfileobj(self._archive.open(entry), file)
+
+    def fault(self, why: str) -> StorageError:
+        """An error that says why this archive is not unpacked."""
+        return StorageError(f"{self.path} is not unpacked: {why}")
+
+    def _check(self, entry: zipfile.ZipInfo) -> None:
+        """Raise StorageError for what is no plain file below one folder."""
+        name = entry.filename
+        parts = PurePosixPath(name).parts
+        inside = len(parts) > 1 and not {"..", "/", "."} & {*parts} and "\\" not in name
+        if str(PurePosixPath(name)) != name or not inside or not name.isprintable():
+            raise self.fault(f"{name!r} is no file inside a folder")
+        kind = stat.S_IFMT(entry.external_attr >> 16)
+        if kind not in (0, stat.S_IFREG):
+            raise self.fault(f"{name!r} is a link, folder or device")
+        if entry.compress_type not in READ or entry.flag_bits & ENCRYPTED:
+            raise self.fault(f"{name!r} is encrypted, or compressed in a way that podusv does not")
+
+    def _check_whole(self, count: int) -> None:
+        if len(self._entries) < count:
+            raise self.fault("it has two files of one name")
+        folders = {str(p) for name in self._entries for p in PurePosixPath(name).parents}
+        if both := sorted(folders & {*self._entries}):
+            raise self.fault(f"{both[0]!r} is a file and a folder")
+        whole, packed = sum(self.sizes.values()), self.path.stat().st_size
+        if whole > LARGEST_RATIO * packed:
+            raise self.fault(
+                f"its {bytes_in_words(packed)} would become {bytes_in_words(whole)}; results of "
+                f"podusv become {LARGEST_RATIO} times as large at most"
+            )
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        try:
+            yield
+        except (zipfile.BadZipFile, EOFError, zlib.error, NotImplementedError) as error:
+            raise self.fault(f"damaged ({error})") from error
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Archive]:
+    """An archive, open for reading. Raises StorageError for one that must not be unpacked."""
+    with files.opened(path) as file:
+        try:
+            archive = zipfile.ZipFile(file)
+        except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
+            raise StorageError(f"{path} is no archive of podusv pack ({error})") from error
+        with archive:
+            yield Archive(path, archive)
