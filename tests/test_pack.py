@@ -260,7 +260,7 @@ UNSAFE = {
     "two of one name": (more("first/log.h5"), "it has two files of one name"),
     "file and folder": (more("first/log.h5/a"), "'log.h5' is a file and a folder"),
     "one more": (more("first/evil.py"), "evil.py is not as its manifest.json lists it"),
-    "bomb": (more("first/zeros", bytes(40_000_000)), "would become 40 MB; results of podusv become"),
+    "bomb": (more("first/zeros", bytes(40_000_000)), "would become 40 MB; results of podusv"),
     "longer": (other("metrics.csv", lambda c: c + b"x"), "metrics.csv is not as its manifest"),
     "other bits": (other("log.h5", lambda c: c[:-1] + bytes([c[-1] ^ 1])), "log.h5 was altered"),
     "missing": (without("metrics.json"), "metrics.json is missing"),
