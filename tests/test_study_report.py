@@ -2,6 +2,7 @@
 
 import math
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,25 +73,63 @@ def test_the_answer_comes_first(whole, told):
     assert "Preliminary" not in answer.text
 
 
-def test_failures_are_listed_with_their_cause_and_how_to_get_one(whole, told):
+def test_the_worst_failures_of_every_law_are_listed_with_what_decided_and_how_to_get_one(
+    whole, told
+):
     part, runs = section(told, "failures"), whole.results.runs
     head, *rows = part.rows()
-    assert head == ["law", "cell", "draw", "status", "until", "cause"]
+    assert head == ["law", "cell", "draw", "ending", "cause", "other laws fail", "drawn"]
     total = sum(int(np.sum(runs.failed(law))) for law in runs.laws)
     assert len(rows) == min(total, report.FIRST)
     assert total > report.FIRST
     assert f"{total - report.FIRST} more failed" in part.text
-    for law, cell, draw, status, until, cause in rows:
-        assert (status, until) == ("finished", "1 s")
-        value = runs.metric(law, "iae")[int(cell.partition(":")[0]), int(draw)]
+    for law, cell, draw, ending, cause, others, _ in rows:
+        assert ending == "finished"
+        place = int(cell.partition(":")[0]), int(draw)
+        value = runs.metric(law, "iae")[place]
         assert value > 0.215
         assert cause == f"iae = {value:.5g}"
+        (other,) = {*runs.laws} - {law}
+        assert others == f"{int(runs.metric(other, 'iae')[place] > 0.215)} of 1"
+    for law in runs.laws:
+        listed = [float(row[4].removeprefix("iae = ")) for row in rows if row[0] == law]
+        assert len(listed) == min(int(np.sum(runs.failed(law))), report.FIRST // 2)
+        all_of_law = np.sort(runs.metric(law, "iae")[runs.failed(law)])[::-1]
+        assert listed == pytest.approx(all_of_law[: len(listed)], rel=1e-4)
     law, cell, draw, *_ = rows[0]
     (command,) = part.all("pre")
     number = cell.partition(":")[0]
     assert command.text == (
         f"podusv sweep draw {whole.folder} --law {law} --draw {draw} --cell {number}"
     )
+
+
+def test_runs_that_ended_first_come_first(whole, monkeypatch):
+    runs, until = whole.results.runs, np.ones((4, 7))
+    until[1, 4], until[0, 2] = 0.5, 0.2
+    monkeypatch.setattr(runs, "until", lambda law: until)
+    monkeypatch.setattr(runs, "finished", lambda law: until == 1.0)
+    listed = report.runs_that(whole.results, lambda law: until < 2.0).first
+    first = [row for row in listed if row.law == runs.laws[1]]
+    assert [(row.cell, row.draw) for row in first[:2]] == [(0, 2), (1, 4)]
+    assert len(listed) == report.FIRST
+    assert len(first) == report.FIRST // 2
+
+
+@pytest.mark.parametrize("by_chance", [0.0, math.nan, 1.0])
+def test_of_a_draw_the_values_are_listed_that_go_together_most_with_success(drawn, by_chance):
+    rows = [row | {"by_chance": by_chance} for row in drawn.results.tables.sensitivity]
+    tables = drawn.results.tables._replace(sensitivity=rows)
+    results = replace(drawn.results, tables=tables)
+    (row, *_) = report.runs_that(results, results.runs.failed).first
+    sizes = {
+        r["quantity"]: abs(r["correlation"])
+        for r in rows if (r["law"], r["metric"]) == (row.law, "iae")
+    }  # fmt: skip
+    most = sorted(sizes, key=sizes.__getitem__, reverse=True)[: report.DECISIVE]
+    told = [f"{name} {results.runs.drawn[name][row.draw]:.3g}" for name in most]
+    assert told
+    assert row.drawn == ("-" if by_chance == 1.0 else ", ".join(told))
 
 
 def test_what_was_varied_is_told_in_words(told):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from podusv_cli.core.phrases import value_text
 from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Failure
-from podusv_cli.studies.counting.runs import STATUSES, Mask
+from podusv_cli.studies.counting.runs import STATUSES, Mask, worst
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.making.sessions import sessions
 from podusv_cli.studies.telling.bars import bars
@@ -21,23 +21,25 @@ from podusv_cli.studies.telling.results import Results
 
 FEW = 5  # laws, whose pairs are no more than ten
 FIRST = 20  # rows of a table of runs
+DECISIVE = 2  # drawn values of a run
 SESSION = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
 
 
 class Row(NamedTuple):
-    """A run of a table: how it ended, when and why."""
+    """A run of a table: how it ended and why, who else failed there, and what the draw was."""
 
     law: str
     cell: int
     label: str
     draw: int
-    status: str
-    until: str
+    ending: str
     cause: str
+    others: str
+    drawn: str
 
 
 class Rows(NamedTuple):
-    """The first runs of a kind, and how many there are."""
+    """The worst runs of a kind, and how many there are."""
 
     first: Sequence[Row]
     total: int
@@ -87,27 +89,67 @@ def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
 
 
 def runs_that(results: Results, are: Any) -> Rows:
-    """The runs of which this is true, by draw; `are` gives a mask (cell, draw) of a law."""
+    """The worst runs of every law of which this is true; `are` gives a mask (cell, draw) of a law.
+
+    Of FIRST rows every law has as many as there are, or an equal share.
+    """
     runs = results.runs
     masks: dict[str, Mask] = {law: are(law) & runs.done(law) for law in runs.laws}
     places = sorted(
-        (draw, cell, law)
-        for law, mask in masks.items()
-        for draw, cell in np.argwhere(mask.T)[:FIRST].tolist()
-    )
-    rows = [_row(results, law, cell, draw) for draw, cell, law in places[:FIRST]]
+        (rank, place, cell, draw)
+        for place, law in enumerate(runs.laws)
+        for rank, (cell, draw) in enumerate(_worst(results, law, masks[law])[:FIRST].tolist())
+    )[:FIRST]
+    drawn = runs.drawn if places else {}
+    rows = [
+        _row(results, drawn, (runs.laws[place], cell, draw))
+        for _, place, cell, draw in sorted(places, key=lambda found: found[1])
+    ]
     return Rows(rows, sum(int(mask.sum()) for mask in masks.values()))
 
 
-def _row(results: Results, law: str, cell: int, draw: int) -> Row:
-    runs = results.runs
+def _worst(results: Results, law: str, mask: Mask) -> Any:
+    """Cell and draw of runs: those that ended first, then those that missed success by most."""
+    runs, (cells, draws) = results.runs, np.nonzero(mask)
+    finished = runs.finished(law)[mask]
+    until = np.where(finished, 0.0, runs.until(law)[mask])
+    none = np.zeros(len(draws), bool)
+    missed = [
+        -worst(results.known[name], runs.metric(law, name)[mask], none) for name in runs.asked
+    ]
+    order = np.lexsort((cells, draws, *reversed(missed), until, finished))
+    return np.column_stack([cells, draws])[order]
+
+
+def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]) -> Row:
+    runs, (law, cell, draw) = results.runs, place
     until = float(runs.until(law)[cell, draw])
     status = STATUSES[int(runs.status(law)[cell, draw])]
     cause = runs.causes.get((runs.laws.index(law), cell, draw), "") or _short_of(
         results, law, cell, draw
     )
-    end = "-" if np.isnan(until) else f"{until:.4g} s"
-    return Row(law, cell, runs.cells[cell], draw, status, end, cause)
+    ending = status if status == "finished" or np.isnan(until) else f"{status} at {until:.4g} s"
+    others = [other for other in runs.laws if other != law]
+    failing = sum(not runs.success(other)[cell, draw] for other in others)
+    return Row(
+        law, cell, runs.cells[cell], draw, ending, cause,
+        f"{failing} of {len(others)}",
+        ", ".join(f"{name} {drawn[name][draw]:.3g}" for name in _decisive(results, law, cell))
+        or "-",
+    )  # fmt: skip
+
+
+def _decisive(results: Results, law: str, cell: int) -> list[str]:
+    """The drawn quantities that go together most with what success, or the answer, asks about."""
+    metric, label = (*results.runs.asked, *results.shown)[0], results.runs.cells[cell]
+    sizes = {
+        row["quantity"]: size
+        for row in results.tables.sensitivity
+        if (row["law"], row["cell"], row["metric"]) == (law, label, metric)
+        and (size := abs(row["correlation"])) > 0.0
+        and not size <= row["by_chance"]  # which is NaN where draws are no random sample
+    }
+    return sorted(sizes, key=lambda quantity: -sizes[quantity])[:DECISIVE]
 
 
 def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
