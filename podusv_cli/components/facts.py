@@ -32,6 +32,7 @@ ENOUGH = 1e6  # of the model ship's acceleration; whoever gives this has no limi
 DELIVERED = 0.999  # fraction of a demand that counts as all of it
 CALM = 0.25  # gain times delay that a hand point bears without swinging
 CRUISE = 0.6  # of the speed at full thrust
+EFFORT0 = 0.456118  # s/m, the model ship's throttle per speed while cruising
 HALVINGS = 60  # of a speed, until it is a float's last digit
 SPINNING = 5.0  # times U/L, the largest yaw rate that is counted on
 ASKED = 20  # halvings of a speed for each of which an actuator is asked, some ms each
@@ -108,6 +109,12 @@ class Facts:
         given = [side * self._given(u, (cruising, side * asked)) for side in (1.0, -1.0)]
         least = min(given)
         return least if least < DELIVERED * asked else asked / ENOUGH
+
+    @cached_property
+    def effort(self) -> float:
+        """Part of the force F that holds the cruising speed, over that speed [s/m]."""
+        u = CRUISE * self.U
+        return self._drag(u) / (self.F * u)
 
     @cached_property
     def r_top(self) -> float:
