@@ -1,4 +1,4 @@
-"""The laws of rovers' autopilots, against plain-Python loops and algebra."""
+"""The laws of ArduPilot, PX4 and MSS, against plain-Python loops and algebra."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from conftest import NONLINEAR, ask, situations
 import podusv
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.ardupilot import ArduPilot, by_l1
+from podusv_cli.components.controllers.mss import Mss
 from podusv_cli.components.controllers.px4 import Px4
 from podusv_cli.components.facts import Facts
 from podusv_cli.core.kernel import bundle
@@ -64,9 +65,9 @@ def rk4(f: Any, s: Any, held: Any) -> Any:
     return s + STEP / 6.0 * (a + 2.0 * b + 2.0 * c + f(s + STEP * c, held))
 
 
-def sailed(law: Any, memory: int, duration: float) -> Any:
+def sailed(law: Any, memory: Any, duration: float) -> Any:
     """Rows of state and memory at every sample; only the memory moves on in between."""
-    s, m, leg, rows = np.array([*START.values(), 0.0, 0.0]), np.zeros(memory), 0, []
+    s, m, leg, rows = np.array([*START.values(), 0.0, 0.0]), np.array(memory), 0, []
     for step in range(round(duration / STEP) + 1):
         at = complex(s[0], s[1])
         if leg < len(POINTS) - 1 and abs(complex(*POINTS[leg + 1]) - at) < NEAR:
@@ -147,7 +148,7 @@ def test_ardupilot_sails_as_in_a_plain_loop_at_an_awkward_period(guidance: str) 
     law = {"kind": "ardupilot", "guidance": guidance} | GAINS
     out = podusv.simulate(scenario(law, TIME))
     states = ("x", "y", "psi", "u", "v", "r", "throttle_i", "steering_i", "cross_i")
-    own = sailed(ardupilot(guidance), 3, TIME)[: len(out["time"])]
+    own = sailed(ardupilot(guidance), np.zeros(3), TIME)[: len(out["time"])]
     ran = np.array([out[name] for name in states]).T[: len(own)]
     np.testing.assert_allclose(ran, own, atol=1e-9)
     assert out["leg"].max() >= 1
@@ -196,14 +197,87 @@ def test_px4_sails_as_in_a_plain_loop_at_an_awkward_period() -> None:
     law = {"kind": "px4", "r_least": 0.05} | gains
     out = podusv.simulate(scenario(law, TIME))
     states = ("x", "y", "psi", "u", "v", "r", "throttle_i", "steering_i", "turns")
-    own = sailed(px4(), 3, TIME)[: len(out["time"])]
+    own = sailed(px4(), np.zeros(3), TIME)[: len(out["time"])]
     ran = np.array([out[name] for name in states]).T[: len(own)]
     np.testing.assert_allclose(ran, own, atol=1e-9)
     assert out["leg"].max() >= 1
     assert 0.05 < out["turns"].mean() < 0.95, "it has turned on the spot, and driven on"
 
 
+def mss(learns: str) -> Any:
+    """MSS's functions in continuous time: ALOSpsi or ILOSpsi, LOSobserver, SIMotter's PID."""
+    D, gain, K_f, wn, zeta, T, w_u = 4.0, 0.05, 0.4, 1.2, 0.9, 1.5, 0.8
+    T_f, m11, m33 = 1.0 / (K_f + 2.0 * math.sqrt(K_f) + 1.0), 64.0, 35.0
+    K_p, K_d, T_i = m33 * wn**2, m33 * (2.0 * zeta * wn - 1.0 / T), 10.0 / wn
+
+    def law(m: Any, seen: Any) -> tuple[Any, Any]:
+        s, target, moves = seen
+        beta, y_i, force, z, psi_d, xi = m
+        along = moves / abs(moves)
+        y = ((complex(s[0], s[1]) - target) * along.conjugate()).imag
+        pi_h = angle_of(along)
+        if learns == "published":
+            psi_ref = pi_h - beta - math.atan(y / D)
+            learnt = [gain * D * y / math.sqrt(D**2 + y**2), 0.0]
+        else:  # its y_int times kappa
+            psi_ref = pi_h - math.atan((y + y_i) / D)
+            learnt = [0.0, gain * D * y / (D**2 + (y + y_i) ** 2)]
+        r_d = psi_d - xi
+        off = angle_of(turned(s[2] - psi_d))
+        yaw = m33 / T * r_d - (K_p * (off + z / T_i) + K_d * (s[5] - r_d))
+        chi_off = s[2] - pi_h
+        aimed = (SPEED + s[4] * math.sin(chi_off)) / max(math.cos(chi_off), 0.2)
+        u_d = min(max(aimed, 0.1, 0.25 * (abs(y) - D)), 1.2)
+        surge = 2.0 * m11 * w_u * (u_d - s[3]) + force
+        return [surge, yaw], np.array([
+            *learnt, m11 * w_u**2 * (u_d - s[3]), off,
+            r_d + K_f * angle_of(turned(psi_ref - psi_d)), r_d / T_f,
+        ])  # fmt: skip
+
+    return law
+
+
+@pytest.mark.parametrize("learns", ["published", "integral"])
+def test_mss_sails_as_in_a_plain_loop_at_an_awkward_period(learns: str) -> None:
+    law = {
+        "kind": "mss", "learns": learns, "lookahead": 4.0, "gamma": 0.05, "sigma": 0.05, "K_f": 0.4,
+        "wn": 1.2, "zeta": 0.9, "T": 1.5, "omega_u": 0.8, "k_s": 0.25, "U": 1.2, "U_min": 0.1,
+        "V_m": 0.02, "chi_m": 0.3,
+    }  # fmt: skip
+    out = podusv.simulate(scenario(law, TIME))
+    memory = ("crab", "offset", "force_i", "heading_i", "psi_f", "xi")
+    begins = [0.0] * 4 + [START["psi"]] * 2
+    own = sailed(mss(learns), begins, TIME)[: len(out["time"])]
+    ran = np.array([out[name] for name in ("x", "y", "psi", "u", "v", "r", *memory)]).T
+    np.testing.assert_allclose(ran[: len(own)], own, atol=1e-9)
+    assert out["leg"].max() >= 1
+
+
 # --- what follows from the equations
+
+
+def test_mss_places_its_poles() -> None:
+    """The observer's at K_f + sqrt(K_f), twice; without T_i the heading's by wn and zeta.
+
+    The source says so of Nomoto's model r' = (K tau - r)/T with K = T/m33.
+    """
+    law, h = Mss(wn=1.1, zeta=0.8, T=1.6, K_f=0.35), 1e-6
+    x, memory = np.zeros(6), np.zeros(6)
+
+    def slope(place: int, of: Any) -> Any:
+        ends = []
+        for side in (h, -h):
+            state, own = x.copy(), memory.copy()
+            (state if place < 6 else own)[place % 6] = side
+            ends.append(of(ask(law, state, own, np.array([0, 0, 1.0, 0, 0, 0]), NONLINEAR)))
+        return (ends[0] - ends[1]) / (2 * h)
+
+    filtered = np.array([slope(6 + i, lambda a: a.rate[4:]) for i in (4, 5)]).T
+    w = 0.35 + math.sqrt(0.35)
+    np.testing.assert_allclose(np.poly(filtered), [1.0, 2 * w, w * w], rtol=1e-6)
+    by_psi, by_r = (slope(i, lambda a: a.tau[1] / NONLINEAR.m33) for i in (2, 5))
+    poles = np.poly([[by_r - 1.0 / 1.6, by_psi], [1.0, 0.0]])
+    np.testing.assert_allclose(poles, [1.0, 2 * 0.8 * 1.1, 1.1**2], rtol=1e-6)
 
 
 @pytest.mark.parametrize("law", [ArduPilot(), ArduPilot(guidance="l1"), Px4()], ids=str)
