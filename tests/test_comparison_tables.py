@@ -142,6 +142,16 @@ def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     assert "booktabs" in text.splitlines()[0]
 
 
+def test_latex_has_ratios_to_the_first_run_where_they_are_asked_for():
+    frame = table.table({"a": {"iae": 8.0}, "b": {"iae": 3.125}, "c": {"iae": 1e-9}})
+    (row,) = table.as_latex(frame, ratios=True).splitlines()[6:-2]
+    assert row.split(" & ")[2:] == [
+        "8", "", "3", ".12~(0.391)",
+        r"\textbf{\boldmath 1}", r"\textbf{\boldmath $\times10^{-9}$}~(1.25e-10) \\",
+    ]  # fmt: skip
+    assert "(" not in table.as_latex(frame).splitlines()[6].partition("m s")[2]
+
+
 def test_every_symbol_of_a_metric_can_be_set():
     symbols = [metric.symbol for metric in METRICS.values() if metric.symbol]
     assert len(symbols) >= 10

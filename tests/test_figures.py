@@ -32,7 +32,7 @@ from podusv_cli.figures.curves import thinned
 from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.looks import LOOKS, nth_style
 from podusv_cli.figures.shown import FEWEST, axis_label, dressed, label, places
-from podusv_cli.figures.style import WIDTHS, house_style, image, new_figure
+from podusv_cli.figures.style import STYLES, WIDTHS, Look, house_style, image, new_figure
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.members import from_folder
@@ -209,11 +209,32 @@ def test_every_figure_is_as_wide_as_its_page_and_names_its_axes(two, name, colum
 
 @pytest.mark.parametrize("columns", [1, 2])
 @pytest.mark.parametrize("name", FIGURES)
-def test_no_text_leaves_the_page_and_no_label_title_or_name_covers_another(two, name, columns):
+@pytest.mark.parametrize(
+    ("style", "widths"), [("ieee", (88.9, 181.864)), ("elsevier", (90.0, 190.0))]
+)
+def test_type_can_be_read_at_the_widths_of_publishers(two, name, columns, style, widths):
     if not FIGURES[name].fits(two):
         pytest.skip("the sample logs lack what this figure shows")
-    with house_style():
-        figure = FIGURES[name].family(two, columns)
+    look = Look(columns, style=STYLES[style])
+    with house_style(look.style):
+        figure = look.given_to(FIGURES[name].family(two, columns))
+        assert image(figure, "pdf")[:4] == b"%PDF"
+        texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
+    assert figure.get_size_inches()[0] * 25.4 == pytest.approx(widths[columns - 1])  # mm
+    assert min(text.get_fontsize() for text in texts) >= 7.0
+
+
+@pytest.mark.parametrize("columns", [1, 2])
+@pytest.mark.parametrize("style", ["podusv", "ieee"])
+@pytest.mark.parametrize("name", FIGURES)
+def test_no_text_leaves_the_page_and_no_label_title_or_name_covers_another(
+    two, name, columns, style
+):
+    if not FIGURES[name].fits(two):
+        pytest.skip("the sample logs lack what this figure shows")
+    look = Look(columns, style=STYLES[style])
+    with house_style(look.style):
+        figure = look.given_to(FIGURES[name].family(two, columns))
         image(figure, "png")
         page, panels = figure.bbox, [axes.get_window_extent() for axes in figure.axes]
         kept = [

@@ -55,6 +55,9 @@ def compare(
             autocompletion=completion.metrics,
         ),
     ] = None,
+    ratios: Annotated[
+        bool, typer.Option("--ratios", help="Ratios to the first run in comparison.tex, too.")
+    ] = False,
     doubt: Annotated[
         bool, typer.Option("--doubt", help="Say what each verdict hangs on, as podusv doubt does.")
     ] = False,
@@ -82,7 +85,8 @@ def compare(
         request = Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), [name.strip() for name in form.split(",")], workers,
-            metrics=metric or (), doubt=doubt, trust=trust, compiling=compiling(progress),
+            metrics=metric or (), ratios=ratios, doubt=doubt, trust=trust,
+            compiling=compiling(progress),
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)
@@ -150,7 +154,7 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
     result = done.result
     by_name = {
         row.metric.name: row
-        for row in rows(result.table, result.metrics, result.unsettled, brief=True)
+        for row in rows(result.table, result.metrics, result.unsettled, brief=True, ratios=False)
     }
     headlines = [n for n, row in by_name.items() if row.metric.headline and {*row.texts} != {"-"}]
     shown = [by_name[name] for name in metrics or headlines]

@@ -47,7 +47,7 @@ def plot(
         str, typer.Option(help="WIDTH or WIDTHxHEIGHT in inches, in place of columns.")
     ] = "",
     style: Annotated[
-        str, typer.Option(help="podusv, or paper: serif type of 8 points.")
+        str, typer.Option(help="podusv, or serif type of 8 points: paper, ieee, elsevier.")
     ] = "podusv",
     animate: Annotated[
         bool,

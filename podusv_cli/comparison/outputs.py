@@ -48,6 +48,7 @@ class Result:
     metrics: Mapping[str, MetricAbout] = field(default_factory=lambda: METRICS)  # of the table
     peaks: Mapping[str, float] = field(default_factory=dict)  # of signals, as claims name them
     chosen: Sequence[str] = ()  # metrics that tables for readers are to have; none: all, headlines
+    ratios: bool = False  # whether comparison.tex has those to the first run
     doubts: Sequence[Sequence[str]] = ()  # head and rows of what verdicts hang on, if asked for
     plugins: Plugins = ()  # of all runs
     meanings: Mapping[str, str] = field(default_factory=dict)  # of the codes of warnings
@@ -83,7 +84,8 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
             result.unsettled,
         ).encode(),
         "comparison.tex": lambda: table.as_latex(
-            lasting.only(result.chosen or headlines), result.metrics, result.unsettled
+            lasting.only(result.chosen or headlines), result.metrics, result.unsettled,
+            ratios=result.ratios,
         ).encode(),
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
     }

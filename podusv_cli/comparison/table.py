@@ -29,8 +29,8 @@ FEW = 3  # where there is room for the numbers alone
 PACKAGES = (
     "% needs \\usepackage{booktabs,graphicx}; numbers stand in two columns each, cut at their point"
 )
-# As wide as it is, and scaled to a column of the text where that is wider.
-FITTED = r"\resizebox{\ifdim\width>\columnwidth\columnwidth\else\width\fi}{!}{%"
+# As wide as it is, and scaled to the line where it is wider: in table* a line is the whole page.
+FITTED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
 NUMBER = re.compile(r"(-?\d+)(\.\d+)?(?:e([+-]\d+))?")
 Names = Collection[str]
 
@@ -117,12 +117,12 @@ def _ratio(number: float, first: float) -> float:
 
 def rows(
     frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, brief: bool = False,
+    *, brief: bool = False, ratios: bool = True,
 ) -> list[Row]:  # fmt: skip
     """All rows, those that a reader sees first before the others; best numbers marked with *.
 
     `unsettled` are the runs that do not end at their target; they are never the best. `brief`
-    numbers have FEW digits and no ratio.
+    numbers have FEW digits.
     """
     of_metrics, unranked, finished = [], _unranked(frame, known), frame.finished
     out = [label in unsettled for label in frame.columns]
@@ -133,8 +133,10 @@ def rows(
         texts = [
             metric.undefined if metric.happens and finished[i] and math.isnan(number) else
             "no limit" if metric.margin and math.isinf(number) else
-            _brief(number, best, out[i]) if brief else
-            _cell(number, first, math.nan if out[i] else best, i)
+            _cell(
+                number, first if i and ratios else math.nan, math.nan if out[i] else best,
+                FEW if brief else DIGITS,
+            )
             for i, number in enumerate(numbers)
         ]  # fmt: skip
         of_metrics.append(Row(metric, texts))
@@ -196,19 +198,13 @@ def _shown(number: float, digits: int = DIGITS) -> str:
     return f"{number:.{digits}g}"
 
 
-def _brief(number: float, best: float, out: bool) -> str:
+def _cell(number: float, first: float, best: float, digits: int) -> str:
     if math.isnan(number):
         return "-"
-    shown = _shown(number, FEW)
-    return f"{shown}*" if not out and shown == _shown(best, FEW) else shown
-
-
-def _cell(number: float, first: float, best: float, position: int) -> str:
-    if math.isnan(number):
-        return "-"
-    mark = "*" if _shown(number) == _shown(best) else ""
-    ratio = f" ({number / first:.3g})" if position and first and math.isfinite(first) else ""
-    return f"{_shown(number)}{mark}{ratio}"
+    shown = _shown(number, digits)
+    mark = "*" if shown == _shown(best, digits) else ""
+    ratio = f" ({number / first:.3g})" if first and math.isfinite(first) else ""
+    return f"{shown}{mark}{ratio}"
 
 
 def as_markdown(
@@ -236,16 +232,18 @@ def as_markdown(
 
 
 def as_latex(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
-) -> str:
-    """The table in LaTeX, no wider than a column of the text.
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
+    *, ratios: bool = False,
+) -> str:  # fmt: skip
+    """The table in LaTeX, no wider than the column, or in `table*` the page.
 
     Symbols or words, numbers of FEW digits with their decimal points aligned, the best of a row in
-    bold. Every number takes two columns, before and from its decimal point on.
+    bold, ratios to the first run in brackets. Every number takes two columns, before and from its
+    decimal point on.
     """
     labels = (rf"\multicolumn{{2}}{{c}}{{{escaping.latex(label)}}}" for label in frame.columns)
     lines = [" & ".join([*HEAD, *labels])]
-    for metric, texts in rows(frame, known, unsettled, brief=True):
+    for metric, texts in rows(frame, known, unsettled, brief=True, ratios=ratios):
         shown = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
         parts = [part for text in texts for part in _cut(text)]
         lines.append(" & ".join([shown, quantities.raised(metric.unit), *parts]))
@@ -256,13 +254,14 @@ def as_latex(
 
 
 def _cut(text: str) -> list[str]:
-    """A number up to its decimal point, and the rest."""
-    whole, point, power = _parts(text.removesuffix("*"))
+    """A number up to its decimal point, and the rest with the ratio."""
+    number, _, ratio = text.partition(" (")
+    whole, point, power = _parts(number.removesuffix("*"))
     cut = [whole, point + power]
-    if text.endswith("*"):
+    if number.endswith("*"):
         bold = r"\boldmath " if power else ""
         cut = [part and rf"\textbf{{{bold}{part}}}" for part in cut]
-    return cut
+    return [cut[0], f"{cut[1]}~({ratio}" if ratio else cut[1]]
 
 
 def _parts(number: str) -> tuple[str, str, str]:

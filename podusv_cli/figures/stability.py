@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -96,7 +97,7 @@ def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
     axes.set_ylim(top=2.0 * top)
     axes.plot([], [], color="#444444", linewidth=THIN, label=r"thin: bound $\Delta/2\lambda$")
     if lines:
-        axes.set_title("\n".join(lines), fontsize="x-small", loc="right")
+        axes.set_title("\n".join(lines), fontsize=rcParams["xtick.labelsize"], loc="right")
 
 
 def _thin(run: Shown) -> dict[str, Any]:

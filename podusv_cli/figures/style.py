@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -21,9 +21,8 @@ from PIL import Image
 from podusv_cli.figures.page import Page
 
 FORMATS = ("png", "pdf", "svg")
-# By name, the style files of a style, each on top of those before it.
-STYLES: dict[str, tuple[str, ...]] = {"podusv": ("podusv",), "paper": ("podusv", "paper")}
 WIDTHS = {1: 3.46, 2: 7.09}  # inches: one column and two columns of a journal page
+INCH = 25.4  # millimetres
 COLOURS = 256  # of a PNG; a curve and its soft edge take about ten, and the file a third
 
 NO_STAMP: dict[str, dict[str, Any]] = {
@@ -32,9 +31,26 @@ NO_STAMP: dict[str, dict[str, Any]] = {
 }
 
 
+class Style(NamedTuple):
+    """Style files, each on top of those before it, and the widths of a page's columns [inches]."""
+
+    files: tuple[str, ...]
+    widths: Mapping[int, float] = WIDTHS
+
+
+PRINTED = ("podusv", "paper")
+STYLES = {
+    "podusv": Style(("podusv",)),
+    "paper": Style(PRINTED),
+    # as the publishers' guides for authors ask for
+    "ieee": Style(PRINTED, {1: 3.5, 2: 7.16}),
+    "elsevier": Style(PRINTED, {1: 90.0 / INCH, 2: 190.0 / INCH}),
+}
+
+
 @dataclass(frozen=True)
 class Look:
-    """Width in columns of a page, a size [inches] in place of that, and the names of style files.
+    """Width in columns of a page, a size [inches] in place of that, and a style.
 
     Without a height figures have the height of their contents.
     """
@@ -42,22 +58,23 @@ class Look:
     columns: int = 2
     width: float | None = None
     height: float | None = None
-    style: tuple[str, ...] = STYLES["podusv"]
+    style: Style = STYLES["podusv"]
 
     def given_to(self, figure: Figure) -> Figure:
         """The figure in this size, where one is given."""
-        if self.width and isinstance(figure, Page):
-            figure.resize(self.width, self.height or figure.get_figheight())
+        width = self.width or self.style.widths[self.columns]
+        if isinstance(figure, Page) and (width != figure.get_figwidth() or self.height):
+            figure.resize(width, self.height or figure.get_figheight())
         return figure
 
 
 @contextmanager
-def house_style(names: Sequence[str] = STYLES["podusv"]) -> Iterator[None]:
-    """matplotlib's settings as in these style files beside this module, for figures made inside."""
+def house_style(style: Style = STYLES["podusv"]) -> Iterator[None]:
+    """matplotlib's settings as in the style's files beside this module, for figures made inside."""
     with mpl.rc_context():
         # as mpl.rcdefaults(), which reads all style sheets of matplotlib for it
         mpl.rcParams.update({k: v for k, v in mpl.rcParamsDefault.items() if k != "backend"})
-        for name in names:
+        for name in style.files:
             place = Path(__file__).with_name(f"{name}.mplstyle")
             mpl.rcParams.update(mpl.rc_params_from_file(place, use_default_template=False))
         yield

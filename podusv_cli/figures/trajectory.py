@@ -88,7 +88,7 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
         close_up(axes, view, runs)
         (left, low), width = view.middle - view.reach, 2.0 * view.reach
         whole.add_patch(Rectangle((left, low), width, width, **FRAME))
-        whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=6)
+        whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=7)
     if below:
         distances(below, compared)
     legend(figure)

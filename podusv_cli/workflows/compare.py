@@ -147,7 +147,7 @@ def compare_gathered(
         lost = unwritten(outcomes.values())
         extras = Extras(interrupted=any(outcome.interrupted for outcome in outcomes.values()))
         result = collect(given.members, outcomes, given.claims, extras)
-        result = replace(result, chosen=request.metrics)
+        result = replace(result, chosen=request.metrics, ratios=request.ratios)
         if extras.interrupted and not result.entries:
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
         doubted = None
