@@ -84,7 +84,9 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
             result.unsettled,
         ).encode(),
         "comparison.tex": lambda: table.as_latex(
-            lasting.only(result.chosen or headlines), result.metrics, result.unsettled,
+            lasting.only(result.chosen or headlines),
+            result.metrics,
+            result.unsettled,
             ratios=result.ratios,
         ).encode(),
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
