@@ -1,7 +1,6 @@
 """Scenarios as environments of Gymnasium; needs `pip install 'podusv[gym]'`.
 
-Importing it tells Gymnasium their name, and `gymnasium.make("podusv.gym:podusv/Scenario-v0", ...)`
-imports it.
+Importing it tells Gymnasium their names; `gymnasium.make("podusv.gym:podusv/Track-v0")` imports it.
 """
 
 from typing import Any
@@ -10,9 +9,14 @@ from gymnasium.envs.registration import register, registry
 
 from podusv_cli.interface.gym import Env as Env
 from podusv_cli.interface.gym import VectorEnv as VectorEnv
+from podusv_cli.interface.gym_task import Moment as Moment
 
-__all__ = ["Env", "VectorEnv"]
-NAME = "podusv/Scenario-v0"
+__all__ = ["Env", "Moment", "VectorEnv"]
+# What each name gives in place of options that are not given.
+NAMES: dict[str, dict[str, Any]] = {
+    "podusv/Scenario-v0": {},
+    "podusv/Track-v0": {"scenario": "podusv:studies/learned.yaml", "period": 0.2},
+}
 
 
 def environment(scenario: Any, **options: Any) -> Env:
@@ -25,7 +29,8 @@ def environments(num_envs: int, scenario: Any, **options: Any) -> VectorEnv:
     return VectorEnv(scenario, count=num_envs, **options)
 
 
-if NAME not in registry:  # a module may be imported again
+for name in {*NAMES} - {*registry}:  # a module may be imported again
     register(
-        NAME, entry_point="podusv.gym:environment", vector_entry_point="podusv.gym:environments"
-    )
+        name, entry_point="podusv.gym:environment", vector_entry_point="podusv.gym:environments",
+        kwargs=NAMES[name],
+    )  # fmt: skip

@@ -10,9 +10,10 @@ import numpy as np
 DTYPES = {"float32": "F32", "float64": "F64", "float16": "F16", "int64": "I64"}
 
 
-def packed(tensors: dict[str, Any]) -> bytes:
+def packed(tensors: dict[str, Any], **remarks: str) -> bytes:
     """A safetensors file: the length of a header, the header, the numbers."""
-    header, numbers = {}, b""
+    header: dict[str, Any] = {"__metadata__": remarks} if remarks else {}
+    numbers = b""
     for name, tensor in tensors.items():
         own = np.asarray(tensor)
         ends = [len(numbers), len(numbers) + own.nbytes]

@@ -289,7 +289,7 @@ def test_a_run_that_ends_with_a_reward_beyond_all_numbers_is_terminated():
 def test_a_reward_that_is_not_defined_at_every_instant_is_a_sentence():
     for env, action in ((single, np.zeros(2)), (lambda: several(2), np.zeros((2, 2)))):
         made = env()
-        made._task.reward = "settling_time"
+        made._task.metric = "settling_time"
         made.reset(seed=0)
         with pytest.raises(UsageError, match=r"settling_time is not defined at 0\.1 s; a reward"):
             made.step(action)
@@ -326,6 +326,143 @@ def test_gymnasium_alone_finds_the_environment_by_module_and_name():
     )
     done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert done.stdout == "Env\n"
+
+
+def test_a_name_for_a_task_that_is_there_needs_nothing_else():
+    """It is `podusv:studies/learned.yaml`, and takes the options of any environment."""
+    made = gymnasium.make("podusv.gym:podusv/Track-v0", reward="ise")
+    own = podusv.gym.Env("podusv:studies/learned.yaml", period=0.2, reward="ise")
+    np.testing.assert_array_equal(made.reset(seed=4)[0], own.reset(seed=4)[0])
+    assert made.step(np.array([3.0, 0.5]))[1:] == own.step((3.0, 0.5))[1:]
+    shorter = gymnasium.make("podusv/Track-v0", changes={"simulation.duration": 1.0}, period=0.5)
+    shorter.reset()
+    assert [shorter.step(np.zeros(2))[3] for _ in range(2)] == [False, True]
+    name = {"vectorization_mode": "vector_entry_point"}
+    assert gymnasium.make_vec("podusv/Track-v0", 3, **name).reset(seed=0)[0].shape == (3, 8)
+
+
+# --- rewards and observations of one's own
+
+
+def distance(now: podusv.gym.Moment) -> Any:
+    return np.hypot(now.target[0] - now.state[0], now.target[1] - now.state[1])
+
+
+def work(before: podusv.gym.Moment, now: podusv.gym.Moment) -> Any:
+    """The distance over the period, and a little for turning and for a demand that changes."""
+    change = ((now.demand - before.demand) ** 2).sum(axis=0)
+    apart = 0.5 * (distance(before) + distance(now)) * (now.time - before.time)
+    return -(apart + 0.1 * now.seen[4] ** 2 + 0.01 * change)
+
+
+def view(now: podusv.gym.Moment) -> Any:
+    return [distance(now), np.sin(now.seen[7]), now.demand[1], 1.0]
+
+
+def test_the_trapezoid_of_the_distance_is_what_iae_grows_by():
+    """At a period of a step; podusv's metric is the same sum."""
+    given: dict[str, Any] = {"period": 0.01}
+
+    def area(before, now):
+        return -0.01 * 0.5 * (distance(before) + distance(now))
+
+    own, usual = podusv.gym.Env(SCENARIO, reward=area, **given), podusv.gym.Env(SCENARIO, **given)
+    for env in (own, usual):
+        env.reset(seed=1)
+    for _ in range(50):
+        one, other = (env.step((4.0, 0.5))[1] for env in (own, usual))
+        assert one == pytest.approx(other, rel=1e-9)
+
+
+def test_a_moment_has_what_the_session_has():
+    """Its arrays are copies, and the demand is that of the action before."""
+    moments = []
+    env = podusv.gym.Env(SCENARIO, observe=lambda now: moments.append(now) or [0.0])
+    env.reset(seed=3)
+    first, moments[:] = env.session.observe(), moments[-1:]
+    env.step(np.array([3.0, -1.0]))
+    for now, seen, demand in zip(
+        moments, (first, env.session.observe()), ((0.0, 0.0), (3.0, -1.0)), strict=True
+    ):
+        assert now.time == seen.time
+        np.testing.assert_array_equal(now.state, seen.state)
+        np.testing.assert_array_equal(now.target, seen.target)
+        np.testing.assert_array_equal(now.demand, demand)
+    usual = single()
+    np.testing.assert_array_equal(usual.reset(seed=3)[0], moments[0].seen)
+
+
+def test_functions_of_one_s_own_have_the_same_bits_side_by_side():
+    """Over the end of an episode: there nothing is gained, and no demand was there before."""
+    given: dict[str, Any] = {"reward": work, "observe": view}
+    many = podusv.gym.VectorEnv(SCENARIO, count=3, **given)
+    ones = [podusv.gym.Env(SCENARIO, **given) for _ in range(3)]
+    assert many.single_observation_space == ones[0].observation_space
+    assert ones[0].observation_space.shape == (4,)
+    seen, _ = many.reset(seed=0)
+    np.testing.assert_array_equal(seen, [env.reset(seed=i)[0] for i, env in enumerate(ones)])
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        actions = random.normal(0.0, 1.0, (3, 2))
+        seen, gained, _, cut, _ = many.step(actions)
+        each = [env.step(action) for env, action in zip(ones, actions, strict=True)]
+        np.testing.assert_array_equal(seen, [one[0] for one in each])
+        np.testing.assert_array_equal(gained, [one[1] for one in each])
+        np.testing.assert_array_equal(seen[:, 2], actions[:, 1])
+        assert (seen[:, 3] == 1.0).all()
+    assert cut.all()
+    seen, gained, *_ = many.step(actions)
+    assert not gained.any()
+    assert not seen[:, 2].any()
+    assert (many.step(actions)[1] < 0.0).all()
+
+
+def test_a_terminated_run_gives_its_last_numbers_to_functions_of_one_s_own():
+    free = {"actuator": {"kind": "ideal"}, "vessel": {"preset": "paper"}}
+    given: dict[str, Any] = {
+        "limits": (1e300, 1e300),
+        "reward": lambda a, b: b.state[0] - a.state[0],
+    }
+    one, many = podusv.gym.Env(SCENARIO, free, **given), podusv.gym.VectorEnv(
+        SCENARIO, free, count=1, **given
+    )  # fmt: skip
+    before, _ = one.reset(seed=0)
+    many.reset(seed=0)
+    seen, reward, dead, *_ = one.step((1e200, 1e200))
+    np.testing.assert_array_equal(seen, before)
+    assert (reward, dead) == (0.0, True)
+    seen, rewards, deads, *_ = many.step(np.array([[1e200, 1e200]]))
+    np.testing.assert_array_equal(seen[0], before)
+    assert (rewards[0], deads[0]) == (0.0, True)
+
+
+OWN: dict[str, tuple[dict[str, Any], str]] = {
+    "no number": ({"reward": lambda a, b: "much"}, "reward gave 'much' at 0.1 s; give finite numb"),
+    "nothing": ({"reward": lambda a, b: None}, "reward gave None at 0.1 s"),
+    "not finite": ({"reward": lambda a, b: math.nan}, "reward gave nan at 0.1 s"),
+    "several": ({"reward": lambda a, b: [1.0, 2.0]}, r"reward gave \[1.0, 2.0\] at 0.1 s"),
+    "no list": ({"observe": lambda now: 3.0}, "observe gave 3.0; give a list of numbers"),
+    "an empty list": ({"observe": lambda now: []}, r"observe gave \[\]; give a list"),
+    "a list of words": ({"observe": lambda now: ["a"]}, "observe gave 'a' at 0 s; give finite"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("make", [podusv.gym.Env, podusv.gym.VectorEnv])
+@pytest.mark.parametrize("case", OWN)
+def test_functions_that_give_no_numbers_are_a_sentence_before_the_first_episode(make, case):
+    options, says = OWN[case]
+    with pytest.raises(UsageError, match=says):
+        make(SCENARIO, **options)
+
+
+def test_a_function_for_one_run_alone_is_a_sentence_where_there_are_several():
+    def reward(before, now):
+        return np.ones(2) if np.size(now.time) > 1 else 0.0
+
+    many = podusv.gym.VectorEnv(SCENARIO, count=3, reward=reward)
+    many.reset(seed=0)
+    with pytest.raises(UsageError, match="give finite numbers, or 3 of them"):
+        many.step(np.zeros((3, 2)))
 
 
 @pytest.mark.parametrize("reward", [None, 3, ["iae"]])

@@ -7,15 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_samples import write
+from command_samples import ROOT, write
 from policy_samples import content, drawn, packed, symmetric
 
 import podusv
 from podusv_cli.components.controllers.policy import INPUTS, OBSERVED, Policy, observed
-from podusv_cli.components.controllers.policy_weights import tensors
+from podusv_cli.components.controllers.policy_weights import PERIOD, tensors
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import bundle, call
 from podusv_cli.core.phrases import value_text
+from podusv_cli.findings.finding import preflight
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.studies.tuning.space import AROUND, gains
@@ -98,7 +99,8 @@ def test_numbers_of_half_the_bits_are_taken_as_they_are():
 def test_a_file_of_the_format_s_own_library_is_read():
     library = pytest.importorskip("safetensors.numpy", reason="podusv[gym] is not installed")
     given = drawn([8, 4, 2], dtype=np.float32) | {"mean": np.arange(8.0), "scale": np.ones(8)}
-    found = tensors(library.save(given, metadata={"trained": "by hand"}))
+    found, remarks = tensors(library.save(given, metadata={"trained": "by hand"}))
+    assert remarks == {"trained": "by hand"}
     assert found.keys() == given.keys()
     for name, tensor in found.items():
         np.testing.assert_array_equal(tensor, given[name])
@@ -139,6 +141,42 @@ def test_a_run_has_its_weights_in_its_folder():
     again = podusv.run("first/resolved.yaml", out="again", figures=False)
     np.testing.assert_array_equal(run["psi"], again["psi"])
     assert run.scenario.controller.content == base64.b64encode(packed(symmetric())).decode()
+
+
+PAPER = podusv.load("podusv:laws/learned.yaml").singles()["policy"]
+
+
+def said(period: float, data: bytes | None = None) -> list[str]:
+    """What is said of a policy's period."""
+    given = PAPER if data is None else scenario(data)
+    found = preflight(podusv.load(given, {"control.period": period}))
+    return [finding.text for finding in found if finding.code == "policy-period"]
+
+
+def test_another_period_than_in_training_is_said():
+    assert said(0.2) == []
+    (slower,) = said(0.5)
+    assert "a demand held for 0.2 s, and here it holds for 0.5 s; set control.period=0.2" in slower
+    assert "and here it changes at every step" in said(0.0)[0]
+    assert said(0.5, packed(symmetric())) == []  # a file that does not say
+    assert said(0.5, packed(symmetric(), **{PERIOD: "0.5"})) == []
+    assert said(0.1, packed(symmetric(), **{PERIOD: "0.5"})) != []
+
+
+def test_a_run_s_folder_keeps_the_period_of_the_training():
+    podusv.run(podusv.load(PAPER, {"simulation.duration": 1.0}), out="run", figures=False)
+    found = preflight(podusv.load("run/resolved.yaml", {"control.period": 0.1}))
+    assert "policy-period" in {finding.code for finding in found}
+
+
+def test_a_demand_that_holds_longer_than_in_training_costs_the_shipped_policy_its_target():
+    """Why it is said, with the numbers of docs/learning.md."""
+    page = " ".join((ROOT / "docs/learning.md").read_text().split())
+    iae = [
+        podusv.simulate(PAPER, {"control.period": period}).metrics["iae"] for period in (0.2, 1.0)
+    ]
+    assert iae[1] > 3.0 * iae[0]
+    assert f"has an IAE of {iae[0]:.0f} m s at that period and of {iae[1]:.0f} at 1 s" in page
 
 
 def raw(header, numbers=b""):
@@ -186,6 +224,9 @@ BAD = {
     "a number of 5000 digits": (layers(**{5000 * "1" + "_bias": np.ones(4)}), "is no tensor of a"),
     "two networks": (packed({f"{part}.{name}": tensor for part in ("pi", "vf")
                              for name, tensor in drawn([8, 2]).items()}), "found 'pi.' and 'vf.'"),
+    "a period in words": (packed(drawn([8, 2]), **{"control.period": "0.2 s"}),
+                          "its remark control.period is '0.2 s'; write how long"),
+    "no period": (packed(drawn([8, 2]), **{"control.period": "nan"}), "its remark control.period"),
     "something else": (layers(log_std=np.ones(2)), "'log.std' is no tensor of a policy"),
     "whole numbers": (layers(**{"2_bias": np.array([1, 2])}), "2.bias has numbers I64; save it as"),
 }  # fmt: skip

@@ -99,7 +99,8 @@ def save(network, file):
     tensors = {"scale": SCALE}
     for i, (weight, bias) in enumerate(layers(network)):
         tensors |= {f"{i}.weight": np.ascontiguousarray(weight), f"{i}.bias": bias.copy()}
-    save_file({name: tensor.astype(np.float32) for name, tensor in tensors.items()}, file)
+    small = {name: tensor.astype(np.float32) for name, tensor in tensors.items()}
+    save_file(small, file, metadata={"control.period": str(PERIOD)})
 
 
 if __name__ == "__main__":

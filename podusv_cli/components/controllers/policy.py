@@ -18,6 +18,7 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.policy_weights import PolicyNetwork, network
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import arctangent, cos_sin, hyperbolic_tangent
+from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, tail
 
 # What a policy is given, in the vessel's own frame: x ahead, y to starboard
@@ -68,7 +69,8 @@ class Policy(Controller):
     tau = (surge, yaw) s(W_n h_n + b_n), h_1 = (o - mean)/scale, h_(i+1) = a(W_i h_i + b_i), where o
     is what the vessel sees (`OBSERVED`), a the `activation` and s the `squash` into [-1, 1]. The
     file's tensors have the names that torch's Sequential gives its layers: 0.weight (out, in),
-    0.bias, 2.weight, ...; `mean` and `scale` of the observation may be left out.
+    0.bias, 2.weight, ...; `mean` and `scale` of the observation may be left out. A remark
+    `control.period` of the file says for how long a demand held in training.
 
     It has no memory, so a constant load leaves an error.
     """
@@ -142,3 +144,23 @@ class Policy(Controller):
             tau[i] = cut if k.squash == CLIP else hyperbolic_tangent(out[i])
         tau[0] *= k.surge
         tau[1] *= k.yaw
+
+
+@warn_before_run(
+    "policy-period", about="control.period", law=Policy,
+    meaning="a policy runs at another period than in its training",
+    condition="control.period is not the remark control.period of the policy's file",
+    remedy="set control.period to that of the training, or train anew with this one",
+)  # fmt: skip
+def policy_period(case: Any) -> Sentences:
+    """What the network has learned of its own delay belongs to another period.
+
+    Nothing is said where the file has no such remark.
+    """
+    period, trained = case.scenario.control.period, case.scenario.controller.network().period
+    if trained is not None and period != trained:
+        now = f"holds for {period:g} s" if period else "changes at every step"
+        yield (
+            f"in its training a demand held for {trained:g} s, and here it {now}; set "
+            f"control.period={trained:g}, or train the policy anew"
+        )

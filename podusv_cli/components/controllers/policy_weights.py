@@ -1,7 +1,8 @@
 """The weights of a policy: a safetensors file, read and checked.
 
 The format: eight bytes with the length of a header (little-endian), the header as JSON, then the
-numbers of all tensors (https://huggingface.co/docs/safetensors).
+numbers of all tensors (https://huggingface.co/docs/safetensors). The header may have remarks, texts
+by name; `PERIOD` is one of them.
 """
 
 from __future__ import annotations
@@ -11,13 +12,16 @@ import binascii
 import math
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import BaseModel, Field, NonNegativeInt, ValidationError
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.phrases import quoted
 
+PERIOD = "control.period"  # the remark for how long a demand held in training [s]
 LENGTH = 8  # bytes of the header's length
 KINDS: dict[str, np.dtype[Any]] = {"F32": np.dtype("<f4"), "F64": np.dtype("<f8")}
 # As torch names what its Sequential holds
@@ -25,11 +29,15 @@ LAYER = re.compile(r"(?P<of>.+\.)?(?P<number>0|[1-9][0-9]{0,3})\.(weight|bias)")
 
 
 class PolicyNetwork(NamedTuple):
-    """Weights as a kernel takes them; narrower hidden layers are filled up with zeros."""
+    """Weights as a kernel takes them; narrower hidden layers are filled up with zeros.
+
+    `period` is for how long a demand held in training [s], where the file says it.
+    """
 
     hidden: int
     width: int
     table: Vector
+    period: float | None
 
 
 class Tensor(BaseModel):
@@ -47,8 +55,8 @@ class Header(BaseModel, extra="allow"):
     remarks: dict[str, str] = Field({}, alias="__metadata__")
 
 
-def tensors(data: bytes) -> dict[str, Vector]:
-    """The tensors of a safetensors file by name. Raises ValueError."""
+def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
+    """The tensors of a safetensors file, and its remarks, by name. Raises ValueError."""
     begin = LENGTH + int.from_bytes(data[:LENGTH], "little")
     try:
         header = Header.model_validate_json(data[LENGTH:begin] if begin <= len(data) else b"")
@@ -61,7 +69,7 @@ def tensors(data: bytes) -> dict[str, Vector]:
     pieces = sorted(tensor.data_offsets for tensor in entries.values())
     if [0, *(end for _, end in pieces)] != [*(first for first, _ in pieces), len(numbers)]:
         raise ValueError("its header does not fit its numbers; save it again")
-    return arrays
+    return arrays, header.remarks
 
 
 def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
@@ -85,7 +93,7 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
     Raises ValueError for what is no network from so many inputs to so many outputs.
     """
     try:
-        arrays = tensors(base64.b64decode("".join(content.split()), validate=True))
+        arrays, remarks = tensors(base64.b64decode("".join(content.split()), validate=True))
     except binascii.Error:
         raise ValueError("is no base64") from None
     given = _normal(arrays, inputs)
@@ -97,7 +105,21 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
         np.concatenate([_filled(bias, (after,)), _filled(weight, (after, before)).T.ravel()])
         for (_, weight, bias), before, after in zip(layers, sizes, sizes[1:], strict=False)
     ]
-    return PolicyNetwork(len(layers) - 1, width, np.concatenate([*given, *filled]))
+    table = np.concatenate([*given, *filled])
+    return PolicyNetwork(len(layers) - 1, width, table, _period(remarks))
+
+
+def _period(remarks: Mapping[str, str]) -> float | None:
+    """The remark `PERIOD` as a number; None where there is none. Raises ValueError."""
+    if PERIOD not in remarks:
+        return None
+    with suppress(ValueError):
+        if 0.0 < (period := float(remarks[PERIOD])) < math.inf:
+            return period
+    raise ValueError(
+        f"its remark {PERIOD} is {quoted(remarks[PERIOD])}; write how long a demand held in "
+        "training [s], as in '0.2'"
+    )
 
 
 def _normal(arrays: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:

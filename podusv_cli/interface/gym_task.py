@@ -1,0 +1,237 @@
+"""What the episodes of an environment have in common: draws, reward, observation, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from operator import index
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.components.controllers.policy import INPUTS, OUTPUTS, observed
+from podusv_cli.components.paths.base import TARGET
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.phrases import unknown
+from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
+from podusv_cli.interface.session import Session, marcher_of, waiting
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.studies.making.check import gathered_metrics, sweep_faults
+from podusv_cli.studies.making.draws import SOBOL_BITS, SWEEP, drawn, draws
+
+LEARNING = "learning"  # the stream of draws that no study has
+Flags = npt.NDArray[np.bool_]
+Limits = tuple[float, float]
+
+
+class Moment(NamedTuple):
+    """An instant of an episode, which rewards and observations of one's own are made of.
+
+    `time` [s]; `seen` has the eight numbers of the usual observation; `state` is (x, y, psi, u, v,
+    r) as a law is given it, `target` position, velocity and acceleration, north and east, both in
+    m, rad and s; `demand` is what held before, (tau_u [N], tau_r [N m]), and zeros at the begin. In
+    a `VectorEnv` each number is an array with an entry for every environment.
+    """
+
+    time: Any
+    seen: Vector
+    state: Vector
+    target: Vector
+    demand: Vector
+
+
+class Terms(NamedTuple):
+    """What a user asks of an environment, beside its scenario; see `Env`."""
+
+    period: float | None
+    reward: str | Callable[[Moment, Moment], Any]
+    observe: Callable[[Moment], Any] | None
+    limits: Limits | None
+
+
+PARTS = INPUTS + len(STATE) + len(TARGET)  # numbers of `looked`
+
+
+@kernel
+def looked(x: Vector, target: Vector, signals: Vector) -> None:
+    """Write `seen`, `state` and `target` of a moment into `signals`, one after the other."""
+    observed(x, target, signals)
+    for i in range(6):
+        signals[8 + i] = x[i]
+        signals[14 + i] = target[i]
+
+
+def moment(time: Any, parts: Vector, demand: Vector) -> Moment:
+    """A moment of what `looked` has written; all are copies."""
+    own, target = parts.copy(), INPUTS + len(STATE)  # where the target begins
+    return Moment(time, own[:INPUTS], own[INPUTS:target], own[target:], demand.copy())
+
+
+class Task:
+    """What the episodes of an environment have in common: a scenario, and what is drawn in it."""
+
+    def __init__(self, source: Source, changes: Changes | None, terms: Terms) -> None:
+        """Raises ScenarioError, and UsageError for what no environment can be made of."""
+        whole = loaded(source, changes, (*CHECKS, sweep_faults)).scenario
+        self.sweep = whole.sweep or Sweep(draws=1)
+        self._check_sweep()
+        self.scenario, self.period = waiting(whole, terms.period)
+        self.limits = self._limits(terms.limits)
+        self.own = terms.reward if callable(terms.reward) else None
+        self.metric = "" if self.own else self._known(str(terms.reward))
+        self._observe = terms.observe
+        self.numbers = self._check_first()
+
+    def _check_first(self) -> int:
+        """How many numbers an observation has.
+
+        Raises UsageError for a reward that the first period does not define, and for functions that
+        do not give numbers.
+        """
+        plain = self.scenario.simulation.model_copy(update={"compiled": False})
+        scenario = self.scenario.model_copy(update={"simulation": plain})
+        session = Session(scenario, self.period, marcher_of(scenario))
+        first = self.moment_of(session, np.zeros(OUTPUTS))
+        after = session.step(np.zeros(OUTPUTS))
+        if self.own is None:
+            self.check_reward(session.metric(self.metric), after.status != "diverged", after.time)
+        else:
+            self.gained(first, self.moment_of(session, np.zeros(OUTPUTS)))
+        return len(self.observation(first))
+
+    def moment_of(self, session: Session, demand: Vector) -> Moment:
+        """The next instant of a session, after this demand."""
+        now, parts = session.observe(), np.zeros(PARTS)
+        looked(now.state, now.target, parts)
+        return moment(now.time, parts, demand)
+
+    def gained(self, before: Moment, now: Moment) -> Vector:
+        """The user's own reward, a number or one for every run. Raises UsageError for none."""
+        assert self.own is not None
+        return _finite(self.own(before, now), np.shape(now.time), "reward", now.time)
+
+    def observation(self, now: Moment) -> Vector:
+        """What an agent is given of a moment. Raises UsageError for no list of numbers."""
+        if self._observe is None:
+            return now.seen
+        given, shape = self._observe(now), np.shape(now.time)
+        parts = list(given) if isinstance(given, Iterable) else []
+        if not parts:
+            raise UsageError(
+                f"podusv.gym: observe gave {given!r}; give a list of numbers, as in [*now.seen]"
+            )
+        return np.array([_finite(part, shape, "observe", now.time) for part in parts])
+
+    def _known(self, reward: str) -> str:
+        known = gathered_metrics(self.scenario)
+        if reward in self.scenario.known_metrics() and reward not in known:
+            raise UsageError(
+                f"podusv.gym: runs of this scenario do not gather {reward!r} on their way; where a "
+                "path is followed, take e_ct_integral in place of iae"
+            )
+        if reward not in known:
+            sentence = unknown(f"reward {reward!r}", reward, known, "podusv list")
+            raise UsageError(f"podusv.gym: {sentence}")
+        return reward
+
+    def _limits(self, given: Limits | None) -> Vector:
+        limits = numbers(self.scenario.actuator.limits() if given is None else given)
+        if limits.shape != (OUTPUTS,) or not (limits >= 0.0).all():
+            raise UsageError(
+                f"podusv.gym: the limits are {given!r}; give the largest surge force and yaw "
+                "moment, as in limits=(8.0, 2.5) [N, N m]"
+            )
+        if not np.isfinite(limits).all():
+            raise UsageError(
+                "podusv.gym: the actuator does not say how large a demand may be; give "
+                "limits=(8.0, 2.5) [N, N m]"
+            )
+        return limits
+
+    def _check_sweep(self) -> None:
+        if self.sweep.grid:
+            raise UsageError(
+                f"podusv.gym: sweep.grid has several values of {', '.join(self.sweep.grid)}; an "
+                "environment has a single cell, so set the value and take the grid out"
+            )
+        for name, quantity in self.sweep.vary.items():
+            for key in quantity.targets(name):
+                if key.partition(".")[0] in ("controller", "controllers"):
+                    raise UsageError(
+                        f"podusv.gym: sweep.vary.{name} draws {key}, and in an environment the "
+                        f"controller is learned; take it out with sweep.vary: {{{name}: null}}"
+                    )
+
+    def observed_bounds(self) -> Vector:
+        """The largest magnitude of each number of an observation; of the usual one, pi at last."""
+        most = np.full(self.numbers, np.inf)
+        if self._observe is None:
+            most[-1] = np.pi  # an angle
+        return most
+
+    def seed(self, given: Any) -> int:
+        """A seed, which is the number of a draw. Raises UsageError."""
+        if (number := whole(given)) < 0:
+            raise UsageError(f"podusv.gym: the seed is {given!r}; give a whole number from 0 on")
+        if not self.sweep.independent and number >= 2**SOBOL_BITS:
+            raise UsageError(
+                f"podusv.gym: the seed is {number}; Sobol' points have numbers up to "
+                f"{2**SOBOL_BITS - 1}"
+            )
+        return number
+
+    def drawn(self, seed: int | None, random: np.random.Generator) -> Scenario:
+        """The scenario with the draw of a study whose number is the seed, or with one of no study.
+
+        Draws of no study are independent, also where those of the study are Sobol' points.
+        """
+        if seed is not None:
+            return drawn(self.scenario, self.sweep.vary, next(draws(self.sweep, seed, 1, SWEEP)))
+        sweep = self.sweep.model_copy(update={"design": "random"})
+        draw = next(draws(sweep, int(random.integers(2**53)), 1, LEARNING))
+        return drawn(self.scenario, sweep.vary, draw)
+
+    def check_reward(self, gathered: Vector | float, alive: Flags | bool, time: float) -> None:
+        """Raise UsageError for a metric that is not defined at this time [s].
+
+        It may be infinite for a run whose numbers are not finite any more.
+        """
+        if (np.isnan(gathered) | np.isinf(gathered) & alive).any():
+            raise UsageError(
+                f"podusv.gym: the metric {self.metric} is not defined at {time:g} s; a reward "
+                "needs one that is at every instant, such as iae"
+            )
+
+
+def _finite(given: Any, shape: tuple[int, ...], whose: str, time: Any) -> Vector:
+    """Numbers of a user's function in this shape, also where they are the same for all runs."""
+    try:
+        array = np.broadcast_to(numbers(given), shape)
+        fine = bool(np.isfinite(array).all())
+    except ValueError:
+        fine = False
+    if not fine:
+        each = f", or {shape[0]} of them" if shape else ""
+        raise UsageError(
+            f"podusv.gym: {whose} gave {given!r} at {np.max(time):g} s; give finite numbers{each}"
+        )
+    return array
+
+
+def whole(given: Any) -> int:
+    """A whole number as Python's own; -1 for what is none."""
+    try:
+        return index(given)
+    except TypeError:
+        return -1
+
+
+def numbers(given: Any) -> Vector:
+    """Numbers as an array; an empty one for what are none."""
+    try:
+        return np.asarray(given, float)
+    except (TypeError, ValueError):
+        return np.zeros(0)
