@@ -22,9 +22,13 @@ from podusv_cli.engine.running import thread as march
 from podusv_cli.storage.run_folder import open_run
 
 PAGES = (
-    "README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md", "docs/start.md"
+    "README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md", "docs/start.md",
+    "docs/choose_a_law.md", "docs/papers.md",
 )  # fmt: skip
-LONG = pytest.param("docs/my_boat.md", marks=pytest.mark.slow)
+LONG = [
+    pytest.param(page, marks=pytest.mark.slow)
+    for page in ("docs/my_boat.md", "docs/check_a_paper.md", "docs/learning.md")
+]
 LARGEST = 10.0  # N m; four times the yaw moment that the actuator of README's scenario delivers
 
 
@@ -78,7 +82,7 @@ def podusv(
     return commanded(monkeypatch, capsys)
 
 
-@pytest.mark.parametrize("page", [*PAGES, LONG])
+@pytest.mark.parametrize("page", [*PAGES, *LONG])
 def test_commands_of_a_page_print_what_it_shows(page: str, podusv: Command) -> None:
     write_files(page)
     assert len(list(dialogues(page))) > 1
