@@ -99,6 +99,8 @@ bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
 	    cp results/.bench/leaderboard.md results/.bench/runs.csv results/bench && \
 	    cp results/.bench/figures/profiles.png results/bench/figures
+	@$(BIN)/podusv bench configs/bench_boats --force --out results/.bench_boats && \
+	    cp results/.bench_boats/runs.csv results/bench/boats.csv
 	@echo "what was found: results/bench.md; the page: results/.bench/report.html"
 
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html

@@ -372,7 +372,11 @@ def test_on_legs_the_cross_track_error_counts_in_place_of_the_distance():
 def test_the_bench_on_legs_is_what_its_page_says(podusv):
     assert podusv("bench", str(ROOT / "configs/bench_legs"), "--no-figures", "--out", "b").code == 0
     runs = pd.read_csv("b/runs.csv")
-    assert (len(runs), set(runs.status)) == (112, {"finished"})
+    others = runs.law.str.contains("ardupilot|px4|mss")
+    assert (sum(~others), set(runs.status[~others])) == (112, {"finished"})
+    assert (sum(others), sum(runs.status[others] != "finished")) == (40, 22)
+    failed = runs.law[runs.status != "finished"].value_counts()
+    assert failed[["ardupilot", "ardupilot_l1", "px4"]].tolist() == [4, 8, 4]
     ranks = runs.pivot_table("rank", "law", "vessel")
     page = " ".join((ROOT / "docs/bench.md").read_text().split())
     for law, hull in (("velocity_vector", "cybership2"), ("super_twisting", "paper_nonlinear")):

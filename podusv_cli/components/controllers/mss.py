@@ -52,10 +52,11 @@ class Mss(LineOfSight):
     kind: Literal["mss"] = "mss"
     signals: ClassVar[tuple[Signal, ...]] = STEERED
     rules: ClassVar[dict[str, Rule]] = {
-        **LineOfSight.rules, "lookahead": by.LENGTH, "omega_u": by.SURGE,
-    }  # fmt: skip
+        **{name: rule for name, rule in LineOfSight.rules.items() if name != "lookahead"},
+        "omega_u": by.SURGE,
+    }
     against_windup: ClassVar[str] = "lower wn"
-    lookahead: Ruled = value(6.28, "m", "distance ahead on the path that the bow aims at", gt=0)
+    lookahead: float = value(10.0, "m", "distance ahead on the path that the bow aims at", gt=0)
     learns: Literal["adaptive", "integral", "published"] = value(
         "published", "", "how the crab angle is found: by ALOS (published), by ILOS (integral), or "
         "as alos does it (adaptive)",

@@ -1,0 +1,124 @@
+"""configs/bench_boats, and what results/bench.md and docs/bench.md say of its committed runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.studies.bench.cases import AXES, Selection, cases
+from podusv_cli.studies.bench.page import as_markdown
+from podusv_cli.studies.bench.runs import play
+from podusv_cli.studies.bench.standing import PLACE, leaderboard, table
+
+ROOT = Path(__file__).parents[1]
+BOATS = ROOT / "configs" / "bench_boats"
+RUNS = pd.read_csv(ROOT / "results" / "bench" / "boats.csv")
+BOARD = leaderboard(RUNS)
+PAGE, GUIDE = (
+    " ".join((ROOT / name).read_text().split()) for name in ("results/bench.md", "docs/bench.md")
+)
+LENGTHS = {"otter": 2.0, "wamv": 4.9}
+
+
+def chosen(overrides: tuple[str, ...] = (), **names: str) -> list[Any]:
+    picked = {axis: (name,) for axis, name in names.items()}
+    return list(cases(Selection(BOATS, overrides=list(overrides), chosen=picked)))
+
+
+def test_the_committed_runs_are_those_of_the_bench() -> None:
+    for axis in AXES:
+        assert set(RUNS[axis.rstrip("s")]) == {path.stem for path in (BOATS / axis).iterdir()}
+    (case,) = chosen(vessels="otter", tasks="reach", conditions="calm")
+    assert set(RUNS.law) == set(case.laws)
+    counts = [RUNS[name].nunique() for name in ("law", "task", "vessel", "condition")]
+    said = "{} laws over {} tasks of legs, {} vessels and {} conditions, {} runs"
+    assert said.format(*counts, len(RUNS)) in PAGE
+
+
+@pytest.mark.parametrize("vessel", LENGTHS)
+def test_a_case_run_now_is_the_committed_one(vessel: str) -> None:
+    (case,) = chosen(vessels=vessel, tasks="reach", conditions="wind")
+    fresh = table(play(case)).set_index("law")
+    kept = RUNS[(RUNS[PLACE] == list(case.place)).all(axis=1)].set_index("law")
+    assert fresh.status.equals(kept.status)
+    np.testing.assert_allclose(fresh.iae, kept.iae, rtol=5e-6)  # six digits are kept
+
+
+def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
+    assert as_markdown(RUNS) in (ROOT / "results" / "bench.md").read_text()
+    failed = RUNS[RUNS.status != "finished"]
+    counts = failed.groupby("law").size()
+    own = ["ardupilot_l1_firmware", "ardupilot_firmware", "px4_r1"]
+    said = "L1 fails in {} of 48 cases and the position controller in {}, with the wheels' gains "
+    assert (said + "PX4 in {};").format(*counts[own]) in PAGE
+    of_them = failed[failed.law.isin(own)]
+    assert f"of these {len(of_them)} failures {(of_them.vessel == 'wamv').sum()} are on" in PAGE
+    iae = RUNS.pivot_table("iae", PLACE, "law")
+    better = (iae.momentum_vector < iae.ardupilot_l1).sum()
+    assert f"`momentum_vector`, which is the better one in {better} of 48 cases" in PAGE
+    ranks = RUNS.pivot_table("rank", "law", "condition")
+    wrong = [f"{ranks.loc[law, f'hull_{how}']:.1f}" for law in ("ardupilot_l1", "momentum_vector")
+             for how in ("heavy", "light")]  # fmt: skip
+    assert "told a wrong hull ({} and {} against {} and {})".format(*wrong) in PAGE
+    for condition in ("calm", "current"):
+        assert ranks[condition].idxmin() in ("sliding_mode", "ilos")
+    costs = [f"{cost:.3g}" for cost in BOARD.variation[["ardupilot_l1", "px4"]]]
+    beside = sorted(BOARD.variation[["momentum_vector", "velocity_vector", "alos", "ilos"]])
+    costs += [f"{cost:.3g}" for cost in (beside[0], beside[-1])]
+    costs[0] = f"{float(costs[0]):.1f}"
+    assert "is {} for L1, {} for PX4, and {} to {} for the four laws".format(*costs) in PAGE
+    assert {"ardupilot_l1", "momentum_vector"} == set(BOARD.index[:2])
+
+
+def test_the_table_of_laws_for_boats_says_what_the_runs_say() -> None:
+    ratio = BOARD.median_ratio
+    assert f"| {ratio.momentum_vector:.2f} times the best in the median, no failure in 48" in GUIDE
+    assert f"| {ratio.ardupilot_l1:.2f}, no failure, a sixth of the variation of thrust" in GUIDE
+    assert f"| {ratio.ardupilot:.2f} and {ratio.px4:.2f}, no failure |" in GUIDE
+    tuned = ["momentum_vector", "ardupilot_l1", "ardupilot", "px4"]
+    assert not BOARD.failed[tuned].any()
+    costs = BOARD.variation
+    assert round(costs.momentum_vector / costs.ardupilot_l1) == 6
+
+
+@pytest.mark.parametrize("vessel", LENGTHS)
+def test_what_is_tuned_on_the_water_is_so_in_every_condition(vessel: str) -> None:
+    """To the true hull, whatever the laws are told."""
+    (calm,) = chosen(vessels=vessel, tasks="reach", conditions="calm")
+    for condition in ("hull_heavy", "hull_light"):
+        (case,) = chosen(vessels=vessel, tasks="reach", conditions=condition)
+        assert case.laws["alos"].nominal.m == pytest.approx(
+            calm.laws["alos"].nominal.m * (1.25 if condition == "hull_heavy" else 0.75)
+        )
+        for law in ("ardupilot", "ardupilot_l1", "px4"):
+            assert case.laws[law].controller == calm.laws[law].controller
+
+
+@pytest.mark.parametrize("vessel", LENGTHS)
+@pytest.mark.parametrize(
+    ("law", "key", "step"), [("px4", "lookahead", 1.0), ("ardupilot_l1", "l1_period", 0.5)]
+)
+def test_guidance_is_raised_until_the_boat_no_longer_weaves(
+    vessel: str, law: str, key: str, step: float
+) -> None:
+    """The least number in the guide's steps that passes the line by less than a tenth of L."""
+
+    def passes(number: float) -> float:
+        changes = (f"controllers.{law}.{key}={number}",)
+        (case,) = chosen(changes, vessels=vessel, tasks="reach", conditions="calm")
+        scenario = case.laws[law]
+        return float(-simulate(scenario.closed_loop(), scenario.time_grid())["e_ct"].min())
+
+    (case,) = chosen(vessels=vessel, tasks="reach", conditions="calm")
+    taken = getattr(case.laws[law].controller, key)
+    default = type(case.laws[law].controller).model_fields[key].default
+    assert passes(taken) < 0.1 * LENGTHS[vessel]
+    if taken > default:
+        assert passes(taken - step) > 0.1 * LENGTHS[vessel]
+    else:
+        assert taken == default
