@@ -1,6 +1,7 @@
 """What can go wrong with the adaptive laws, and with all that steer by distance and direction.
 
-The printed sign, and a network that lies elsewhere; then folding and singularities.
+The printed sign, and a network that lies elsewhere; then folding and singularities, relays, and a
+learned law at another period.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from podusv_cli.components.controllers.network import NODE_DISTANCE, nearest, node_distance
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.components.controllers.policy import Policy
 from podusv_cli.components.controllers.tracking import TrackingController
 from podusv_cli.core.finding import Sentences, rows_where, times_of, warn_after_run, warn_before_run
 from podusv_cli.core.recording import Recording
@@ -220,4 +222,24 @@ def relay_gains(case: Any) -> Sentences:
             f"K_P and K_D/T_d over the inertia are {loops}, and the loop is late by {late:.2g} s: "
             f"the demand can swing from limit to limit; take about {RELAY / worst:.2g} times these "
             "gains, or a law whose defaults follow from hull and actuator, as velocity_vector's do"
+        )
+
+
+@warn_before_run(
+    "policy-period", about="control.period", law=Policy,
+    meaning="a policy runs at another period than in its training",
+    condition="control.period is not the remark control.period of the policy's file",
+    remedy="set control.period to that of the training, or train anew with this one",
+)  # fmt: skip
+def policy_period(case: Any) -> Sentences:
+    """What the network has learned of its own delay belongs to another period.
+
+    Nothing is said where the file has no such remark.
+    """
+    period, trained = case.scenario.control.period, case.scenario.controller.network().period
+    if trained is not None and period != trained:
+        now = f"holds for {period:g} s" if period else "changes at every step"
+        yield (
+            f"in its training a demand held for {trained:g} s, and here it {now}; set "
+            f"control.period={trained:g}, or train the policy anew"
         )

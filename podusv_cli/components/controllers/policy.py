@@ -18,7 +18,6 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.policy_weights import PolicyNetwork, network
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import arctangent, cos_sin, hyperbolic_tangent
-from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, tail
 
 # What a policy is given, in the vessel's own frame: x ahead, y to starboard
@@ -144,23 +143,3 @@ class Policy(Controller):
             tau[i] = cut if k.squash == CLIP else hyperbolic_tangent(out[i])
         tau[0] *= k.surge
         tau[1] *= k.yaw
-
-
-@warn_before_run(
-    "policy-period", about="control.period", law=Policy,
-    meaning="a policy runs at another period than in its training",
-    condition="control.period is not the remark control.period of the policy's file",
-    remedy="set control.period to that of the training, or train anew with this one",
-)  # fmt: skip
-def policy_period(case: Any) -> Sentences:
-    """What the network has learned of its own delay belongs to another period.
-
-    Nothing is said where the file has no such remark.
-    """
-    period, trained = case.scenario.control.period, case.scenario.controller.network().period
-    if trained is not None and period != trained:
-        now = f"holds for {period:g} s" if period else "changes at every step"
-        yield (
-            f"in its training a demand held for {trained:g} s, and here it {now}; set "
-            f"control.period={trained:g}, or train the policy anew"
-        )
