@@ -22,9 +22,10 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP, explored
 from podusv_cli.doubt.answer import _word, compared
 from podusv_cli.doubt.check import doubt_faults
-from podusv_cli.doubt.choices import Choice, Range, choices, public
+from podusv_cli.doubt.choices import Choice, choices, public
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judged
+from podusv_cli.doubt.ranges import Range
 from podusv_cli.doubt.together import counted, drawn, explained
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.distributions import Distribution
@@ -96,7 +97,10 @@ def test_a_verdict_turns_where_algebra_says(out):
     u = 0.5 * 1.03
     X_u = MASS * math.log(1.03 * left() / 0.5) / 10.0
     m = HULL.X_u * 10.0 / math.log(1.03 * left() / 0.5) + HULL.X_udot
-    for key, value in {"start.u": u, "vessel.X_u": X_u, "vessel.m": m}.items():
+    rest = math.exp(HULL.X_u * 10.0 / MASS)  # a steady surge force b_u adds b_u/-X_u (1 - rest)
+    b_u = 0.03 * left() * -HULL.X_u / (1.0 - rest)
+    turning = {"start.u": u, "vessel.X_u": X_u, "vessel.m": m, "disturbance.b_u": b_u}
+    for key, value in turning.items():
         turns_at, held, own = (float(turns[key][name]) for name in ("turns_at", "held", "own"))
         assert abs(held - own) < abs(value - own) <= abs(turns_at - own) <= SHARP * abs(held - own)
     assert "vessel.Y_v" not in turns  # a hull that goes straight does not feel it
@@ -104,7 +108,13 @@ def test_a_verdict_turns_where_algebra_says(out):
     nearest = min(abs(X_u / HULL.X_u - 1.0), abs(m / HULL.m - 1.0), 0.03 * 0.5 / 1.0)
     assert float(slow["nearest_share"]) == pytest.approx(nearest, rel=SHARP - 1.0)
     assert (slow["word"], slow["verdict"]) == ("fragile", "reproduced")
-    assert still["word"] == "robust"
+    assert still["word"] == "under conditions"  # it goes straight unless it starts sideways
+    sideways = [r for r in rows("turns.csv", out[0]) if r["claim"] == "still"]
+    assert {(r["key"], r["task"]) for r in sideways} == {
+        ("start.v", "False"), ("disturbance.b_v", "True"),
+    }  # fmt: skip
+    starts = [abs(float(r["turns_at"])) for r in sideways if r["key"] == "start.v"]
+    assert all(0.1 < v <= SHARP * 0.1 for v in starts)
 
 
 def test_draws_are_judged_as_algebra_has_it(out):
@@ -128,7 +138,8 @@ def test_one_process_or_two_find_the_same(out, podusv):
 
 
 def test_what_the_source_prints_stays(podusv):
-    text = WRITTEN.replace("doubt: {", "doubt: {printed: [start, vessel.X_u, controllers.a], ")
+    stays = "doubt: {printed: [start, vessel.X_u, controllers.a, disturbance, simulation], "
+    text = WRITTEN.replace("doubt: {", stays)
     doubted(podusv, text=text)
     moved = [*rows("draws.csv")[0]]
     assert "vessel.m" in moved
@@ -293,8 +304,8 @@ def test_a_verdict_that_some_value_leaves_open_is_robust_where_it_can_tell(podus
     """A run of 5 s has no window from 8 s to 10 s."""
     text = WRITTEN.replace("expect: max(abs(a.v))", "expect: 'max(abs(a.v), 8, 10)")
     text = text.replace("0.1, tolerance", "0.1', tolerance")
-    shorter = f"doubt: {{vary: {{simulation.duration: {{choice: [5.0]}}}}, {STAY}, "
-    doubted(podusv, text=text.replace("doubt: {", shorter))
+    stays = STAY.replace("[", "[start, disturbance, ")
+    doubted(podusv, text=text.replace("doubt: {", f"doubt: {{{stays}, "))
     assert rows("doubt.csv")[1]["word"] == "robust where it can tell"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judge, Judged, moved
 
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
-BETWEEN = 0.1  # of the range: where it looks between, for verdicts that turn and turn back
+BETWEEN = (0.1, 0.5)  # of the range: where it looks between, for verdicts that turn and turn back
 SHARP = 1.02  # ratio of distances to which a turn is known
 BY_SEED = 0.1
 EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
@@ -137,16 +138,14 @@ def _searched(
 
     assert choice.range
     scale = choice.range.scale
-    whole, near, last = abs(end - choice.own), NEAR * scale, math.ulp(choice.own or scale)
-    for distance in (BETWEEN * whole, near):
+    whole, last = abs(end - choice.own), math.ulp(choice.own or scale)
+    near, *further = sorted({NEAR * scale, *(share * whole for share in BETWEEN), whole})
+    for distance in (near, *further):
         tried(distance)
     for claim in base.answers:
-        reached = [d for d in (near, BETWEEN * whole, whole) if tried(d).turned(claim, base)]
-        if not reached:
-            continue
-        turned = min(reached)
-        held = {near: last, BETWEEN * whole: near, whole: BETWEEN * whole}[turned]
-        if turned == near and tried(last).turned(claim, base):
+        pairs = pairwise([last, near, *further])
+        held, turned = next((p for p in pairs if tried(p[1]).turned(claim, base)), (0.0, 0.0))
+        if not turned or (turned == near and tried(last).turned(claim, base)):
             continue
         while turned / held > SHARP:
             middle = math.sqrt(turned * held)

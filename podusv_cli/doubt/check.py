@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from podusv_cli.core.phrases import unknown
-from podusv_cli.doubt.choices import by_key
+from podusv_cli.doubt.choices import by_key, with_loads
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import Route, bracketed
@@ -22,7 +22,7 @@ def doubt_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 def _printed(scenario: Scenario) -> Faults:
     assert scenario.doubt
-    known = set(by_key(scenario.singles()))
+    known = set(by_key(with_loads(scenario.singles())))
     sections = {key[:end] for key in known for end in range(len(key)) if key[end] in ".["}
     for place, key in enumerate(scenario.doubt.printed):
         if bracketed(key) not in known | sections:
@@ -31,7 +31,7 @@ def _printed(scenario: Scenario) -> Faults:
 
 def _vary(scenario: Scenario) -> Faults:
     assert scenario.doubt
-    known = by_key(scenario.singles())
+    known = by_key(with_loads(scenario.singles()))
     for name, quantity in scenario.doubt.vary.items():
         if quantity.rows and scenario.sweep and scenario.sweep.claims:
             text = (

@@ -7,18 +7,19 @@ a time, and a narrower one for draws of all at once. What may move by default is
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
+from podusv_cli.components.disturbances.calm import Calm
+from podusv_cli.components.disturbances.step import Step
 from podusv_cli.core.component import Component
+from podusv_cli.doubt.ranges import RANGES, TRIED, Range
 from podusv_cli.scenario.address import ValueRefused, content, described, with_values
-from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.doubt import Doubt
-from podusv_cli.scenario.keys import Key, limits
+from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import Route, bracketed, dotted
@@ -27,19 +28,7 @@ HULL: Route = ("vessel",)  # where the name of a preset stands for the whole hul
 Singles = Mapping[str, Scenario]  # the scenario of each law, by its label
 Place = tuple[str, Route]  # a law's label, and where the value stands in the scenario of its run
 ITS_OWN = "the scenario's own"
-GRAVITY = 9.81  # m/s2
 BESIDE = 1.0123456789  # a factor on a time: whether it may be any, or whole steps only
-
-
-class Range(NamedTuple):
-    """How a number moves, as a study draws it: one at a time, and with all others.
-
-    `scale` is what its distance from the scenario's own is measured by, in the unit of the number.
-    """
-
-    alone: Quantity
-    together: Quantity
-    scale: float
 
 
 @dataclass(frozen=True)
@@ -83,90 +72,6 @@ class Choice:
         return self.named or (bool(self.labels & labels) and bool(self.beside & labels))
 
 
-Way = Callable[[float, Scenario, Key], Range | None]  # how a number of this key moves
-
-
-def _times(alone: float, together: float) -> Way:
-    """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
-
-    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
-        ends = [_inside([own / f, own * f], key) for f in (alone, together)]
-        if not own or any(low * high <= 0.0 for low, high in ends):
-            return None
-        ways = [tuple(sorted((low / own, high / own))) for low, high in ends]
-        drawn = [Quantity(times=Distribution(log_uniform=(low, high))) for low, high in ways]
-        return Range(drawn[0], drawn[1], abs(own))
-
-    return moved
-
-
-def _plus(scale: Callable[[Scenario], float], share: float) -> Way:
-    """A summand up to a share of a scale, inside the key's bounds; the same alone and together."""
-
-    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
-        unit = scale(scenario)
-        low, high = _inside([own - share * unit, own + share * unit], key)
-        drawn = Quantity(plus=Distribution(uniform=(low - own, high - own)))
-        return Range(drawn, drawn, unit)
-
-    return moved
-
-
-def _inside(ends: list[float], key: Key) -> tuple[float, float]:
-    """The ends of a range, cut off at the key's bounds."""
-    bounds = limits(key.field)
-    low, high = sorted(ends)
-    return max(low, bounds.get("ge", low)), min(high, bounds.get("le", high))
-
-
-def _speed(scenario: Scenario) -> float:
-    """The path's speed; where it has none, that at which the hull's Froude number is 0.1."""
-    own = getattr(scenario.path, "speed", 0.0)
-    return abs(own) or 0.1 * math.sqrt(GRAVITY * scenario.vessel.length)
-
-
-def _length(scenario: Scenario) -> float:
-    return scenario.vessel.length
-
-
-def _radian(scenario: Scenario) -> float:
-    return 1.0
-
-
-def _turning(scenario: Scenario) -> float:
-    """The yaw rate that goes with the speed on a circle of a hull's length."""
-    return _speed(scenario) / scenario.vessel.length
-
-
-# How the numbers of a section move, by their unit; "" is for all other units.
-RANGES: dict[str, dict[str, Way]] = {
-    "vessel": {"": _times(1.1, 1.1)},
-    "nominal": {"": _times(1.1, 1.1)},
-    "start": {
-        "m": _plus(_length, 0.5), "rad": _plus(_radian, 0.2), "m/s": _plus(_speed, 0.1),
-        "rad/s": _plus(_turning, 0.1),
-    },
-    "path": {"m": _plus(_length, 0.5), "rad": _plus(_radian, 0.2), "": _times(1.05, 1.05)},
-    "disturbance": {"rad": _plus(_radian, math.pi), "": _times(1.2, 1.2)},
-    "actuator": {"": _times(2.0, 1.25)},
-    "measurement": {"": _times(3.0, 1.25)},
-    "estimator": {"": _times(3.0, 1.25)},
-    "controller": {"": _times(3.0, 1.25)},
-}  # fmt: skip
-
-
-def _whole(own: float) -> tuple[float, ...]:
-    """None and all of the Coriolis terms."""
-    return tuple(share for share in (0.0, 1.0) if share != own)
-
-
-# Keys that have values of their own to be tried, from the scenario's own.
-TRIED: dict[str, Callable[[Any], tuple[Any, ...]]] = {
-    "simulation.step": lambda own: (own / 2.0,),
-    "simulation.duration": lambda own: (own * 1.5,),  # a shorter run ends before windows of claims
-    "control.period": lambda own: (own / 2.0, own * 2.0) if own else (),
-    "vessel.coriolis": _whole, "nominal.coriolis": _whole,
-}  # fmt: skip
 OTHERS = ("simulation.step", "simulation.duration", "control.period", "control.update")
 # What another value of makes another task: where the target goes, a hull that laws know wrongly,
 # and whether the hull has Coriolis terms
@@ -289,10 +194,24 @@ def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:
     """A choice without other values, and its key."""
     (label, route), name = places[0], public(places[0])
     key, own = described(singles[label], route), content(singles[label], route)
-    task = name.startswith(TASK) and not name.startswith(WAYS_OF_LAW)
+    task = (name.startswith(TASK) and not name.startswith(WAYS_OF_LAW)) or _adds_load(route, own)
     beside = _beside(places, singles)
     named = bool(beside) and own != key.default
     return Choice(name, tuple(places), own, key.unit, task=task, beside=beside, named=named), key
+
+
+def _adds_load(route: Route, own: Any) -> bool:
+    return route[0] == "disturbance" and own == 0.0
+
+
+def with_loads(singles: Singles) -> Singles:
+    """The same with calm water as a steady load of 0, which may be another."""
+    calm, steady = Calm(), Step()
+    return {
+        label: single.model_copy(update={"disturbance": steady})
+        if single.disturbance == calm else single
+        for label, single in singles.items()
+    }  # fmt: skip
 
 
 def _given(name: str, quantity: Quantity, singles: Singles) -> Choice:

@@ -20,7 +20,7 @@ from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import TriedChoice, explored
 from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
-from podusv_cli.doubt.choices import HULL, Choice, Singles, choices
+from podusv_cli.doubt.choices import HULL, Choice, Singles, choices, with_loads
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.together import Draws, drawn
@@ -94,7 +94,8 @@ def comparison(loaded: Loaded) -> Subject:
     named = {label for claim in parsed for label in labels_of(claim.claim)}
 
     def judged(scenario: Scenario) -> Singles:
-        return {label: single for label, single in scenario.singles().items() if label in named}
+        singles = with_loads(scenario.singles())
+        return {label: single for label, single in singles.items() if label in named}
 
     hulls = find(loaded.root, ("doubt", "hulls"))
     others = {
