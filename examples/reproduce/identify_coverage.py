@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
+from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -53,7 +54,7 @@ MANOEUVRES = (
 )  # fmt: skip
 CURRENT = 0.05  # of the speed at full thrust
 LOAD = 0.02  # of largest force and moment: deviation of a load that is fixed to the earth
-LASTING, SINES = 10.0, 8  # s on the model ship: how long a gust's load lasts; of the sum
+LASTING = 10.0  # s on the model ship: how long a gust's load lasts
 WANTED = Identify(logs=(LogFile(file="-"),))
 HEAD = (
     "sea", "hull", "gnss", "set", "what", "name", "truth", "value", "low", "high", "width", "off",
@@ -118,22 +119,25 @@ def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[Log]:
         return logs_of(path, LogFile(file=path.name, delay=0.0), before)
 
 
-def gusts(facts: Facts, seeds: np.random.Generator) -> list[dict[str, Any]]:
+def gusts(
+    facts: Facts, seeds: np.random.Generator, *, sines: int = 8, highest: float = 0.48
+) -> list[dict[str, Any]]:
     """A load north, east and about the vertical that wanders about a mean, and forgets.
 
-    Sines whose rates are spread as the power of a Gauss-Markov process is.
+    Sines whose rates are spread as the power of a Gauss-Markov process is, up to the part `highest`
+    of pi: tan(pi highest) over the time that a load lasts.
     """
 
     def axis(largest: float) -> dict[str, float]:
-        size = LOAD * largest / math.sqrt(SINES)  # of 2 SINES sines, so that their sum has LOAD
-        rates = np.tan(seeds.uniform(0.0, 0.48 * math.pi, 2)) / (LASTING * math.sqrt(facts.lam))
+        size = LOAD * largest / math.sqrt(sines)  # of 2 sines each, so that their sum has LOAD
+        rates = np.tan(seeds.uniform(0.0, highest * math.pi, 2)) / (LASTING * math.sqrt(facts.lam))
         phases = seeds.uniform(0.0, 2.0 * math.pi, 2)
         return {
             "mean": size * seeds.standard_normal(), "sin": size, "sin_rate": rates[0],
             "sin_phase": phases[0], "cos": size, "cos_rate": rates[1], "cos_phase": phases[1],
         }  # fmt: skip
 
-    return [_earth(facts, axis) for _ in range(SINES)]
+    return [_earth(facts, axis) for _ in range(sines)]
 
 
 def swings(facts: Facts, seeds: np.random.Generator) -> list[dict[str, Any]]:
@@ -155,7 +159,11 @@ def _earth(facts: Facts, axis: Callable[[float], dict[str, float]]) -> dict[str,
     return {"kind": "harmonic", "frame": "earth", **loads}
 
 
-SEAS = {"gusts": gusts, "swings": swings}
+SEAS = {
+    "wandering": partial(gusts, sines=64, highest=0.499),  # as the filter takes it
+    "gusts": gusts,  # none of it faster than 1.6 rad/s on the model ship
+    "swings": swings,
+}
 
 
 def sensors(gnss: float, step: float, seed: int) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judge, Judged, moved
 
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
-BETWEEN = (0.1, 0.5)  # of the range: where it looks between, for verdicts that turn and turn back
+BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that turn and turn back
 SHARP = 1.02  # ratio of distances to which a turn is known
 BY_SEED = 0.1
 EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
