@@ -113,7 +113,7 @@ MISTAKES = {
         {"x": lambda c: c["y"], "y": lambda c: c["x"]}, "exchange x and y under identify.columns"
     ),
     "yaw rate in deg/s": ({"r": lambda c: c["r"] * DEG}, r'write r: "COLUMN \[deg/s\]"'),
-    "yaw rate to port": ({"r": lambda c: -c["r"]}, r'r is -1.04 .*write r: "-COLUMN"'),
+    "yaw rate to port": ({"r": lambda c: -c["r"]}, r'r is -1 .*write r: "-COLUMN"'),
     "speed in knots": ({"u": lambda c: c["u"] / 0.514444}, r'u is 1\.9\d .*"COLUMN \[kn\]"'),
     "sway to port": ({"v": lambda c: -c["v"]}, r'write v: "-COLUMN"'),
     "a compass that stands": ({"psi": lambda c: 0 * c["psi"] + 0.7}, "psi is 0.7 throughout"),
@@ -147,6 +147,19 @@ def test_a_boat_that_yaws_in_waves_on_a_straight_track_is_no_mistake():
         "psi": 0.4 * np.sin(1.3 * times), "tau_u": np.sin(times),
     }  # fmt: skip
     assert checked(Table("waves.csv", times, columns), Ideal()) == []
+
+
+def test_a_yaw_rate_agrees_however_fast_the_boat_weaves():
+    """The heading of a second and the yaw rate of a second differ where a turn takes little more."""
+    times = np.arange(0.0, 120.0, 0.1)
+    psi = 0.3 * np.sin(1.8 * times)
+    columns = {
+        "x": 1.5 * times, "y": 0.01 * times, "psi": psi, "r": 0.54 * np.cos(1.8 * times),
+        "tau_u": np.sin(times),
+    }  # fmt: skip
+    assert checked(Table("weaves.csv", times, columns), Ideal()) == []
+    with pytest.raises(LogFault, match=r'write r: "COLUMN \[deg/s\]"'):
+        checked(Table("weaves.csv", times, {**columns, "r": DEG * columns["r"]}), Ideal())
 
 
 def test_times_in_milliseconds(weaving):

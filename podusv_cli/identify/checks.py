@@ -74,6 +74,16 @@ class Motion:
         """How fast a quantity changes, by the bins on either side."""
         return np.asarray(np.gradient(means, self.width))
 
+    def turned(self) -> Vector:
+        """The mean angle in each bin by which the yaw rate says that the boat has turned [rad]."""
+        known = np.isfinite(self.table.columns["r"])
+        rates, times = self.table.columns["r"][known], self.table.times[known]
+        angles = np.full_like(self.table.times, np.nan)
+        angles[known] = np.cumsum(
+            0.5 * (rates + np.roll(rates, 1)) * np.diff(times, prepend=times[:1])
+        )
+        return self.mean("r", angles)
+
     def heading(self, turn: float = RADIANS) -> Vector:
         """Of each bin, in the log's own numbers, of which `turn` make a full turn."""
         values = self.table.columns["psi"].copy()
@@ -233,7 +243,7 @@ def _yaw_rate(motion: Motion) -> Iterator[str]:
     """Yaw rate in deg/s or of the other sign, or heading in degrees: by how both turn."""
     if "r" not in motion.table.columns:
         return
-    given = motion.mean("r")
+    given = motion.rate(motion.turned())  # as smooth as the rate of the heading
     own, degrees = (_match(motion.rate(motion.heading(turn)), given) for turn in (RADIANS, DEGREES))
     if degrees.same and not own.same:
         raise LogFault(
