@@ -150,7 +150,7 @@ def test_a_boat_that_yaws_in_waves_on_a_straight_track_is_no_mistake():
 
 
 def test_a_yaw_rate_agrees_however_fast_the_boat_weaves():
-    """The heading of a second and the yaw rate of a second differ where a turn takes little more."""
+    """Means over a second of heading and yaw rate differ where a turn takes little more."""
     times = np.arange(0.0, 120.0, 0.1)
     psi = 0.3 * np.sin(1.8 * times)
     columns = {
