@@ -6,8 +6,8 @@ rover-quicktune.lua (13139c3). L1 guidance: S. Park, J. Deyst and J. P. How, "A 
 guidance logic for trajectory tracking", AIAA 2004-4900. Equations and numbers are taken from there,
 no code. docs/laws.md has them, and what is left out.
 
-Proved: nothing. Not proved: that the vessel comes to the path. Anti-windup: an integral whose
-output is limited may only shrink.
+Proved: period and damping of L1, linearised on a line; no offset in a steady state on a line. Not
+proved: that the vessel comes there. Anti-windup: an integral whose output is limited only shrinks.
 """
 
 from __future__ import annotations
