@@ -228,7 +228,7 @@ def relay_gains(case: Any) -> Sentences:
 @warn_before_run(
     "policy-period", about="control.period", law=Policy,
     meaning="a policy runs at another period than in its training",
-    condition="control.period is not the remark control.period of the policy's file",
+    condition="control.period is another one than the policy's file says of its training",
     remedy="set control.period to that of the training, or train anew with this one",
 )  # fmt: skip
 def policy_period(case: Any) -> Sentences:
