@@ -374,9 +374,9 @@ def test_the_bench_on_legs_is_what_its_page_says(podusv):
     runs = pd.read_csv("b/runs.csv")
     others = runs.law.str.contains("ardupilot|px4|mss")
     assert (sum(~others), set(runs.status[~others])) == (112, {"finished"})
-    assert (sum(others), sum(runs.status[others] != "finished")) == (40, 22)
+    assert (sum(others), sum(runs.status[others] != "finished")) == (40, 30)
     failed = runs.law[runs.status != "finished"].value_counts()
-    assert failed[["ardupilot", "ardupilot_l1", "px4"]].tolist() == [4, 8, 4]
+    assert failed[["ardupilot", "ardupilot_l1", "px4"]].tolist() == [8, 8, 8]
     ranks = runs.pivot_table("rank", "law", "vessel")
     page = " ".join((ROOT / "docs/bench.md").read_text().split())
     for law, hull in (("velocity_vector", "cybership2"), ("super_twisting", "paper_nonlinear")):

@@ -60,30 +60,38 @@ def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
     assert f"of these {len(of_them)} failures {(of_them.vessel == 'wamv').sum()} are on" in PAGE
     iae = RUNS.pivot_table("iae", PLACE, "law")
     better = (iae.momentum_vector < iae.ardupilot_l1).sum()
-    assert f"`momentum_vector`, which is the better one in {better} of 48 cases" in PAGE
+    ratio = [f"{BOARD.median_ratio[law]:.2f}" for law in ("ardupilot_l1", "ardupilot")]
+    assert "at {} (L1) and {} (position controller) times the best law".format(*ratio) in PAGE
+    assert f"`momentum_vector` is better than L1 in {better} of 48 cases" in PAGE
     ranks = RUNS.pivot_table("rank", "law", "condition")
-    wrong = [f"{ranks.loc[law, f'hull_{how}']:.1f}" for law in ("ardupilot_l1", "momentum_vector")
+    wrong = [f"{ranks.loc[law, f'hull_{how}']:.1f}" for law in ("ardupilot_l1", "ilos")
              for how in ("heavy", "light")]  # fmt: skip
-    assert "told a wrong hull ({} and {} against {} and {})".format(*wrong) in PAGE
+    assert "(mean ranks {} and {}; `ilos` {} and {})".format(*wrong) in PAGE
     for condition in ("calm", "current"):
-        assert ranks[condition].idxmin() in ("sliding_mode", "ilos")
-    costs = [f"{cost:.3g}" for cost in BOARD.variation[["ardupilot_l1", "px4"]]]
-    beside = sorted(BOARD.variation[["momentum_vector", "velocity_vector", "alos", "ilos"]])
-    costs += [f"{cost:.3g}" for cost in (beside[0], beside[-1])]
-    costs[0] = f"{float(costs[0]):.1f}"
-    assert "is {} for L1, {} for PX4, and {} to {} for the four laws".format(*costs) in PAGE
-    assert {"ardupilot_l1", "momentum_vector"} == set(BOARD.index[:2])
+        assert ranks.loc["ardupilot_l1", condition] > ranks.loc["momentum_vector", condition]
+    costs = BOARD.variation
+    beside = sorted(costs[["momentum_vector", "velocity_vector", "alos", "ilos"]])
+    assert costs.ardupilot == pytest.approx(costs.ardupilot_l1, rel=0.01)
+    numbers = [f"{cost:.3g}" for cost in (costs.ardupilot_l1, costs.px4, beside[0], beside[-1])]
+    said = "is {} for both of ArduPilot's, {} for PX4, and {} to {} for the four laws before them"
+    assert said.format(*numbers) in PAGE
+    windy = failed[(failed.law == "px4") & (failed.vessel == "wamv")]
+    assert not windy.condition.isin(["calm", "current"]).any()
+    assert f"On the WAM-V in wind it fails in {len(windy)} of 16 cases" in PAGE
+    assert f"({BOARD.median_ratio.los_pid:.2f} times the best), but fails nowhere" in PAGE
 
 
 def test_the_table_of_laws_for_boats_says_what_the_runs_say() -> None:
-    ratio = BOARD.median_ratio
+    ratio, failed, costs = BOARD.median_ratio, BOARD.failed, BOARD.variation
+    assert not failed[["momentum_vector", "ardupilot_l1", "ardupilot", "los_pid"]].any()
     assert f"| {ratio.momentum_vector:.2f} times the best in the median, no failure in 48" in GUIDE
-    assert f"| {ratio.ardupilot_l1:.2f}, no failure, a sixth of the variation of thrust" in GUIDE
-    assert f"| {ratio.ardupilot:.2f} and {ratio.px4:.2f}, no failure |" in GUIDE
-    tuned = ["momentum_vector", "ardupilot_l1", "ardupilot", "px4"]
-    assert not BOARD.failed[tuned].any()
-    costs = BOARD.variation
-    assert round(costs.momentum_vector / costs.ardupilot_l1) == 6
+    own = [failed[f"{law}_firmware"] for law in ("ardupilot", "ardupilot_l1")]
+    said = "| {:.2f} and {:.2f}, no failure, a fifth of the variation of thrust; with the "
+    said += "firmware's gains "
+    said = said.format(ratio.ardupilot, ratio.ardupilot_l1)
+    assert said + "{:.0f} and {:.0f} of 48 fail |".format(*own) in GUIDE
+    assert f"| {ratio.px4:.2f}, fails in {failed.px4:.0f} of 48 |" in GUIDE
+    assert costs.momentum_vector / costs.ardupilot_l1 == pytest.approx(5.0, abs=0.5)
 
 
 @pytest.mark.parametrize("vessel", LENGTHS)
@@ -106,19 +114,18 @@ def test_what_is_tuned_on_the_water_is_so_in_every_condition(vessel: str) -> Non
 def test_guidance_is_raised_until_the_boat_no_longer_weaves(
     vessel: str, law: str, key: str, step: float
 ) -> None:
-    """The least number in the guide's steps that passes the line by less than a tenth of L."""
+    """The least number in the guide's steps with one swing at most beyond a tenth of L."""
 
-    def passes(number: float) -> float:
+    def swings(number: float) -> int:
         changes = (f"controllers.{law}.{key}={number}",)
         (case,) = chosen(changes, vessels=vessel, tasks="reach", conditions="calm")
         scenario = case.laws[law]
-        return float(-simulate(scenario.closed_loop(), scenario.time_grid())["e_ct"].min())
+        e = simulate(scenario.closed_loop(), scenario.time_grid())["e_ct"]
+        beside = np.split(e, np.flatnonzero(np.diff(np.sign(e))) + 1)[1:]
+        return sum(np.abs(swing).max() > 0.1 * LENGTHS[vessel] for swing in beside)
 
     (case,) = chosen(vessels=vessel, tasks="reach", conditions="calm")
     taken = getattr(case.laws[law].controller, key)
     default = type(case.laws[law].controller).model_fields[key].default
-    assert passes(taken) < 0.1 * LENGTHS[vessel]
-    if taken > default:
-        assert passes(taken - step) > 0.1 * LENGTHS[vessel]
-    else:
-        assert taken == default
+    assert swings(taken) <= 1
+    assert taken == default or swings(taken - step) > 1

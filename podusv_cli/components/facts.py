@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.components.vessels.plant import surge_force
+from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import describe
 from podusv_cli.core.errors import SizingError, in_a_line
@@ -32,7 +32,10 @@ ENOUGH = 1e6  # of the model ship's acceleration; whoever gives this has no limi
 DELIVERED = 0.999  # fraction of a demand that counts as all of it
 CALM = 0.25  # gain times delay that a hand point bears without swinging
 CRUISE = 0.6  # of the speed at full thrust
-EFFORT0 = 0.456118  # s/m, the model ship's throttle per speed while cruising
+# The model ship's throttle per speed [s/m] and steering per yaw rate [s/rad] on the trial circle
+THROTTLE0, STEERING0 = 0.358133, 0.102592
+HALF = 0.5  # of the speed at full thrust, on the trial circle
+TRIAL = math.radians(10.0), 0.1  # rad/s and part of N, which are at least needed on it
 HALVINGS = 60  # of a speed, until it is a float's last digit
 SPINNING = 5.0  # times U/L, the largest yaw rate that is counted on
 ASKED = 20  # halvings of a speed for each of which an actuator is asked, some ms each
@@ -111,10 +114,30 @@ class Facts:
         return least if least < DELIVERED * asked else asked / ENOUGH
 
     @cached_property
-    def effort(self) -> float:
-        """Part of the force F that holds the cruising speed, over that speed [s/m]."""
-        u = CRUISE * self.U
+    def throttle(self) -> float:
+        """Part of the force F that holds half the top speed, over that speed [s/m]."""
+        u = HALF * self.U
         return self._drag(u) / (self.F * u)
+
+    @cached_property
+    def steering(self) -> float:
+        """Part of the moment N that holds the trial circle, over its yaw rate [s/rad].
+
+        It is the widest one at half the top speed that takes 10 deg/s and a tenth of N, or the
+        tightest one where 10 deg/s take more than N.
+        """
+        rate, least = TRIAL
+        highest = max(SPINNING * self.U / self.L, rate)
+        if not least <= self._turning(rate) <= 1.0:
+            wanted = least if self._turning(rate) < least else 1.0
+            rate = _rises_to(self._turning, wanted, highest)
+        return self._turning(rate) / rate
+
+    def _turning(self, r: float) -> float:
+        """Part of N that holds the yaw rate r [rad/s] at half the top speed, at rest in sway."""
+        u = HALF * self.U
+        drift = _rises_to(lambda v: -sway_force(u, v - self.U, r, self._k), 0.0, 2.0 * self.U)
+        return -yaw_moment(u, drift - self.U, r, self._k) / self.N
 
     @cached_property
     def r_top(self) -> float:

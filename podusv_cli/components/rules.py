@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from podusv_cli.components.facts import EFFORT0, F0, N0, Facts
+from podusv_cli.components.facts import F0, N0, STEERING0, THROTTLE0, Facts
 from podusv_cli.core.component import Rule
 
 OBSERVED = 0.5  # of 1/period, the largest bandwidth of an observer
@@ -57,8 +57,10 @@ PACE_TIME = times("1/g_p", lambda f: 1.0 / f.g_p)
 YAW_RATE = times("min(r_top/r0, w_N/w0)", lambda f: min(f.r_f, f.w_f))
 TURN = times("r_top/r0", lambda f: f.r_f)
 SLOWNESS = times("U0/U", lambda f: 1.0 / f.s)
-TURNING = times("r0/r_top", lambda f: 1.0 / f.r_f)
-THROTTLE = times("e/e0, e = throttle per speed at 0.6 U", lambda f: f.effort / EFFORT0)
+STEERING = times(
+    "q/q0, q = steering per yaw rate in a circle at 0.5 U", lambda f: f.steering / STEERING0
+)
+THROTTLE = times("e/e0, e = throttle per speed at 0.5 U", lambda f: f.throttle / THROTTLE0)
 AHEAD = times("max(L/L0, (U/U0)/g_r)", reach)
 YAW_REACH = times("g_r max(L/L0, (U/U0)/g_r)", lambda f: f.g_r * reach(f))
 YAW_PER_REACH = times("g_r/max(L/L0, (U/U0)/g_r)", lambda f: f.g_r / reach(f))

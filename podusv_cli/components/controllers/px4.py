@@ -67,12 +67,12 @@ class Px4(Rover):
     speed_P: Ruled = value(0.189, "s/m", "throttle per missing speed (RO_SPEED_P)", ge=0)
     speed_I: Ruled = value(0.0189, "1/m", "rate of throttle per missing speed (RO_SPEED_I)", ge=0)
     rate_FF: Ruled = value(
-        1.05, "s/rad", "steering per wanted yaw rate "
+        0.103, "s/rad", "steering per wanted yaw rate "
         "(RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED))", ge=0,
     )  # fmt: skip
-    rate_P: Ruled = value(0.491, "s/rad", "steering per missing yaw rate (RO_YAW_RATE_P)", ge=0)
+    rate_P: Ruled = value(0.0481, "s/rad", "steering per missing yaw rate (RO_YAW_RATE_P)", ge=0)
     rate_I: Ruled = value(
-        0.491, "1/rad", "rate of steering per missing yaw rate (RO_YAW_RATE_I)", ge=0
+        0.0481, "1/rad", "rate of steering per missing yaw rate (RO_YAW_RATE_I)", ge=0
     )
     yaw_P: float = value(1.0, "1/s", "wanted yaw rate per heading error (RO_YAW_P)", gt=0)
     lookahead: float = value(1.0, "s", "lookahead per wanted speed (PP_LOOKAHD_GAIN)", gt=0)

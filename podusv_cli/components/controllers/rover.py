@@ -69,8 +69,8 @@ class Rover(Controller):
     no_gains: ClassVar[tuple[str, ...]] = ("surge", "yaw", "U", "r_m")
     against_windup: ClassVar[str] = "lower speed_I and rate_I"
     rules: ClassVar[dict[str, Rule]] = {
-        "surge": by.FORCE, "yaw": by.MOMENT, "U": by.SPEED, "r_m": by.TURN, "rate_FF": by.TURNING,
-        "rate_P": by.TURNING, "rate_I": by.TURNING,
+        "surge": by.FORCE, "yaw": by.MOMENT, "U": by.SPEED, "r_m": by.TURN, "rate_FF": by.STEERING,
+        "rate_P": by.STEERING, "rate_I": by.STEERING,
     }  # fmt: skip
 
     surge: Ruled = value(8.0, "N", "surge force at full throttle", gt=0)
@@ -80,12 +80,12 @@ class Rover(Controller):
     )
     U: Ruled = value(1.0, "m/s", "largest wanted speed", gt=0)
     r_m: Ruled = value(0.955, "rad/s", "largest wanted yaw rate", gt=0)
-    speed_FF: Ruled = value(0.456, "s/m", "throttle per wanted speed", ge=0)
-    speed_P: Ruled = value(0.456, "s/m", "throttle per missing speed", ge=0)
-    speed_I: Ruled = value(0.456, "1/m", "rate of the throttle per missing speed", ge=0)
-    rate_FF: Ruled = value(0.942, "s/rad", "steering per wanted yaw rate", ge=0)
-    rate_P: Ruled = value(0.471, "s/rad", "steering per missing yaw rate", ge=0)
-    rate_I: Ruled = value(0.471, "1/rad", "rate of the steering per missing yaw rate", ge=0)
+    speed_FF: Ruled = value(0.358, "s/m", "throttle per wanted speed", ge=0)
+    speed_P: Ruled = value(0.358, "s/m", "throttle per missing speed", ge=0)
+    speed_I: Ruled = value(0.358, "1/m", "rate of the throttle per missing speed", ge=0)
+    rate_FF: Ruled = value(0.0923, "s/rad", "steering per wanted yaw rate", ge=0)
+    rate_P: Ruled = value(0.0462, "s/rad", "steering per missing yaw rate", ge=0)
+    rate_I: Ruled = value(0.0462, "1/rad", "rate of the steering per missing yaw rate", ge=0)
 
     def slots(self) -> Slots:
         """The integrals."""
