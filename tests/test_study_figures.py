@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from study_samples import pairs, sensitivity, study
 
-from podusv_cli.figures.style import house_style, image
+from podusv_cli.figures.style import WIDTHS, house_style, image, new_figure
 from podusv_cli.studies.telling import figures
 
 inf, nan = math.inf, math.nan
@@ -103,3 +103,31 @@ def test_a_study_imports_neither_matplotlib_nor_pandas() -> None:
         "sys.exit(any(m in sys.modules for m in ('matplotlib', 'scipy.stats', 'pandas')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("shape", "labels", "columns"),
+    [((1, 3), "xy", 1), ((3, 4), "x", 2), ((2, 2), "x", 2), ((4, 1), "y", 1), ((3, 5), "", None)],
+)
+def test_a_page_for_a_phone_has_at_most_two_columns(
+    shape: tuple[int, int], labels: str, columns: int | None
+) -> None:
+    with house_style():
+        page = new_figure(2, 2.0)
+        panels = page.subplots(*shape, squeeze=False).ravel()
+        panels[0].set_ylabel("first")
+        panels[-1].set_visible(shape == (1, 3))
+        for axes in panels:
+            axes.set(**{f"{name}label": "m" for name in labels})
+        fits = page.narrow(4.5)
+        image(page, "png")
+    seen = [axes for axes in panels if axes.get_visible()]
+    if columns is None:
+        assert not fits
+        assert page.get_figwidth() == WIDTHS[2]
+        return
+    rows = -(-len(seen) // columns) if "x" in labels else shape[0]
+    assert page.get_size_inches() == pytest.approx((4.5, 2.0 * rows / shape[0]))
+    lefts = {round(axes.get_position().x0, 6) for axes in seen}
+    assert len(lefts) == columns
+    assert all(axes.get_ylabel() for axes in seen[::columns])

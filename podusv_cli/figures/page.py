@@ -18,6 +18,7 @@ from matplotlib.axis import Axis, Tick, XAxis, YAxis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import Formatter, LogFormatterSciNotation, NullLocator, ScalarFormatter
 from matplotlib.transforms import ScaledTranslation
 
@@ -68,6 +69,32 @@ class Page(Figure):
             legend.remove()
         for handles, names, below in keys:
             self.add_key(handles, names, below=below)
+
+    def narrow(self, width: float) -> bool:
+        """Give the page this width [inches] and its panels fewer columns; False where it cannot.
+
+        A row of panels, each with labels of its own, becomes a column; others that say what is
+        along them stand in two. Rows and columns that mean something stay, up to two columns.
+        """
+        panels = [axes for axes in self.axes if axes.get_visible()]
+        specs = [axes.get_subplotspec() for axes in panels]
+        grids = {spec.get_gridspec() if spec else None for spec in specs}
+        grid, height = grids.pop() if len(grids) == 1 else None, self.get_figheight()
+        if grid and all(axes.get_xlabel() for axes in panels):
+            single = grid.nrows == 1 and all(axes.get_ylabel() for axes in panels)
+            columns = 1 if single else min(grid.ncols, 2)
+            rows = -(-len(panels) // columns)
+            cells = GridSpec(rows, columns, figure=self)
+            for place, axes in enumerate(panels):
+                axes.set_subplotspec(cells[place // columns, place % columns])
+                if place % columns == 0:
+                    axes.tick_params(labelleft=True)
+                    axes.set_ylabel(axes.get_ylabel() or panels[0].get_ylabel())
+            height *= rows / grid.nrows
+        elif grid and grid.ncols > 2:
+            return False
+        self.resize(width, height)
+        return True
 
     def add_key(self, handles: Sequence[Any], names: Sequence[str], *, below: bool = False) -> None:
         """A legend above (or below) all panels, in as few rows as its names fit into."""

@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from podusv_cli.figures.style import Look, house_style, image
+from podusv_cli.figures.page import Page
+from podusv_cli.figures.style import house_style, image
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
@@ -55,11 +56,12 @@ def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, byte
 
 
 def _images(sketch: Sketch, tell: Callable[[float], None]) -> tuple[bytes, bytes]:
-    """The figure as a PNG, and as one for a phone."""
+    """The figure as a PNG, and as one for a phone where its panels fit there."""
     with (
         interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
     ):  # fmt: skip
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         figure = sketch.draw()
         whole = image(figure, "png")
-        return whole, image(Look(width=ON_PHONE).given_to(figure), "png")
+        narrow = isinstance(figure, Page) and figure.narrow(ON_PHONE)
+        return whole, image(figure, "png") if narrow else b""
