@@ -1,10 +1,16 @@
 """`examples/my_lab` as an installer leaves it, made without one, so that no network is needed."""
 
 import shutil
+import sys
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import pytest
 from command_samples import ROOT
+
+from podusv_cli.core.plugins import installed
 
 LAB = ROOT / "examples" / "my_lab"
 
@@ -25,3 +31,18 @@ def install(site: Path) -> Path:
     ]
     (info / "entry_points.txt").write_text("\n".join(sections))
     return site
+
+
+@contextmanager
+def importable(site: Path) -> Iterator[None]:
+    """Packages in the folder `site` are installed, in this process and its children."""
+    with suppress(ImportError):
+        import importlib_metadata  # noqa: F401  as Dask does; it replaces Python's own
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(site))
+        patch.setenv("PYTHONPATH", str(site), prepend=":")
+        installed.cache_clear()
+        yield
+    installed.cache_clear()
+    for name in [name for name in sys.modules if name.partition(".")[0] == "my_lab"]:
+        del sys.modules[name]

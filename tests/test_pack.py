@@ -6,6 +6,8 @@ import io
 import json
 import shutil
 import stat
+import subprocess
+import sys
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -14,6 +16,7 @@ from typing import Any
 
 import pytest
 from command_samples import Command, commanded
+from installed_sample import LAB, importable, install
 from rerun_samples import SCENARIO, copied, made, replaced, told_otherwise
 from storage_samples import files
 
@@ -126,7 +129,7 @@ def test_code_is_named_and_never_executed_by_unpacking(podusv: Command, tmp_path
     Path("imported").unlink()
     assert podusv("pack", tmp_path / "first").code == 0
     said = podusv("unpack", "first.zip")
-    assert "code, executed with --trust alone: plugins/mine.py" in words(said)
+    assert "code, which unpacking does not execute: plugins/mine.py" in words(said)
     assert said.out.endswith("read the code, then: podusv rerun first --trust\n")
     assert not Path("imported").exists()
     assert (
@@ -158,6 +161,36 @@ def test_packages_and_versions_that_differ_are_named(
     said = words(podusv("unpack", "first.zip"))
     assert "needs their-lab 3.1: not installed" in said
     assert "versions, there -> here: packages.numpy 1.9 -> " in said
+
+
+def test_an_installed_package_of_components_comes_with_its_runs(
+    tmp_path: Path, podusv: Command
+) -> None:
+    """As a wheel, which pip checks and installs; then the run has the same bytes."""
+    name = "packages/my_lab-1.0-py3-none-any.whl"
+    text = (LAB / "scenario.yaml").read_text().partition("claims:")[0]
+    Path("a.yaml").write_text(text.replace("duration: 20.0", "duration: 0.5, compiled: false"))
+    with importable(install(tmp_path / "site")):
+        done = podusv("run", "a.yaml", "--out", tmp_path / "lab", "--no-figures")
+        assert done.code == 0, done.err
+        assert f"execute: {name} needs my-lab 1.0: installed" in words(
+            podusv("pack", tmp_path / "lab")
+        )
+        packed = Path("lab.zip").read_bytes()
+        podusv("pack", tmp_path / "lab", "--force")
+        assert Path("lab.zip").read_bytes() == packed
+    said = podusv("unpack", "lab.zip")
+    assert f"needs my-lab 1.0: not installed; read it, then pip install {name}" in words(said)
+    assert said.out.endswith("read the code, then: podusv rerun lab\n")
+    assert podusv("rerun", "lab").code == 2
+    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index")
+    subprocess.run([*pip, "--target", "there", f"lab/{name}"], check=True, capture_output=True)
+    with importable(Path("there").resolve()):
+        assert words(podusv("rerun", "lab")).startswith("lab identical: ")
+        assert podusv("pack", "lab", "--out", "again.zip").code == 0
+    assert Path("again.zip").read_bytes() == packed
+    assert podusv("pack", "lab", "--force").code == 0  # where the package is not installed
+    assert Path("lab.zip").read_bytes() == packed
 
 
 def test_files_that_are_not_of_the_result_are_left_out(
@@ -259,6 +292,7 @@ UNSAFE = {
     "two folders": (more("second/a"), "it has files of 2 folders, must have those of one"),
     "two of one name": (more("first/log.h5"), "it has two files of one name"),
     "file and folder": (more("first/log.h5/a"), "'log.h5' is a file and a folder"),
+    "a script among packages": (more("first/packages/evil.py"), "evil.py is not as its manifest"),
     "one more": (more("first/evil.py"), "evil.py is not as its manifest.json lists it"),
     "bomb": (more("first/zeros", bytes(40_000_000)), "would become 40 MB; results of podusv"),
     "longer": (other("metrics.csv", lambda c: c + b"x"), "metrics.csv is not as its manifest"),

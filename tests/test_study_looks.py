@@ -4,17 +4,16 @@ import csv
 import json
 import shutil
 import sys
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from installed_sample import LAB, install
+from installed_sample import LAB, importable, install
 from loop_counts import COUNTED, loop_counts
 from plugin_samples import LAW
 from small_study import TEXT
 from test_plugins import MORE
 
-from podusv_cli.core.plugins import MODULES, installed
+from podusv_cli.core.plugins import MODULES
 from podusv_cli.workflows import studies, sweep
 
 MARK = Path("imported")
@@ -184,16 +183,10 @@ def test_odd_words_in_the_record_are_refused_in_a_sentence(study, podusv, change
 
 
 @pytest.fixture
-def installed_lab(tmp_path, monkeypatch):
-    """`examples/my_lab` as an installed package, in this process and its children."""
-    with suppress(ImportError):
-        import importlib_metadata  # noqa: F401  as Dask does; it replaces Python's own
-    monkeypatch.syspath_prepend(str(install(tmp_path / "site")))
-    installed.cache_clear()
-    yield
-    installed.cache_clear()
-    for name in [name for name in sys.modules if name.partition(".")[0] == "my_lab"]:
-        del sys.modules[name]
+def installed_lab(tmp_path):
+    """`examples/my_lab` as an installed package."""
+    with importable(install(tmp_path / "site")):
+        yield
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def show(contents: Contents) -> None:
     count = f"{len(sizes)} files, {in_words(sum(sizes.values()))}"
     facts = f"{contents.kind}, {contents.status}: {count}"
     lines = {
-        "code, executed with --trust alone: ": _few(contents.code),
+        "code, which unpacking does not execute: ": _few(contents.code),
         "pages, whose scripts a browser executes: ": _few(contents.pages),
         "not packed, to be made anew: ": _few(contents.lacking),
         "": "; ".join(f"needs {name}: {found}" for name, found in contents.packages.items()),

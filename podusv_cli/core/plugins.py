@@ -160,15 +160,35 @@ def installed() -> Plugins:
     return tuple(by_package[name] for name in sorted(by_package))
 
 
-def _package_digest(points: Iterable[tuple[str, EntryPoint]]) -> str:
-    """The digest of all Python and YAML files of the packages in which the entry points are."""
-    whole = hashlib.sha256()
+def package_files(package: Plugin) -> dict[str, Path]:
+    """Every file of an installed package's modules, by its place beside other packages."""
+    points = [(room, thing) for room, thing in package.offers if isinstance(thing, EntryPoint)]
+    return {
+        f"{top}/{name.as_posix()}" if is_folder else name.as_posix(): path
+        for top, is_folder, files in _modules(points)
+        for name, path in files
+        if path.is_file() and "__pycache__" not in name.parts
+    }
+
+
+def _modules(
+    points: Iterable[tuple[str, EntryPoint]],
+) -> Iterator[tuple[str, bool, list[tuple[Path, Path]]]]:
+    """The modules that hold entry points: name, whether it is a folder, what is in it by name."""
     for top in sorted({point.module.partition(".")[0] for _, point in points}):
         spec = find_spec(top)
         folders = (spec and spec.submodule_search_locations) or ()
-        files = [(path.relative_to(top), path) for top in folders for path in Path(top).rglob("*")]
+        inside = [(path.relative_to(top), path) for top in folders for path in Path(top).rglob("*")]
         alone = [Path(spec.origin)] if spec and spec.origin and not folders else []
-        for name, path in sorted([*files, *((Path(path.name), path) for path in alone)]):
+        files = [*inside, *((Path(path.name), path) for path in alone)]
+        yield top, bool(folders), sorted(files)
+
+
+def _package_digest(points: Iterable[tuple[str, EntryPoint]]) -> str:
+    """The digest of all Python and YAML files of the packages in which the entry points are."""
+    whole = hashlib.sha256()
+    for _, _, files in _modules(points):
+        for name, path in files:
             if path.suffix in (".py", ".yaml"):
                 content = path.read_bytes()
                 whole.update(f"{name.as_posix()}\0{len(content)}\0".encode() + content)

@@ -6,16 +6,19 @@ import os
 import stat
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path, PurePosixPath
 from shutil import copyfileobj
+from typing import BinaryIO
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 from podusv_cli.storage import files
 
+NOTHING: Mapping[str, bytes] = {}
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # the time of every file: the first that the format has
 PLAIN = stat.S_IFREG | 0o644
 MOST_FILES = 100_000
@@ -25,18 +28,22 @@ READ = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
 ENCRYPTED = 0x1  # a bit of `flag_bits`
 
 
-def write(out: Path, folder: Path, names: Sequence[str]) -> int:
-    """Pack these files of a folder below its name, in place of an older archive; its size in bytes.
+def write(
+    out: Path, folder: Path, names: Sequence[str], made: Mapping[str, bytes] = NOTHING
+) -> int:
+    """Pack these files of a folder, and others that are `made`, below the folder's name.
 
-    The bytes depend on names and contents alone. Raises StorageError.
+    An older archive is replaced; the bytes depend on names and contents alone. Returns the
+    archive's bytes. Raises StorageError.
     """
     remove_abandoned_files(out.parent)
-    part = out.with_name(temporary_name())
+    part, top = out.with_name(temporary_name()), folder.resolve().name
     size = sum((folder / name).stat().st_size for name in names)
     try:
         with files.new_file(part, size) as file, zipfile.ZipFile(file, "w") as archive:
-            for name in sorted(names):
-                _add(archive, f"{folder.resolve().name}/{name}", folder / name)
+            for name in sorted({*names, *made}):
+                with BytesIO(made[name]) if name in made else files.opened(folder / name) as source:
+                    _add(archive, f"{top}/{name}", source)
         with files.storage_errors(f"cannot write {out}"):
             os.replace(part, out)
     finally:
@@ -45,14 +52,20 @@ def write(out: Path, folder: Path, names: Sequence[str]) -> int:
     return out.stat().st_size
 
 
-def _add(archive: zipfile.ZipFile, name: str, path: Path) -> None:
+def entry_of(name: str) -> zipfile.ZipInfo:
+    """An entry of a plain file without the time at which it is packed."""
     entry = zipfile.ZipInfo(name, EARLIEST)
     entry.create_system, entry.external_attr = 3, PLAIN << 16  # Unix
     entry.compress_type = zipfile.ZIP_DEFLATED
-    with files.opened(path) as source:
-        entry.file_size = files.file_size(source)
-        with archive.open(entry, "w") as target:
-            copyfileobj(source, target)
+    return entry
+
+
+def _add(archive: zipfile.ZipFile, name: str, source: BinaryIO) -> None:
+    entry = entry_of(name)
+    entry.file_size = source.seek(0, os.SEEK_END)  # beyond 4 GB it takes another form
+    source.seek(0)
+    with archive.open(entry, "w") as target:
+        copyfileobj(source, target)
 
 
 class Archive:

@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 from podusv_cli.comparison.run_difference import Change, version_changes
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import installed
-from podusv_cli.storage import archive, json_files, manifest, provenance
+from podusv_cli.storage import archive, json_files, manifest, provenance, wheel
 from podusv_cli.storage.manifest import Manifest
 from podusv_cli.storage.run_folder import LOG, check_free_space
 from podusv_cli.storage.staging import Staging, remove_abandoned
 
 PROVENANCE = "provenance.json"
+PACKAGES = "packages"  # the folder of wheels, which no manifest lists
 # A file that only folders of one kind have, and how such a folder is made once more.
 KINDS = {
     "metrics.json": ("run", "podusv rerun {folder}"),
@@ -37,8 +38,8 @@ class Contents:
 
     `sizes` are bytes by file, `lacking` the logs that were not packed. `code` are files that are
     neither data nor pages, `pages` those for a browser. `packages` are installed packages whose
-    components the runs take, and what of them is here. `differs` has the versions that are others
-    here.
+    components the runs take, and what is to be done for them here. `differs` has the versions that
+    are others here.
     """
 
     name: str
@@ -60,7 +61,8 @@ class Contents:
         """The command that makes it once more; "" where there is none."""
         command = next((KINDS[mark][1] for mark in KINDS if mark in self.sizes), "")
         kept = " --out again" if self.lacking and "rerun" in command else ""
-        trust = " --trust" if command and self.code else ""
+        own = [name for name in self.code if not _is_wheel(name)]
+        trust = " --trust" if command and own else ""
         return f"{command.format(folder=shlex.quote(str(folder)))}{kept}{trust}"
 
 
@@ -75,19 +77,24 @@ class Written(NamedTuple):
 def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> Written:
     """Write what the manifest of a finished folder lists into one archive.
 
-    Raises UsageError for a folder without a manifest, StorageError for a damaged one, and where
-    `out` exists and `force` is not given.
+    Installed packages whose components its runs took come with it as wheels, where they are still
+    the ones that were used. Raises UsageError for a folder without a manifest, StorageError for a
+    damaged one, and where `out` exists and `force` is not given.
     """
     manifest.demand(folder)
     if out.exists() and not force:
         raise StorageError(f"{out} exists already; --force replaces it")
     listed = manifest.check(folder, optional=LOG)
-    there = {name for name in listed.files if (folder / name).exists()}
-    names = sorted(name for name in there if logs or PurePosixPath(name).name != LOG)
-    origins = [json_files.read(folder / name) for name in names if _is_origin(name)]
-    contents = _contents(folder.resolve().name, listed, names, origins)
-    size = archive.write(out, folder, [*names, manifest.NAME])
-    return Written(contents, size, tuple(manifest.foreign(folder, listed)))
+    there = {name: one.bytes for name, one in listed.files.items() if (folder / name).exists()}
+    sizes = {n: size for n, size in there.items() if logs or PurePosixPath(n).name != LOG}
+    sessions = _sessions(json_files.read(folder / name) for name in sizes if _is_origin(name))
+    foreign = manifest.foreign(folder, listed)
+    sizes |= {name: (folder / name).stat().st_size for name in foreign if _is_wheel(name)}
+    made = {name: data for name, data in _wheels(sessions).items() if name not in sizes}
+    written = archive.write(out, folder, [*sizes, manifest.NAME], made)
+    sizes |= {name: len(data) for name, data in made.items()}
+    contents = _contents(folder.resolve().name, listed, sizes, sessions)
+    return Written(contents, written, tuple(name for name in foreign if not _is_wheel(name)))
 
 
 @dataclass(frozen=True)
@@ -120,55 +127,79 @@ def opened(path: Path) -> Iterator[Packed]:
     """An archive of `pack` and what it has, before anything of it is written.
 
     Raises StorageError for what is no such archive, and for one that would be written elsewhere
-    than in its folder, has links, would become far too large, or has files that its
-    manifest does not list.
+    than in its folder, has links, would become far too large, or has files, beside wheels of
+    packages, that its manifest does not list.
     """
     with archive.opened(path) as packed:
         listed = manifest.parsed(packed.text(manifest.NAME), path / packed.name)
-        names = [name for name in packed.sizes if name != manifest.NAME]
-        for name in names:
+        sizes = {name: size for name, size in packed.sizes.items() if name != manifest.NAME}
+        for name, size in sizes.items():
             entry = listed.files.get(name)
-            if entry is None or entry.bytes != packed.sizes[name]:
+            if entry.bytes != size if entry else not _is_wheel(name):
                 raise packed.fault(f"{name} is not as its {manifest.NAME} lists it")
-        missing = {*listed.files} - {*names}
+        missing = {*listed.files} - {*sizes}
         if gone := sorted(name for name in missing if PurePosixPath(name).name != LOG):
             raise packed.fault(f"{gone[0]} is missing")
-        origins = [
-            json_files.parsed(packed.text(name), path / name) for name in names if _is_origin(name)
-        ]
-        yield Packed(_contents(packed.name, listed, names, origins), packed)
+        sessions = _sessions(
+            json_files.parsed(packed.text(name), path / name) for name in sizes if _is_origin(name)
+        )
+        yield Packed(_contents(packed.name, listed, sizes, sessions), packed)
 
 
 def _is_origin(name: str) -> bool:
     return PurePosixPath(name).name == PROVENANCE
 
 
+def _is_wheel(name: str) -> bool:
+    path = PurePosixPath(name)
+    return str(path.parent) == PACKAGES and path.suffix == ".whl"
+
+
+def _sessions(origins: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """What made the results: a session each, of a study several."""
+    return [session for origin in origins for session in origin.get("sittings", [origin])]
+
+
 def _contents(
-    name: str, listed: Manifest, names: Sequence[str], origins: Iterable[Mapping[str, Any]]
+    name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[Mapping[str, Any]]
 ) -> Contents:
-    sessions = [session for origin in origins for session in origin.get("sittings", [origin])]
     made_by = sessions[-1] if sessions else {}
     kinds = [kind for mark, (kind, _) in KINDS.items() if mark in listed.files]
-    ends = {name: PurePosixPath(name).suffix for name in names}
+    ends = {name: PurePosixPath(name).suffix for name in sizes}
     return Contents(
-        name, next(iter(kinds), OTHER), listed.status,
-        {name: listed.files[name].bytes for name in names},
-        lacking=tuple(sorted({*listed.files} - {*names})),
+        name, next(iter(kinds), OTHER), listed.status, sizes,
+        lacking=tuple(sorted({*listed.files} - {*sizes})),
         code=tuple(name for name, end in ends.items() if end not in DATA | PAGES),
         pages=tuple(name for name, end in ends.items() if end in PAGES),
-        packages=dict(_packages(sessions)),
+        packages={f"{package} {version}": _found(package, version, sha256, sizes)
+                  for package, version, sha256 in _packages(sessions)},
         made_by={key: made_by[key] for key in ("podusv", "python", "packages") if key in made_by},
         differs=version_changes(made_by, provenance.surroundings()),
     )  # fmt: skip
 
 
-def _packages(sessions: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
-    """The packages of plug-ins that runs took, and whether these very ones are installed."""
-    here = {plugin.name: plugin for plugin in installed()}
-    for session in sessions:
-        for plugin in session.get("plugins", ()):
-            if name := plugin.get("package"):
-                own = here.get(name)
-                same = own is not None and own.sha256 == plugin.get("sha256")
-                found = "installed" if same else f"another one is installed ({own})"
-                yield f"{name} {plugin.get('version', '')}", found if own else "not installed"
+def _packages(sessions: Iterable[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Name, version and digest of the packages whose components runs took, each once."""
+    listed = (plugin for session in sessions for plugin in session.get("plugins", ()))
+    named = ((p.get("package"), p.get("version", ""), p.get("sha256", "")) for p in listed)
+    return [*dict.fromkeys(package for package in named if package[0])]
+
+
+def _found(package: str, version: str, sha256: str, sizes: Mapping[str, int]) -> str:
+    """Whether this very package is installed, and where its wheel is else."""
+    here = {plugin.name: plugin for plugin in installed()}.get(package)
+    if here and here.sha256 == sha256:
+        return "installed"
+    place = f"{PACKAGES}/{wheel.name_of(package, version)}"
+    how = f"; read it, then pip install {place}" if place in sizes else ", and not packed"
+    return (f"another one is installed ({here})" if here else "not installed") + how
+
+
+def _wheels(sessions: Iterable[Mapping[str, Any]]) -> dict[str, bytes]:
+    """Wheels of these packages, where the very ones are installed and have no compiled modules."""
+    here = {(plugin.name, plugin.sha256): plugin for plugin in installed()}
+    used = {
+        (name, version): here.get((name, sha256)) for name, version, sha256 in _packages(sessions)
+    }
+    made = {key: wheel.wheel(plugin) for key, plugin in used.items() if plugin}
+    return {f"{PACKAGES}/{wheel.name_of(*key)}": data for key, data in made.items() if data}
