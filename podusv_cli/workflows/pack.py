@@ -16,17 +16,17 @@ from podusv_cli.storage import archive, json_files, manifest, provenance, wheel
 from podusv_cli.storage.manifest import Manifest
 from podusv_cli.storage.run_folder import LOG, check_free_space
 from podusv_cli.storage.staging import Staging, remove_abandoned
+from podusv_cli.workflows import runs
 
 PROVENANCE = "provenance.json"
 PACKAGES = "packages"  # the folder of wheels, which no manifest lists
-# A file that only folders of one kind have, and how such a folder is made once more.
-KINDS = {
-    "metrics.json": ("run", "podusv rerun {folder}"),
-    "comparison.csv": ("comparison", "podusv rerun {folder}"),
-    "study.json": ("study", "podusv sweep run {folder}/scenario.yaml --out again"),
-    "tune.json": ("search", "podusv tune {folder}/scenario.yaml --out again"),
-}
-OTHER = "result"
+# A file that only folders of one kind have.
+KINDS = {mark: kind for mark, (kind, *_) in runs.KINDS.items()} | {"comparison.csv": "comparison"}
+AGAIN = {
+    "run": "podusv rerun {folder}", "comparison": "podusv rerun {folder}",
+    "study": "podusv sweep run {folder}/scenario.yaml --out again",
+    "search": "podusv tune {folder}/scenario.yaml --out again",
+}  # fmt: skip
 # What podusv reads and shows; whatever else is in an archive counts as code.
 DATA = {".yaml", ".json", ".h5", ".csv", ".md", ".tex", ".png", ".pdf", ".gif", ".mp4"}
 PAGES = {".html", ".svg"}  # may have scripts, which a browser executes
@@ -59,7 +59,7 @@ class Contents:
 
     def repeat(self, folder: Path) -> str:
         """The command that makes it once more; "" where there is none."""
-        command = next((KINDS[mark][1] for mark in KINDS if mark in self.sizes), "")
+        command = AGAIN.get(self.kind, "")
         kept = " --out again" if self.lacking and "rerun" in command else ""
         own = [name for name in self.code if not _is_wheel(name)]
         trust = " --trust" if command and own else ""
@@ -164,10 +164,10 @@ def _contents(
     name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[Mapping[str, Any]]
 ) -> Contents:
     made_by = sessions[-1] if sessions else {}
-    kinds = [kind for mark, (kind, _) in KINDS.items() if mark in listed.files]
+    kinds = (kind for mark, kind in KINDS.items() if mark in listed.files)
     ends = {name: PurePosixPath(name).suffix for name in sizes}
     return Contents(
-        name, next(iter(kinds), OTHER), listed.status, sizes,
+        name, next(kinds, "result"), listed.status, sizes,
         lacking=tuple(sorted({*listed.files} - {*sizes})),
         code=tuple(name for name, end in ends.items() if end not in DATA | PAGES),
         pages=tuple(name for name, end in ends.items() if end in PAGES),
