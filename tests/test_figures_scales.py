@@ -47,6 +47,14 @@ def test_an_axis_with_a_tall_peak_is_logarithmic_beyond_the_settled_values():
     assert axes.get_ylim()[0] > -0.1
 
 
+def test_no_tick_of_a_logarithmic_axis_lies_within_its_linear_part():
+    peak = {"r": lambda t: np.where(t < 1.0, -3e4, np.where(t < 2.0, 3e4, 110.0 * np.sin(t)))}
+    axes = panels(drawn("velocities", shown(("a", recording(**peak)))))["$r$ [rad/s]"]
+    linear = axes.yaxis.get_transform().linthresh
+    assert linear == pytest.approx(1e3)
+    assert [*axes.get_yticks()] == pytest.approx([-1e4, -1e3, 0.0, 1e3, 1e4])
+
+
 @pytest.mark.parametrize(("peak", "scale"), [(19.0, "linear"), (21.0, "symlog")])
 def test_a_peak_is_tall_from_twenty_times_the_settled_values_on(peak, scale):
     given = {"r": lambda t: np.where(t < 1.0, -peak, 1.0)}

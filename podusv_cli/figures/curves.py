@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import SymmetricalLogLocator
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.scales import Span, linear_up_to, mean_size, scaling
@@ -21,6 +22,20 @@ DENSE = 60.0  # ranges that a curve runs through; from there it hides what is be
 FINE = 0.5  # points, of such a curve
 APART = 1.5  # a curve that goes this many times as far up and down lies below the calmer one
 RIPPLE = 1e-3  # of a signal's mean size over the run; a panel never shows less than this
+
+
+class Beyond(SymmetricalLogLocator):
+    """Ticks at 0 and beyond the linear part, within which those of powers cover each other."""
+
+    def __init__(self, linear: float) -> None:
+        """`linear` is where the linear part ends."""
+        super().__init__(base=10.0, linthresh=linear)
+        self.linear = linear
+
+    def tick_values(self, vmin: float, vmax: float) -> Sequence[float]:
+        """As matplotlib has them, but for those."""
+        ticks = super().tick_values(vmin, vmax)
+        return [tick for tick in ticks if tick == 0.0 or abs(tick) > 0.5 * self.linear]
 
 
 def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
@@ -151,4 +166,5 @@ def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:
     linear = linear_up_to(runs, name, max(abs(limit) for limit in axes.dataLim.intervaly))
     if linear:
         axes.set_yscale("symlog", linthresh=linear)
+        axes.yaxis.set_major_locator(Beyond(linear))
         axes.autoscale_view(scalex=False)  # margins in the new scale
