@@ -26,6 +26,7 @@ STARTS, NEARER = 5, 0.5  # searches at most, and how far from the prior's centre
 # by about this much: two searches that differ by less have come to the same. It is little beside
 # 1 for each number.
 SETTLED = 2.0
+NEARBY = 1e-3  # of a coordinate: a step within which a smooth function hardly bends
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 # Posterior over prior standard deviation of a direction: above OPEN the logs do not determine it,
 # above SILENT they say next to nothing of it, and it stays as it was.
@@ -73,6 +74,16 @@ class Search:
         with np.errstate(all="ignore"):
             nu, s = self.innovations(points)
         return [_value(nu[:, i], s[:, i], y) for i, y in enumerate(points)]
+
+    def roughness(self, y: Vector) -> float:
+        """How much -2 log of the posterior bends at a point within NEARBY of a number of the hull.
+
+        A smooth one bends by 2 (NEARBY/sd)^2, hardly ever above 0.1; a rough one jumps.
+        """
+        steps = NEARBY * np.eye(self.size)[: self.hull]
+        middle, *sides = self.values([y, *(y + steps), *(y - steps)])
+        bends = np.abs(np.reshape(sides, (2, -1)).sum(axis=0) - 2.0 * middle)
+        return float(bends.max(initial=0.0))
 
     def scored(self, y: Vector) -> Scored:
         """Value, slopes and Fisher's matrix at a point."""
