@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html.parser import HTMLParser
 
-VOID = {"meta", "img", "br", "wbr", "input", "link", "hr", "col"}
+VOID = {"meta", "img", "br", "wbr", "input", "link", "hr", "col", "source"}
 
 
 class Element:

@@ -573,7 +573,7 @@ def test_the_event_nearest_to_a_window_is_named():
         ("fossen_2003/course.yaml", "F1", "robust", ""),
         ("fossen_2003/course.yaml", "F2", "robust", ""),
         ("fossen_2003/course.yaml", "F4", "knife's edge", "start.y"),
-        ("fossen_2003/cybership2.yaml", "F7w", "under conditions", "controllers.paper.w"),
+        ("fossen_2003/cybership2.yaml", "F7w", "under conditions", "vessel.Y_vv"),
     ],
 )
 def test_the_sentences_hang_on_what_reviewers_turned_them_by(podusv, config, claim, word, key):

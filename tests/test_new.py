@@ -227,7 +227,8 @@ def test_commands_list_explain_and_draw_it(place):
     listed = podusv(place, "list")
     for name in ("los", "lawn", "skiff", "largest_east"):
         assert f"\n  {name}" in listed
-    assert "a number > 0 [m], default 3.0" in podusv(place, "explain", "lookahead")
+    explained = " ".join(podusv(place, "explain", "lookahead").split())
+    assert "nmi], default 3.0 " in explained
     assert "cross-track error" in podusv(place, "explain", "e_y")
     assert "identical" in podusv(place, "rerun", "c/los")
 

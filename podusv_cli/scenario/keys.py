@@ -149,6 +149,13 @@ class Key:
         fields = self.section.model_fields.items() if self.section else ()
         return {name: self._key(name, field) for name, field in fields} or self.kinds
 
+    def _within(self, name: str) -> Key | None:
+        """One of `keys`, without the others being made."""
+        if not self.section:
+            return self.kinds.get(name)
+        field = self.section.model_fields.get(name)
+        return self._key(name, field) if field else None
+
     def _key(self, name: str, field: FieldInfo) -> Key:
         model = self.section or self.model
         # A section that is left out is its default, whatever its own class would start with.
@@ -236,7 +243,7 @@ class Key:
     def inside(self, step: str | int) -> list[Key]:
         """The kind, the item, or the keys (of several kinds) that a step leads to."""
         inner = (self, *self.kinds.values())
-        led_to = [key.keys.get(str(step)) or key.item(step) for key in inner]
+        led_to = [key._within(str(step)) or key.item(step) for key in inner]
         return [key for key in led_to if key]
 
     def all(self) -> Iterator[Key]:
@@ -254,6 +261,7 @@ def _scalars(annotation: Any) -> Iterator[Any]:
             yield member
 
 
+@cache
 def members(annotation: Any) -> tuple[Any, ...]:
     """The members of a union; of any other type, itself."""
     if get_origin(annotation) is Annotated:
@@ -280,6 +288,7 @@ def _metadata(field: FieldInfo) -> Iterator[Any]:
             )
 
 
+@cache
 def sections(annotation: Any) -> dict[str, type[Component]]:
     """The component classes that a value may be of, by kind; "" is a class without kinds."""
     return {_kind(member): member for member in members(annotation) if _is_component(member)}

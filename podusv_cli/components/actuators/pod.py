@@ -260,6 +260,8 @@ class Pods(Actuator):
         """
         force = sum(pod.T_nn * pod.n_max * pod.n_max for pod in self.pods) / 3.0
         at, still, small = np.array([force, 0.0]), np.zeros(6), SMALL * force
+        if not small:
+            return np.zeros((3, 2))
         columns = [
             (self.settled(still, at + change) - self.settled(still, at - change)) / (2.0 * small)
             for change in small * np.eye(2)
