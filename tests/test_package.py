@@ -57,3 +57,19 @@ def test_elsewhere_podusv_says_where_it_runs(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(sys, "platform", "darwin")
     with pytest.raises(SystemExit, match="podusv runs on Linux; on Windows use WSL"):
         __main__.main()
+
+
+@pytest.mark.parametrize("package", ["podusv", "podusv_cli"])
+def test_every_file_of_a_package_is_packed(package: str) -> None:
+    """Templates and presets, too; the links to rooms beside it are for tests of the wheel."""
+    given = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    home = ROOT / package
+    packed = {path for text in given["package-data"][package] for path in home.glob(text)}
+    links = [path for path in home.iterdir() if path.is_symlink()]
+    needed = {
+        path
+        for path in home.rglob("*")
+        if path.is_file() and path.suffix not in {".py", ".pyc"} and links.count(path) == 0
+        and not any(link in path.parents for link in links)
+    }  # fmt: skip
+    assert needed - packed <= {ROOT / PROJECT["readme"]}
