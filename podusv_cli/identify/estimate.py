@@ -55,6 +55,11 @@ class Scored:
     by_values: Vector
     by_sizes: Vector
 
+    def curvature(self) -> Vector:
+        """Fisher's matrix of all blocks and the prior."""
+        whole = (self.by_values + self.by_sizes).sum(axis=0)
+        return np.asarray(whole + 2.0 * np.eye(len(whole)))
+
 
 @dataclass(frozen=True)
 class Search:
@@ -76,14 +81,16 @@ class Search:
         return [_value(nu[:, i], s[:, i], y) for i, y in enumerate(points)]
 
     def roughness(self, y: Vector) -> float:
-        """How much -2 log of the posterior bends at a point within NEARBY of a number of the hull.
+        """How far -2 log of the posterior is from a parabola within NEARBY of a point.
 
-        A smooth one bends by 2 (NEARBY/sd)^2, hardly ever above 0.1; a rough one jumps.
+        Over the numbers of the hull, beyond half of what the parabola itself bends; a smooth one
+        has 0, one that jumps the jump.
         """
         steps = NEARBY * np.eye(self.size)[: self.hull]
         middle, *sides = self.values([y, *(y + steps), *(y - steps)])
-        bends = np.abs(np.reshape(sides, (2, -1)).sum(axis=0) - 2.0 * middle)
-        return float(bends.max(initial=0.0))
+        bends = np.reshape(sides, (2, -1)).sum(axis=0) - 2.0 * middle
+        expected = NEARBY**2 * np.diag(self.scored(y).curvature())[: self.hull]
+        return float((np.abs(bends - expected) - 0.5 * expected).max(initial=0.0))
 
     def scored(self, y: Vector) -> Scored:
         """Value, slopes and Fisher's matrix at a point."""
@@ -178,7 +185,7 @@ def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
 def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:
     """Steps of growing damping, none longer than LONGEST, and what the first should gain."""
     gradient = at.slopes.sum(axis=0) + 2.0 * y
-    curvature = (at.by_values + at.by_sizes).sum(axis=0) + 2.0 * np.eye(len(y))
+    curvature = at.curvature()
     damped = (curvature + part * np.diag(np.diag(curvature)) for part in DAMPINGS)
     steps = [-np.linalg.solve(matrix, gradient) for matrix in damped]
     short = [step * min(1.0, LONGEST / max(np.abs(step).max(), SHIFT)) for step in steps]
