@@ -119,7 +119,7 @@ def test_latex_escapes_and_marks():
     first = r"a\_b\&\textasciitilde{}\textasciicircum{}\textbackslash{}\{\}"
     head = rf"\multicolumn{{2}}{{c}}{{{first}}} & \multicolumn{{2}}{{c}}{{\#\$\%}} \\"
     assert lines[4].endswith(head)
-    assert lines[6] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} &  & 2 &  \\"
+    assert lines[6] == r"$\int z_e\,\mathrm{d}t$ & m s & \textbf{1} & \textbf{.00} & 2 & .00 \\"
 
 
 def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
@@ -130,12 +130,12 @@ def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines()]
     by_row = {row[0]: row[1:] for row in rows[6:-2]}
     assert by_row[r"$\int z_e^2\,\mathrm{d}t$"] == [
-        "m$^2$ s", r"\textbf{\boldmath 2}", r"\textbf{\boldmath $\times10^{-9}$}",
-        "0", ".04", "1", "",
+        "m$^2$ s", r"\textbf{\boldmath 2}", r"\textbf{\boldmath .00$\times10^{-9}$}",
+        "0", ".0400", "1", ".00",
     ]  # fmt: skip
     assert by_row[r"$\int\tau_r^2\,\mathrm{d}t$"][3:5] == ["3", r".25$\times10^{12}$"]
     words = METRICS["saturated_fraction"].row
-    assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.5}", "-", "", "-", ""]
+    assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.500}", "-", "", "-", ""]
     assert by_row[METRICS["path_time"].row][-2:] == ["never", ""]
     columns = text.splitlines()[2].partition("{tabular}")[2].replace("@{}", "")
     assert {len(row) for row in rows[6:-2]} == {len(columns) - 2}
@@ -146,8 +146,8 @@ def test_latex_has_ratios_to_the_first_run_where_they_are_asked_for():
     frame = table.table({"a": {"iae": 8.0}, "b": {"iae": 3.125}, "c": {"iae": 1e-9}})
     (row,) = table.as_latex(frame, ratios=True).splitlines()[6:-2]
     assert row.split(" & ")[2:] == [
-        "8", "", "3", ".12~(0.391)",
-        r"\textbf{\boldmath 1}", r"\textbf{\boldmath $\times10^{-9}$}~(1.25e-10) \\",
+        "8", ".00", "3", ".12~(0.391)",
+        r"\textbf{\boldmath 1}", r"\textbf{\boldmath .00$\times10^{-9}$}~(1.25e-10) \\",
     ]  # fmt: skip
     assert "(" not in table.as_latex(frame).splitlines()[6].partition("m s")[2]
 

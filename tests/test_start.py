@@ -208,9 +208,33 @@ def test_a_file_that_exists_is_not_replaced(podusv):
     assert (said.code, said.err) == (5, "boat.yaml exists; name another file with --out\n")
 
 
-def test_a_terminal_is_asked_for_what_is_missing(podusv, monkeypatch):
+@pytest.mark.parametrize("hulls", [1, 2])
+def test_a_terminal_is_asked_for_what_is_missing(podusv, monkeypatch, hulls):
     answers = {"Length": "4.9", "Beam": "2.4", "Mass": "400lb", "Thrusters": "2x180N@1.0"}
+    answers["Hulls"] = hulls
+
+    def answered(text, **options):
+        return answers[text.split()[0].strip(",:")]
+
     monkeypatch.setattr("podusv_cli.cli.start.sys.stdin.isatty", lambda: True, raising=False)
-    monkeypatch.setattr("typer.prompt", lambda text: answers[text.split()[0].strip(",")])
-    assert podusv("start", "boat").code == 0
-    assert load("boat.yaml").scenario.vessel.m == pytest.approx(181.437)
+    monkeypatch.setattr("typer.prompt", answered)
+    assert podusv("start", "boat.yaml").code == 0
+    vessel = load("boat.yaml").scenario.vessel
+    assert vessel.m == pytest.approx(181.437)
+    given = ("--length", "4.9", "--beam", "2.4", "--mass", "400lb", "--thrusters", "2x180N@1.0")
+    assert podusv("start", "same", *given, "--hulls", str(hulls)).code == 0
+    assert vessel == load("same.yaml").scenario.vessel
+
+
+@pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        ({"--thrusters": "2x180N@1.3"}, "1.3 m from the centre line, beyond half the beam, 1.2 m"),
+        ({"--hulls": "3"}, "less than or equal to 2"),
+    ],
+)
+def test_what_no_boat_has_is_refused(podusv, changed, fault):
+    given = dict(zip(BOAT[::2], BOAT[1::2], strict=True)) | changed
+    said = podusv("start", "boat", *(word for pair in given.items() for word in pair))
+    assert said.code != 0
+    assert fault in said.err

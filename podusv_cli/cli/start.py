@@ -35,7 +35,10 @@ def start(
             show_default="asked for",
         ),
     ] = "",
-    hulls: Annotated[int, typer.Option(min=1, max=2, help="1, or 2 of a catamaran.")] = 1,
+    hulls: Annotated[
+        int,
+        typer.Option(min=0, max=2, help="1, or 2 of a catamaran.", show_default="1, or asked for"),
+    ] = 0,
     hull_beam: Annotated[
         str,
         typer.Option(help="Beam of one hull of a catamaran.", show_default="a tenth of the length"),
@@ -63,7 +66,7 @@ def start(
     from podusv_cli.core.errors import UsageError
     from podusv_cli.workflows import start as workflow  # heavy imports only when needed
 
-    file = out or Path(f"{name}.yaml")
+    file = out or Path(f"{name.removesuffix('.yaml')}.yaml")
     given = {"length": length, "beam": beam, "mass": mass, "thrusters": thrusters}
     if preset:
         if any(given.values()):
@@ -74,7 +77,9 @@ def start(
         if lacking and not sys.stdin.isatty():
             raise UsageError(f"give {', '.join(lacking)}, or --preset")
         asked = {option: text or typer.prompt(ASKED[option]) for option, text in given.items()}
-        boat = workflow.Boat(**asked, hulls=hulls, hull_beam=hull_beam, speed=speed, turn=turn)
+        if lacking and not hulls:
+            hulls = typer.prompt("Hulls: 1, or 2 of a catamaran", default=1, type=int)
+        boat = workflow.Boat(**asked, hulls=hulls or 1, hull_beam=hull_beam, speed=speed, turn=turn)
         written = workflow.start(boat, file)
     echo(f"wrote {written}")
     echo(f"next: podusv compare {written}")

@@ -194,7 +194,9 @@ def leaders(
 
 
 def _shown(number: float, digits: int = DIGITS) -> str:
-    """As readers see it; numbers are compared as printed."""
+    """As readers see it; numbers are compared as printed. FEW digits are all there, zeros too."""
+    if digits == FEW and number:
+        return f"{number:#.{digits}g}".removesuffix(".")
     return f"{number:.{digits}g}"
 
 

@@ -110,6 +110,13 @@ def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
         given["hull_beam"] = (boat.hull_beam, "m")
     numbers = {name: _number(name, text, unit) for name, (text, unit) in given.items()}
     hull = Hull(**numbers, thrust=thrusters.count * thrusters.thrust, hulls=boat.hulls)
+    if boat.hulls not in (1, 2):
+        raise UsageError(f"{boat.hulls} hulls: must be 1, or 2 of a catamaran")
+    if thrusters.lever > 0.5 * hull.beam:
+        raise UsageError(
+            f"--thrusters {boat.thrusters}: {thrusters.lever:g} m from the centre line, beyond "
+            f"half the beam, {0.5 * hull.beam:g} m"
+        )
     if boat.hulls > 1 and 2.0 * hull.narrow > hull.beam:
         raise UsageError(
             f"two hulls of {hull.narrow:g} m do not fit into a beam of {hull.beam:g} m; give "
