@@ -278,6 +278,23 @@ def test_metrics_that_are_asked_for_are_all_that_a_terminal_shows(podusv, monkey
                                "distance to the target, integrated [m s]")  # fmt: skip
 
 
+@pytest.mark.parametrize("others", [(), ("ise", "energy")])
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_metric_that_no_run_has_is_warned_of(podusv, monkeypatch, others, terminal):
+    config = write("two.yaml", TWO.replace("duration: 1.0", "duration: 0.1"))
+    if terminal:
+        on_a_terminal(monkeypatch, 100)
+    chosen = [word for name in ("path_done", *others) for word in ("--metric", name)]
+    said = podusv(config, "--out", "x", *chosen)
+    assert said.code == 0
+    assert "warning: no run here has path_done; tables are without it\n" in said.err
+    assert "path_done" not in said.out
+    rows = Path("x/comparison.tex").read_text().splitlines()[6:-2]
+    assert len(rows) == len(others)
+    lines = Path("x/comparison.md").read_text().splitlines()
+    assert [line.split("`")[1] for line in lines if "`" in line] == [*others]
+
+
 def test_findings_of_one_kind_are_one_line_where_runs_go_together(capsys):
     limited = [
         Finding("saturated", "actuator", f"{n} % limited", (run,)) for n, run in enumerate("abc")

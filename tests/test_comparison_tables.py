@@ -47,6 +47,16 @@ def test_the_numbers_that_matter_most_come_first_and_nothing_is_lost():
     assert {"iae_e", "settling_time", "e_steady", "energy", "saturated_fraction"} <= set(first)
 
 
+def test_metrics_that_are_chosen_stand_in_their_order_in_every_form():
+    chosen = ["iae", "path_done", "energy"]
+    written = [cells[-1] for cells in table.cells(FRAME, chosen=chosen)]
+    assert written == ["iae", "energy"]
+    lines = table.as_markdown(FRAME, {}, chosen=chosen).splitlines()
+    assert [line.split("`")[1] for line in lines[2:4]] == written
+    rows = table.as_latex(FRAME, chosen=chosen).splitlines()[6:-2]
+    assert [row.split(" & ")[0] for row in rows] == [f"${METRICS[n].symbol}$" for n in written]
+
+
 def test_what_never_happened_in_a_run_that_finished_is_never_and_not_undefined():
     runs = {"a": {"iae": 1.0, "settling_time": math.nan}, "lost": {"settling_time": math.nan}}
     assert row(table.table(runs), "settling_time") == ["s", "never", "-"]
@@ -83,6 +93,7 @@ def test_a_measured_time_is_never_marked_as_the_best():
 def test_where_a_law_keeps_a_standoff_to_be_nearer_is_not_better():
     frame = table.table({"a": {"iae": 9.0, "iae_e": 5.0}, "b": {"iae": 8.0, "iae_e": 6.0}})
     assert table.leaders(frame) == {"a": ["iae_e"], "b": []}
+    assert r"\textbf" not in table.as_latex(frame, chosen=["iae"])
 
 
 def test_csv_has_units_first_and_ratios_last():

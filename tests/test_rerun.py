@@ -22,6 +22,7 @@ from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.workflows import compare
 from podusv_cli.workflows import run as running
+from podusv_cli.workflows.members import runs_of
 
 
 @pytest.fixture(scope="module")
@@ -161,6 +162,18 @@ def test_every_run_of_a_comparison_is_repeated(compared, tmp_path, podusv):
         logs = [folder / label / "log.h5" for folder in (compared, tmp_path / "kept")]
         assert logs[0].read_bytes() == logs[1].read_bytes()
     manifest.check(tmp_path / "kept")
+
+
+def test_runs_made_again_are_compared_in_the_order_of_the_scenario(compared, tmp_path, podusv):
+    again, twice = tmp_path / "again", tmp_path / "twice"
+    podusv("rerun", compared, "--out", again)
+    podusv("rerun", again, "--out", twice)
+    for folder in (compared, again, twice):
+        assert [run.folder.name for run in runs_of(folder)] == ["soft", "hard"]
+    provenance = again / "provenance.json"
+    provenance.write_text(json.dumps({**json.loads(provenance.read_text()), "runs": 3}))
+    manifest.write(again, "finished")
+    assert "damaged, not as podusv wrote it (runs" in podusv("compare", again).err
 
 
 def test_a_run_that_cannot_be_repeated_takes_no_other_with_it(compared, podusv, monkeypatch):

@@ -93,6 +93,8 @@ def compare(
     together = [*done.result.warnings] if sys.stderr.isatty() and not verbose else []
     warned.all_of(done.warnings(), together)
     warn_of_differences(done.result.differences)
+    if lacking := [name for name in metric or () if name not in done.result.table.rows]:
+        echo(f"warning: no run here has {', '.join(lacking)}; tables are without it", err=True)
     for label, ending in done.result.endings.items():
         if ending:
             echo(*f"{label}: {ending}".splitlines(), err=True)
@@ -141,23 +143,22 @@ def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
     from podusv_cli.comparison.table import NOTE, cells, head
 
     result = done.result
-    rows = cells(result.table, result.metrics, result.unsettled)
-    chosen = [row for name in metrics for row in rows if row[-1] == name]
-    echo_table(head(result.table), chosen if metrics else rows)
+    rows = cells(result.table, result.metrics, result.unsettled, chosen=metrics)
+    echo_table(head(result.table), rows)
     echo(NOTE)
 
 
 def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
-    """Print the laws side by side, or a line each; False where the terminal is too narrow."""
+    """Print the laws side by side, or a line each; False without rows or room for them."""
     from podusv_cli.comparison.table import rows
 
     result = done.result
-    by_name = {
-        row.metric.name: row
-        for row in rows(result.table, result.metrics, result.unsettled, brief=True, ratios=False)
-    }
-    headlines = [n for n, row in by_name.items() if row.metric.headline and {*row.texts} != {"-"}]
-    shown = [by_name[name] for name in metrics or headlines]
+    every = rows(
+        result.table, result.metrics, result.unsettled, chosen=metrics, brief=True, ratios=False
+    )
+    shown = [r for r in every if metrics or (r.metric.headline and {*r.texts} != {"-"})]
+    if not shown:
+        return False
     units = [f"[{row.metric.unit}]" if row.metric.unit != "1" else "" for row in shown]
     names = [f"{row.metric.name}\n{unit}".strip() for row, unit in zip(shown, units, strict=True)]
     words = [f"{row.metric.row} {unit}".strip() for row, unit in zip(shown, units, strict=True)]

@@ -78,15 +78,13 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
     forms: dict[str, Callable[[], bytes]] = {
         TABLE: lambda: table.as_csv(lasting, result.metrics).encode(),
         "comparison.md": lambda: table.as_markdown(
-            lasting.only(result.chosen or lasting.rows),
-            result.endings,
-            result.metrics,
-            result.unsettled,
+            lasting, result.endings, result.metrics, result.unsettled, chosen=result.chosen
         ).encode(),
         "comparison.tex": lambda: table.as_latex(
-            lasting.only(result.chosen or headlines),
+            lasting,
             result.metrics,
             result.unsettled,
+            chosen=result.chosen or headlines,
             ratios=result.ratios,
         ).encode(),
         TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),

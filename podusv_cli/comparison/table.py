@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -117,14 +117,15 @@ def _ratio(number: float, first: float) -> float:
 
 def rows(
     frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, brief: bool = False, ratios: bool = True,
+    *, chosen: Sequence[str] = (), brief: bool = False, ratios: bool = True,
 ) -> list[Row]:  # fmt: skip
-    """All rows, those that a reader sees first before the others; best numbers marked with *.
+    """The rows of the metrics `chosen`, in this order; best numbers marked with *.
 
-    `unsettled` are the runs that do not end at their target; they are never the best. `brief`
-    numbers have FEW digits.
+    None chosen: all, those that a reader sees first before the others. `unsettled` are the runs
+    that do not end at their target; they are never the best. `brief` numbers have FEW digits.
     """
-    of_metrics, unranked, finished = [], _unranked(frame, known), frame.finished
+    of_metrics = dict[str, Row]()
+    unranked, finished = _unranked(frame, known), frame.finished
     out = [label in unsettled for label in frame.columns]
     for name, numbers in frame.rows.items():
         ranked = [x for x, off in zip(numbers, out, strict=True) if not (off or math.isnan(x))]
@@ -139,17 +140,19 @@ def rows(
             )
             for i, number in enumerate(numbers)
         ]  # fmt: skip
-        of_metrics.append(Row(metric, texts))
-    return sorted(of_metrics, key=lambda row: not row.metric.headline)
+        of_metrics[name] = Row(metric, texts)
+    first_read = sorted(of_metrics, key=lambda name: not known[name].headline)
+    return [of_metrics[name] for name in chosen or first_read if name in of_metrics]
 
 
 def cells(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
-) -> list[list[str]]:
-    """The rows as text: what the metric is, unit, a text a run, and the metric's name."""
+    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
+    *, chosen: Sequence[str] = (),
+) -> list[list[str]]:  # fmt: skip
+    """The `rows` as text: what the metric is, unit, a text a run, and the metric's name."""
     return [
         [metric.row, metric.unit, *texts, metric.name]
-        for metric, texts in rows(frame, known, unsettled)
+        for metric, texts in rows(frame, known, unsettled, chosen=chosen)
     ]
 
 
@@ -211,7 +214,7 @@ def _cell(number: float, first: float, best: float, digits: int) -> str:
 
 def as_markdown(
     frame: Table, endings: Mapping[str, str], known: Mapping[str, MetricAbout] = METRICS,
-    unsettled: Names = (),
+    unsettled: Names = (), *, chosen: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """The table in Markdown, followed by the reasons why runs did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
@@ -222,7 +225,7 @@ def as_markdown(
     ]
     texts = (
         [escaping.markdown_cell(words), *numbers, escaping.markdown_code(name)]
-        for words, *numbers, name in cells(frame, known, unsettled)
+        for words, *numbers, name in cells(frame, known, unsettled, chosen=chosen)
     )
     top = [escaping.markdown_cell(label) for label in head(frame)]
     lines = [top, ["---", "---", *["---:"] * len(frame.columns), "---"], *texts]
@@ -235,7 +238,7 @@ def as_markdown(
 
 def as_latex(
     frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, ratios: bool = False,
+    *, chosen: Sequence[str] = (), ratios: bool = False,
 ) -> str:  # fmt: skip
     """The table in LaTeX, no wider than the column, or in `table*` the page.
 
@@ -245,7 +248,9 @@ def as_latex(
     """
     labels = (rf"\multicolumn{{2}}{{c}}{{{escaping.latex(label)}}}" for label in frame.columns)
     lines = [" & ".join([*HEAD, *labels])]
-    for metric, texts in rows(frame, known, unsettled, brief=True, ratios=ratios):
+    for metric, texts in rows(
+        frame, known, unsettled, chosen=chosen, brief=True, ratios=ratios
+    ):  # fmt: skip
         shown = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
         parts = [part for text in texts for part in _cut(text)]
         lines.append(" & ".join([shown, quantities.raised(metric.unit), *parts]))

@@ -25,9 +25,9 @@ from podusv_cli.storage.files import read_text
 from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 
 LOG, ABOUT, THEORY, MISSING = "log.h5", "about.json", "theory.json", "missing.json"
-RESOLVED = "resolved.yaml"
+RESOLVED, PROVENANCE = "resolved.yaml", "provenance.json"
 STUDY, LOGS = "study.json", "logs"  # in the folder of a study
-NEEDED = (LOG, "metrics.json", "provenance.json", RESOLVED)
+NEEDED = (LOG, "metrics.json", PROVENANCE, RESOLVED)
 
 
 def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
@@ -238,7 +238,7 @@ def open_run(folder: Path, *, optional: str = "") -> FinishedRun:
         folder=folder,
         status=contents.status,
         metrics=_metrics(folder / "metrics.json"),
-        provenance=json_files.read(folder / "provenance.json"),
+        provenance=json_files.read(folder / PROVENANCE),
         resolved_yaml=read_text(folder / RESOLVED),
         theory=json_files.read(folder / THEORY) if THEORY in contents.files else {},
         about=json_files.read_as(folder / ABOUT, RunAbout) if ABOUT in contents.files else None,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel
 
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.measured import Track
@@ -25,10 +26,12 @@ from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.plugins import continue_with, on_hand, used_of
 from podusv_cli.storage import manifest
 from podusv_cli.storage.files import read_text
+from podusv_cli.storage.json_files import read_as
 from podusv_cli.storage.run_folder import (
     ABOUT,
     LOG,
     LOGS,
+    PROVENANCE,
     RESOLVED,
     STUDY,
     THEORY,
@@ -52,6 +55,10 @@ BESIDE = {
     "power": ("delta",),
 }
 LARGEST = 1e300  # beyond it the engine calls a run diverged and logs no row
+
+
+class _Repetition(BaseModel):
+    runs: list[str] = []
 
 
 @dataclass(frozen=True)
@@ -117,12 +124,17 @@ def _unlisted(path: Path) -> list[Path]:
 
 
 def _listed(path: Path, optional: str) -> list[Path]:
-    """The runs of a finished comparison in its table's order, else by name; none in a run."""
+    """The runs of a finished comparison, or of one made again, in its order; none in a run."""
     files = manifest.check(path, optional).files
     runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
-    head = _first_row(path / TABLE) if TABLE in files else []
+    head = _first_row(path / TABLE) if TABLE in files else _made_again(path, files)
     runs.sort(key=lambda run: head.index(run) if run in head else len(head))
     return [path / run for run in runs]
+
+
+def _made_again(path: Path, files: Collection[str]) -> Sequence[str]:
+    """The order of runs that `podusv rerun` made, which writes no table."""
+    return read_as(path / PROVENANCE, _Repetition).runs if PROVENANCE in files else ()
 
 
 def _first_row(path: Path) -> list[str]:

@@ -23,7 +23,7 @@ from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import loaded
 from podusv_cli.storage import manifest, provenance, run_folder
-from podusv_cli.storage.run_folder import LOG, FinishedRun
+from podusv_cli.storage.run_folder import LOG, PROVENANCE, FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
@@ -145,7 +145,8 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
                 {label: end.failure for label, end in outcomes.items() if not end.result},
             )
             origin = provenance.collect(request.argv, started, datetime.now(UTC))
-            writer.add_json("provenance.json", origin)
+            # the order in which compare and rerun take them, as no table here has it
+            writer.add_json(PROVENANCE, {**origin, "runs": [member.label for member in again]})
             writer.finish("interrupted" if done.interrupted else "finished", missing)
         return done
 
