@@ -175,6 +175,15 @@ def test_what_a_diverging_run_asks_for_does_not_set_the_scale():
     assert drawn_axes[4].get_ylim()[1] < 1e3
 
 
+def test_a_run_that_diverges_later_does_not_set_the_scale_of_the_beginning():
+    def blowing_up(t):
+        return np.where(t < 45.0, 5.0, 1e12)
+
+    lost = blown_up(tau_u=blowing_up, tau_u_cmd=blowing_up)
+    early = controls(("a", recording(tau_u=np.cos, tau_u_cmd=np.cos)), ("lost", lost))[1][0]
+    assert 5.0 < early.get_ylim()[1] < 10.0
+
+
 def test_filters_show_virtual_control_and_output_together_and_their_difference():
     log, plain = recording(), recording(shift=0.4, without=("beta_u", "beta_r"))
     figure = drawn("filters", shown(("filtered", log), ("plain", plain)))

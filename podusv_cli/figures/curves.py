@@ -75,7 +75,8 @@ def draw_signal(
         elif differ(run, name, beside):
             thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
             draw_curve(axes, curve, fitted=run in fitted, **thin)
-    _widen(axes, max((mean_size(run, name) for run in fitted if run.has(name)), default=0.0))
+    sizes = [mean_size(run, name) for run in fitted if run.whole and run.has(name)]
+    _widen(axes, max(sizes, default=0.0))
 
 
 def _widen(axes: Axes, size: float) -> None:
