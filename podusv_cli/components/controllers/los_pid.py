@@ -25,7 +25,7 @@ from podusv_cli.components.controllers.guidance import (
     line_of_sight,
     wanted_speed,
 )
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.velocity_loop import Axis, Loop, pi_loop
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
@@ -72,13 +72,9 @@ class LosPid(LineOfSight):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Surge with its integral; yaw with heading and integral; integrals per told inertia."""
         surge, yaw = axes
-        to_u, to_r = surge.told / surge.inertia, yaw.told / yaw.inertia
-        w_u, w = self.omega_u, self.omega_psi
+        to_r, w = yaw.told / yaw.inertia, self.omega_psi
         return [
-            Loop(
-                surge.name, "omega_u", surge.damping, to_u * np.array([-2.0 * w_u, 1.0]),
-                np.array([[-w_u * w_u, 0.0]]), name="PI loop", told=np.array([w_u / to_u]),
-            ),
+            pi_loop(surge, "omega_u", self.omega_u),
             Loop(
                 yaw.name, "omega_psi", yaw.damping, to_r * np.array([-3.0 * w, -3.0 * w * w, 1.0]),
                 np.array([[1.0, 0.0, 0.0], [0.0, -w * w * w, 0.0]]), name="PID loop",

@@ -28,7 +28,7 @@ from podusv_cli.components.controllers.guidance import (
     wanted_speed,
 )
 from podusv_cli.components.controllers.los_pid import INTEGRALS
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.velocity_loop import Axis, Loop, pi_loop
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
@@ -105,15 +105,10 @@ class Mss(LineOfSight):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Surge with its integral; yaw with heading and its integral."""
         surge, yaw = axes
-        w_u, square = self.omega_u, self.wn * self.wn
+        square = self.wn * self.wn
         gains = np.array([-self.damping(), -square, -RESET * self.wn * square])
         return [
-            Loop(
-                surge.name, "omega_u", surge.damping,
-                surge.told / surge.inertia * np.array([-2.0 * w_u, 1.0]),
-                np.array([[-w_u * w_u, 0.0]]), name="PI loop",
-                told=np.array([w_u * surge.inertia / surge.told]),
-            ),
+            pi_loop(surge, "omega_u", self.omega_u),
             Loop(
                 yaw.name, "wn", yaw.damping, yaw.told / yaw.inertia * gains,
                 np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), name="PID loop",
