@@ -22,6 +22,7 @@ T_D = 1.0  # s; a hull whose sway decays within this has less weight on it
 ETA_SHARE = 0.75  # of 1/p, the weight that the linear loop bears at most
 ACROSS_SHARE = 0.3  # of d/(p - 1), the gain that it bears at most
 BANDWIDTH_SHARE = 0.9  # of Q (1 - eta p)/S, how fast the heading follows
+ROUTH_SHARE = 0.95  # of the gain that Routh's third condition bears for p > 1
 SLOW = 2.0  # times V_m; a target below this counts as one at rest, and less so up to twice this
 NEAR = 10.0  # s, times V_m; nearer to it the gain is the smaller one, and less so up to twice this
 REST_SHARE = 0.8  # of |Y_v|/m11
@@ -95,6 +96,18 @@ def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any
 
 
 @kernel
+def routh_gain(p: float, d: float, eta: float, k: Any) -> float:
+    """A gain across the path below which Routh's third condition holds, for p > 1 [1/s].
+
+    (a_3 a_2 - a_1) a_1 > a_3^2 a_0 with the coefficients of docs/theory.md for h = 0, where one
+    of the two a_1 that are multiplied is taken as Q d, which is more.
+    """
+    a_3 = k.S + d
+    room = max(a_3 * (k.Q * (1.0 - eta * p) + k.S * d) - k.Q * d, 0.0)
+    return float(d * room / (a_3 * a_3 * d + (p - 1.0) * room))
+
+
+@kernel
 def schedule(at: Answer, k: Any) -> Schedule:
     """eta and k_b; `trust` is by how much the true p may exceed the told one."""
     p = k.trust * at.p
@@ -103,5 +116,5 @@ def schedule(at: Answer, k: Any) -> Schedule:
     if p > ETA_SHARE:
         eta = min(eta, ETA_SHARE / p)
     if p > 1.0:
-        k_b = min(k_b, ACROSS_SHARE * at.d / (p - 1.0))
+        k_b = min(k_b, ACROSS_SHARE * at.d / (p - 1.0), ROUTH_SHARE * routh_gain(p, at.d, eta, k))
     return Schedule(eta, min(k_b, BANDWIDTH_SHARE * k.Q_per_S * max(1.0 - eta * p, 0.0)))
