@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import shutil
@@ -213,6 +214,32 @@ def test_what_is_no_finished_folder_is_not_packed(
     assert not list(Path().iterdir())
 
 
+def test_a_hidden_folder_is_not_packed_since_it_would_not_be_unpacked(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    hidden = Path(shutil.copytree(run, tmp_path / ".first"))
+    said = podusv("pack", hidden)
+    assert (said.code, said.err.count("\n")) == (5, 1)
+    assert "is hidden, or begins as an option does; rename it" in said.err
+    assert not list(Path().iterdir())
+
+
+def test_the_command_for_a_package_is_one_argument_whatever_its_name(
+    run: Path, tmp_path: Path, podusv: Command
+) -> None:
+    """So that a line that is copied into a shell installs a file and does nothing else."""
+
+    def told(content: bytes) -> bytes:
+        names = {"package": "a;id #", "version": "1", "sha256": "0" * 64}
+        return json.dumps(json.loads(content) | {"plugins": [names]}).encode()
+
+    podusv("pack", copied(run, tmp_path / "first", provenance_json=told))
+    change = more("first/packages/a;id #-1-py3-none-any.whl")
+    Path("first.zip").write_bytes(repacked(Path("first.zip").read_bytes(), change))
+    said = words(podusv("unpack", "first.zip", "--list"))
+    assert "then pip install 'packages/a;id #-1-py3-none-any.whl'" in said
+
+
 def test_nothing_that_exists_is_replaced(run: Path, podusv: Command) -> None:
     podusv("pack", run)
     assert podusv("pack", run).err == "first.zip exists already; --force replaces it\n"
@@ -264,6 +291,30 @@ def other(name: str, change: Callable[[bytes], bytes]) -> Callable[[Any], None]:
     return changed
 
 
+def retold(told: bytes) -> Callable[[Any], None]:
+    """Another provenance.json, which the manifest lists."""
+
+    def change(listed: Any) -> None:
+        other("provenance.json", lambda _: told)(listed)
+        entry = {"sha256": hashlib.sha256(told).hexdigest(), "bytes": len(told)}
+        at = next(i for i, (e, _) in enumerate(listed) if e.filename == "first/manifest.json")
+        about = json.loads(listed[at][1])
+        about["files"]["provenance.json"] = entry
+        listed[at] = listed[at][0], json.dumps(about).encode()
+
+    return change
+
+
+def called(folder: str) -> Callable[[Any], None]:
+    """Another name of the folder."""
+
+    def change(listed: Any) -> None:
+        for entry, _ in listed:
+            entry.filename = entry.filename.replace("first", folder, 1)
+
+    return change
+
+
 def without(name: str) -> Callable[[Any], None]:
     """An entry less."""
 
@@ -286,6 +337,9 @@ UNSAFE = {
     "twice a slash": (more("first//evil"), "is no file inside a folder"),
     "no folder": (more("evil"), "'evil' is no file inside a folder"),
     "a folder": (more("first/sub/", b""), "is no file inside a folder"),
+    "a hidden folder": (called(".ssh"), "is hidden, or begins as an option does"),
+    "an option": (called("--trust"), "is hidden, or begins as an option does"),
+    "hidden inside": (more("first/.git/config"), "'first/.git/config' is hidden, or begins as"),
     "not shown": (more("first/e\x1b[2Jvil"), r"'first/e\x1b[2Jvil' is no file inside a folder"),
     "link": (more("first/link", b"/etc/passwd", stat.S_IFLNK), "is a link, folder or device"),
     "device": (more("first/null", b"", stat.S_IFCHR), "is a link, folder or device"),
@@ -305,6 +359,16 @@ UNSAFE = {
     "manifest is no JSON": (other("manifest.json", lambda _: b"no"), "not valid JSON"),
     "provenance is no JSON": (
         other("provenance.json", lambda c: b" " * len(c)), "not valid JSON"),
+    **{
+        f"provenance of {told!r}": (
+            retold(told), f"provenance.json: damaged, not as podusv wrote it ({place}")
+        for told, place in {
+            b'{"plugins": 3}': "plugins: ", b'{"plugins": ["x"]}': "plugins.0: ",
+            b'{"plugins": [{"package": ["x"]}]}': "plugins.0.package: ",
+            b'{"plugins": [{"package": "x", "version": {}}]}': "plugins.0.version: ",
+            b'{"sittings": 3}': "sittings: ", b'{"sittings": [1]}': "sittings.0: ",
+        }.items()
+    },
     "compressed otherwise": (lzma, "compressed in a way that podusv does not"),
     "empty": (lambda listed: listed.clear(), "it has files of 0 folders"),
 }  # fmt: skip

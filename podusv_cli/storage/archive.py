@@ -34,10 +34,12 @@ def write(
     """Pack these files of a folder, and others that are `made`, below the folder's name.
 
     An older archive is replaced; the bytes depend on names and contents alone. Returns the
-    archive's bytes. Raises StorageError.
+    archive's bytes. Raises StorageError, also for a name that would not be unpacked.
     """
     remove_abandoned_files(out.parent)
     part, top = out.with_name(temporary_name()), folder.resolve().name
+    if why := next(filter(None, (misnamed(f"{top}/{name}") for name in names)), ""):
+        raise StorageError(f"{folder} is not packed: {why}; rename it")
     size = sum((folder / name).stat().st_size for name in names)
     try:
         with files.new_file(part, size) as file, zipfile.ZipFile(file, "w") as archive:
@@ -50,6 +52,21 @@ def write(
         part.unlink(missing_ok=True)
     files.sync_folder(out.parent)
     return out.stat().st_size
+
+
+def misnamed(name: str) -> str:
+    """Why a file is not unpacked under this name; "" if it is.
+
+    It has to be below one folder, and to be seen: a folder `.git` or `.ssh` that is suddenly there
+    is read by other programs.
+    """
+    parts = PurePosixPath(name).parts
+    inside = len(parts) > 1 and not {"..", "/", "."} & {*parts} and "\\" not in name
+    if str(PurePosixPath(name)) != name or not inside or not name.isprintable():
+        return f"{name!r} is no file inside a folder"
+    if any(part[0] in ".-" for part in parts):
+        return f"{name!r} is hidden, or begins as an option does"
+    return ""
 
 
 def entry_of(name: str) -> zipfile.ZipInfo:
@@ -118,10 +135,8 @@ class Archive:
     def _check(self, entry: zipfile.ZipInfo) -> None:
         """Raise StorageError for what is no plain file below one folder."""
         name = entry.filename
-        parts = PurePosixPath(name).parts
-        inside = len(parts) > 1 and not {"..", "/", "."} & {*parts} and "\\" not in name
-        if str(PurePosixPath(name)) != name or not inside or not name.isprintable():
-            raise self.fault(f"{name!r} is no file inside a folder")
+        if why := misnamed(name):
+            raise self.fault(why)
         kind = stat.S_IFMT(entry.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
             raise self.fault(f"{name!r} is a link, folder or device")

@@ -63,8 +63,13 @@ def parsed(text: str, path: Path) -> dict[str, Any]:
 
 def read_as(path: Path, model: type[Model]) -> Model:
     """Read a JSON object of known keys; raises StorageError for a wrong one, with its place."""
+    return parsed_as(read_text(path), path, model)
+
+
+def parsed_as(text: str, path: Path, model: type[Model]) -> Model:
+    """As `read_as`, of the text of the file at `path`."""
     try:
-        return model.model_validate_json(json.dumps(read(path)))  # where a list is a tuple, too
+        return model.model_validate_json(json.dumps(parsed(text, path)))  # a list is a tuple, too
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, NamedTuple
 
+from pydantic import BaseModel, ConfigDict
+
 from podusv_cli.comparison.run_difference import Change, version_changes
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import installed
@@ -30,6 +32,28 @@ AGAIN = {
 # What podusv reads and shows; whatever else is in an archive counts as code.
 DATA = {".yaml", ".json", ".h5", ".csv", ".md", ".tex", ".png", ".pdf", ".gif", ".mp4"}
 PAGES = {".html", ".svg"}  # may have scripts, which a browser executes
+
+
+class _Plugin(BaseModel):
+    """A package that offers components, or a file; a file has no `package`."""
+
+    package: str = ""
+    version: str = ""
+    sha256: str = ""
+
+
+class _Session(BaseModel):
+    """What made a result, as provenance.json has it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    plugins: list[_Plugin] = []
+
+
+class _Origin(_Session):
+    """provenance.json; that of a study has several sessions."""
+
+    sittings: list[_Session] | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +111,9 @@ def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> Written:
     listed = manifest.check(folder, optional=LOG)
     there = {name: one.bytes for name, one in listed.files.items() if (folder / name).exists()}
     sizes = {n: size for n, size in there.items() if logs or PurePosixPath(n).name != LOG}
-    sessions = _sessions(json_files.read(folder / name) for name in sizes if _is_origin(name))
+    sessions = _sessions(
+        json_files.read_as(folder / name, _Origin) for name in sizes if _is_origin(name)
+    )
     foreign = manifest.foreign(folder, listed)
     sizes |= {name: (folder / name).stat().st_size for name in foreign if _is_wheel(name)}
     made = {name: data for name, data in _wheels(sessions).items() if name not in sizes}
@@ -141,8 +167,9 @@ def opened(path: Path) -> Iterator[Packed]:
         if gone := sorted(name for name in missing if PurePosixPath(name).name != LOG):
             raise packed.fault(f"{gone[0]} is missing")
         sessions = _sessions(
-            json_files.parsed(packed.text(name), path / name) for name in sizes if _is_origin(name)
-        )
+            json_files.parsed_as(packed.text(name), path / name, _Origin)
+            for name in sizes if _is_origin(name)
+        )  # fmt: skip
         yield Packed(_contents(packed.name, listed, sizes, sessions), packed)
 
 
@@ -155,15 +182,16 @@ def _is_wheel(name: str) -> bool:
     return str(path.parent) == PACKAGES and path.suffix == ".whl"
 
 
-def _sessions(origins: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def _sessions(origins: Iterable[_Origin]) -> list[_Session]:
     """What made the results: a session each, of a study several."""
-    return [session for origin in origins for session in origin.get("sittings", [origin])]
+    several = ([origin] if origin.sittings is None else origin.sittings for origin in origins)
+    return [session for sessions in several for session in sessions]
 
 
 def _contents(
-    name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[Mapping[str, Any]]
+    name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[_Session]
 ) -> Contents:
-    made_by = sessions[-1] if sessions else {}
+    made_by = sessions[-1].model_dump() if sessions else {}
     kinds = (kind for mark, kind in KINDS.items() if mark in listed.files)
     ends = {name: PurePosixPath(name).suffix for name in sizes}
     return Contents(
@@ -178,11 +206,11 @@ def _contents(
     )  # fmt: skip
 
 
-def _packages(sessions: Iterable[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+def _packages(sessions: Iterable[_Session]) -> list[tuple[str, str, str]]:
     """Name, version and digest of the packages whose components runs took, each once."""
-    listed = (plugin for session in sessions for plugin in session.get("plugins", ()))
-    named = ((p.get("package"), p.get("version", ""), p.get("sha256", "")) for p in listed)
-    return [*dict.fromkeys(package for package in named if package[0])]
+    listed = (plugin for session in sessions for plugin in session.plugins)
+    named = ((p.package, p.version, p.sha256) for p in listed if p.package)
+    return [*dict.fromkeys(named)]
 
 
 def _found(package: str, version: str, sha256: str, sizes: Mapping[str, int]) -> str:
@@ -191,11 +219,12 @@ def _found(package: str, version: str, sha256: str, sizes: Mapping[str, int]) ->
     if here and here.sha256 == sha256:
         return "installed"
     place = f"{PACKAGES}/{wheel.name_of(package, version)}"
-    how = f"; read it, then pip install {place}" if place in sizes else ", and not packed"
+    read = f"; read it, then pip install {shlex.quote(place)}"
+    how = read if place in sizes else ", and not packed"
     return (f"another one is installed ({here})" if here else "not installed") + how
 
 
-def _wheels(sessions: Iterable[Mapping[str, Any]]) -> dict[str, bytes]:
+def _wheels(sessions: Iterable[_Session]) -> dict[str, bytes]:
     """Wheels of these packages, where the very ones are installed and have no compiled modules."""
     here = {(plugin.name, plugin.sha256): plugin for plugin in installed()}
     used = {
