@@ -20,9 +20,10 @@ from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP, explored
-from podusv_cli.doubt.answer import _word, compared
+from podusv_cli.doubt.answer import _word
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import Choice, choices, public
+from podusv_cli.doubt.compared import compared
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.ranges import Range
@@ -330,7 +331,7 @@ def by(rule):
 @pytest.mark.parametrize("place", [3.3, 1.04, 1.0 + 3e-5, 0.9997, 0.31])
 def test_the_place_is_bracketed_however_near(place):
     judge = by(lambda k: (k < place) is (place > 1.0))
-    (turn,) = explored(moving(), judge, judge({})).turns("C", judge({}))
+    (turn,) = explored(moving(), judge, judge({}), {}).turns("C", judge({}))
     assert abs(turn.held - 1.0) < abs(place - 1.0) * (1 + 1e-12)
     assert abs(turn.value - 1.0) >= abs(place - 1.0) * (1 - 1e-12)
     assert turn.distance <= SHARP * abs(turn.held - 1.0) * (1 + 1e-9)
@@ -338,15 +339,47 @@ def test_the_place_is_bracketed_however_near(place):
 
 def test_a_verdict_that_the_last_digit_turns():
     judge = by(lambda k: k == 1.0)
-    turns = explored(moving(), judge, judge({})).turns("C", judge({}))
+    turns = explored(moving(), judge, judge({}), {}).turns("C", judge({}))
     assert [turn.by_rounding for turn in turns] == [True, True]
     assert {turn.value for turn in turns} == {1.0 + math.ulp(1.0), 1.0 - math.ulp(1.0)}
 
 
 def test_a_verdict_that_turns_back_is_seen_at_a_tenth_of_the_range():
     judge = by(lambda k: not 1.2 < k < 1.4)
-    (turn,) = explored(moving(), judge, judge({})).turns("C", judge({}))
+    (turn,) = explored(moving(), judge, judge({}), {}).turns("C", judge({}))
     assert 1.2 < turn.value < 1.2 * SHARP + 0.01
+
+
+def of_distance(law, edge=0.1):
+    """A judge whose number is a law of k, above an edge at k = 1; and what was tried."""
+    tried = []
+
+    def judge(world):
+        k = next(iter(world.values()), 1.0)
+        tried.append(k)
+        return Judged({"C": law(k) > edge}, {"C": {"k": law(k)}})
+
+    numbers = {"C": compared(f"k > {edge}")}
+    return explored(moving(), judge, judge({}), numbers), judge({}), tried
+
+
+@pytest.mark.parametrize("at", [2.87, 1.41, 0.44])
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+def test_a_window_of_a_hundredth_of_the_range_is_found_by_the_number_that_falls(at, power):
+    """A start that cancels a mode: the number vanishes there, and is under 0.1 for 0.03 only."""
+    half = 0.015 if at > 1.0 else 0.004
+    alone, base, tried = of_distance(lambda k: 0.1 * (abs(k - at) / half) ** power)
+    (turn,) = alone.turns("C", base)
+    nearest = at - math.copysign(half, at - 1.0)
+    assert abs(turn.held - 1.0) < abs(nearest - 1.0) <= abs(turn.value - 1.0)
+    assert abs(turn.value - at) < half
+    assert len(tried) < 2 + 16 + 3 * 12
+
+
+def test_a_number_that_falls_and_cannot_reach_its_edge_costs_few_tries():
+    alone, base, tried = of_distance(lambda k: 0.5 + (k - 2.87) ** 2)
+    assert not alone.turns("C", base)
+    assert len(tried) <= 2 + 16 + 2
 
 
 def test_a_number_that_does_not_act_is_tried_at_its_ends_alone():
@@ -356,7 +389,7 @@ def test_a_number_that_does_not_act_is_tried_at_its_ends_alone():
         tried.append(world)
         return Judged({"C": True}, {"C": {"k": 7.0}})
 
-    alone = explored(moving(), judge, judge({}))
+    alone = explored(moving(), judge, judge({}), {})
     assert len(tried) == 1 + 2
     assert not alone.acts("C", judge({}))
 
@@ -462,6 +495,7 @@ def test_a_time_of_whole_steps_is_halved_and_doubled_and_not_drawn():
     assert found["measurement.position.period"].values == (0.1, 0.4)
     assert found["measurement.position.delay"].values == (0.02,)
     assert found["measurement.heading.period"].values == (0.3,)
+    assert found["control.period"].values == (0.1,)  # of a law at every instant
     assert found["measurement.position.bias_time"].range
     moving = [choice.name for choice in drawn([*found.values()], 1, 20).choices]
     assert not any(name.endswith(("period", "delay")) for name in moving)

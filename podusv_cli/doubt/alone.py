@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -11,10 +11,13 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.doubt.choices import Choice
+from podusv_cli.doubt.compared import ClaimNumber
 from podusv_cli.doubt.judged import Judge, Judged, moved
 
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
 BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that turn and turn back
+LOOKS = 12  # steps of golden section: to a 300th of the way between two places
+GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
 SHARP = 1.02  # ratio of distances to which a turn is known
 BY_SEED = 0.1
 EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
@@ -97,20 +100,28 @@ class TriedChoice:
         return Turn(self.choice, first.value, held, abs(first.value - own))
 
 
-def explored(choice: Choice, judge: Judge, base: Judged) -> TriedChoice:
-    """Try the values of a choice, and find where verdicts turn."""
+def explored(
+    choice: Choice, judge: Judge, base: Judged, numbers: Mapping[str, Sequence[ClaimNumber]]
+) -> TriedChoice:
+    """Try the values of a choice, and find where verdicts turn; `numbers` are those of a claim."""
     if not choice.range:
         return TriedChoice(
             choice, tuple(TriedValue(v, judge(moved(choice, v))) for v in choice.values)
         )
-    trials = {end: judge(moved(choice, end)) for end in ends(choice)}
-    acting = [
-        claim for claim in base.answers if any(_acts(j, claim, base) for j in trials.values())
-    ]
-    if acting:
-        for end in list(trials):
-            _searched(choice, end, judge, base, trials)
-    return TriedChoice(choice, tuple(TriedValue(*trial) for trial in trials.items()))
+    sides = [_Side(choice, end, judge, base) for end in ends(choice)]
+    acting = any(
+        _acts(side.tried(side.whole), claim, base) for side in sides for claim in base.answers
+    )
+    for side in sides if acting else ():
+        side.tried_between()
+        for claim in base.answers:
+            for number in numbers.get(claim, ()):
+                _look_nearer(side, claim, number)
+        for claim in base.answers:
+            _bisect(side, claim)
+    return TriedChoice(
+        choice, tuple(TriedValue(*t) for side in sides for t in side.trials.values())
+    )
 
 
 def _acts(judged: Judged, claim: str, base: Judged) -> bool:
@@ -125,28 +136,72 @@ def ends(choice: Choice) -> list[float]:
     return [end for end in (way.value(own, number) for number in drawn) if end != own]
 
 
-def _searched(
-    choice: Choice, end: float, judge: Judge, base: Judged, trials: dict[float, Judged]
+class _Side:
+    """The values between the scenario's own and an end of the range, by their distance from it."""
+
+    def __init__(self, choice: Choice, end: float, judge: Judge, base: Judged) -> None:
+        assert choice.range
+        self.choice, self.end, self.judge, self.base = choice, end, judge, base
+        self.scale, self.whole = choice.range.scale, abs(end - choice.own)
+        self.trials = {self.whole: (end, judge(moved(choice, end)))}  # a value and what is said
+
+    def tried(self, distance: float) -> Judged:
+        """What the claims say there."""
+        if distance not in self.trials:
+            value = self.choice.own + math.copysign(distance, self.end - self.choice.own)
+            self.trials[distance] = value, self.judge(moved(self.choice, value))
+        return self.trials[distance][1]
+
+    def turned(self, distance: float, claim: str) -> bool:
+        """Whether a verdict is the opposite there."""
+        return self.tried(distance).turned(claim, self.base)
+
+    def tried_between(self) -> None:
+        """Try the places that every side has."""
+        for distance in (NEAR * self.scale, *(share * self.whole for share in BETWEEN)):
+            self.tried(distance)
+
+
+def _look_nearer(side: _Side, claim: str, number: ClaimNumber) -> None:
+    """Look where a number comes nearer to its edge than on both sides, by golden section.
+
+    It ends with a turn, or where a number that is convex there cannot reach its edge.
+    """
+    places = [0.0, *sorted(side.trials)]
+    if any(side.turned(place, claim) for place in places[1:]):
+        return
+
+    def away(distance: float) -> float:
+        judged = side.tried(distance) if distance else side.base
+        return number.away(judged.numbers.get(claim, {}))
+
+    for a, b, c in zip(places, places[1:], places[2:], strict=False):
+        if away(a) > away(b) <= away(c) and away(b) < away(0.0):
+            _golden(side, claim, away, (a, b, c))
+
+
+def _golden(
+    side: _Side, claim: str, away: Callable[[float], float], around: tuple[float, float, float]
 ) -> None:
-    """Look between the own value and an end, and bisect what turns, into `trials`."""
+    a, b, c = around
+    for _ in range(LOOKS):
+        slopes = (away(a) - away(b)) / (b - a), (away(c) - away(b)) / (c - b)
+        if away(b) > max(slopes[0] * (c - b), slopes[1] * (b - a)):
+            return
+        new = b - GOLDEN * (b - a) if b - a > c - b else b + GOLDEN * (c - b)
+        if side.turned(new, claim):
+            return
+        low, high = sorted((b, new))
+        a, b, c = (a, low, high) if away(low) < away(high) else (low, high, c)
 
-    def tried(distance: float) -> Judged:
-        value = choice.own + math.copysign(distance, end - choice.own)
-        if value not in trials:
-            trials[value] = judge(moved(choice, value))
-        return trials[value]
 
-    assert choice.range
-    scale = choice.range.scale
-    whole, last = abs(end - choice.own), math.ulp(choice.own or scale)
-    near, *further = sorted({NEAR * scale, *(share * whole for share in BETWEEN), whole})
-    for distance in (near, *further):
-        tried(distance)
-    for claim in base.answers:
-        pairs = pairwise([last, near, *further])
-        held, turned = next((p for p in pairs if tried(p[1]).turned(claim, base)), (0.0, 0.0))
-        if not turned or (turned == near and tried(last).turned(claim, base)):
-            continue
-        while turned / held > SHARP:
-            middle = math.sqrt(turned * held)
-            turned, held = (middle, held) if tried(middle).turned(claim, base) else (turned, middle)
+def _bisect(side: _Side, claim: str) -> None:
+    """Find where a verdict turns first, to `SHARP`, or that one unit in the last place turns it."""
+    near, last = NEAR * side.scale, math.ulp(side.choice.own or side.scale)
+    pairs = pairwise([last, *sorted(side.trials)])
+    held, turned = next((p for p in pairs if side.turned(p[1], claim)), (0.0, 0.0))
+    if not turned or (turned <= near and side.turned(last, claim)):
+        return
+    while turned / held > SHARP:
+        middle = math.sqrt(turned * held)
+        turned, held = (middle, held) if side.turned(middle, claim) else (turned, middle)

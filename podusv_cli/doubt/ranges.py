@@ -145,10 +145,11 @@ def _whole(own: float) -> tuple[float, ...]:
     return tuple(share for share in (0.0, 1.0) if share != own)
 
 
+SAMPLED = 0.1  # s; of a law that its source has at every instant
 # Keys that have values of their own to be tried, from the scenario's own.
 TRIED: dict[str, Callable[[Any], tuple[Any, ...]]] = {
     "simulation.step": lambda own: (own / 2.0,),
     "simulation.duration": lambda own: (own / 2.0, own * 1.5),
-    "control.period": lambda own: (own / 2.0, own * 2.0) if own else (),
+    "control.period": lambda own: (own / 2.0, own * 2.0) if own else (SAMPLED,),
     "vessel.coriolis": _whole, "nominal.coriolis": _whole,
 }  # fmt: skip

@@ -21,6 +21,7 @@ from podusv_cli.doubt.alone import TriedChoice, explored
 from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import HULL, Choice, Singles, choices, with_loads
+from podusv_cli.doubt.compared import ClaimNumber, compared
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.together import Draws, drawn
@@ -117,7 +118,7 @@ def doubted(
     with interrupts_enabled():
         entries = {label: _entry(label, case, subject.parsed) for label, case in cases.items()}
     judge, asked = judging(subject, entries), scenario.doubt or Doubt()
-    tried = search(subject.singles, judge, asked, request.workers, progress)
+    tried = search(subject, judge, asked, request.workers, progress)
     whole = len(choices(subject.singles, asked)), asked.draws
     extras = Extras(interrupted=(len(tried.alone), len(tried.worlds)) != whole)
     verdicts = [
@@ -134,15 +135,19 @@ def doubted(
 
 
 def search(
-    singles: Singles, judge: Judge, doubt: Doubt, workers: int = 0,
+    subject: Subject, judge: Judge, doubt: Doubt, workers: int = 0,
     progress: Progress | None = None,
 ) -> Tried:  # fmt: skip
     """Try every choice alone, and draw all at once; shorter after an interrupt."""
-    base, moving = judge({}), choices(singles, doubt)
+    base, moving = judge({}), choices(subject.singles, doubt)
+    numbers = {
+        parsed.name: compared(parsed.claim.expect, parsed.claim.tolerance)
+        for parsed in subject.parsed
+    }
     draws = drawn(moving, doubt.seed, doubt.draws)
     tell = progress or (lambda what, fraction: None)
     alone = _made(
-        [partial(_explored, choice, judge, base) for choice in moving],
+        [partial(_explored, choice, judge, base, numbers) for choice in moving],
         partial(tell, "one at a time"), workers,
     )  # fmt: skip
     parts = [range(i, min(i + BATCH, doubt.draws)) for i in range(0, doubt.draws, BATCH)]
@@ -164,10 +169,11 @@ def _made(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) 
 
 
 def _explored(
-    choice: Choice, judge: Judge, base: Judged, tell: Callable[[float], None]
-) -> TriedChoice:
+    choice: Choice, judge: Judge, base: Judged, numbers: Mapping[str, Sequence[ClaimNumber]],
+    tell: Callable[[float], None],
+) -> TriedChoice:  # fmt: skip
     with interrupts_enabled():
-        return explored(choice, judge, base)
+        return explored(choice, judge, base, numbers)
 
 
 def _judged(draws: Draws, part: range, judge: Judge, tell: Callable[[float], None]) -> list[Judged]:
