@@ -119,7 +119,7 @@ def ardupilot(guidance: str) -> Any:
         if abs(over_ground) < 0.1 or s[3] <= 0.0:
             over_ground = 0.1 * bow
         V = abs(over_ground)
-        ahead = max(0.75 * 8.0 * V / math.pi, 0.1)
+        ahead = max(0.75 * 8.0 * V / math.pi, 1.2)
         eta_1 = math.asin(clip(-across / ahead, math.sin(math.pi / 4)))
         eta = clip(eta_1 + m[2] + angle_of(along / over_ground), math.pi / 2)
         learns = 0.02 * eta_1 if abs(eta_1) < math.radians(5.0) else 0.0
@@ -146,7 +146,7 @@ def ardupilot(guidance: str) -> Any:
 
 @pytest.mark.parametrize("guidance", ["position", "l1"])
 def test_ardupilot_sails_as_in_a_plain_loop_at_an_awkward_period(guidance: str) -> None:
-    law = {"kind": "ardupilot", "guidance": guidance} | GAINS
+    law = {"kind": "ardupilot", "guidance": guidance, "l1_least": 1.2} | GAINS
     out = podusv.simulate(scenario(law, TIME))
     states = ("x", "y", "psi", "u", "v", "r", "throttle_i", "steering_i", "cross_i")
     own = sailed(ardupilot(guidance), np.zeros(3), TIME)[: len(out["time"])]
@@ -351,6 +351,24 @@ def test_px4_stays_beside_a_line_by_the_sine_of_the_crab_angle() -> None:
     crab = math.atan2(at["v"], at["u"])
     assert at["e"] == pytest.approx(3.0 * math.sin(crab), abs=3.0 * 2 * 0.002)
     assert abs(at["e"]) > 0.2
+
+
+@pytest.mark.parametrize(
+    "law", [{"kind": "ardupilot"}, {"kind": "ardupilot", "guidance": "l1"}, {"kind": "px4"}]
+)
+def test_they_stay_at_a_target_that_comes_to_rest(law: dict[str, Any]) -> None:
+    """The sources aim at a waypoint itself where the line to it has no length."""
+    out = podusv.simulate(
+        {
+            "vessel": {"preset": "otter"}, "actuator": {"kind": "pod", "preset": "otter"},
+            "path": {"kind": "waypoints", "legs": "straight", "after": "stop", "speed": 1.0,
+                     "points": [[0.0, 0.0], [30.0, 20.0]]},
+            "disturbance": {"kind": "none"}, "controller": law, "log": {"every": 50},
+            "simulation": {"step": 0.02, "duration": 200.0}, "start": {"x": -5.0, "y": 3.0},
+        }
+    )  # fmt: skip
+    beside = np.hypot(out["x"] - out["x_d"], out["y"] - out["y_d"])
+    assert beside[out["time"] > 50.0].max() < 7.5
 
 
 def circled(law: dict[str, Any], radius: float) -> tuple[float, float]:

@@ -1,10 +1,10 @@
 """ArduPilot Rover in Auto: guidance to a lateral acceleration, then control of yaw rate and speed.
 
 Source: github.com/ArduPilot/ardupilot, AR_PosControl.cpp (commit 00357a4), AR_AttitudeControl.cpp
-(00f02a6), AP_L1_Control.cpp (069b133), AP_MotorsUGV.cpp (0264b67), and its tuning in
-rover-quicktune.lua (13139c3). L1 guidance: S. Park, J. Deyst and J. P. How, "A new nonlinear
-guidance logic for trajectory tracking", AIAA 2004-4900. Equations and numbers are taken from there,
-no code. docs/laws.md has them, and what is left out.
+(00f02a6), AP_L1_Control.cpp (069b133), AR_WPNav.cpp where it still calls L1, AP_MotorsUGV.cpp
+(0264b67), and its tuning in rover-quicktune.lua (13139c3). L1 guidance: S. Park, J. Deyst and J. P.
+How, "A new nonlinear guidance logic for trajectory tracking", AIAA 2004-4900. Equations and numbers
+are taken from there, no code. docs/laws.md has them, and what is left out.
 
 Proved: period and damping of L1, linearised on a line; no offset in a steady state on a line. Not
 proved: that the vessel comes there. Anti-windup: an integral whose output is limited only shrinks.
@@ -25,6 +25,7 @@ from podusv_cli.components.controllers.rover import (
     approached,
     clipped,
     kept_within,
+    path_course,
 )
 from podusv_cli.core.component import Rule, value
 from podusv_cli.core.elementary import arctangent, cos_sin
@@ -58,13 +59,13 @@ def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
 @kernel
 def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, float, float]:
     """Wanted speed and yaw rate of L1 guidance, and the rate of the integral's angle."""
-    course = direction(target[2], target[3])
+    course = path_course(x, target)
     c, s = cos_sin(course)
     across = (x[1] - target[1]) * c - (x[0] - target[0]) * s
     speed, track = math.sqrt(x[3] * x[3] + x[4] * x[4]), x[2] + direction(x[3], x[4])
     if speed < STANDING or x[3] <= 0.0:
         speed, track = STANDING, x[2]
-    L_1 = max(k.l1_damping * k.l1_period * speed / math.pi, 0.1)
+    L_1 = max(k.l1_damping * k.l1_period * speed / math.pi, k.l1_least)
     sine = clipped(-across / L_1, CAPTURE)
     sight = arctangent(sine, math.sqrt(1.0 - sine * sine))
     learns = k.l1_I * sight if abs(sight) < LEARNS else 0.0
@@ -98,6 +99,7 @@ class ArduPilot(Rover):
     vel_FF: float = value(0.0, "1/s", "acceleration per wanted velocity (PSC_VEL_FF)", ge=0)
     l1_period: float = value(8.0, "s", "period of the L1 loop (NAVL1_PERIOD)", gt=0)
     l1_damping: float = value(0.75, "", "damping of the L1 loop (NAVL1_DAMPING)", gt=0)
+    l1_least: float = value(2.0, "m", "shortest distance ahead of L1 (WP_RADIUS)", ge=0.1)
     l1_I: float = value(0.02, "1/s", "gain of the cross-track integral (NAVL1_XTRACK_I)", ge=0)
 
     def slots(self) -> Slots:

@@ -25,11 +25,12 @@ from podusv_cli.components.controllers.rover import (
     beyond,
     clipped,
     kept_within,
+    path_course,
 )
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.kinematics import direction, wrap
+from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import Signal
 
 TURNS = 2  # position in the memory
@@ -39,7 +40,7 @@ TURNING = Signal("turns", "1", "1 while it turns on the spot, else 0")
 @kernel
 def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     """Bearing of where a circle about the vessel meets the path, or of the path, less psi [rad]."""
-    course = direction(target[2], target[3])
+    course = path_course(x, target)
     c, s = cos_sin(course)
     across = (x[1] - target[1]) * c - (x[0] - target[0]) * s
     reach = min(max(k.lookahead * u_d, k.lookahead_min), k.lookahead_max)

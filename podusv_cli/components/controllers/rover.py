@@ -17,6 +17,7 @@ from podusv_cli.components.controllers.base import Controller, Most, Slots, each
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kinematics import direction
 from podusv_cli.core.signal import Signal
 
 THROTTLE_I, STEERING_I = 0, 1  # positions in the memory
@@ -49,6 +50,14 @@ def beyond(number: float, least: float) -> float:
 def kept_within(integral: float, rate: float, most: float) -> float:
     """The rate of an integral that ends at +-`most`."""
     return 0.0 if abs(integral) >= most and rate * integral > 0.0 else rate
+
+
+@kernel
+def path_course(x: Vector, target: Vector) -> float:
+    """Direction of the target's path; of a target at rest, that of the line to it [rad]."""
+    if target[2] == 0.0 and target[3] == 0.0:
+        return direction(target[0] - x[0], target[1] - x[1])
+    return direction(target[2], target[3])
 
 
 @kernel
