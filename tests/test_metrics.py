@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_samples import TWO, write
-from conftest import NONLINEAR, POD, Constant, corrected, example, target_at
+from conftest import NONLINEAR, POD, Constant, adrift, corrected, example, target_at
 
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.components.actuators.pod import Pod, Pods
@@ -19,7 +19,7 @@ from podusv_cli.components.controllers.turning_circle import TurningCircle
 from podusv_cli.components.controllers.zigzag import Zigzag
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.components.estimators.none import NoEstimator
-from podusv_cli.components.measurements.sensors import Sensors
+from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.components.paths.legs import Legs
 from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.core.component import value
@@ -111,13 +111,18 @@ def test_metrics_follow_their_definitions(limited):
 
 @pytest.mark.parametrize("compiled", [True, False])
 def test_errors_of_the_estimate_follow_their_definitions(compiled):
+    """Over each step the estimate is that of its begin, so both ends of every jump count."""
     loop = corrected(measurement=Sensors(), estimator=NoEstimator())
     log, got = gathered(loop, steps=300, compiled=compiled)
     t = log["time"]
-    error = {name: log[f"{name}_est"] - log[name] for name in ("x", "y", "psi", "u", "v", "r")}
+
+    def squared(name):
+        true, held = log[name], log[f"{name}_est"]
+        before = np.append(true[0], held[:-1])
+        return 0.5 * ((before - true) ** 2 + (held - true) ** 2)
 
     def rms(*names):
-        square = sum(error[name] ** 2 for name in names)
+        square = sum(squared(name) for name in names)
         assert square.any()
         return pytest.approx(np.sqrt(np.trapezoid(square, t) / t[-1]), rel=1e-12)
 
@@ -125,6 +130,25 @@ def test_errors_of_the_estimate_follow_their_definitions(compiled):
     assert got["estimate_heading_rms"] == rms("psi")
     assert got["estimate_velocity_rms"] == rms("u", "v")
     assert got["estimate_yaw_rate_rms"] == rms("r")
+
+
+def test_a_position_that_is_held_is_off_by_a_sawtooth_whatever_the_step():
+    """At 1 m/s the distance grows from 0 to P between two deliveries: rms P/sqrt(3).
+
+    Of a parabola of n steps a trapezoidal sum has 1 + 1/(2 n^2) of the area.
+    """
+    undamped = dict.fromkeys(("X_u", "X_uu", "X_uuu"), 0.0)
+    exact = dict.fromkeys(("position", "heading", "velocity", "yaw_rate"), Sensor(period=0.5))
+    loop = adrift(
+        vessel=NONLINEAR.model_copy(update=undamped), estimator=NoEstimator(),
+        measurement=Sensors(**exact), start=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    )  # fmt: skip
+    for n in (2, 5, 10):
+        grid = TimeGrid(0.5 / n, 400 * n)
+        probe = metrics_probe(Plan(loop, grid), steady_fraction=0.25, settling_radius=2.0)
+        got = probe.summary(simulate(loop, grid, probe=probe).seen)["estimate_position_rms"]
+        sawtooth = 0.5 * math.sqrt((1 + 1 / (2 * n**2)) / 3)
+        assert got == pytest.approx(sawtooth, rel=1.0 / grid.steps)  # half a jump at the end
 
 
 @pytest.mark.parametrize("turns", [-1, 0, 1, 2])

@@ -40,6 +40,14 @@ def test_a_power_of_the_step_gives_its_order_and_its_error(order):
     assert got.error == pytest.approx(0.5 * 0.1**order, rel=1e-6)
 
 
+def test_the_step_that_would_do_follows_from_the_order():
+    """An error of 0.04 of 1 at order 2 is 0.01 at half the step."""
+    got = estimate([1.0 - 0.04 * (4.0**-n - 1.0) for n in range(3)])
+    assert got.sufficient(0.01) == pytest.approx(0.5)
+    assert got.sufficient(0.1) == 1.0
+    assert math.isnan(estimate([1.0, 1.01, 0.995]).sufficient(0.001))
+
+
 def test_differences_that_do_not_shrink_have_no_order_and_are_all_error():
     got = estimate([1.0, 1.01, 0.995])
     assert math.isnan(got.order)

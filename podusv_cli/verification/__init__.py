@@ -1,1 +1,1 @@
-"""Can the numbers of a run be trusted: the same run at finer steps and by another integrator."""
+"""Can the numbers of a run be trusted: the same run at finer steps."""

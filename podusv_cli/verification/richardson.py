@@ -44,6 +44,15 @@ class Estimate:
         """Whether the relative error is within the tolerance; false where it is unknown."""
         return self.relative <= tolerance
 
+    def sufficient(self, tolerance: float) -> float:
+        """The part of the first step at which the error is within the tolerance, by the order.
+
+        NaN without an order, 1 where it is within it already.
+        """
+        if self.converged(tolerance):
+            return 1.0
+        return float((tolerance / self.relative) ** (1.0 / self.order))
+
     @property
     def undefined(self) -> bool:
         """Whether the number is NaN at all steps, as a settling time never reached."""

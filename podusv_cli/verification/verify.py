@@ -64,6 +64,19 @@ class Verification:
         by_run["ranking"] = [name for name, rank in self.rankings.items() if not rank.converged]
         return {label: names for label, names in by_run.items() if names}
 
+    @property
+    def sufficient_step(self) -> float | None:
+        """The step [s] at which all numbers would be within the tolerance, by their orders.
+
+        None where it is the scenario's own, or where a number has no order or is infinite.
+        """
+        first = next(iter(self.runs.values()))
+        parts = [
+            e.sufficient(self.tolerance) for r in self.runs.values() for e in r.estimates.values()
+        ]
+        least = min(parts, key=lambda part: (not math.isnan(part), part), default=1.0)
+        return first.levels[0].step * least if 0.0 < least < 1.0 else None
+
     def as_json(self) -> dict[str, Any]:
         """The output of `--json`."""
         first = next(iter(self.runs.values()))

@@ -29,7 +29,7 @@ from podusv_cli.engine.loop.closed_loop import (
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.step.delay_line import delay_line
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import HELD_SIGNALS, Layout, Parts, Vectors
+from podusv_cli.engine.step.layout import BEFORE, HELD_SIGNALS, Layout, Parts, Vectors
 
 FORCES, SEA = LOADS[:3], LOADS[3:]
 SHOWN = tuple(f"{name}, shown" for name in TARGET)  # which no log has
@@ -289,7 +289,7 @@ class Plan:
             measurement_table=recall(loop.measurement.table_for, grid.step, grid.steps),
             estimator_table=recall(estimator.table),
             s=np.concatenate([begun[part] for part in self.states]),
-            row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
+            row=np.zeros(layout.columns + BEFORE), stages=np.zeros(5 * layout.states),
             sensed=loop.measurement.first(start, grid.step),
             delay_line=delay_line(loop.actuator.delay(), grid),
             held=np.zeros(HELD_SIGNALS + len(law.signals)), work=np.zeros(law.workspace()),

@@ -154,17 +154,14 @@ class Lanes:
         return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
 
     def _ending(self, lane: int, reached: int, last: int) -> Ending:
-        own, ended = self.runs[lane], self.under_way[REACHED + lane]
+        own, ended, n = self.runs[lane], self.under_way[REACHED + lane], self.layout
         together = Vectors(*self.vectors)
         kept = [vector[lane::LANES] for vector in (together.s, together.row, together.seen)]
         if ended != MARCHING:
-            kept = np.split(
-                self.ends.reshape(LANES, -1)[lane], np.cumsum([len(part) for part in kept])[:-1]
-            )
-        own.s[:], own.row[:], own.seen[:] = (
-            part[: len(vector)]
-            for part, vector in zip(kept, (own.s, own.row, own.seen), strict=True)
-        )
+            ends = self.ends.reshape(LANES, -1)[lane]
+            kept = np.split(ends, [n.states, n.states + n.columns])
+        for part, vector in zip(kept, (own.s, own.row, own.seen), strict=True):
+            vector[: len(part)] = part[: len(vector)]
         if ended != MARCHING:
             return Ending(int(ended), "diverged")
         return Ending(reached, "finished" if reached == last else "interrupted")

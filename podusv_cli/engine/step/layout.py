@@ -64,7 +64,7 @@ class Layout(NamedTuple):
     flow: int  # offset in the row of the current's speed and direction; 0: no actuator needs it
     flags: int
     sensed: int
-    columns: int  # length of the row
+    columns: int  # length of the row that is logged; behind it is the estimate before an instant
     steps: int
     log_every: int
     hold_every: int  # 0: the law acts continuously
@@ -115,6 +115,7 @@ class Vectors(NamedTuple):
 
 
 DISTANCE = 6  # where the row has z_e (18), behind the target
+BEFORE = 6  # numbers behind the logged row: the estimate before what an instant delivers
 HELD_X, HELD_TARGET, HELD_DEMAND = 1, 7, 13
 HELD_SIGNALS = HELD_DEMAND + len(DEMAND)
 STOP = 1  # in `under_way`

@@ -5,6 +5,7 @@ from __future__ import annotations
 from podusv_cli.components.measurements.base import KNOWN
 from podusv_cli.core.kernel import Vector, kernel, shared, tail
 from podusv_cli.engine.step.layout import (
+    BEFORE,
     HELD_DEMAND,
     HELD_SIGNALS,
     HELD_TARGET,
@@ -82,11 +83,15 @@ def perceive(
 ) -> None:
     """Measure at instant k, and take what is delivered into the estimate.
 
-    Leaves the measured values behind the other signals in the row, which has the disturbance.
+    Leaves the measured values behind the other signals in the row, which has the disturbance, and
+    the estimate as it was before behind the row's columns.
     """
     b, sensed, measured = tail(c.row, n.b), c.sensed, tail(c.row, n.sensed)
+    given, before = tail(c.s, n.estimate), tail(c.row, n.columns)
+    for i in range(BEFORE):
+        before[i] = given[i]
     measurement(t, float(k), c.s, b, c.measurement, c.measurement_table, sensed)
-    correct(t, sensed, tail(c.s, n.estimate), c.estimator, c.estimator_table)
+    correct(t, sensed, given, c.estimator, c.estimator_table)
     logged = 0
     for i in range(6):
         if shared(sensed[KNOWN + i]) != 0.0:
