@@ -69,6 +69,9 @@ def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
     assert "(mean ranks {} and {}; `ilos` {} and {})".format(*wrong) in PAGE
     for condition in ("calm", "current"):
         assert ranks.loc["ardupilot_l1", condition] > ranks.loc["momentum_vector", condition]
+    gentle = leaderboard(RUNS[RUNS.task.isin(["reach", "zigzag"])]).median_ratio
+    said = "L1 is at {:.2f} and the position controller at {:.2f} times the best law), slowing"
+    assert said.format(gentle.ardupilot_l1, gentle.ardupilot) in PAGE
     costs = BOARD.variation
     beside = sorted(costs[["momentum_vector", "velocity_vector", "alos", "ilos"]])
     assert costs.ardupilot == pytest.approx(costs.ardupilot_l1, rel=0.01)

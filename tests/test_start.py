@@ -192,14 +192,25 @@ def test_units_are_those_of_scenarios(podusv):
          "of 2.4 m; give --hull-beam, or --hulls 1"),
         (("--preset", "oter"), "unknown boat 'oter'; did you mean 'otter'? (allowed: milliampere, "
          "otter, revolt, wamv)"),
-        (("--preset", "otter", "--mass", "3"), "--preset has hull and thrusters; leave the "
-         "dimensions out"),
+        *(
+            (("--preset", "otter", *more), "--preset has hull and thrusters; leave the dimensions "
+             "out")
+            for more in (("--mass", "3"), ("--speed", "5kn"), ("--turn", "35deg"), ("--hulls", "2"))
+        ),
+        ((*BOAT, "--hull-beam", "0.3"), "--hull-beam is that of one hull of a catamaran; add "
+         "--hulls 2"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_one_sentence(podusv, words, says):
     said = podusv("start", "boat", *words)
     assert (said.code, said.err) == (2, f"{says}\n")
     assert not Path("boat.yaml").exists()
+
+
+def test_a_thruster_on_the_centre_line_may_have_a_unit(podusv):
+    given = (*BOAT[:-1], "1x500N@0m", "--turn", "35deg")
+    assert podusv("start", "boat", *given).err == ""
+    assert load("boat.yaml").scenario.actuator.pods[0].y == 0.0
 
 
 def test_a_file_that_exists_is_not_replaced(podusv):

@@ -69,7 +69,7 @@ def start(
     file = out or Path(f"{name.removesuffix('.yaml')}.yaml")
     given = {"length": length, "beam": beam, "mass": mass, "thrusters": thrusters}
     if preset:
-        if any(given.values()):
+        if any((*given.values(), hulls, hull_beam, speed, turn)):
             raise UsageError("--preset has hull and thrusters; leave the dimensions out")
         written = workflow.start_from(preset, file)
     else:

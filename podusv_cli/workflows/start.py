@@ -112,6 +112,8 @@ def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
     hull = Hull(**numbers, thrust=thrusters.count * thrusters.thrust, hulls=boat.hulls)
     if boat.hulls not in (1, 2):
         raise UsageError(f"{boat.hulls} hulls: must be 1, or 2 of a catamaran")
+    if boat.hull_beam and boat.hulls == 1:
+        raise UsageError("--hull-beam is that of one hull of a catamaran; add --hulls 2")
     if thrusters.lever > 0.5 * hull.beam:
         raise UsageError(
             f"--thrusters {boat.thrusters}: {thrusters.lever:g} m from the centre line, beyond "
@@ -130,14 +132,14 @@ def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
     return hull, thrusters
 
 
-def _number(name: str, text: str, unit: str) -> float:
-    """A number above 0 as in a scenario, with or without a unit. Raises UsageError."""
+def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
+    """A number above 0 (or 0) as in a scenario, with or without a unit. Raises UsageError."""
     option, plain = f"--{name.replace('_', '-')} {text}", resolve(text.strip())
     number = units.number(plain, unit) if isinstance(plain, str) else plain
     if number is None or isinstance(number, bool):
         wrong = units.misfit(text, unit) or "; write a number, with a unit if it is another one"
         raise UsageError(f"{option}: is no number in {unit}{wrong}")
-    if not 0.0 < number < math.inf:
+    if not (0.0 < number < math.inf or (zero and number == 0.0)):
         raise UsageError(f"{option}: must be above 0 [{unit}]")
     return float(number)
 
@@ -147,7 +149,7 @@ def _thrusters(boat: Boat) -> Thrusters:
     if not match:
         raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}")
     count, turn = int(match[1]), _number("turn", boat.turn, "rad") if boat.turn else 0.0
-    lever = 0.0 if match[3].strip() == "0" else _number("thrusters", match[3], "m")
+    lever = _number("thrusters", match[3], "m", zero=True)
     made = Thrusters(count, _number("thrusters", match[2].strip(), "N"), lever, turn)
     if count not in (1, 2, 4) or (count > 1) != (lever > 0.0):
         raise UsageError(
