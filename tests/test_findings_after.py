@@ -177,6 +177,20 @@ def test_a_law_without_integral_is_not_told_that_it_winds_up():
     assert "its memory does not wind up" in text
 
 
+def test_limits_that_are_over_are_told_where_memory_winds_up_or_the_run_is_lost():
+    scenario, out = scene().alone(), log()
+    law = SimpleNamespace(slots=lambda: (1,), wants_loads=lambda: True)
+    told_of_loads = scenario.model_copy(update={"controller": law})
+    approach = out["time"] < 0.5 * out["time"][-1]
+    early, late = changed(out, saturated=1.0 * approach), changed(out, saturated=1.0 * ~approach)
+    assert len(list(saturated.search(scenario, early))) == 1
+    assert list(saturated.search(told_of_loads, early)) == []
+    (text,) = saturated.search(told_of_loads, late)
+    assert "100.0% of the steady window" in text
+    (text,) = saturated.search(told_of_loads, replace(early, status="diverged"))
+    assert "of the run" in text
+
+
 def test_what_helps_against_windup_is_what_the_law_has():
     scenario, out = scene().alone(), changed(log(), saturated=np.ones_like(log()["z_e"]))
 

@@ -24,18 +24,24 @@ REVERSALS = 3  # of a zig-zag with two overshoots
 @warn_after_run(
     "saturated", about="actuator",
     meaning=f"the actuator limits the law for over {LONG:.0%} of the run",
-    condition=f"limited during more than {LONG:.0%} of the run",
+    condition=f"limited during more than {LONG:.0%} of the run; of its steady window where the "
+    "law's memory does not wind up, as an approach or a turn at the limits is then over for good",
     remedy="switch anti-windup on where it is off, or take smaller gains or a stronger actuator",
 )  # fmt: skip
 def saturated(scenario: Scenario, log: Recording) -> Sentences:
-    """The actuator limits the law during a considerable part of the run."""
+    """The actuator limits the law for long, where that lasts or leaves something behind."""
     if "saturated" not in log:
         return
-    limited = rows_where(log, lambda part: part["saturated"] > 0.5)
-    fraction = float(limited.mean())
-    if fraction > LONG:
+    law = scenario.controller
+    winds_up = bool(law.slots()) and not law.wants_loads()
+    whole = winds_up or log.status != "finished"
+    begin, span = (0.0, "run") if whole else (scenario.steady_from(), "steady window")
+    counted = log["time"] >= begin
+    limited = counted & rows_where(log, lambda part: part["saturated"] > 0.5)
+    share = limited.sum() / max(counted.sum(), 1)
+    if share > LONG:
         yield (
-            f"the actuator limits the law during {fraction:.1%} of the run, "
+            f"the actuator limits the law during {share:.1%} of the {span}, "
             f"{times_of(log, limited)}; {_windup(scenario)}"
         )
 
@@ -48,9 +54,12 @@ def _windup(scenario: Scenario) -> str:
             "anti-windup does not mend; compare a run without, or take smaller gains"
         )
     if not law.slots():
-        return "the law has no memory that could wind up"
+        return "the law has no memory that could wind up; take smaller gains or a stronger actuator"
     if law.wants_loads():
-        return "the law is told the loads that act, so its memory does not wind up"
+        return (
+            "the law is told the loads that act, so its memory does not wind up; take smaller "
+            "gains or a stronger actuator"
+        )
     return f"while limited, the law's adaptation and integrators wind up; {law.against_windup}"
 
 
