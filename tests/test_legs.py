@@ -13,6 +13,7 @@ from pydantic import ValidationError
 import podusv as package
 from podusv_cli.components.paths.legs import Legs
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.findings.finding import preflight
 
 POINTS = ((0.0, 0.0), (12.0, 3.0), (15.0, 14.0), (2.0, 16.0))
 SCENARIO: dict[str, Any] = {
@@ -170,6 +171,25 @@ def test_findings_tell_of_a_leg_too_short_and_of_legs_that_are_left() -> None:
     missed = run("los_pid", path=legs | {"acceptance": 0.05})
     (told,) = (warning for warning in missed.warnings if "never-arrives" in warning)
     assert "path.switch: passed" in told
+
+
+def test_legs_that_no_run_can_end_in_time_are_told_with_a_duration_that_does() -> None:
+    """Hops by hand: 13.153 + 11.402 + 13.153 m; without the circles 7.5 m less, 60.4 s."""
+
+    def told(seconds: float, law: str = "los_pid") -> list[str]:
+        changes = {"controller": {"kind": law}, "simulation.duration": seconds}
+        scenario = package.load("podusv:mu_2017/corrected.yaml", SCENARIO | changes)
+        return [one.text for one in preflight(scenario) if one.code == "legs-too-long"]
+
+    (text,) = told(60.0)
+    assert "37.71 m" in text
+    assert "75.4 s at 0.5 m/s; simulate 91 s" in text
+    assert not told(61.0)
+    assert not told(60.0, "zigzag")
+    for law in ("los_pid", "velocity_vector"):
+        done = run(law, **{"simulation.duration": 91.0}).metrics
+        assert done["path_done"] == 1.0
+        assert done["path_time"] > 60.4
 
 
 def test_a_trial_leaves_the_legs_aside_and_no_finding_asks_for_them() -> None:

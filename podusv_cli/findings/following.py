@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 
 import numpy as np
@@ -17,6 +18,7 @@ from podusv_cli.findings.sizing import other_numbers
 from podusv_cli.scenario.model import Scenario
 
 ROOM = 2.0  # acceptance radii; a shorter leg is left before it is followed
+AMPLE = 1.2  # of length over speed: a duration that leaves time to speed up and to turn
 
 
 def _lengths(path: Path) -> Vector:
@@ -40,6 +42,29 @@ def short_leg(case: Case) -> Sentences:
             f"leg {leg} is {lengths[leg]:.3g} m long, and the acceptance radius of its "
             f"waypoints is {radius:g} m, so the vessel leaves it before it is on it; take "
             "a smaller path.acceptance, or fewer waypoints"
+        )
+
+
+@warn_before_run(
+    "legs-too-long", about="simulation.duration", meaning="the run ends before the legs can",
+    condition="at the path's speed, straight from the start to the waypoints' circles and from one "
+    "to the next takes longer than the run",
+    remedy="simulate longer, or ask for more speed",
+)  # fmt: skip
+def legs_too_long(case: Case) -> Sentences:
+    """Even without any turn the last waypoint comes after the end."""
+    scenario, circles = case.scenario, np.array(case.scenario.path.circles())
+    if not len(circles) or not scenario.controller.aims():
+        return
+    start, duration = scenario.start, scenario.simulation.duration
+    hops = np.hypot(*np.diff(np.vstack([(start.x, start.y), circles[:, :2]]), axis=0).T)
+    radii, speed = np.append(0.0, circles[:, 2]), float(case.reference.speed.max())
+    if np.maximum(hops - radii[:-1] - radii[1:], 0.0).sum() > speed * duration:
+        whole = float(hops.sum()) / speed
+        yield (
+            f"{duration:g} s, and {hops.sum():.4g} m from the start round all waypoints take "
+            f"{whole:.3g} s at {speed:.3g} m/s; simulate {math.ceil(AMPLE * whole):g} s, or ask "
+            "for more path.speed"
         )
 
 
