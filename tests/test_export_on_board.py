@@ -1,5 +1,6 @@
 """An exported law on another computer: the programs of docs/export.md, and hardware in the loop."""
 
+import ctypes
 import json
 import re
 import runpy
@@ -20,6 +21,7 @@ from export_samples import CC, HARDWARE, OTTER, SOURCE, exported, law, needs_cc,
 import podusv
 from podusv_cli.export import link
 from podusv_cli.export.law import ExportedLaw
+from podusv_cli.workflows.start import Boat, start
 
 steer = runpy.run_path(str(HARDWARE / "hardware.py"))["steer"]
 
@@ -30,10 +32,15 @@ def sound(tmp_path_factory):
     return exported(tmp_path_factory.mktemp("sound") / "law")
 
 
+def c_of_the_page() -> list[str]:
+    """The program in docs/export.md, and the functions before and after a step of the law."""
+    return re.findall(r"```c\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
+
+
 @needs_cc
 def test_the_program_in_the_documentation_runs(tmp_path):
     folder = exported(tmp_path / "law", "momentum_vector")  # it asks for the loads
-    (program,) = re.findall(r"```c\n(.*?)```", (ROOT / "docs/export.md").read_text(), re.DOTALL)
+    program, _ = c_of_the_page()
     (folder / "program.c").write_text(program)
     sources = ["program.c", "law.c", f"{link.this_machine()}/law.o"]
     subprocess.run([*CC.split(), *sources, "-lm"], cwd=folder, check=True)
@@ -47,6 +54,42 @@ def test_the_program_in_the_documentation_runs(tmp_path):
         row[12], row[14] = np.clip(demand, [-8.0, -2.5], [8.0, 2.5])  # as the actuator cuts them
     assert demands.shape == (3, 2)
     assert (demands[:, 0] > 0.0).all()  # towards the target
+
+
+@needs_cc
+def test_targets_and_thrusts_of_the_documentation_are_those_of_the_simulator(tmp_path, monkeypatch):
+    """The law of a started boat over a whole run, from the legs to each thruster."""
+    monkeypatch.chdir(tmp_path)
+    start(Boat("4.9", "2.4", "180", "2x180N@1.0", hulls=2), Path("boat.yaml"))
+    short = {"simulation.duration": 110.0}
+    folder = exported(tmp_path / "law", source="boat.yaml", changes=short, controller="los_pid")
+    (folder / "ends.c").write_text(c_of_the_page()[1])
+    sources = ["ends.c", "law.c", f"{link.this_machine()}/law.o"]
+    build = [*CC.split(), "-shared", "-fPIC", *sources, "-lm", "-o", "ends.so"]
+    subprocess.run(build, cwd=folder, check=True)
+    ends, leg = ctypes.CDLL(str(folder / "ends.so")), ctypes.c_int(0)
+    memory = ctypes.create_string_buffer(ends.podusv_law_size())
+    ends.podusv_law_start(memory)
+
+    def vector(*numbers):
+        return (ctypes.c_double * len(numbers))(*numbers)
+
+    for row in np.genfromtxt(folder / "check.csv", delimiter=",", skip_header=1):
+        state, target, demand = vector(*row[1:7]), vector(*[0.0] * 6), vector(0.0, 0.0)
+        ends.aim(state, ctypes.byref(leg), target)
+        np.testing.assert_allclose(target, row[7:13], rtol=0, atol=1e-9)
+        ends.podusv_law_step(memory, state, target, vector(*row[13:16]), demand)
+        np.testing.assert_allclose(demand, row[16:18], rtol=1e-9, atol=1e-9)
+    assert leg.value == 2
+    alone = {"controllers": None, "controller": {"kind": "los_pid"}, "claims": {}, **short}
+    run = podusv.simulate("boat.yaml", alone)
+    T = 180.0 * run["n_part_cmd"] * np.abs(run["n_part_cmd"])
+    assert run["saturated"].any()
+    for asked, wanted in zip(zip(run["tau_u_cmd"], run["tau_r_cmd"], strict=True), T, strict=True):
+        sides, loads = vector(0.0, 0.0), vector(0.0, 0.0, 0.0)
+        ends.thrusts(vector(*asked), sides, loads)
+        np.testing.assert_allclose(sides, wanted, rtol=0, atol=0.001 * 180)
+        np.testing.assert_allclose(loads, [sides[0] + sides[1], 0.0, sides[0] - sides[1]])
 
 
 @contextmanager
