@@ -376,6 +376,19 @@ def test_a_window_of_a_hundredth_of_the_range_is_found_by_the_number_that_falls(
     assert len(tried) < 2 + 16 + 3 * 12
 
 
+def test_many_claims_that_fall_at_one_place_look_there_once_each():
+    """A bracket that the claims before have narrowed would have no width."""
+    claims, least = [f"C{n}" for n in range(20)], 1.0123
+
+    def judge(world):
+        number = 0.11 + abs(next(iter(world.values()), 1.0) - least) ** 0.5
+        return Judged(dict.fromkeys(claims, True), dict.fromkeys(claims, {"k": number}))
+
+    alone = explored(moving(), judge, judge({}), dict.fromkeys(claims, compared("k > 0.1")))
+    assert not alone.turns("C3", judge({}))
+    assert len(alone.trials) < 2 + 16 + 2 * 12
+
+
 def test_a_number_that_falls_and_cannot_reach_its_edge_costs_few_tries():
     alone, base, tried = of_distance(lambda k: 0.5 + (k - 2.87) ** 2)
     assert not alone.turns("C", base)

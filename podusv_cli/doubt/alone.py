@@ -113,10 +113,10 @@ def explored(
         _acts(side.tried(side.whole), claim, base) for side in sides for claim in base.answers
     )
     for side in sides if acting else ():
-        side.tried_between()
+        places = side.tried_between()
         for claim in base.answers:
             for number in numbers.get(claim, ()):
-                _look_nearer(side, claim, number)
+                _look_nearer(side, places, claim, number)
         for claim in base.answers:
             _bisect(side, claim)
     return TriedChoice(
@@ -156,26 +156,26 @@ class _Side:
         """Whether a verdict is the opposite there."""
         return self.tried(distance).turned(claim, self.base)
 
-    def tried_between(self) -> None:
-        """Try the places that every side has."""
+    def tried_between(self) -> list[float]:
+        """Try the places that every side has, and give all that were tried."""
         for distance in (NEAR * self.scale, *(share * self.whole for share in BETWEEN)):
             self.tried(distance)
+        return sorted(self.trials)
 
 
-def _look_nearer(side: _Side, claim: str, number: ClaimNumber) -> None:
-    """Look where a number comes nearer to its edge than on both sides, by golden section.
+def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumber) -> None:
+    """Look by golden section where a number is nearer to its edge than at the places beside it.
 
     It ends with a turn, or where a number that is convex there cannot reach its edge.
     """
-    places = [0.0, *sorted(side.trials)]
-    if any(side.turned(place, claim) for place in places[1:]):
+    if any(side.turned(distance, claim) for distance in side.trials):
         return
 
     def away(distance: float) -> float:
         judged = side.tried(distance) if distance else side.base
         return number.away(judged.numbers.get(claim, {}))
 
-    for a, b, c in zip(places, places[1:], places[2:], strict=False):
+    for a, b, c in zip([0.0, *places], places, places[1:], strict=False):
         if away(a) > away(b) <= away(c) and away(b) < away(0.0):
             _golden(side, claim, away, (a, b, c))
 
