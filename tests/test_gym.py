@@ -392,6 +392,22 @@ def test_a_moment_has_what_the_session_has():
     np.testing.assert_array_equal(usual.reset(seed=3)[0], moments[0].seen)
 
 
+def test_an_agent_may_work_in_the_observation_that_it_was_given():
+    """As one that scales it in its place; the next reward is of what was seen."""
+    given: dict[str, Any] = {"reward": lambda before, now: now.seen[0] - before.seen[0]}
+    many = podusv.gym.VectorEnv(SCENARIO, count=1, **given)
+    kept, scaled = podusv.gym.Env(SCENARIO, **given), podusv.gym.Env(SCENARIO, **given)
+    seen, several = kept.reset(seed=1)[0], many.reset(seed=1)[0]
+    own = scaled.reset(seed=1)[0]
+    for _ in range(3):
+        own *= 0.0
+        several *= 0.0
+        last, (seen, reward, *_) = seen[0], kept.step((1.0, 0.1))
+        own, own_reward, *_ = scaled.step((1.0, 0.1))
+        several, rewards, *_ = many.step(np.array([[1.0, 0.1]]))
+        assert own_reward == rewards[0] == reward == seen[0] - last
+
+
 def test_functions_of_one_s_own_have_the_same_bits_side_by_side():
     """Over the end of an episode: there nothing is gained, and no demand was there before."""
     given: dict[str, Any] = {"reward": work, "observe": view}

@@ -116,7 +116,7 @@ class Task:
     def observation(self, now: Moment) -> Vector:
         """What an agent is given of a moment. Raises UsageError for no list of numbers."""
         if self._observe is None:
-            return now.seen
+            return now.seen.copy()  # of which an agent may make what it likes
         given, shape = self._observe(now), np.shape(now.time)
         parts = list(given) if isinstance(given, Iterable) else []
         if not parts:
