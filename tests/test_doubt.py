@@ -378,11 +378,11 @@ def test_a_window_of_a_hundredth_of_the_range_is_found_by_the_number_that_falls(
 
 def test_many_claims_that_fall_at_one_place_look_there_once_each():
     """A bracket that the claims before have narrowed would have no width."""
-    claims, least = [f"C{n}" for n in range(20)], 1.0123
+    claims = [f"C{n}" for n in range(20)]
 
     def judge(world):
-        number = 0.11 + abs(next(iter(world.values()), 1.0) - least) ** 0.5
-        return Judged(dict.fromkeys(claims, True), dict.fromkeys(claims, {"k": number}))
+        number = 0.1 + abs(next(iter(world.values()), 1.0) - 1.41)
+        return Judged(dict.fromkeys(claims, True), {claim: {"k": number} for claim in claims})
 
     alone = explored(moving(), judge, judge({}), dict.fromkeys(claims, compared("k > 0.1")))
     assert not alone.turns("C3", judge({}))

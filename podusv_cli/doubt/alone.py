@@ -17,6 +17,7 @@ from podusv_cli.doubt.judged import Judge, Judged, moved
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
 BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that turn and turn back
 LOOKS = 12  # steps of golden section: to a 300th of the way between two places
+STEEPER = 3.0  # times as steep as between the places may a number fall to its edge
 GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
 SHARP = 1.02  # ratio of distances to which a turn is known
 BY_SEED = 0.1
@@ -166,7 +167,7 @@ class _Side:
 def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumber) -> None:
     """Look by golden section where a number is nearer to its edge than at the places beside it.
 
-    It ends with a turn, or where a number that is convex there cannot reach its edge.
+    It ends with a turn, or where the number would have to fall more steeply than it may.
     """
     if any(side.turned(distance, claim) for distance in side.trials):
         return
@@ -186,7 +187,7 @@ def _golden(
     a, b, c = around
     for _ in range(LOOKS):
         slopes = (away(a) - away(b)) / (b - a), (away(c) - away(b)) / (c - b)
-        if away(b) > max(slopes[0] * (c - b), slopes[1] * (b - a)):
+        if away(b) > STEEPER * max(slopes[0] * (c - b), slopes[1] * (b - a)):
             return
         new = b - GOLDEN * (b - a) if b - a > c - b else b + GOLDEN * (c - b)
         if side.turned(new, claim):
