@@ -1,6 +1,9 @@
 """Table, differences, entries and verdicts as texts, from numbers planted by hand."""
 
 import math
+import re
+import shutil
+import subprocess
 
 import pytest
 from comparison_samples import FRAME, Folder, about, scenario, verdicts
@@ -148,9 +151,59 @@ def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     words = METRICS["saturated_fraction"].row
     assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.500}", "-", "", "-", ""]
     assert by_row[METRICS["path_time"].row][-2:] == ["never", ""]
-    columns = text.splitlines()[2].partition("{tabular}")[2].replace("@{}", "")
-    assert {len(row) for row in rows[6:-2]} == {len(columns) - 2}
+    columns = text.splitlines()[2].rpartition("Xl")[2].replace("@{}", "")
+    assert {len(row) - 2 for row in rows[6:-2]} == {len(columns.removesuffix("}"))}
     assert "booktabs" in text.splitlines()[0]
+
+
+def test_latex_has_a_power_of_ten_once_where_all_numbers_of_a_row_have_nearly_that():
+    """A large and a small row, one with a zero; what differs by a thousand keeps its own powers."""
+    numbers = {"energy": [30934.5, 1720.0], "saturated_fraction": [0.0355, 0.0144]}
+    numbers |= {"iae": [1e-9, 1.0], "e_ct_max": [0.0, 2.5e3]}
+    runs = {label: {name: row[i] for name, row in numbers.items()} for i, label in enumerate("ab")}
+    lines = table.as_latex(table.table(runs)).splitlines()[6:-2]
+    rows = {line.split(" & ")[0]: line.removesuffix(r" \\").split(" & ")[1:] for line in lines}
+    small = r"\textbf{\boldmath .00$\times10^{-9}$}"
+    assert rows[f"${METRICS['iae'].symbol}$"] == ["m s", r"\textbf{\boldmath 1}", small, "1", ".00"]
+    share = ["$10^{-2}$", "3", ".55", r"\textbf{1}", r"\textbf{.44}"]
+    assert rows[METRICS["saturated_fraction"].row] == share
+    work = ["$10^{3}$ J", "30", ".9", r"\textbf{1}", r"\textbf{.72}"]
+    assert rows[f"${METRICS['energy'].symbol}$"] == work
+    assert rows[METRICS["e_ct_max"].row] == ["$10^{3}$ m", r"\textbf{0}", "", "2", ".50"]
+
+
+@pytest.mark.skipif(not shutil.which("pdflatex"), reason="needs pdflatex")
+def test_latex_fills_a_column_of_a_journal_and_nothing_is_overfull(tmp_path):
+    """Type of 8 points, as IEEE's tables have it, for four runs at nine tenths of that or more."""
+    names = ("e_ct_integral", "e_ct_steady", "path_time", "energy", "saturated_fraction")
+    numbers = dict(zip(names, (81.2, 0.0485, 101.8, 3.1e4, 0.0355), strict=True))
+    labels = ["los_pid", "alos", "momentum_vector", "velocity_vector", *"abcde"]
+    page = [
+        r"\documentclass[10pt,twocolumn]{article}\usepackage{booktabs,graphicx,tabularx}",
+        r"\usepackage[textwidth=7.16in,columnsep=0.16in]{geometry}\begin{document}\newsavebox{\all}",
+    ]
+    for count in (1, 2, 4, 9):
+        text = table.as_latex(table.table(dict.fromkeys(labels[:count], numbers)))
+        (tmp_path / f"{count}.tex").write_text(text)
+        given = rf"\input{{{count}}}\unskip"
+        page += [
+            rf"{{\footnotesize\sbox{{\all}}{{\def\resizebox#1#2#3{{#3}}{given}}}%",
+            rf"\typeout{{{count} runs: \the\wd\all\space of \the\linewidth}}}}",
+            *(rf"\begin{{{n}}}{t}{given}\end{{{n}}}" for n in ("table", "table*")
+              for t in ("", r"\footnotesize")), r"\clearpage",
+        ]  # fmt: skip
+    (tmp_path / "page.tex").write_text("\n".join([*page, r"\end{document}"]))
+    done = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "page.tex"],
+        cwd=tmp_path, capture_output=True, text=True, errors="replace", check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "Overfull" not in done.stdout
+    widths = re.findall(r"(\d) runs: ([\d.]+)pt of ([\d.]+)pt", done.stdout)
+    part = {int(count): float(line) / float(width) for count, width, line in widths}
+    assert part[1] == part[2] == pytest.approx(1.0, abs=1e-3)
+    assert 0.9 < part[4] < 1.0
+    assert part[9] < 0.6
 
 
 def test_latex_has_ratios_to_the_first_run_where_they_are_asked_for():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -27,10 +28,16 @@ NOTE = (
 DIGITS = 5  # of a number
 FEW = 3  # where there is room for the numbers alone
 PACKAGES = (
-    "% needs \\usepackage{booktabs,graphicx}; numbers stand in two columns each, cut at their point"
+    "% needs \\usepackage{booktabs,graphicx,tabularx}; numbers stand in two columns each, cut at "
+    "their point"
 )
-# As wide as it is, and scaled to the line where it is wider: in table* a line is the whole page.
-FITTED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
+# As wide as the line, in table* the page: words are broken, and all is smaller where numbers alone
+# are wider.
+FITTED = r"\resizebox{\linewidth}{!}{\setlength{\tabcolsep}{0.4em}%"
+SMALL = 2  # a number of this power of ten below 1, or of FEW above it, has more than FEW digits
+WORDS, BETWEEN, CHARACTER = 7.5, 0.8, 0.52  # em: least width of words, of a gap, of a character
+POWER = 5  # characters of a power of ten
+LABEL = 10  # characters; a longer label is broken at its underscores
 NUMBER = re.compile(r"(-?\d+)(\.\d+)?(?:e([+-]\d+))?")
 Names = Collection[str]
 
@@ -40,6 +47,14 @@ class Row(NamedTuple):
 
     metric: MetricAbout
     texts: list[str]
+
+
+class Scaled(NamedTuple):
+    """A row whose numbers are to be multiplied by a power of ten."""
+
+    metric: MetricAbout
+    texts: list[str]
+    power: int
 
 
 @dataclass(frozen=True)
@@ -240,24 +255,72 @@ def as_latex(
     frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
     *, chosen: Sequence[str] = (), ratios: bool = False,
 ) -> str:  # fmt: skip
-    """The table in LaTeX, no wider than the column, or in `table*` the page.
+    """The table in LaTeX, as wide as the column, or in `table*` the page.
 
     Symbols or words, numbers of FEW digits with their decimal points aligned, the best of a row in
     bold, ratios to the first run in brackets. Every number takes two columns, before and from its
     decimal point on.
     """
-    labels = (rf"\multicolumn{{2}}{{c}}{{{escaping.latex(label)}}}" for label in frame.columns)
-    lines = [" & ".join([*HEAD, *labels])]
-    for metric, texts in rows(
-        frame, known, unsettled, chosen=chosen, brief=True, ratios=ratios
-    ):  # fmt: skip
-        shown = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
+    shown = [
+        _of_a_power(row)
+        for row in rows(frame, known, unsettled, chosen=chosen, brief=True, ratios=ratios)
+    ]
+    heads = [_broken(label) for label in frame.columns]
+    lines = [[*HEAD, *(rf"\multicolumn{{2}}{{c}}{{{_stacked(head)}}}" for head in heads)]]
+    for metric, texts, power in shown:
+        words = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
         parts = [part for text in texts for part in _cut(text)]
-        lines.append(" & ".join([shown, quantities.raised(metric.unit), *parts]))
-    top, *body = (rf"{line} \\" for line in lines)
-    columns = "ll" + "r@{}l" * len(frame.columns)
-    opening = [PACKAGES, FITTED, rf"\begin{{tabular}}{{{columns}}}", r"\toprule", top, r"\midrule"]
-    return "\n".join([*opening, *body, r"\bottomrule", r"\end{tabular}}", ""])
+        unit = [rf"$10^{{{power}}}$"] if power else []
+        if not power or metric.unit != "1":
+            unit.append(quantities.raised(metric.unit))
+        lines.append([words, " ".join(unit), *parts])
+    top, *body = (" & ".join(cells) + r" \\" for cells in lines)
+    width = _least_width(heads, shown)
+    wide = rf"\ifdim\linewidth<{width:.1f}em {width:.1f}em\else\linewidth\fi"
+    columns = r"@{}>{\raggedright\arraybackslash}Xl" + "r@{}l" * len(heads) + "@{}"
+    opening = [PACKAGES, FITTED, rf"\begin{{tabularx}}{{{wide}}}{{{columns}}}", r"\toprule"]
+    return "\n".join([*opening, top, r"\midrule", *body, r"\bottomrule", r"\end{tabularx}}", ""])
+
+
+def _of_a_power(row: Row) -> Scaled:
+    """A row of large or small numbers as multiples of a power of ten, which its unit then has."""
+    numbers = [float(match[0]) for text in row.texts if (match := NUMBER.match(text))]
+    powers = [math.floor(math.log10(abs(number))) for number in numbers if number]
+    power = min(powers, default=0)
+    if (max(powers, default=0) > -SMALL and power < FEW) or max(powers) - power >= FEW:
+        return Scaled(*row, 0)
+    texts = [
+        NUMBER.sub(lambda own: _shown(float(own[0]) / 10.0**power, FEW), text, count=1)
+        for text in row.texts
+    ]
+    return Scaled(row.metric, texts, power)
+
+
+def _least_width(heads: Sequence[Sequence[str]], shown: Sequence[Scaled]) -> float:
+    """About what the columns take with words that are broken [em]."""
+    lengths = max((len(own.metric.unit) + POWER * bool(own.power) for own in shown), default=0)
+    for place, head in enumerate(heads):
+        sides = zip(*(_lengths(own.texts[place]) for own in shown), strict=True)
+        lengths += max(sum(map(max, sides)), *map(len, head))
+    return WORDS + BETWEEN * (1 + len(heads)) + CHARACTER * lengths
+
+
+def _lengths(text: str) -> tuple[int, int]:
+    """Characters of a number before and from its decimal point on, with its ratio."""
+    number, _, ratio = text.partition(" (")
+    whole, point, power = _parts(number.removesuffix("*"))
+    return len(whole), len(point) + POWER * bool(power) + len(ratio)
+
+
+def _broken(label: str) -> list[str]:
+    """A label in lines, broken behind underscores."""
+    lines = textwrap.wrap(label.replace("_", "_ "), LABEL, break_long_words=False)
+    return [line.replace("_ ", "_") for line in lines] or [label]
+
+
+def _stacked(lines: Sequence[str]) -> str:
+    stack = r"\\".join(map(escaping.latex, lines))
+    return rf"\shortstack{{{stack}}}" if len(lines) > 1 else stack
 
 
 def _cut(text: str) -> list[str]:
