@@ -94,7 +94,7 @@ def test_the_ends_of_runs_are_told():
     whole, lost, bare, apart = chase.chase(runs())["runs"]
     assert [run["ending"] for run in (whole, lost, bare)] == ["", "diverged at t = 40 s", ""]
     assert max(lost["x"]) == chase.FAR
-    assert "z_e" not in bare
+    assert bare["distance"] == []
     assert (whole["standoff"], apart["standoff"]) == (0.5, 0.0)
     cut = replace(recording(end=3.0), status="interrupted")
     assert chase.chase(shown(("a", cut)))["runs"][0]["ending"] == "interrupted at t = 3 s"
@@ -102,9 +102,16 @@ def test_the_ends_of_runs_are_told():
 
 def test_what_is_no_number_is_none():
     gaps = recording(z_e=lambda t: np.where(t < 5, np.nan, np.where(t < 6, np.inf, 1.0)))
-    distances = chase.chase(shown(("a", gaps)))["runs"][0]["z_e"]
+    distances = chase.chase(shown(("a", gaps)))["runs"][0]["distance"]
     assert (distances[0], distances[55], distances[-1]) == (None, chase.FAR, 1.0)
     assert "NaN" not in chase.as_json(chase.chase(shown(("a", gaps))))
+
+
+def test_on_legs_the_distance_is_that_from_the_path():
+    beside = recording(without=("z_e",), e_ct=lambda t: np.where(t < 5, -0.25, 0.5))
+    (run,) = chase.chase(shown(("a", beside)))["runs"]
+    assert (run["distance"][0], run["distance"][-1]) == (0.25, 0.5)
+    assert "x_d" not in run
 
 
 def test_runs_that_cannot_be_placed_have_no_animation():

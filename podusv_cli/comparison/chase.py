@@ -16,7 +16,8 @@ from podusv_cli.pages.page import environment
 
 FRAMES = 1000  # of a run, at most
 WHERE = ("x", "y", "psi")  # without these a run cannot be shown
-DIGITS = {"time": 4, "psi": 4, "z_e": 4}
+DIGITS = {"time": 4, "psi": 4}
+AWAY = ("z_e", "e_ct")  # the distance that is drawn: to the target, else from the active leg
 MILLIMETRES = 3  # digits of all others
 FAR = 1e9  # m; diverged runs end beyond any map
 
@@ -53,7 +54,8 @@ def as_json(content: dict[str, Any]) -> str:
 def _track(run: Shown) -> dict[str, Any]:
     count = len(run.recording["time"])
     rows = np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)
-    names = ("time", *WHERE, *(("x_d", "y_d", "z_e") if run.has("z_e") else ()))
+    names = ("time", *WHERE, *(("x_d", "y_d") if run.has("z_e") else ()))
+    away = next(filter(run.has, AWAY), None)
     legs = np.array(run.about.waypoints if run.about.follows else ())
     stopped = f"{run.recording.status} at t = {run.end:g} s"
     return {
@@ -65,6 +67,7 @@ def _track(run: Shown) -> dict[str, Any]:
         "standoff": run.about.standoff,
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
         "legs": [_rounded(axis) for axis in legs.T],
+        "distance": _rounded(np.abs(run.signal(away)[rows]), MILLIMETRES + 1) if away else [],
         **{
             name: _rounded(run.signal(name)[rows], DIGITS.get(name, MILLIMETRES))
             for name in names

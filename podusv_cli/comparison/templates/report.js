@@ -88,12 +88,12 @@
     slider.value = now;
   };
 
-  const traced = runs.filter((run) => run.z_e), settled = traced.filter((run) => !run.ending);
-  const tops = (settled.length ? settled : traced).flatMap((run) => run.z_e).filter((z) => z !== null);
+  const traced = runs.filter((run) => run.distance.length), settled = traced.filter((run) => !run.ending);
+  const tops = (settled.length ? settled : traced).flatMap((run) => run.distance).filter((z) => z !== null);
   const high = Math.ceil(Math.log10(Math.max(10 * LOW, tops.reduce((a, b) => Math.max(a, b), 0))));
-  const low = Math.max(Math.log10(LOW), Math.floor(Math.log10(Math.max(LOW, tops.reduce((a, b) => Math.min(a, Math.abs(b)), Infinity)))));
+  const low = Math.max(Math.log10(LOW), Math.floor(Math.log10(Math.max(LOW, tops.reduce((a, b) => Math.min(a, b), Infinity)))));
   const across = (t) => LEFT + (wide - LEFT - RIGHT) * t / end;
-  const up = (z) => TOP + (tall - TOP - BASE) * (high - Math.log10(Math.min(Math.max(Math.abs(z), LOW), 10 ** (high + 1)))) / (high - low);
+  const up = (z) => TOP + (tall - TOP - BASE) * (high - Math.log10(Math.min(Math.max(z, LOW), 10 ** (high + 1)))) / (high - low);
   let cursor;
   const drawTrace = () => {
     wide = Math.max(200, trace.clientWidth);
@@ -105,7 +105,7 @@
     }
     const clip = make(make(trace, "clipPath", { id: "inside" }), "rect", { x: LEFT, y: TOP, width: Math.max(0, wide - LEFT - RIGHT), height: tall - TOP - BASE });
     const inside = make(trace, "g", { "clip-path": "url(#inside)", fill: "none" });
-    for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.z_e.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
+    for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.distance.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
     const tick = round(Math.max(end / 5, 110 * end / wide));
     for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: tall - 5, "text-anchor": "middle" }, `${+(i * tick).toPrecision(6)} s`);
     cursor = make(trace, "path", { class: "cursor" });
@@ -121,7 +121,7 @@
     height = Math.round(Math.min(Math.max(width / ratio, LEAST_MAP), most));
     set(map, "viewBox", `0 0 ${width} ${height}`);
     set(map, "style", `width: ${width}px; height: ${height}px`);
-    tall = aside ? Math.max(LOWEST, Math.min(height - BELOW, 300)) : LOWEST;
+    tall = aside ? Math.max(LOWEST, height - BELOW) : LOWEST;
     drawTrace();
     draw();
   };
