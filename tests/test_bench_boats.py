@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, Selection, cases
 from podusv_cli.studies.bench.page import as_markdown
 from podusv_cli.studies.bench.runs import play
@@ -108,6 +109,14 @@ def test_what_is_tuned_on_the_water_is_so_in_every_condition(vessel: str) -> Non
         )
         for law in ("ardupilot", "ardupilot_l1", "px4"):
             assert case.laws[law].controller == calm.laws[law].controller
+
+
+def test_the_scenario_to_begin_with_has_the_bench_s_laws() -> None:
+    """Of the Otter: the same numbers under the same names."""
+    (case,) = chosen(vessels="otter", tasks="reach", conditions="calm")
+    alone = load(ROOT / "configs/laws/autopilots.yaml").scenario.singles()
+    for law in ("ardupilot", "ardupilot_l1", "ardupilot_firmware", "px4", "px4_r1"):
+        assert alone[law].controller == case.laws[law].controller
 
 
 @pytest.mark.parametrize("vessel", LENGTHS)
