@@ -12,6 +12,7 @@ from study_samples import claim, judged, study
 from test_report_chase import WIDTHS, browsed, needs_browser
 
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.pages.page import environment
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
 from podusv_cli.studies.telling import bars, figures, outputs, report
@@ -162,6 +163,16 @@ def test_no_figures_are_drawn_where_none_are_wanted(drawn, tmp_path):
     sweep.report(folder, sweep.Request(figures=False))
     assert not list((folder / "figures").iterdir())
     assert "<figcaption>" not in (folder / "report.html").read_text()
+
+
+def test_a_table_of_cells_has_the_whole_page_and_its_keys_break_after_dots(whole):
+    """Beside a figure it was cut behind its second number at 1920 pixels."""
+    plain = whole.results.without_verdicts("")
+    answer = section(tree(report.page(whole.folder, plain, [], [], [])), "answer")
+    assert "failed" in answer.all("table")[0].text
+    assert not answer.all("div", kind="answer")
+    label = environment("podusv_cli.studies").filters["label"]
+    assert label("a_b<c.d_e = 0.1") == "a_<wbr>b&lt;c.<wbr>d_<wbr>e = 0.1"
 
 
 def test_a_study_with_a_grid_has_figures_of_cells_and_of_the_grid(whole):

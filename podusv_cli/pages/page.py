@@ -85,10 +85,10 @@ def _number(text: object) -> str:
 
 
 def _label(text: object) -> str:
-    """A name of a run or law, which may break after its underscores."""
+    """A name of a run, law or key, which may break after its underscores and dots."""
     from markupsafe import Markup, escape  # with jinja2
 
-    return escape(lines(text)).replace("_", Markup("_<wbr>"))
+    return Markup(re.sub(r"_|\.(?=[A-Za-z])", r"\g<0><wbr>", str(escape(lines(text)))))
 
 
 def flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
