@@ -171,7 +171,7 @@ def test_a_table_of_cells_has_the_whole_page_and_its_keys_break_after_dots(whole
     answer = section(tree(report.page(whole.folder, plain, [], [], [])), "answer")
     assert "failed" in answer.all("table")[0].text
     assert not answer.all("div", kind="answer")
-    label = environment("podusv_cli.studies").filters["label"]
+    label = environment("podusv_cli.studies.telling").filters["label"]
     assert label("a_b<c.d_e = 0.1") == "a_<wbr>b&lt;c.<wbr>d_<wbr>e = 0.1"
 
 
