@@ -51,10 +51,13 @@ robust verdicts with values outside these ranges, so they were widened on 26 Nov
 all claims and before the numbers of this page were computed.
 
 A second reader, after that, searched 9 to 41 values of each of 13 robust verdicts at 15 to 81 \
-places, and between these by golden section. 11 stay. L9 turns for `start.u` of -0.0339 to \
+places, and between these by golden section. 11 stayed; L9 turned for `start.u` of -0.0339 to \
 -0.0345 m/s, and L12 for `start.y` of 6.16 to 6.19 m, `start.x` of 7.79 to 7.83 m: there the \
-start cancels the slowest mode. These windows are a hundredth of the ranges and less, and \
-`podusv doubt` passes over them.
+start cancels the slowest mode. So golden section now looks wherever a number of a claim comes \
+nearer to its limit, and a law that acts at every instant is tried at every 0.1 s, both decided \
+before the numbers of this page were computed. L9 and L12 came under conditions by it, as did \
+C9u and C13 (figures_compare), which were robust where they can tell; five verdicts that had been \
+under conditions became fragile.
 
 | claim | verdict | hangs on | in draws | nearest | of its scale | if the task may change |
 |---|---|---|---|---|---|---|
