@@ -177,7 +177,7 @@ TABLE: dict[str, list[Row]] = {
      "test_an_actuator_too_weak_is_told_and_falls_behind"),
     ("at.what == what and at.time < case.scenario.simulation.duration", "at.what == what",
      "test_what_comes_after_the_run_is_not_told"),
-    ("LONG = 0.02 ", "LONG = 0.2 ", "test_every_finding_is_documented_as_its_declaration_says"),
+    ("LONG = 0.02 ", "LONG = 0.2 ", "test_saturation_is_long_from_a_fiftieth_of_the_run"),
 ],
 "figures": [
     ("starts + bins.argmin(1), starts + bins.argmax(1)", "starts + bins.argmin(1)",
@@ -369,7 +369,18 @@ TABLE: dict[str, list[Row]] = {
      "t, tail(held, HELD_X), memory, tail(held, HELD_TARGET), k,",
      SURVIVES + "test_a_sampled_law_is_integrated_at_fourth_order_to_another_solution"),
 ],
+"doubt": [
+    ("for _ in range(LOOKS):", "for _ in range(0):",
+     "test_a_window_of_a_hundredth_of_the_range_is_found_by_the_number_that_falls"),
+    ("in zip([0.0, *places], places, places[1:], strict=False):",
+     "in zip([0.0, *sorted(side.trials)], sorted(side.trials), sorted(side.trials)[1:], strict=False):",
+     "test_many_claims_that_fall_at_one_place_look_there_once_each"),
+    ("while turned / held > SHARP:", "while turned / held > 2.0:",
+     "test_the_place_is_bracketed_however_near"),
+],
 "controllers": [
+    (", ROUTH_SHARE * routh_gain(p, at.d, eta, k))", ")",
+     "test_its_gain_leaves_routh_s_third_condition_a_margin_where_it_binds"),
     ("MOST * k.U and learns * more > 0.0", "MOST * k.U",
      "test_beyond_its_bound_it_learns_nothing_and_unlearns"),
     ("(k.k_ze * z_e + P - v * sin_e) / cos_e", "(k.k_ze * z_e + P + v * sin_e) / cos_e",

@@ -111,6 +111,15 @@ def test_long_saturation_is_told_with_its_times():
     assert told("saturated", "actuator={kind: saturated, surge_limit: 1e6, yaw_limit: 1e6}") == []
 
 
+def test_saturation_is_long_from_a_fiftieth_of_the_run():
+    quiet = log()
+    rows = len(quiet["time"])
+    for limited, found in ((rows // 50, 0), (rows // 50 + 1, 1)):
+        at_limit = np.where(np.arange(rows) < limited, 1.0, 0.0)
+        findings = postflight(scene().alone(), changed(quiet, saturated=at_limit))
+        assert [finding.code for finding in findings].count("saturated") == found
+
+
 def moving(u, v, r, **water):
     """Findings about the envelope of a hull that moves like this from 2 s to 3 s of 20 s."""
     out = log()
