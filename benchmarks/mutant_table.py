@@ -373,7 +373,7 @@ TABLE: dict[str, list[Row]] = {
     ("for _ in range(LOOKS):", "for _ in range(0):",
      "test_a_window_of_a_hundredth_of_the_range_is_found_by_the_number_that_falls"),
     ("in zip([0.0, *places], places, places[1:], strict=False):",
-     "in zip([0.0, *sorted(side.trials)], sorted(side.trials), sorted(side.trials)[1:], strict=False):",
+     "in zip([0.0, *(p := sorted(side.trials))], p, p[1:], strict=False):",
      "test_many_claims_that_fall_at_one_place_look_there_once_each"),
     ("while turned / held > SHARP:", "while turned / held > 2.0:",
      "test_the_place_is_bracketed_however_near"),
