@@ -16,6 +16,7 @@ from podusv_cli.doubt.judged import Judge, Judged, moved
 
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
 BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that turn and turn back
+SHOWING = (0.5, 1.0)  # of the range, where a number that changes none shows that it does not act
 LOOKS = 12  # steps of golden section: to a 300th of the way between two places
 STEEPER = 3.0  # times as steep as between the places may a number fall to its edge
 GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
@@ -34,7 +35,7 @@ class TriedValue:
 
 @dataclass(frozen=True)
 class Turn:
-    """Where a verdict turns: the nearest value that turns it, and the farthest before it.
+    """Where a verdict turns: the nearest value that turns it, and the last before that keeps it.
 
     `distance` is that of the value from the scenario's own; 0 for words.
     """
@@ -87,15 +88,17 @@ class TriedChoice:
         if not self.choice.range:
             return [Turn(self.choice, t.value, self.choice.own, 0.0) for t in turned]
         sides = ([t for t in turned if (t.value > self.choice.own) == up] for up in (True, False))
-        return [self._nearest(side) for side in sides if side]
+        holding = [
+            t.value for t in self.trials if t.judged.answers.get(claim) is base.answers[claim]
+        ]
+        return [self._nearest(side, holding) for side in sides if side]
 
-    def _nearest(self, turned: Sequence[TriedValue]) -> Turn:
+    def _nearest(self, turned: Sequence[TriedValue], holding: Sequence[float]) -> Turn:
         own = self.choice.own
         first = min(turned, key=lambda t: abs(t.value - own))
         inside = [
-            t.value for t in self.trials
-            if not t.judged.failed and (t.value > own) == (first.value > own)
-            and abs(t.value - own) < abs(first.value - own)
+            value for value in holding
+            if (value > own) == (first.value > own) and abs(value - own) < abs(first.value - own)
         ]  # fmt: skip
         held = max(inside, key=lambda value: abs(value - own), default=own)
         return Turn(self.choice, first.value, held, abs(first.value - own))
@@ -111,12 +114,13 @@ def explored(
         )
     sides = [_Side(choice, end, judge, base) for end in ends(choice)]
     acting = any(
-        _acts(side.tried(side.whole), claim, base) for side in sides for claim in base.answers
-    )
+        _acts(side.tried(share * side.whole), claim, base)
+        for side in sides for share in SHOWING for claim in base.answers
+    )  # fmt: skip
     for side in sides if acting else ():
         places = side.tried_between()
         for claim in base.answers:
-            for number in numbers.get(claim, ()):
+            for number in numbers[claim]:
                 _look_nearer(side, places, claim, number)
         for claim in base.answers:
             _bisect(side, claim)
@@ -169,12 +173,15 @@ def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumb
 
     It ends with a turn, or where the number would have to fall more steeply than it may.
     """
-    if any(side.turned(distance, claim) for distance in side.trials):
+    unknown = side.base.answers[claim] is None  # so that nothing can turn it
+    if unknown or any(side.turned(distance, claim) for distance in side.trials):
         return
+    edges = number.turning(side.base.numbers[claim])
 
     def away(distance: float) -> float:
         judged = side.tried(distance) if distance else side.base
-        return number.away(judged.numbers.get(claim, {}))
+        far = min(abs(number.of(judged.numbers.get(claim, {})) - edge) for edge in edges)
+        return far if math.isfinite(far) else math.inf
 
     for a, b, c in zip([0.0, *places], places, places[1:], strict=False):
         if away(a) > away(b) <= away(c) and away(b) < away(0.0):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,12 +20,14 @@ class ClaimNumber(NamedTuple):
     """A number of a claim, and where a comparison of it turns.
 
     It is compared with a limit; against another number it is the ratio of the two. `edges` are the
-    limit, or 1, as far as the claim's tolerance moves it; an equality has two.
+    limit, or 1, as far as the claim's tolerance moves it; an equality has two, and so has a strict
+    comparison, which cannot tell `between` them.
     """
 
     left: str
     right: str
     edges: tuple[float, ...]
+    between: bool = False
 
     @property
     def text(self) -> str:
@@ -47,13 +49,17 @@ class ClaimNumber(NamedTuple):
 
     def margin(self, numbers: Mapping[str, float], spread: Spread) -> float:
         """Its distance from the nearest edge, in half-widths of the spread; infinite at 0."""
-        low, _, high = spread
-        return self.away(numbers) / (0.5 * (high - low)) if high > low else math.inf
+        (low, _, high), number = spread, self.of(numbers)
+        away = min(abs(number - edge) for edge in self.edges)
+        return away / (0.5 * (high - low)) if high > low else math.inf
 
-    def away(self, numbers: Mapping[str, float]) -> float:
-        """Its distance from the nearest edge, in its own unit; infinite where it is missing."""
-        away = min(abs(self.of(numbers) - edge) for edge in self.edges)
-        return away if math.isfinite(away) else math.inf
+    def turning(self, base: Mapping[str, float]) -> tuple[float, ...]:
+        """The edges at which the comparison turns into the opposite of what it is at the base.
+
+        Those of an equality; of a strict comparison the one beyond which it can tell again.
+        """
+        own = self.of(base)
+        return (max(self.edges, key=lambda edge: abs(edge - own)),) if self.between else self.edges
 
 
 def compared(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
@@ -66,20 +72,25 @@ def compared(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
     return links or [ClaimNumber(ast.unparse(tree), "", (0.5,))]
 
 
-# By how many tolerances the right side may be larger or smaller where a comparison turns.
-SIDES: dict[type[ast.cmpop], tuple[float, ...]] = {
-    ast.Eq: (-1.0, 1.0), ast.LtE: (1.0,), ast.GtE: (-1.0,),
+# What the right side is times where a comparison turns, for a tolerance.
+SIDES: dict[type[ast.cmpop], Callable[[float], tuple[float, ...]]] = {
+    ast.Eq: lambda t: (1.0 - t, 1.0 + t), ast.LtE: lambda t: (1.0 + t,),
+    ast.GtE: lambda t: (1.0 - t,),
 }  # fmt: skip
 
 
+def _strictly(tolerance: float) -> tuple[float, ...]:
+    """Of `<` and `>`, which cannot tell within a tolerance of the larger number."""
+    return (1.0 - tolerance, 1.0 / (1.0 - tolerance)) if tolerance else (1.0,)
+
+
 def _link(left: ast.expr, right: ast.expr, sign: ast.cmpop, tolerance: float) -> ClaimNumber:
-    """The tolerance is that of the right side, as `docs/claims.md` has it."""
-    factors = tuple(1.0 + side * tolerance for side in SIDES.get(type(sign), (0.0,)))
+    factors, between = SIDES.get(type(sign), _strictly)(tolerance), type(sign) not in SIDES
     with suppress(ValueError):  # not a plain number
         limit = float(ast.literal_eval(right))
-        edges = (limit + (factor - 1.0) * abs(limit) for factor in factors)
-        return ClaimNumber(ast.unparse(left), "", tuple(edges))
+        edges = tuple(limit * f if between else limit + (f - 1.0) * abs(limit) for f in factors)
+        return ClaimNumber(ast.unparse(left), "", edges, between)
     with suppress(ValueError):
         limit = float(ast.literal_eval(left))
-        return ClaimNumber(ast.unparse(right), "", tuple(limit / factor for factor in factors))
-    return ClaimNumber(ast.unparse(left), ast.unparse(right), factors)
+        return ClaimNumber(ast.unparse(right), "", tuple(limit / f for f in factors), between)
+    return ClaimNumber(ast.unparse(left), ast.unparse(right), factors, between)
