@@ -164,6 +164,28 @@ def test_the_wind_of_the_comment_comes_from_where_it_says(podusv):
     assert abs(run["psi"][0]) < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("more", "X_u", "X_uu"),
+    [
+        ((), "time constant of L seconds, as MSS has it", "full thrust gives top speed"),
+        # m + 6.45 kg over 4.9 s would ask for 38.1 kg/s, 490 N at 12.9 m/s: more than 360 N.
+        (("--speed", "25kn"), "full thrust gives top speed", "X_u takes all of the thrust"),
+    ],
+)
+def test_the_comments_of_drag_say_where_its_numbers_come_from(podusv, more, X_u, X_uu):
+    podusv("start", "boat", *BOAT, *more)
+    lines = {x.split(":")[0].strip(): x.strip() for x in Path("boat.yaml").read_text().splitlines()}
+    if more:
+        drag = -360.0 / (25.0 * 1852.0 / 3600.0)
+        assert lines["X_u"] == f"X_u: {drag:.3g} # kg/s, estimated: {X_u}"
+        assert lines["X_uu"] == f"X_uu: 0 # kg/m, estimated: {X_uu}"
+    assert (lines["X_u"].endswith(X_u), lines["X_uu"].endswith(X_uu)) == (True, True)
+
+
+def test_a_thruster_turns_to_90_degrees(podusv):
+    assert podusv("start", "boat", *BOAT, "--turn", "90deg").code == 0
+
+
 def test_units_are_those_of_scenarios(podusv):
     podusv("start", "boat", *BOATS["with units"])
     scenario = load("boat.yaml").scenario
@@ -188,8 +210,17 @@ def test_units_are_those_of_scenarios(podusv):
          "(units here: kg, g, t, lb)"),
         ((*BOAT, "--mass", "18t"), "18000 kg would make hulls of 4.9 m by 2.4 m 3.06 m deep, "
          "deeper than they are wide; check length, beam and mass"),
-        ((*BOAT, "--hulls", "2", "--hull-beam", "1.5"), "two hulls of 1.5 m do not fit into a beam "
-         "of 2.4 m; give --hull-beam, or --hulls 1"),
+        ((*BOAT, "--hulls", "2", "--hull-beam", "1.5"), "two hulls of 1.5 m (--hull-beam 1.5) do "
+         "not fit into a beam of 2.4 m; check --length 4.9 and --beam 2.4, or give a smaller "
+         "--hull-beam or --hulls 1"),
+        ((*BOAT, "--hulls", "2", "--length", "320"), "two hulls of 32 m (a tenth of the length "
+         "each) do not fit into a beam of 2.4 m; check --length 320 and --beam 2.4, or give "
+         "--hull-beam or --hulls 1"),
+        ((*BOAT, "--length", "3,2"), "--length 3,2: is no number in m; write a point before "
+         "decimals (3.2), nothing between thousands"),
+        ((*BOAT, "--turn", "35"), "--turn 35: more than 90 deg to either side; write 35deg"),
+        ((*BOAT, "--turn", "100"), "--turn 100: more than 90 deg to either side"),
+        ((*BOAT, "--turn", "91deg"), "--turn 91deg: more than 90 deg to either side"),
         (("--preset", "oter"), "unknown boat 'oter'; did you mean 'otter'? (allowed: milliampere, "
          "otter, revolt, wamv)"),
         *(
@@ -242,6 +273,7 @@ def test_a_terminal_is_asked_for_what_is_missing(podusv, monkeypatch, hulls):
     [
         ({"--thrusters": "2x180N@1.3"}, "1.3 m from the centre line, beyond half the beam, 1.2 m"),
         ({"--hulls": "3"}, "less than or equal to 2"),
+        ({"--hulls": "0"}, "greater than or equal to 1"),
     ],
 )
 def test_what_no_boat_has_is_refused(podusv, changed, fault):

@@ -36,9 +36,9 @@ def start(
         ),
     ] = "",
     hulls: Annotated[
-        int,
-        typer.Option(min=0, max=2, help="1, or 2 of a catamaran.", show_default="1, or asked for"),
-    ] = 0,
+        int | None,
+        typer.Option(min=1, max=2, help="1, or 2 of a catamaran.", show_default="1, or asked for"),
+    ] = None,
     hull_beam: Annotated[
         str,
         typer.Option(help="Beam of one hull of a catamaran.", show_default="a tenth of the length"),
@@ -77,7 +77,7 @@ def start(
         if lacking and not sys.stdin.isatty():
             raise UsageError(f"give {', '.join(lacking)}, or --preset")
         asked = {option: text or typer.prompt(ASKED[option]) for option, text in given.items()}
-        if lacking and not hulls:
+        if lacking and hulls is None:
             hulls = typer.prompt("Hulls: 1, or 2 of a catamaran", default=1, type=int)
         boat = workflow.Boat(**asked, hulls=hulls or 1, hull_beam=hull_beam, speed=speed, turn=turn)
         written = workflow.start(boat, file)

@@ -30,6 +30,7 @@ RADIUS = 2.0  # boat lengths, of the turn that is left at full moment
 LEGS = (12.0, 8.0)  # boat lengths: the first and third leg, the second
 TIME = 1.6  # of that for the legs at the wanted speed
 HEIGHT = 0.1  # of what stands above the water, over the length
+TURN = 0.5 * math.pi  # the largest `angle_limit` of a pod
 AFT = 0.4  # of the length, that thrusters are behind the middle
 BESIDE = "path: {kind: line}\ndisturbance: {kind: none}\ncontroller: {kind: los_pid}\n"
 THRUSTERS = re.compile(r"(\d)\s*x\s*([^@]+)@\s*(.+)")
@@ -120,9 +121,11 @@ def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
             f"half the beam, {0.5 * hull.beam:g} m"
         )
     if boat.hulls > 1 and 2.0 * hull.narrow > hull.beam:
+        one = f"--hull-beam {boat.hull_beam}" if boat.hull_beam else "a tenth of the length each"
         raise UsageError(
-            f"two hulls of {hull.narrow:g} m do not fit into a beam of {hull.beam:g} m; give "
-            "--hull-beam, or --hulls 1"
+            f"two hulls of {hull.narrow:g} m ({one}) do not fit into a beam of {hull.beam:g} m; "
+            f"check --length {boat.length} and --beam {boat.beam}, or give "
+            f"{'a smaller --hull-beam' if boat.hull_beam else '--hull-beam'} or --hulls 1"
         )
     if hull.draught > hull.narrow:
         raise UsageError(
@@ -138,6 +141,9 @@ def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
     number = units.number(plain, unit) if isinstance(plain, str) else plain
     if number is None or isinstance(number, bool):
         wrong = units.misfit(text, unit) or "; write a number, with a unit if it is another one"
+        if "," in text:
+            dotted = text.replace(",", ".")
+            wrong = f"; write a point before decimals ({dotted}), nothing between thousands"
         raise UsageError(f"{option}: is no number in {unit}{wrong}")
     if not (0.0 < number < math.inf or (zero and number == 0.0)):
         raise UsageError(f"{option}: must be above 0 [{unit}]")
@@ -155,6 +161,10 @@ def _thrusters(boat: Boat) -> Thrusters:
         raise UsageError(
             f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
         )
+    if turn > TURN:
+        degrees = turn <= 90.0 and not units.parted(boat.turn)
+        way = f"; write {boat.turn}deg" if degrees else ""
+        raise UsageError(f"--turn {boat.turn}: more than 90 deg to either side{way}")
     if count == 1 and not turn:
         raise UsageError("a single thruster that does not turn cannot steer: give --turn 35deg")
     return made
@@ -204,6 +214,10 @@ WHY = {
     "N_r": "Clarke et al. (1983)",
     "N_rr": "cross-flow drag",
 }
+FAST = {  # where that time constant alone would ask for more than full thrust at top speed
+    "X_u": "full thrust gives top speed",
+    "X_uu": "X_u takes all of the thrust",
+}
 
 
 def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]:
@@ -214,9 +228,9 @@ def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]
     yield f"  length: {hull.length:g} # m"
     yield f"  beam: {hull.beam:g} # m"
     yield f"  m: {hull.mass:g} # kg"
-    for name in WHY:
+    for name, why in (WHY if numbers["X_uu"] else WHY | FAST).items():
         unit = unit_of(Vessel.model_fields[name])
-        yield f"  {name}: {numbers[name]:g} # {unit}, estimated: {WHY[name]}"
+        yield f"  {name}: {numbers[name]:g} # {unit}, estimated: {why}"
     front, side = (HEIGHT * hull.length * along for along in (hull.beam, hull.length))
     yield f"  windage: {{A_F: {front:.2g}, A_L: {side:.2g}}} # m2, a guess: 0.1 L high"
 
@@ -228,7 +242,7 @@ def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
     yield "  counts: parts"
     yield "  # x ahead, y to starboard of the middle [m]; rates, lags and thrust astern are guesses"
     yield "  pods:"
-    angle = f"angle_limit: {thrusters.turn:.4g}"
+    angle = f"angle_limit: {math.degrees(thrusters.turn):.4g} deg"
     if thrusters.turn:
         angle += ", angle_rate: 1.0, angle_lag: 0.2"
     for lever in thrusters.levers:

@@ -84,6 +84,8 @@ def estimated(hull: Hull) -> dict[str, float]:
       not depend on the beam in Clarke, Gedling and Hine (1983). Of two hulls yaw also moves each
       in surge.
     - `X_u`: a time constant of L seconds (clarke83.m of MSS); `X_uu`: full thrust gives top speed.
+      Where that `X_u` would need more than full thrust at top speed, it is thrust over speed, and
+      `X_uu` is 0.
     - `Y_v`, `N_r`: Clarke, Gedling and Hine (1983), regressions over model tests of ships, times
       the speed. What they have of coupling between sway and yaw is left out.
     - `Y_vv`, `N_rr`: cross-flow drag over the length with Hoerner's coefficient (Fossen 2021,
@@ -104,7 +106,7 @@ def estimated(hull: Hull) -> dict[str, float]:
         "Y_vdot": -sway,
         "N_rdot": -(sway * length**2 / 12.0 + surge * apart**2),
         "X_u": -min(linear, hull.thrust / top),
-        "X_uu": -rest / top**2,
+        "X_uu": -rest / top**2 if rest else 0.0,
         "Y_v": -lift * (1.0 + 0.4 * BLOCK * wide),
         "N_r": -lift * length**2 * max(0.25 + 0.039 * wide - 0.56 * beam / length, 0.05),
         "Y_vv": -drag,
