@@ -3,6 +3,7 @@
 import math
 import shutil
 from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import environment
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import files
+from podusv_cli.studies.counting import runs_file
 from podusv_cli.studies.telling import bars, figures, outputs, report
 from podusv_cli.workflows import sweep
 
@@ -115,6 +117,40 @@ def test_runs_that_ended_first_come_first(whole, monkeypatch):
     assert [(row.cell, row.draw) for row in first[:2]] == [(0, 2), (1, 4)]
     assert len(listed) == report.FIRST
     assert len(first) == report.FIRST // 2
+
+
+@pytest.mark.parametrize(
+    ("success", "missed"),
+    [
+        ("finished and iae <= 0.215", lambda iae, z: iae - 0.215),
+        ("finished and iae >= 0.24", lambda iae, z: 0.24 - iae),
+        ("finished and not 0.215 < iae", lambda iae, z: iae - 0.215),
+        ("z_e_steady >= 1e9 and finished", lambda iae, z: -z),
+    ],
+)
+def test_the_run_that_missed_success_by_most_comes_first_of_its_law(whole, success, missed):
+    runs = runs_file.Table(whole.folder / "runs.h5", success, whole.results.known)
+    listed = report.runs_that(replace(whole.results, runs=runs), runs.failed).first
+    for law in runs.laws:
+        by = np.where(
+            runs.failed(law), missed(runs.metric(law, "iae"), runs.metric(law, "z_e_steady")), -inf
+        )
+        most = np.argsort(-by, axis=None)[: min(runs.failed(law).sum(), report.FIRST // 2)]
+        assert len(most) > 2
+        places = [row.cell * runs.wanted + row.draw for row in listed if row.law == law]
+        assert places == most.tolist()
+
+
+def test_a_comparison_that_a_run_keeps_does_not_rank_it(whole):
+    """All keep the first, each by another margin; the second decides."""
+    success = "finished and iae < 1e3 and z_e_steady <= 0"
+    runs = runs_file.Table(whole.folder / "runs.h5", success, whole.results.known)
+    listed = report.runs_that(replace(whole.results, runs=runs), runs.failed).first
+    for law in runs.laws:
+        steady, of_law = runs.metric(law, "z_e_steady"), [row for row in listed if row.law == law]
+        missed = [steady[row.cell, row.draw] for row in of_law]
+        assert len(missed) > 2
+        assert missed == sorted(missed, reverse=True)
 
 
 @pytest.mark.parametrize("by_chance", [0.0, math.nan, 1.0])

@@ -10,8 +10,9 @@ the language.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -138,3 +139,23 @@ def succeeded(
     """Which runs of a law are a success; one is not where the condition is unknown."""
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
     return np.broadcast_to(held, np.shape(finished))
+
+
+def shortfalls(tree: ast.expr, runs: OfOneRun, kept: bool = True) -> Iterator[Vector]:
+    """By how much every run misses each comparison of a condition, in their order.
+
+    0 where it holds, infinite where what has to happen never did, NaN where a number is unknown.
+    `kept` is False within a `not`.
+    """
+    match tree:
+        case ast.BoolOp(values=parts):
+            for part in parts:
+                yield from shortfalls(part, runs, kept)
+        case ast.UnaryOp(operand=part):
+            yield from shortfalls(part, runs, not kept)
+        case ast.Compare(left=left, ops=signs, comparators=others):
+            sides = [np.broadcast_to(runs.side(s), runs.ended.shape) for s in (left, *others)]
+            for sign, (a, b) in zip(signs, pairwise(sides), strict=True):
+                smaller, larger = (a, b) if isinstance(sign, (ast.Lt, ast.LtE)) is kept else (b, a)
+                with np.errstate(invalid="ignore"):  # of two that never happened
+                    yield np.where(smaller <= larger, 0.0, smaller - larger)

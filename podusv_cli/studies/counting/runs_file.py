@@ -17,7 +17,7 @@ from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import hdf5
-from podusv_cli.studies.counting.expressions import parse_success, succeeded
+from podusv_cli.studies.counting.expressions import OfOneRun, parse_success, shortfalls, succeeded
 from podusv_cli.studies.counting.runs import (
     AXES,
     BROKEN,
@@ -130,14 +130,21 @@ class Table:
     def success(self, law: str) -> Mask:
         """Whether a run was a success. Kept, as all tables and claims ask again and again."""
         if law not in self._successes:
-            read = {name: self.metric(law, name) for name in self.asked}
-            successes = succeeded(self._success, read, self.finished(law), self._known)
+            successes = succeeded(self._success, self._read(law), self.finished(law), self._known)
             self._successes[law] = np.ascontiguousarray(successes)
         return self._successes[law]
 
     def failed(self, law: str) -> Mask:
         """Whether a run has a result and is no success."""
         return self.done(law) & ~self.success(law) & ~self.broken(law)
+
+    def missed(self, law: str) -> list[Vector]:
+        """By how much every run misses each comparison of success; see `shortfalls`."""
+        runs = OfOneRun(self._known, values=self._read(law), ended=self.finished(law))
+        return [*shortfalls(self._success, runs)]
+
+    def _read(self, law: str) -> dict[str, Vector]:
+        return {name: self.metric(law, name) for name in self.asked}
 
     @cached_property
     def asked(self) -> list[str]:

@@ -12,7 +12,8 @@ from podusv_cli.core.phrases import value_text
 from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Failure
-from podusv_cli.studies.counting.runs import STATUSES, Mask, worst
+from podusv_cli.studies.counting.runs import STATUSES, Mask
+from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.making.sessions import sessions
 from podusv_cli.studies.telling.bars import bars
@@ -98,7 +99,7 @@ def runs_that(results: Results, are: Any) -> Rows:
     places = sorted(
         (rank, place, cell, draw)
         for place, law in enumerate(runs.laws)
-        for rank, (cell, draw) in enumerate(_worst(results, law, masks[law])[:FIRST].tolist())
+        for rank, (cell, draw) in enumerate(_worst(runs, law, masks[law])[:FIRST].tolist())
     )[:FIRST]
     drawn = runs.drawn if places else {}
     rows = [
@@ -108,15 +109,12 @@ def runs_that(results: Results, are: Any) -> Rows:
     return Rows(rows, sum(int(mask.sum()) for mask in masks.values()))
 
 
-def _worst(results: Results, law: str, mask: Mask) -> Any:
+def _worst(runs: Table, law: str, mask: Mask) -> Any:
     """Cell and draw of runs: those that ended first, then those that missed success by most."""
-    runs, (cells, draws) = results.runs, np.nonzero(mask)
+    cells, draws = np.nonzero(mask)
     finished = runs.finished(law)[mask]
     until = np.where(finished, 0.0, runs.until(law)[mask])
-    none = np.zeros(len(draws), bool)
-    missed = [
-        -worst(results.known[name], runs.metric(law, name)[mask], none) for name in runs.asked
-    ]
+    missed = [-by[mask] for by in runs.missed(law)]
     order = np.lexsort((cells, draws, *reversed(missed), until, finished))
     return np.column_stack([cells, draws])[order]
 
