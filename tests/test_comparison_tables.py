@@ -6,13 +6,16 @@ import shutil
 import subprocess
 
 import pytest
+from command_samples import ROOT
 from comparison_samples import FRAME, Folder, about, scenario, verdicts
+from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.differences import as_text, differences
 from podusv_cli.comparison.entries import CHECKS, Entry, EntryWithoutLog
 from podusv_cli.core.about import BESIDE_RUNS
+from podusv_cli.figures.style import STYLES
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.windows import NAMED, named
 
@@ -204,6 +207,37 @@ def test_latex_fills_a_column_of_a_journal_and_nothing_is_overfull(tmp_path):
     assert part[1] == part[2] == pytest.approx(1.0, abs=1e-3)
     assert 0.9 < part[4] < 1.0
     assert part[9] < 0.6
+
+
+@pytest.mark.skipif(not shutil.which("pdflatex"), reason="needs pdflatex")
+@pytest.mark.parametrize(
+    ("style", "text", "between"),
+    [("ieee", "43pc", "1pc"), ("elsevier", "522pt", "18pt")],  # IEEEtran; elsarticle, 5p
+)
+def test_latex_lines_of_the_pages_fill_columns_of_these_classes(tmp_path, style, text, between):
+    """The lines of docs/check_a_paper.md, and that of docs/figures.md in two columns."""
+    page = (ROOT / "docs/check_a_paper.md").read_text()
+    packages, *lines = re.findall(r"^    (\\.*)$", page, re.M)
+    (wide,) = re.findall(r"`(\\includegraphics.*?)`", (ROOT / "docs/figures.md").read_text())
+    numbers = {"a": {"iae": 8.0, "iae_settled": 1.0}, "b": {"iae": 3.125, "iae_settled": 2.0}}
+    for place, columns in (("paper/errors", 1), ("errors", 2)):
+        file = tmp_path / f"{place}.pdf"
+        file.parent.mkdir(exist_ok=True)
+        figure = Figure(figsize=(STYLES[style].widths[columns], 1.0))
+        figure.savefig(file)
+    (tmp_path / "line").mkdir()
+    (tmp_path / "line/comparison.tex").write_text(table.as_latex(table.table(numbers)))
+    (tmp_path / "page.tex").write_text("\n".join([
+        rf"\documentclass[10pt,twocolumn]{{article}}{packages}",
+        rf"\usepackage[textwidth={text},columnsep={between}]{{geometry}}\begin{{document}}",
+        "Words.", *lines, rf"\begin{{figure*}}{wide}\end{{figure*}}", r"\end{document}",
+    ]))  # fmt: skip
+    done = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "page.tex"],
+        cwd=tmp_path, capture_output=True, text=True, errors="replace", check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "Overfull" not in done.stdout
 
 
 def test_latex_has_ratios_to_the_first_run_where_they_are_asked_for():

@@ -70,7 +70,7 @@ def legs_too_long(case: Case) -> Sentences:
 
 @warn_after_run(
     "never-arrives", about="path", meaning="legs are left at the end",
-    condition="the last waypoint is not reached by the end of the run",
+    condition="not all legs are done by the end of the run",
     remedy="simulate longer, take a larger acceptance radius, or path.switch: passed",
     needs=("leg", "e_ct", "along_leg"),
 )  # fmt: skip

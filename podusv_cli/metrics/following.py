@@ -83,9 +83,10 @@ e_ct_steady = Metric(
     words="steady cross-track error", headline=True,
 )  # fmt: skip
 path_time = Metric(
-    "path_time", "s", "time at which the last waypoint is reached", OF,
+    "path_time", "s", "time at which all legs are done, within `acceptance` of the last waypoint",
+    OF,
     lambda seen, step: float(seen[ARRIVED]) if seen[DONE] == 1.0 else math.nan,
-    place=1, happens=True, words="reached the last waypoint after", headline=True,
+    place=1, happens=True, words="all legs done after", headline=True,
 )  # fmt: skip
 path_done = Metric(
     "path_done", "1", "share of the legs that are done at the end", OF,
