@@ -19,7 +19,8 @@ from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.sketch import COLUMNS, Sketch
 
-KEPT, TURNED, RANGE = nth_style(0)[0], "#D55E00", "#BBBBBB"
+TURNED, RANGE = nth_style(1)[0], "#BBBBBB"
+MARKS = ((nth_style(0)[0], "."), (TURNED, "."), ("#444444", "x"))  # kept, turned, cannot tell
 LANES = 8  # the most choices below a curve
 ROW, LANE = 0.19, 0.3  # inches
 WIDE = 34  # letters of an axis' name on a line
@@ -56,19 +57,23 @@ def specification(report: DoubtReport, answer: Answer, acting: Sequence[TriedCho
     tried, name = report.tried, answer.verdict.name
     number = answer.number
     numbers = np.array([number.of(world.numbers.get(name, {})) for world in tried.worlds])
-    turned, _ = counted(name, tried.worlds, tried.base)
+    turned, known = counted(name, tried.worlds, tried.base)
     order = [i for i in np.argsort(numbers) if np.isfinite(numbers[i])]
     lanes = _lanes(report, answer, {a.choice.name for a in acting}, numbers[order], order)
     figure = new_figure(COLUMNS, 2.2 + LANE * len(lanes))
     top, below = figure.subplots(
         2, 1, sharex=True, gridspec_kw={"height_ratios": [2.2, LANE * len(lanes)]}
     )
-    for mask, colour, label in ((~turned, KEPT, "kept"), (turned, TURNED, "turned")):
+    told = "can tell" if answer.verdict.answer is None else "kept"
+    kinds = {told: known & ~turned, "turned": turned, "cannot tell": ~known}
+    for (label, mask), (colour, mark) in zip(kinds.items(), MARKS, strict=True):
         at = [x for x, i in enumerate(order) if mask[i]]
-        top.plot(at, numbers[[order[x] for x in at]], ".", color=colour, ms=3.0, label=label)
+        if not at:
+            continue
+        top.plot(at, numbers[[order[x] for x in at]], mark, color=colour, ms=3.0, label=label)
         for lane, column in enumerate(lanes):
             heights = lane + 0.1 + 0.8 * tried.draws.shares[[order[x] for x in at], column]
-            below.plot(at, heights, ".", color=colour, ms=1.6)
+            below.plot(at, heights, mark, color=colour, ms=1.6)
     own = number.of(answer.numbers)
     if math.isfinite(own):
         top.axhline(own, color="black", lw=0.8, ls=":", label="the scenario's own")
