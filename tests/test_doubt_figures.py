@@ -4,17 +4,21 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from podusv_cli.doubt import figures
-from podusv_cli.doubt.alone import TriedChoice
+from podusv_cli.doubt.alone import TriedChoice, Turn
 from podusv_cli.doubt.answer import Tried
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.compared import compared
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.ranges import Range
 from podusv_cli.doubt.together import Draws
+from podusv_cli.figures.style import house_style
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.sweep import Quantity
+from podusv_cli.studies.sketch import ON_PHONE
 
 
 def choice(name, own, unit):
@@ -62,3 +66,35 @@ def test_of_a_verdict_that_cannot_tell_no_draw_is_kept():
     assert {"can tell", "cannot tell"} < {*found}
     assert not {"kept", "turned"} & {*found}
     assert found["can tell"].get_ydata().tolist() == [3.0, 6.0]
+
+
+@pytest.mark.parametrize("width", [None, ON_PHONE])
+def test_where_a_verdict_turns_can_be_read_at_any_width(width):
+    """Inside the panel, and over no other text, bar or line."""
+    omega = choice("controllers.los_pid.omega_psi", 0.5, "rad/s")
+    inertia, psi = choice("vessel.N_rdot", -1234.0, "kg m2/rad"), choice("start.psi", 3.14, "rad")
+    answer = SimpleNamespace(
+        turns=(
+            Turn(omega, 0.357, 0.36, 0.143), Turn(omega, 0.881, 0.88, 0.381),
+            Turn(inertia, -1930.0, -1900.0, 696.0), Turn(inertia, -812.0, -815.0, 422.0),
+        ),
+        neighbours=(Turn(psi, 3.14 + 7e-6, 3.14, 7e-6),),
+    )  # fmt: skip
+    with house_style():
+        figure = figures.ranges(answer, [TriedChoice(c, ()) for c in (omega, inertia, psi)])
+        if width:
+            assert figure.narrow(width)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        (axes,) = figure.axes
+        boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
+        lines = [bar.get_window_extent(canvas.get_renderer()) for bar in axes.lines]
+    assert [text.get_text() for text in axes.texts] == [
+        "down from 0.357", "from 0.881", "from -812", "down from -1.93e+03", "+7e-06",
+    ]  # fmt: skip
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names[0] == "controllers.los_pid.omega_psi\n0.5 rad/s"
+    for place, box in enumerate(boxes):
+        assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1
+        assert axes.bbox.y0 <= box.y0 < box.y1 <= axes.bbox.y1
+        assert not any(box.overlaps(other) for other in (*boxes[:place], *lines))

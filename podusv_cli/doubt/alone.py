@@ -56,6 +56,11 @@ class Turn:
         return BY_SEED if self.choice.name.endswith("seed") else math.inf
 
     @property
+    def near(self) -> bool:
+        """Whether its distance says more than its value: beside the scenario's own, or from 0."""
+        return self.share < 0.01 or not self.choice.own
+
+    @property
     def by_rounding(self) -> bool:
         """Whether one unit in the last place turns it."""
         return self.distance > 0.0 and self.held == self.choice.own and self.share < NEAR

@@ -165,10 +165,15 @@ def place(turn: Turn) -> str:
     choice, unit = turn.choice, f" {turn.choice.unit}" if turn.choice.unit else ""
     if not choice.range:
         return f"{choice.name}: {as_yaml(turn.value)} ({as_yaml(choice.own)})"
-    if turn.share < 0.01 or not choice.own:
-        return f"{choice.name} {turn.value - choice.own:+.2g}{unit}"
-    way = "from" if turn.value > choice.own else "down from"
-    return f"{choice.name} {way} {turn.value:.3g}{unit} ({choice.own:.3g})"
+    own = "" if turn.near else f" ({choice.own:.3g})"
+    return f"{choice.name} {reached(turn)}{unit}{own}"
+
+
+def reached(turn: Turn) -> str:
+    """The number that turns a verdict, `down from 0.36`; near its own how far from it, `+7e-06`."""
+    if turn.near:
+        return f"{turn.value - turn.choice.own:+.2g}"
+    return f"{'from' if turn.value > turn.choice.own else 'down from'} {turn.value:.3g}"
 
 
 def as_json(answer: Answer) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.doubt.alone import TriedChoice, ends
-from podusv_cli.doubt.answer import Answer, DoubtReport, place
+from podusv_cli.doubt.answer import Answer, DoubtReport, reached
 from podusv_cli.doubt.together import counted
 from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.style import legend, new_figure
@@ -22,7 +22,7 @@ from podusv_cli.studies.sketch import COLUMNS, Sketch
 TURNED, RANGE = nth_style(1)[0], "#BBBBBB"
 MARKS = ((nth_style(0)[0], "."), (TURNED, "."), ("#444444", "x"))  # kept, turned, cannot tell
 LANES = 8  # the most choices below a curve
-ROW, LANE = 0.19, 0.3  # inches
+ROW, LANE = 0.3, 0.3  # inches
 WIDE = 34  # letters of an axis' name on a line
 
 
@@ -45,9 +45,10 @@ def sketches(report: DoubtReport) -> Iterator[Sketch]:
         if rows:
             yield Sketch(
                 f"ranges-{name}",
-                f"{name}: the ranges of the values that turn it, one at a time; where the verdict "
-                f"is another, the range is orange ({len(acting) - len(rows)} more numbers change "
-                "its number, and never the verdict)",
+                f"{name}: the ranges of the values that turn it, one at a time, each with the "
+                "scenario's own below its name; where the verdict is another, the range is orange "
+                f"({len(acting) - len(rows)} more numbers change its number, and never the "
+                "verdict)",
                 partial(ranges, answer, rows),
             )
 
@@ -120,11 +121,14 @@ def ranges(answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
                 at = side * turn.distance / abs(end - shown.choice.own)
                 axes.plot([at, side], [row, row], color=TURNED, lw=3.0, solid_capstyle="butt")
                 axes.annotate(
-                    escaping.figure(place(turn)), (side, row), (4 * side, 0), fontsize=5.5,
-                    textcoords="offset points", va="center", ha="left" if side > 0 else "right",
+                    escaping.figure(reached(turn)), (side, row), (0, 3), fontsize=5.5,
+                    textcoords="offset points", va="bottom", ha="right" if side > 0 else "left",
                 )  # fmt: skip
     axes.axvline(0.0, color="black", lw=0.8)
-    axes.set_yticks(range(len(rows)), [escaping.figure(a.choice.name) for a in rows], fontsize=5.5)
-    axes.set(xlim=(-3.2, 3.2), ylim=(len(rows) - 0.5, -0.5))
+    words = [(c.name, f"{c.own:.3g} {c.unit}".rstrip()) for c in (row.choice for row in rows)]
+    names = ["\n".join(map(escaping.figure, lines)) for lines in words]
+    axes.set_yticks(range(len(rows)), names, fontsize=5.5)
+    axes.set(xlim=(-1.1, 1.1), ylim=(len(rows) - 0.5, -0.7))
+    axes.grid(visible=False)
     axes.set_xticks([-1.0, 0.0, 1.0], ["lower end", "own value", "upper end"])
     return figure
