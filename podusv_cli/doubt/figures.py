@@ -23,6 +23,7 @@ TURNED, RANGE = nth_style(1)[0], "#BBBBBB"
 MARKS = ((nth_style(0)[0], "."), (TURNED, "."), ("#444444", "x"))  # kept, turned, cannot tell
 LANES = 8  # the most choices below a curve
 ROW, LANE = 0.3, 0.3  # inches
+SMALL = 6.5  # points; 8 pixels on a phone
 WIDE = 34  # letters of an axis' name on a line
 
 
@@ -121,13 +122,13 @@ def ranges(answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
                 at = side * turn.distance / abs(end - shown.choice.own)
                 axes.plot([at, side], [row, row], color=TURNED, lw=3.0, solid_capstyle="butt")
                 axes.annotate(
-                    escaping.figure(reached(turn)), (side, row), (0, 3), fontsize=5.5,
+                    escaping.figure(reached(turn)), (side, row), (0, 3), fontsize=SMALL,
                     textcoords="offset points", va="bottom", ha="right" if side > 0 else "left",
                 )  # fmt: skip
     axes.axvline(0.0, color="black", lw=0.8)
     words = [(c.name, f"{c.own:.3g} {c.unit}".rstrip()) for c in (row.choice for row in rows)]
     names = ["\n".join(map(escaping.figure, lines)) for lines in words]
-    axes.set_yticks(range(len(rows)), names, fontsize=5.5)
+    axes.set_yticks(range(len(rows)), names, fontsize=SMALL)
     axes.set(xlim=(-1.1, 1.1), ylim=(len(rows) - 0.5, -0.7))
     axes.grid(visible=False)
     axes.set_xticks([-1.0, 0.0, 1.0], ["lower end", "own value", "upper end"])
