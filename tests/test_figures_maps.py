@@ -1,6 +1,7 @@
 """The map of the tracks, by its data: positions, headings, limits, instants."""
 
 import io
+import re
 import shutil
 from dataclasses import replace
 from itertools import pairwise
@@ -27,6 +28,7 @@ from PIL import Image
 
 from podusv_cli.core.signal import Signal
 from podusv_cli.figures import animation
+from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.style import image
 from podusv_cli.figures.tracks import bounds
 from podusv_cli.figures.trajectory import enlargement, hull_of
@@ -224,18 +226,48 @@ def test_a_map_of_any_shape_has_equal_scales_and_fills_its_panel(wide, columns):
     assert max(east / np.ptp(whole.get_xlim()), north / np.ptp(whole.get_ylim())) > 0.75
 
 
-def test_along_legs_the_close_up_shows_where_a_run_is_farthest_from_its_path():
+def on_legs(**e_ct):
+    """Runs on legs with these distances from them over time, by their names."""
     legs = scenario(path="{kind: legs, points: [[0, 0], [20, 5], [35, -3]]}")
     about = {**ABOUT, "e_ct": Signal("e_ct", "m", "cross-track error")}
-    off = recording(e_ct=lambda t: 3.0 * gap(t, 60.0, 5.0))
-    near = recording(e_ct=lambda t: 0.1 + 9.0 * gap(t, 1.0, 2.0))  # in the approach
-    runs = shown(*(
-        (name, replace(log, about=about), legs) for name, log in (("near", near), ("off", off))
-    ))  # fmt: skip
+    logs = {name: recording(e_ct=law) for name, law in e_ct.items()}
+    return shown(*((name, replace(log, about=about), legs) for name, log in logs.items()))
+
+
+def test_along_legs_the_close_up_shows_where_a_run_is_farthest_from_its_path():
+    runs = on_legs(
+        near=lambda t: 0.1 + 9.0 * gap(t, 1.0, 2.0),  # in the approach
+        off=lambda t: 3.0 * gap(t, 60.0, 5.0),
+    )
+    off = runs[1].recording
     _, view, distance = drawn("trajectory", runs).axes
     assert title(view) == "(b) farthest from the path, t = 60 s"
     assert np.mean(view.get_xlim()) == pytest.approx(off["y"][600])
     assert [line.get_label() for line in distance.lines] == ["near", "off"]
+
+
+def test_the_caption_names_what_any_panel_may_show():
+    off = {"y": lambda t: np.sin(0.05 * t) + 4.0 * gap(t, 40.0, 5.0)}
+    still = changed(recording(), x_d=np.zeros(1001), y_d=np.zeros(1001))
+    cases = {
+        "apart": shown(("the first run", recording()), ("b", recording(**off))),
+        "alone": shown(("a", still)),
+        "on a path": on_legs(a=lambda t: 3.0 + 0.0 * t, b=lambda t: 2.0 + 0.0 * t),
+    }
+    shows = {}
+    for name, runs in cases.items():
+        titles = (title(axes).partition(" ")[2] for axes in drawn("trajectory", runs).axes)
+        shows[name] = [re.sub(r" \d+ times as large|, t = .*", "", words) for words in titles]
+    assert shows == {
+        "apart": ["hulls", "largest gap", "end", "from the first run"],
+        "alone": ["hulls to scale", "end", "from the target"],
+        "on a path": ["hulls", "farthest from the path", "from the path"],
+    }
+    caption = FIGURES["trajectory"].caption
+    assert all(words in caption for titles in shows.values() for words in titles)
+    path, other = re.search("on a path (.*?), else (.*?);", caption).groups()
+    assert "end" not in path
+    assert "end" in other
 
 
 def test_a_run_that_diverges_does_not_set_the_limits_of_the_map():

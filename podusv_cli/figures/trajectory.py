@@ -67,10 +67,12 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 
 @figure(
     "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
-    caption="tracks and target: on a map with hulls enlarged, and close up, with hulls to scale, "
-    "where the runs are farthest apart and at the end; how far each run is from the first at the "
-    "same time, or from its target or path; of tracks that coincide, the first is the broadest; x "
-    "marks where a run ended early",
+    caption="tracks and target or path, on a map, with hulls enlarged where its title says so, and "
+    "close up, with hulls to scale: on a path where a run is farthest from the path, else at the "
+    "end and, where runs were farther apart before, at their largest gap; curves are the distance "
+    "of each run from the path, of a run alone from the target, else from the first run at the "
+    "same time; of tracks that coincide, the first is the broadest; x marks where a run ended "
+    "early",
 )  # fmt: skip
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
