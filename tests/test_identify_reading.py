@@ -257,6 +257,12 @@ def test_the_command_lists_columns_without_a_scenario(podusv, tmp_path):
     assert listed["columns"][1]["unit"] == "deg"
     assert podusv("identify", "--columns", "none.csv").err == "none.csv: there is no such file\n"
     assert "CONFIG is missing" in podusv("identify").err
+    said = podusv("identify", "log.csv")
+    assert said.code == 2
+    assert said.err == (
+        "log.csv is a log; CONFIG is a scenario that names logs, as `podusv init identify/otter` "
+        "copies one. `podusv identify --columns log.csv` lists its columns\n"
+    )
 
 
 def test_what_is_guessed_of_a_ros_bag_can_be_pasted(tmp_path):

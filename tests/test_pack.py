@@ -400,7 +400,7 @@ def test_a_file_that_is_cut_off_or_no_archive_is_a_sentence(
         Path("bad.zip").write_bytes(bad)
         said = podusv("unpack", "bad.zip")
         assert said.code == 5
-        assert said.err.startswith("bad.zip is no")
+        assert said.err.startswith("bad.zip is no archive of podusv pack, or not all of one (")
         assert said.err.count("\n") == 1
     assert podusv("unpack", "none.zip").err == "cannot read none.zip: no such file or folder\n"
 

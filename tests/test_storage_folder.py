@@ -133,7 +133,7 @@ def test_files_that_others_put_into_a_run_folder_are_not_removed(final, name):
 def test_what_is_no_run_folder_is_never_replaced(final, force):
     final.mkdir(parents=True)
     (final / "thesis.tex").write_text("ten years")
-    with pytest.raises(StorageError, match="not a finished run folder"):
+    with pytest.raises(StorageError, match="not a finished run folder; name another folder with"):
         RunWriter(final, force=force)
     (final / "manifest.json").write_text('{"files": {}}')  # of some other program
     with pytest.raises(StorageError, match=re.escape(f"{final} exists")):

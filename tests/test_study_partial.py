@@ -82,6 +82,19 @@ def test_claims_on_sobol_points_are_refused(tmp_path):
     assert not (tmp_path / "study").exists()
 
 
+@pytest.mark.parametrize("more", [(), ("--force",)])
+def test_an_interrupt_before_there_is_a_study_says_how_to_go_on(podusv, tmp_path, monkeypatch, more):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    config = written(tmp_path / "small.yaml")
+    monkeypatch.setattr("podusv_cli.workflows.sweep.check_fits", interrupted)
+    said = podusv("sweep", "run", config, "--out", tmp_path / "study", *more)
+    assert said.code == 130
+    without = " without --force" if more else ""
+    assert said.err.endswith(f"interrupted; the same command{without} goes on\n")
+
+
 @pytest.mark.slow
 def test_sobol_points_have_no_intervals(podusv, tmp_path):
     success = "  success: finished and iae <= 0.215\n"

@@ -11,6 +11,7 @@ import typer
 from podusv_cli.cli import options
 from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
     from podusv_cli.identify.listing import Listing
@@ -65,9 +66,16 @@ def identify(
     if not config:
         raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
     from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.identify.formats import READERS
     from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
     from podusv_cli.workflows.run import Request
 
+    ending = Path(config).suffix.lower()
+    if ending and ending in READERS:
+        raise UsageError(
+            f"{config} is a log; CONFIG is a scenario that names logs, as `podusv init "
+            f"identify/otter` copies one. `podusv identify --columns {config}` lists its columns"
+        )
     warned = Warnings(quiet)
     request = Request(
         assign or (), out, force, figures, sys.argv, warned, False, plugin or (), trust=trust

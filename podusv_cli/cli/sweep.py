@@ -79,7 +79,11 @@ def run(
             changes, out, workers, sys.argv, plugin or (), figures, scheduler, trust,
             seconds(until), part_of(shard), force, line.say, line.warn,
         )  # fmt: skip
-        done = workflow.run(Path(config), request, line.tell)
+        try:
+            done = workflow.run(Path(config), request, line.tell)
+        except KeyboardInterrupt as stop:
+            again = f"the same command{' without --force' if force else ''} goes on"
+            raise KeyboardInterrupt(str(stop) or f"interrupted; {again}") from None
     for refused in done.refused:
         warn(refused)
     _tell(done, as_json=as_json, quiet=quiet)

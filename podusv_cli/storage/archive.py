@@ -171,6 +171,7 @@ def opened(path: Path) -> Iterator[Archive]:
         try:
             archive = zipfile.ZipFile(file)
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
-            raise StorageError(f"{path} is no archive of podusv pack ({error})") from error
+            text = f"{path} is no archive of podusv pack, or not all of one ({error})"
+            raise StorageError(text) from error
         with archive:
             yield Archive(path, archive)

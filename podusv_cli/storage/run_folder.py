@@ -164,7 +164,8 @@ def _check_replaceable(final: Path, force: bool) -> None:
         contents = manifest.read(final)
         foreign = manifest.foreign(final, contents)
     except StorageError as error:  # or another writer has just renamed it
-        raise Taken(f"{final} exists and is not a finished run folder") from error
+        text = f"{final} exists and is not a finished run folder; name another folder with --out"
+        raise Taken(text) from error
     if not force:
         raise Taken(f"{final} exists already; --force replaces it")
     shown = (name for name in foreign if not Path(name).name.startswith("."))
