@@ -83,7 +83,7 @@ def test_claims_on_sobol_points_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("more", [(), ("--force",)])
-def test_an_interrupt_before_there_is_a_study_says_how_to_go_on(podusv, tmp_path, monkeypatch, more):
+def test_an_early_interrupt_says_how_to_go_on(podusv, tmp_path, monkeypatch, more):
     def interrupted(*_):
         raise KeyboardInterrupt
 
