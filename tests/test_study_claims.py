@@ -147,6 +147,21 @@ def test_a_run_that_finished_without_success_is_failed_and_the_worst() -> None:
         assert judged(runs, f"{text} >= 0.5").parts[0].estimate == expected, text
 
 
+def test_a_failed_run_has_the_least_of_what_more_is_better_of() -> None:
+    """A share of legs done: infinite it would be the best."""
+    poor = {"a": np.arange(20) < 4}
+    iae = {"iae": np.ones(20)}
+    laws = {"a": {"path_done": np.ones(20), **iae}, "b": {"path_done": np.full(20, 0.5), **iae}}
+    for text, expected in {
+        "share(a.path_done > b.path_done)": 0.8, "share(a.path_done < b.path_done)": 0.2,
+        "share(a.path_done >= 1)": 0.8, "quantile(a.path_done, 0.1)": -inf,
+        "quantile(a.path_done, 0.3)": 1.0,
+    }.items():  # fmt: skip
+        assert judged(Made(laws, poor=poor), f"{text} >= 0.5").parts[0].estimate == expected, text
+    both = Made(laws, poor={law: np.arange(20) < 4 for law in laws})
+    assert judged(both, "share(a.path_done > b.path_done) >= 0.5").parts[0].estimate == 0.8
+
+
 def test_success_is_a_condition_on_one_run() -> None:
     tree = parse_success("finished and z_e_steady <= 1.5", METRICS)
     values = {"z_e_steady": np.array([1.0, 1.6, 1.0, nan])}

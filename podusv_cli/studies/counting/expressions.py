@@ -43,7 +43,7 @@ class OfRuns(Walk):
     def link(self, sign: ast.cmpop, left: ast.expr, a: Any, right: ast.expr, b: Any) -> Condition:
         """In which draws one side compares so with the next."""
         if np.ndim(a) and np.ndim(b):
-            failed = np.isposinf(a) & np.isposinf(b)
+            failed = np.isinf(a) & np.equal(a, b)
             self.both_failed.append(failed)
             wins = below(a, b, self.tolerance) | below(b, a, self.tolerance)
             self.close.append(~wins & ~failed & ~np.isnan(a) & ~np.isnan(b))
@@ -57,8 +57,11 @@ class OfRuns(Walk):
         return np.where(np.abs(values) > REAL, np.copysign(np.inf, values), values)
 
     def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
-        """A metric with FAILED in place of infinity."""
-        numbers = worst(self.metrics[name], values, failed)
+        """A metric with FAILED in place of infinity, or less than any where more is better."""
+        about = self.metrics[name]
+        if about.margin:
+            return np.where(failed, -FAILED, values)
+        numbers = worst(about, values, failed)
         return np.where(np.isposinf(numbers), FAILED, numbers)
 
 
