@@ -637,7 +637,7 @@ def test_the_event_nearest_to_a_window_is_named():
         ("lefeber_2003/line.yaml", "L6b", "knife's edge", "start.psi"),
         ("lefeber_2003/line.yaml", "L7", "robust", ""),
         ("lefeber_2003/circle.yaml", "L3", "robust", ""),
-        ("lefeber_2003/port.yaml", "L9", "robust", ""),
+        ("lefeber_2003/port.yaml", "L9", "under conditions", "start.u"),
         ("fossen_2003/course.yaml", "F1", "robust", ""),
         ("fossen_2003/course.yaml", "F2", "robust", ""),
         ("fossen_2003/course.yaml", "F4", "knife's edge", "start.y"),
