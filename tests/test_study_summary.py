@@ -80,6 +80,17 @@ def test_pairs_have_both_win_rates_and_the_median_ratio():
     assert len(pairs(study(a=a, b=b, c=a))) == 3
 
 
+def test_more_of_a_share_of_legs_wins_and_a_failed_run_has_the_least():
+    """In a failed run as in any other, however many legs it did."""
+    iae = {"iae": np.ones(20)}
+    laws = {"a": {"path_done": np.ones(20), **iae}, "b": {"path_done": np.full(20, 0.5), **iae}}
+    runs = Made(laws, poor={"a": np.arange(20) < 4})
+    entry = row(pairs(runs), metric="path_done")
+    assert (entry.a_wins, entry.b_wins, entry.ratio) == (0.8, 0.2, 2.0)
+    column = row(summary(runs), law="a", metric="path_done")
+    assert (column.q05, column.q50) == (-math.inf, 1.0)
+
+
 def test_sensitivity_finds_the_quantity_that_matters_and_ranks_failures_worst():
     random = np.random.default_rng(1)
     mass, noise = random.random((2, 300))

@@ -57,12 +57,9 @@ class OfRuns(Walk):
         return np.where(np.abs(values) > REAL, np.copysign(np.inf, values), values)
 
     def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
-        """A metric with FAILED in place of infinity, or less than any where more is better."""
-        about = self.metrics[name]
-        if about.margin:
-            return np.where(failed, -FAILED, values)
-        numbers = worst(about, values, failed)
-        return np.where(np.isposinf(numbers), FAILED, numbers)
+        """A metric with FAILED, of its sign, in place of infinity."""
+        numbers = worst(self.metrics[name], values, failed)
+        return np.where(np.isinf(numbers), np.copysign(FAILED, numbers), numbers)
 
 
 @dataclass

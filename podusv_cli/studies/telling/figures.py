@@ -383,7 +383,7 @@ def _share_curve(
 
 def _told(law: str, values: Vector) -> str:
     """The law as a legend tells it: how many of its runs failed, or have no number."""
-    failed, unknown = int(np.isposinf(values).sum()), int(np.isnan(values).sum())
+    failed, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
     counts = [f"{failed} of {len(values)} failed"] if failed else []
     counts += [f"{unknown} unknown"] if unknown else []
     return escaping.figure(law) + (f" ({', '.join(counts)})" if counts else "")

@@ -36,14 +36,15 @@ def pairs(
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
     Of the draws that both laws met. A win is a smaller metric by more than the margin, which is
-    relative. `names` are those of the runs' laws that are compared, by their names in the table; by
-    default all.
+    relative; a larger one where more is better. `names` are those of the runs' laws that are
+    compared, by their names in the table; by default all.
     """
     laws = names or {law: law for law in runs.laws}
     return [
         {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
-         **_pair(of_a[used], of_b[used], margin, level)}
-        for name in _names(runs, metrics) for cell in range(len(runs.cells))
+         **_pair(sign * of_a[used], sign * of_b[used], margin, level)}
+        for name in _names(runs, metrics) for sign in [-1.0 if metrics[name].margin else 1.0]
+        for cell in range(len(runs.cells))
         for read in [{a: column_of(runs, law, cell, metrics[name]) for a, law in laws.items()}]
         for a, b in combinations(laws, 2)
         for of_a, of_b in [(read[a], read[b])] if of_a is not None and of_b is not None
@@ -87,7 +88,7 @@ def _names(runs: StudyRuns, metrics: Known) -> list[str]:
 
 
 def column_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vector | None:
-    """A metric of every draw of a cell, +inf for a run that failed; None where the law has none.
+    """A metric of every draw of a cell, the `worst` for a run that failed; None where it has none.
 
     It has the metric where a run that succeeded has it, or where there is no such run.
     """
