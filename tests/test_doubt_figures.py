@@ -8,7 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from podusv_cli.doubt import figures
-from podusv_cli.doubt.alone import TriedChoice, Turn
+from podusv_cli.doubt.alone import TriedChoice, TriedValue, Turn, ends
 from podusv_cli.doubt.answer import Tried
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.compared import compared
@@ -68,20 +68,44 @@ def test_of_a_verdict_that_cannot_tell_no_draw_is_kept():
     assert found["can tell"].get_ydata().tolist() == [3.0, 6.0]
 
 
+BASE = judged(True, 3.9)
+
+
+def tried(of, answers):
+    """A choice with the answer on the claim at each value."""
+    return TriedChoice(of, tuple(TriedValue(v, judged(word, 3.9)) for v, word in answers.items()))
+
+
+def test_a_window_is_orange_as_far_as_it_was_seen_to_reach():
+    omega = choice("controllers.los_pid.omega_psi", 0.5, "rad/s")
+    low, high = sorted(ends(omega))
+    answers = {low: False, 0.4: None, 0.6: False, 0.62: False, 0.7: True, 1.0: False, high: True}
+    row = tried(omega, answers)
+    up = list(figures.turned_spans(row, high, "C", BASE))
+    assert up == [pytest.approx((0.1, 0.12)), pytest.approx((0.5, 0.5))]
+    assert list(figures.turned_spans(row, low, "C", BASE)) == [(-1.0, -1.0)]
+
+
 @pytest.mark.parametrize("width", [None, ON_PHONE])
 def test_where_a_verdict_turns_can_be_read_at_any_width(width):
     """Inside the panel, and over no other text, bar or line."""
     omega = choice("controllers.los_pid.omega_psi", 0.5, "rad/s")
     inertia, psi = choice("vessel.N_rdot", -1234.0, "kg m2/rad"), choice("start.psi", 3.14, "rad")
     answer = SimpleNamespace(
+        verdict=SimpleNamespace(name="C"),
         turns=(
             Turn(omega, 0.357, 0.36, 0.143), Turn(omega, 0.881, 0.88, 0.381),
             Turn(inertia, -1930.0, -1900.0, 696.0), Turn(inertia, -812.0, -815.0, 422.0),
         ),
         neighbours=(Turn(psi, 3.14 + 7e-6, 3.14, 7e-6),),
     )  # fmt: skip
+    turned = [(t.choice, t.value) for t in (*answer.turns, *answer.neighbours)]
+    rows = [
+        tried(c, dict.fromkeys([*ends(c), *(v for of, v in turned if of is c)], False))
+        for c in (omega, inertia, psi)
+    ]
     with house_style():
-        figure = figures.ranges(answer, [TriedChoice(c, ()) for c in (omega, inertia, psi)])
+        figure = figures.ranges(SimpleNamespace(tried=SimpleNamespace(base=BASE)), answer, rows)
         if width:
             assert figure.narrow(width)
         canvas = FigureCanvasAgg(figure)

@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import groupby
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,6 +15,7 @@ from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.doubt.alone import TriedChoice, ends
 from podusv_cli.doubt.answer import Answer, DoubtReport, reached
+from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import counted
 from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.style import legend, new_figure
@@ -47,10 +49,11 @@ def sketches(report: DoubtReport) -> Iterator[Sketch]:
             yield Sketch(
                 f"ranges-{name}",
                 f"{name}: the ranges of the values that turn it, one at a time, each with the "
-                "scenario's own below its name; where the verdict is another, the range is orange "
+                "scenario's own below its name; orange from the first to the last of neighbouring "
+                "values that were tried and turn it "
                 f"({len(acting) - len(rows)} more numbers change its number, and never the "
                 "verdict)",
-                partial(ranges, answer, rows),
+                partial(ranges, report, answer, rows),
             )
 
 
@@ -106,7 +109,7 @@ def _lanes(
     return list(dict.fromkeys([*first, *sorted(others, key=follows)]))[:LANES]
 
 
-def ranges(answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
+def ranges(report: DoubtReport, answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
     """The range of each choice, from its own value to both ends, and where the verdict turns."""
     turns = {
         (t.choice.name, t.value > t.choice.own): t for t in (*answer.turns, *answer.neighbours)
@@ -119,8 +122,8 @@ def ranges(answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
             side = math.copysign(1.0, end - shown.choice.own)
             turn = turns.get((shown.choice.name, end > shown.choice.own))
             if turn:
-                at = side * turn.distance / abs(end - shown.choice.own)
-                axes.plot([at, side], [row, row], color=TURNED, lw=3.0, solid_capstyle="butt")
+                for span in turned_spans(shown, end, answer.verdict.name, report.tried.base):
+                    axes.plot(span, [row, row], color=TURNED, lw=3.0, solid_capstyle="projecting")
                 axes.annotate(
                     escaping.figure(reached(turn)), (side, row), (0, 3), fontsize=SMALL,
                     textcoords="offset points", va="bottom", ha="right" if side > 0 else "left",
@@ -133,3 +136,19 @@ def ranges(answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
     axes.grid(visible=False)
     axes.set_xticks([-1.0, 0.0, 1.0], ["lower end", "own value", "upper end"])
     return figure
+
+
+def turned_spans(
+    shown: TriedChoice, end: float, claim: str, base: Judged
+) -> Iterator[tuple[float, float]]:
+    """First and last of neighbouring tried values that turn a claim, as parts of the way to an end.
+
+    The parts have the sign of the side; a value alone is both.
+    """
+    own = shown.choice.own
+    side = [t for t in shown.trials if (t.value > own) == (end > own)]
+    places = sorted((abs(t.value - own), t.judged.turned(claim, base)) for t in side)
+    for turned, run in groupby(places, key=lambda place: place[1]):
+        if turned:
+            at = [distance / abs(end - own) for distance, _ in run]
+            yield math.copysign(at[0], end - own), math.copysign(at[-1], end - own)
