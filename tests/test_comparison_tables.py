@@ -175,6 +175,18 @@ def test_latex_has_a_power_of_ten_once_where_all_numbers_of_a_row_have_nearly_th
     assert rows[METRICS["e_ct_max"].row] == ["$10^{3}$ m", r"\textbf{0}", "", "2", ".50"]
 
 
+def typeset(folder, lines):
+    """What pdflatex says of a page; no line of it is too wide."""
+    (folder / "page.tex").write_text("\n".join(lines))
+    done = subprocess.run(
+        ["pdflatex", "-interaction=nonstopmode", "page.tex"],
+        cwd=folder, capture_output=True, text=True, errors="replace", check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "Overfull" not in done.stdout
+    return done.stdout
+
+
 @pytest.mark.skipif(not shutil.which("pdflatex"), reason="needs pdflatex")
 def test_latex_fills_a_column_of_a_journal_and_nothing_is_overfull(tmp_path):
     """Type of 8 points, as IEEE's tables have it, for four runs at nine tenths of that or more."""
@@ -195,14 +207,8 @@ def test_latex_fills_a_column_of_a_journal_and_nothing_is_overfull(tmp_path):
             *(rf"\begin{{{n}}}{t}{given}\end{{{n}}}" for n in ("table", "table*")
               for t in ("", r"\footnotesize")), r"\clearpage",
         ]  # fmt: skip
-    (tmp_path / "page.tex").write_text("\n".join([*page, r"\end{document}"]))
-    done = subprocess.run(
-        ["pdflatex", "-interaction=nonstopmode", "page.tex"],
-        cwd=tmp_path, capture_output=True, text=True, errors="replace", check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-2000:]
-    assert "Overfull" not in done.stdout
-    widths = re.findall(r"(\d) runs: ([\d.]+)pt of ([\d.]+)pt", done.stdout)
+    said = typeset(tmp_path, [*page, r"\end{document}"])
+    widths = re.findall(r"(\d) runs: ([\d.]+)pt of ([\d.]+)pt", said)
     part = {int(count): float(line) / float(width) for count, width, line in widths}
     assert part[1] == part[2] == pytest.approx(1.0, abs=1e-3)
     assert 0.9 < part[4] < 1.0
@@ -227,17 +233,11 @@ def test_latex_lines_of_the_pages_fill_columns_of_these_classes(tmp_path, style,
         figure.savefig(file)
     (tmp_path / "line").mkdir()
     (tmp_path / "line/comparison.tex").write_text(table.as_latex(table.table(numbers)))
-    (tmp_path / "page.tex").write_text("\n".join([
+    typeset(tmp_path, [
         rf"\documentclass[10pt,twocolumn]{{article}}{packages}",
         rf"\usepackage[textwidth={text},columnsep={between}]{{geometry}}\begin{{document}}",
         "Words.", *lines, rf"\begin{{figure*}}{wide}\end{{figure*}}", r"\end{document}",
-    ]))  # fmt: skip
-    done = subprocess.run(
-        ["pdflatex", "-interaction=nonstopmode", "page.tex"],
-        cwd=tmp_path, capture_output=True, text=True, errors="replace", check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout[-2000:]
-    assert "Overfull" not in done.stdout
+    ])  # fmt: skip
 
 
 def test_latex_has_ratios_to_the_first_run_where_they_are_asked_for():
