@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 
 from podusv_cli.doubt import figures
 from podusv_cli.doubt.alone import TriedChoice, TriedValue, Turn, ends
@@ -84,6 +85,16 @@ def test_a_window_is_orange_as_far_as_it_was_seen_to_reach():
     up = list(figures.turned_spans(row, high, "C", BASE))
     assert up == [pytest.approx((0.1, 0.12)), pytest.approx((0.5, 0.5))]
     assert list(figures.turned_spans(row, low, "C", BASE)) == [(-1.0, -1.0)]
+    answer = SimpleNamespace(
+        verdict=SimpleNamespace(name="C"), neighbours=(), turns=(Turn(omega, 1.0, 0.7, 0.5),)
+    )  # fmt: skip
+    report = SimpleNamespace(tried=SimpleNamespace(base=BASE))
+    drawing = FigureCanvasAgg(figures.ranges(report, answer, [row]))
+    drawing.draw()
+    (axes,) = drawing.figure.axes
+    x, y = axes.transData.transform((0.5, 0.0)).round().astype(int)
+    pixel = np.asarray(drawing.buffer_rgba())[::-1][y, x, :3] / 255.0
+    assert pixel == pytest.approx(to_rgb(figures.TURNED), abs=0.1)  # though it is one value alone
 
 
 @pytest.mark.parametrize("width", [None, ON_PHONE])

@@ -123,7 +123,10 @@ def ranges(report: DoubtReport, answer: Answer, rows: Sequence[TriedChoice]) -> 
             turn = turns.get((shown.choice.name, end > shown.choice.own))
             if turn:
                 for span in turned_spans(shown, end, answer.verdict.name, report.tried.base):
-                    axes.plot(span, [row, row], color=TURNED, lw=3.0, solid_capstyle="projecting")
+                    axes.plot(
+                        span, [row, row], "|-", color=TURNED, lw=3.0, solid_capstyle="butt",
+                        ms=4.0, mew=1.2,
+                    )  # fmt: skip
                 axes.annotate(
                     escaping.figure(reached(turn)), (side, row), (0, 3), fontsize=SMALL,
                     textcoords="offset points", va="bottom", ha="right" if side > 0 else "left",
