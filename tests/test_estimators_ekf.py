@@ -40,7 +40,7 @@ def derivative(x: Vector, load: Vector, k: Any) -> Vector:
     c, s = np.cos(x[2]), np.sin(x[2])
     b = np.array([c * load[0] + s * load[1], c * load[1] - s * load[0], load[2]])
     f = np.full(54, np.nan)
-    slopes(x, b, c, s, k, f)
+    slopes(x, 0.0, 0.0, b, c, s, k, f)
     return np.vstack([f.reshape(6, N), np.zeros((3, N))])
 
 

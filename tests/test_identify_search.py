@@ -37,23 +37,6 @@ def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
     assert np.all(sd >= [0.99 * math.sqrt(variance / 401), 0.99 * math.sqrt(0.5 / 401)])
 
 
-@pytest.mark.parametrize("slope", [10.0, 1400.0])
-def test_jumps_of_the_filter_are_seen_and_a_sharp_valley_is_none(slope):
-    """-2 log of the posterior is (slope y)^2 + y^2, and jumps by 9 at a place."""
-
-    def search(jump):
-        def innovations(points):
-            nu = [[slope * y[0], 3.0 if jump < y[0] else 0.0] for y in points]
-            return np.transpose(nu), np.ones((2, len(points)))
-
-        return Search(innovations, 1, np.zeros(2, int), hull=1)
-
-    at = np.array([0.3])
-    assert search(jump=2.0).roughness(at) == 0.0
-    bend = 2.0 * (slope * slope + 1.0) * 1e-6
-    assert search(jump=0.3005).roughness(at) == pytest.approx(9.0 - 0.5 * bend, rel=1e-3)
-
-
 def test_an_interrupt_at_any_time_keeps_what_the_first_search_found():
     """At every call of the filter in the second search, the first of which no round protects."""
     z = np.random.default_rng(5).normal(0.7, 0.3, 40)

@@ -37,7 +37,6 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.identify.answer import AXES, SIDE, Answer
 from podusv_cli.identify.estimate import OPEN, directions, estimated, prior_kept
 from podusv_cli.identify.intake import logs_of
-from podusv_cli.identify.phrases import rough_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
 from podusv_cli.scenario.identify import Identify, LogFile
@@ -59,7 +58,7 @@ LASTING = 10.0  # s on the model ship: how long a gust's load lasts
 WANTED = Identify(logs=(LogFile(file="-"),))
 HEAD = (
     "sea", "hull", "gnss", "set", "what", "name", "truth", "value", "low", "high", "width", "off",
-    "holds", "determined", "settled", "rough",
+    "holds", "determined", "settled",
 )  # fmt: skip
 
 
@@ -204,9 +203,8 @@ def rows(cell: Cell) -> list[tuple[Any, ...]]:
         return []
     ways = directions(found.covariance, len(problem.hull))
     answer = Answer(problem, found, ways, (), ())
-    rough = bool(rough_words(answer))
     return [
-        (*cell, *row, found.settled, rough)
+        (*cell, *row, found.settled)
         for row in (*of_numbers(answer, true), *of_forces(answer, true))
     ]
 
@@ -249,18 +247,16 @@ def of_forces(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
 def summary(made: pd.DataFrame) -> pd.DataFrame:
     """Of each sea, hull and GNSS what the logs determine, and how it stands to the truth.
 
-    Without searches that did not settle, and those of which podusv says that the filter jumps.
+    Without searches that did not settle.
     """
-    made = made.assign(sound=made.settled & ~made.rough)
-    determined = made[made.determined & made.sound]
+    determined = made[made.determined & made.settled]
     by = determined.groupby(["sea", "hull", "gnss", "what"], sort=False)
     sets = made.groupby(["sea", "hull", "gnss", "what"], sort=False)
     return pd.DataFrame(
         {
             "sets": sets.set.nunique(),
             "settled": sets.apply(lambda cell: cell[cell.settled].set.nunique()),
-            "sound": sets.apply(lambda cell: cell[cell.sound].set.nunique()),
-            "determined": by.size(), "of": sets.sound.sum(), "held": by.holds.mean(),
+            "determined": by.size(), "of": sets.settled.sum(), "held": by.holds.mean(),
             "off_rms": by.off.apply(lambda off: float(np.sqrt(np.mean(off**2)))),
             "off_median": by.off.apply(lambda off: float(np.median(np.abs(off)))),
         }

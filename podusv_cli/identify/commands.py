@@ -10,11 +10,11 @@ from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.identify.reading import Table
 
-FINE = 0.5  # of the shortest lag, one step at most
+FINE = 0.2  # of the shortest lag, one step at most
 
 
 def acted(table: Table, actuator: Actuator) -> Table:
-    """The log with what the actuator did, where it has only the commands of it.
+    """The log with what the actuator did at its rows, where it has only the commands of it.
 
     Lags hang on no motion of the hull. What the log itself has of this stays.
     """
@@ -58,15 +58,3 @@ def _lagged(times: Vector, commands: Vector, actuator: Actuator) -> Vector:
             state = state + 0.5 * h * (first + second)
         states[row + 1] = state
     return states
-
-
-def later(table: Table, actuator: Actuator, delay: float) -> Table:
-    """The log with its commands acting so much later [s]."""
-    if not delay:
-        return table
-    at = np.searchsorted(table.times, table.times - delay + 1e-9, "right") - 1
-    moved = {
-        signal.name: held(table.columns[signal.name])[np.maximum(at, 0)]
-        for signal in actuator.replayed if signal.name in table.columns
-    }  # fmt: skip
-    return replace(table, columns={**table.columns, **moved})

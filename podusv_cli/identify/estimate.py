@@ -22,11 +22,7 @@ LONGEST = 1.0  # of a coordinate, in one step
 ROUNDS = 100
 DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)  # of the curvature, tried side by side
 STARTS, NEARER = 5, 0.5  # searches at most, and how far from the prior's centre they begin
-# The filter's slopes jump where v or r pass through 0 (|v| r), so -2 log of the posterior is rough
-# by about this much: two searches that differ by less have come to the same. It is little beside
-# 1 for each number.
-SETTLED = 2.0
-NEARBY = 1e-3  # of a coordinate: a step within which a smooth function hardly bends
+SETTLED = 0.5  # of -2 log of the posterior: two searches that differ by less came to the same
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 # Posterior over prior standard deviation of a direction: above OPEN the logs do not determine it,
 # above SILENT they say next to nothing of it, and it stays as it was.
@@ -66,31 +62,20 @@ class Search:
     """What is searched: `innovations` at points whose prior is normal, with covariance 1.
 
     `blocks` has the part of the logs that every delivered value belongs to. The first `hull`
-    coordinates are numbers of a hull.
+    coordinates are numbers of a hull. The second search begins at `second`, if there is one.
     """
 
     innovations: Innovations
     size: int
     blocks: Whole
     hull: int = 0
+    second: Vector | None = None
 
     def values(self, points: Sequence[Vector]) -> list[float]:
         """-2 log of the posterior at points; infinite where the filter breaks down."""
         with np.errstate(all="ignore"):
             nu, s = self.innovations(points)
         return [_value(nu[:, i], s[:, i], y) for i, y in enumerate(points)]
-
-    def roughness(self, y: Vector) -> float:
-        """How far -2 log of the posterior is from a parabola within NEARBY of a point.
-
-        Over the numbers of the hull, beyond half of what the parabola itself bends; a smooth one
-        has 0, one that jumps the jump.
-        """
-        steps = NEARBY * np.eye(self.size)[: self.hull]
-        middle, *sides = self.values([y, *(y + steps), *(y - steps)])
-        bends = np.reshape(sides, (2, -1)).sum(axis=0) - 2.0 * middle
-        expected = NEARBY**2 * np.diag(self.scored(y).curvature())[: self.hull]
-        return float((np.abs(bends - expected) - 0.5 * expected).max(initial=0.0))
 
     def scored(self, y: Vector) -> Scored:
         """Value, slopes and Fisher's matrix at a point."""
@@ -139,7 +124,7 @@ class Estimate:
 def estimated(
     search: Search, tell: Tell = lambda i, value: None, *, starts: int = STARTS
 ) -> Estimate:
-    """The best of several searches: from the prior's centre, then from draws of the prior.
+    """The best of several searches: from the prior's centre, `second`, then draws of the prior.
 
     They end when two have come to the same value. An interrupt leaves the best so far. Raises
     UsageError where the filter breaks down at the prior's centre.
@@ -150,6 +135,8 @@ def estimated(
     rng = np.random.Generator(np.random.PCG64(search.size))
     while len(found) < starts and not (found[-1].interrupted or _agree(found)):
         start = NEARER * rng.standard_normal(search.size)
+        if len(found) == 1 and search.second is not None:
+            start = search.second
         try:
             found.append(_estimated(search, start, tell))
         except KeyboardInterrupt:  # before its first round

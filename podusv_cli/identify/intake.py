@@ -13,11 +13,11 @@ import numpy as np
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.checks import checked
-from podusv_cli.identify.commands import acted, later
+from podusv_cli.identify.commands import acted
 from podusv_cli.identify.frames import LAT, LON
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.reading import CLOCK, Named, Table, table
-from podusv_cli.identify.records import FEWEST, POSE, Log, log_of
+from podusv_cli.identify.records import FEWEST, POSE, Log, complete, log_of
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
 
@@ -31,10 +31,11 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     signals = (*STATE, *actuator.replayed, *actuator.lagged)
     _all_taken(wanted.columns, {signal.name for signal in (*signals, CLOCK, LAT, LON)})
     whole = table(path, signals, Named(wanted.columns, wanted.frame), name=given.name)
-    part = acted(whole.part(*given.span) if given.span else whole, actuator)
-    log_of(part, actuator, wanted.step)  # says what is missing before anything else is looked at
-    part = replace(part, warnings=(*part.warnings, *checked(part, actuator)))
-    found = list(pieces(part))
+    part = whole.part(*given.span) if given.span else whole
+    at_rows = acted(part, actuator)
+    complete(at_rows, actuator)  # says what is missing before anything else is looked at
+    part = replace(part, warnings=(*part.warnings, *checked(at_rows, actuator)))
+    found = [acted(piece.finer(wanted.step), actuator) for piece in pieces(part)]
     longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
@@ -42,9 +43,8 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     if lines and given.role == "judge":  # what the whole log says must not help to predict it
         lines = [f"{line} A log for judging stays as it is without that." for line in lines]
         delay = 0.0
-    moved = [later(piece, actuator, delay) for piece in found]
-    moved[0] = replace(moved[0], warnings=(*moved[0].warnings, *lines))
-    return [log_of(piece, actuator, wanted.step) for piece in moved]
+    found[0] = replace(found[0], warnings=(*found[0].warnings, *lines))
+    return [log_of(piece, actuator, wanted.step, delay) for piece in found]
 
 
 def _all_taken(columns: Mapping[str, str], taken: Collection[str]) -> None:

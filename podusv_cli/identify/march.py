@@ -33,9 +33,10 @@ from podusv_cli.engine.step.layout import Function, shifted
 SIZE = N + PACKED + 2 * MOVING  # numbers of the filter's state
 STAGES = 4 * SIZE
 MOST_COMMANDS = 32  # of a row
-# A row of a record: how long it holds [s], in how many steps, what is delivered, its values, then
-# the commands, and how fast these change [1/s].
-HOLDS, STEPS, DELIVERED, VALUES, COMMANDS = 0, 1, 2, 2 + MOVING, 2 + 2 * MOVING
+# A row of a record: how long it holds [s], what is delivered, its values, then of each command its
+# mean over the row as it acts so many times APART [s] later.
+HOLDS, DELIVERED, VALUES, COMMANDS = 0, 1, 1 + MOVING, 1 + 2 * MOVING
+SHIFTS, APART = (-1.0, 0.0, 1.0), 0.1
 SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
 CURRENT = ("current_x", "current_y")  # m/s: how fast the water flows north and east
 DELAY = "delay"  # s: how much later than the log says its commands act
@@ -117,28 +118,30 @@ def filtered(
     """
     k = named(p)
     tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
-    at, since, inputs = 0, 0.0, (width - COMMANDS) // 2
+    at, since, inputs = 0, 0.0, (width - COMMANDS) // 3
+    late = k.delay / APART
     for row in range(count):
         line = tail(record, row * width)
         for i in range(N):
             track[apart * row + i] = state[i]
         at += corrected(line, since, state, k, tail(out, at))
-        for i in range(inputs):
-            commands[i] = line[COMMANDS + i] - k.delay * line[COMMANDS + inputs + i]
-        h = line[HOLDS] / line[STEPS]
-        since += line[HOLDS]
-        for _ in range(int(line[STEPS])):
-            shifted(SIZE, state, 0.0, state, y)
-            for stage in range(4):
-                rate = tail(stages, stage * SIZE)
-                loads(0.0, y, y, commands, actuator, table, tau, rate, rate)
-                for i in range(3):
-                    tau[i] *= k.thrust
-                follow(0.0, y, tau, y, p, table, rate)
-                shifted(SIZE, state, h if stage == 2 else 0.5 * h, rate, y)
-            for i in range(SIZE):
-                between = stages[SIZE + i] + stages[2 * SIZE + i]
-                state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
+        for i in range(inputs):  # the parabola through the three
+            shifts = tail(line, COMMANDS + 3 * i)
+            commands[i] = shifts[1] + 0.5 * late * (shifts[2] - shifts[0])
+            commands[i] += 0.5 * late * late * (shifts[2] - 2.0 * shifts[1] + shifts[0])
+        h = line[HOLDS]
+        since += h
+        shifted(SIZE, state, 0.0, state, y)
+        for stage in range(4):
+            rate = tail(stages, stage * SIZE)
+            loads(0.0, y, y, commands, actuator, table, tau, rate, rate)
+            for i in range(3):
+                tau[i] *= k.thrust
+            follow(0.0, y, tau, y, p, table, rate)
+            shifted(SIZE, state, h if stage == 2 else 0.5 * h, rate, y)
+        for i in range(SIZE):
+            between = stages[SIZE + i] + stages[2 * SIZE + i]
+            state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
 
 
 FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 3, *[PLAIN] * 7)

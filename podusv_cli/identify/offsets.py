@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 
 from podusv_cli.identify import estimate
-from podusv_cli.identify.commands import later
 from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.march import DELAY
 from podusv_cli.identify.problem import WALKS, Problem
@@ -128,8 +127,8 @@ class Clocks:
         """The filter along a log that is read so."""
         wanted, actuator = self.scenario.identify, self.scenario.actuator
         assert wanted is not None
-        read = later(_mirrored(self.part) if way.mirrored else self.part, actuator, way.delay)
-        return Problem(self.scenario, wanted, [log_of(read, actuator, wanted.step)])
+        read = _mirrored(self.part) if way.mirrored else self.part
+        return Problem(self.scenario, wanted, [log_of(read, actuator, wanted.step, way.delay)])
 
     def _valued(self, way: Way) -> Way:
         """With loads that hardly wander, so that the commands have to explain the motion."""

@@ -35,6 +35,8 @@ AXIS = {axis.name: axis for axis in AXES}
 OTHERS = {
     "m11": "kg", "m22": "kg", "m33": "kg m2", THRUST: "1", DELAY: "s",
     **dict.fromkeys(CURRENT, "m/s"),
+    "first u": "m/s", "first v": "m/s", "first load_x": "N", "first load_y": "N",
+    "first load_psi": "N m",
 }  # fmt: skip
 
 

@@ -19,7 +19,6 @@ MANOEUVRES = {
 SHOWN = 30.0  # s after the start of a free run
 WORSE = 1.2  # times the prior's error: what is no accident of one log
 FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
-ROUGH = 1.0  # of -2 log of the posterior: jumps that make intervals meaningless
 FINEST = 1.0  # %, since what an interval leaves out is hardly ever less
 MOST = 4  # directions that are named
 SHARE = 0.3  # of a direction, from which on a number is named
@@ -111,21 +110,6 @@ def worse_words(answer: Answer) -> list[str]:
         f"{name}: the vessel as it was given predicts this log better than the one from the logs; "
         "do not take that one before you know why (the logs determine too little, or disagree)"
         for name in names
-    ]
-
-
-def rough_words(answer: Answer) -> list[str]:
-    """A sentence where the filter jumps, as it does with positions that are coarse for the boat."""
-    problem, y = answer.problem, answer.estimate.y
-    jump = problem.search.roughness(y)
-    if not jump > ROUGH:
-        return []
-    sigma = problem.values(y).get("sigma_p", problem.filter.sigma_p)
-    return [
-        f"a hull that is a thousandth another makes the filter jump ({jump:.2g} in -2 log of the "
-        "posterior), so that the search may have ended beside the best hull, and the intervals are "
-        f"too narrow: positions known to {sigma:.2g} m are coarse for a "
-        f"boat of {problem.scenario.vessel.length:.3g} m; log a finer receiver's, or velocities"
     ]
 
 

@@ -42,9 +42,14 @@ FORCES = ("m", "I_z", *(n for n in COEFFICIENTS if n[:2] in DAMPING.values()))
 DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
+LOUD = 2.0  # of these deviations, of accelerations and loads, where a second search begins
 LEAST = -3.0  # of these deviations, of a sensor: a log without noise would make a singular filter
 CALM = 0.002  # m/s2/sqrt(Hz): accelerations that neither hull nor load explain, on the model ship
 AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at the start
+# What a log begins with: speed through the water, sway, loads. A filter that is unsure of them on
+# positions of 0.5 m begins with kicks of 1 m/s for a boat of 2 m, and what it makes of these
+# differs from one hull to the next, for all of the log; so they are looked for.
+FIRST = ("first u", "first v", "first load_x", "first load_y", "first load_psi")
 TURNED = 0.05  # rad, of the heading at the start
 FINEST = 1e-4  # of what a sensor measured, its least error
 FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
@@ -197,11 +202,12 @@ class Problem:
         guessed = [name for name in self._sensed if name not in self.wanted.noise]
         noises = [Number(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
         noises += [Number(n, getattr(self.filter, n), UNSURE) for n in WALKS]
-        currents = [
-            Number(f"{axis}, {log.name}", 0.0, self.current, ratio=False)
-            for log in self.logs for axis in (CURRENT if self.current else ())
+        own = {**dict.fromkeys(CURRENT if self.current else (), self.current), **self._first}
+        each = [
+            Number(f"{name}, {log.name}", 0.0, sd, ratio=False)
+            for log in self.logs for name, sd in own.items()
         ]  # fmt: skip
-        return [*self.hull, *noises, Number(DELAY, 0.0, self.wanted.step, ratio=False), *currents]
+        return [*self.hull, *noises, Number(DELAY, 0.0, self.wanted.step, ratio=False), *each]
 
     @cached_property
     def current(self) -> float:
@@ -213,6 +219,13 @@ class Problem:
     def sd(self) -> Vector:
         """Standard deviations of the hull's logarithms, before the logs are read."""
         return np.array([number.sd for number in self.hull])
+
+    @cached_property
+    def _first(self) -> dict[str, float]:
+        """Standard deviations of what a log begins with, about what is guessed of it."""
+        f, s = self.filter, self.facts.s
+        sizes = (AT_START[0] * s, AT_START[1] * s, f.sigma_b, f.sigma_b, f.sigma_b_psi)
+        return dict(zip(FIRST, sizes, strict=True))
 
     @cached_property
     def _base(self) -> dict[str, float]:
@@ -268,39 +281,42 @@ class Problem:
     def _follow(self) -> Follow:
         return side_by_side(self.scenario.actuator)
 
-    def start(self, log: Log, current: Sequence[float]) -> Vector:
-        """The filter's state at the beginning of a log, in the water's frame."""
+    def start(self, log: Log, current: Sequence[float], y: Vector | None = None) -> Vector:
+        """The filter's state at the beginning of a log, in the water's frame; that of a point."""
         state, (c, s) = log.state.copy(), (math.cos(log.state[2]), math.sin(log.state[2]))
         state[3] -= c * current[0] + s * current[1]
         state[4] -= c * current[1] - s * current[0]
         pose = max(self.filter.sigma_p, 1e-9) * 3.0
         speeds = np.array(AT_START) * [self.facts.s, self.facts.s, self.facts.s / self.facts.lam]
-        loads = [self.filter.sigma_b, self.filter.sigma_b, self.filter.sigma_b_psi]
+        loads, first = [*self._first.values()][2:], np.zeros(len(FIRST))
+        if y is not None:
+            values = self.values(y)
+            first = np.array([values[f"{name}, {log.name}"] for name in FIRST])
+            speeds[:2], loads = 0.0, [0.0] * 3
+        state[3:5] += first[:2]
         unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
-        return np.concatenate(
-            [state, np.zeros(N - MOVING), unsure[np.triu_indices(N)], np.zeros(2 * MOVING)]
-        )
+        return np.concatenate([state, first[2:], unsure[np.triu_indices(N)], np.zeros(2 * MOVING)])
 
     def followed(
         self, log: Log, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
     ) -> Followed:
         """The filter along a log, for every point, in the current of the point or another."""
         flows = currents or [self.currents(log, y) for y in points]
-        runs = self._runs(log, points, flows, tracked=True)
+        known = [None] * len(points) if currents else points
+        starts = [self.start(log, flow, y) for flow, y in zip(flows, known, strict=True)]
+        runs = self._runs(log, [*map(self.constants, points, flows)], starts, tracked=True)
         whole = Followed(*(np.concatenate(arrays, axis=-1) for arrays in zip(*runs, strict=True)))
         since = log.times - log.times[0]
         whole.track[:, :2] += since[:, None, None] * np.array(flows).T
         return whole
 
     def _runs(
-        self, log: Log, points: Sequence[Vector], flows: Sequence[Sequence[float]], *, tracked: bool
+        self, log: Log, constants: Sequence[Vector], starts: Sequence[Vector], *, tracked: bool
     ) -> Iterator[Followed]:
-        """The filter along a log for a few points after another, in currents [m/s]."""
-        for i in range(0, len(points), LANES):
+        """The filter along a log for a few constants and starts after another."""
+        for i in range(0, len(constants), LANES):
             part = slice(i, i + LANES)
-            constants = map(self.constants, points[part], flows[part])
-            starts = [self.start(log, flow) for flow in flows[part]]
-            yield self._follow(log.record, [*constants], starts, tracked)
+            yield self._follow(log.record, constants[part], starts[part], tracked)
 
     def innovations(self, points: Sequence[Vector]) -> tuple[Vector, Vector]:
         """Innovations and their variances of all logs, a row a value, a column a point.
@@ -311,10 +327,17 @@ class Problem:
         nu, s = (np.empty((ends[-1], len(points))) for _ in range(2))
 
         def fill(log: Log, begin: int, end: int) -> None:
-            flows, at = [self.currents(log, y) for y in points], 0
-            for run in self._runs(log, points, flows, tracked=False):
-                columns = slice(at, at := at + run.innovations.shape[1])
-                nu[begin:end, columns], s[begin:end, columns] = run.innovations, run.variances
+            flows = [self.currents(log, y) for y in points]
+            both = zip(points, flows, strict=True)
+            rows = [np.append(self.constants(y, f), self.start(log, f, y)) for y, f in both]
+            # What another log begins with changes nothing here.
+            each, of = np.unique(rows, axis=0, return_inverse=True)
+            constants, starts = each[:, : len(NAMES)], each[:, len(NAMES) :]
+            for i, run in enumerate(self._runs(log, constants, starts, tracked=False)):
+                for lane in range(run.innovations.shape[1]):
+                    columns = np.flatnonzero(of.ravel() == LANES * i + lane)
+                    nu[begin:end, columns] = run.innovations[:, lane, None]
+                    s[begin:end, columns] = run.variances[:, lane, None]
 
         with ThreadPoolExecutor(available_workers()) as pool:
             list(pool.map(fill, self.logs, ends[:-1], ends[1:]))
@@ -322,8 +345,12 @@ class Problem:
 
     @cached_property
     def search(self) -> Search:
-        """What is searched."""
-        return Search(self.innovations, len(self.numbers), self.blocks, len(self.hull))
+        """What is searched, the second time from a filter on that trusts its model little.
+
+        A hull far from the boat's explains a log badly, and one that is trusted is stuck there.
+        """
+        loud = np.array([LOUD * (number.name in WALKS) for number in self.numbers])
+        return Search(self.innovations, len(loud), self.blocks, len(self.hull), loud)
 
     @cached_property
     def blocks(self) -> Whole:

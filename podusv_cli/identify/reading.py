@@ -24,6 +24,7 @@ Marks = npt.NDArray[np.bool_]
 Whole = npt.NDArray[np.int64]
 CLOCK = Signal(TIME, "s", "time")
 SELDOM = 0.05  # of a sensor's values, that may come at another time than the others
+SLACK = 1e-5  # of a step, to which times of a date are true
 LISTED = 30  # columns that a message names
 # What logs have beside the units that people write: propellers in rad/s, positions as integers.
 OF_LOGS = {
@@ -59,6 +60,20 @@ class Table:
                 f"from {self.times[0]:.10g} to {self.times[-1]:.10g} s"
             )
         return self.where(inside)
+
+    def finer(self, longest: float) -> Table:
+        """With rows between its own, without any value, that are at most so far apart [s]."""
+        spans = np.diff(self.times)
+        parts = np.maximum(np.ceil(spans / longest - SLACK), 1.0).astype(int)
+        first = np.cumsum([0, *parts])
+        times = np.empty(first[-1] + 1)
+        times[first] = self.times
+        between = np.arange(len(times) - 1) - np.repeat(first[:-1], parts)
+        times[:-1] = np.repeat(self.times[:-1], parts) + between * np.repeat(spans / parts, parts)
+        columns = {name: np.full(len(times), np.nan) for name in self.columns}
+        for name, column in columns.items():
+            column[first] = self.columns[name]
+        return replace(self, times=times, columns=columns)
 
     def where(self, rows: Marks) -> Table:
         """These rows alone."""

@@ -11,10 +11,9 @@ from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.formats import LogFault
-from podusv_cli.identify.march import COMMANDS, DELIVERED, HOLDS, STEPS, VALUES, Record
-from podusv_cli.identify.reading import Marks, Table, Whole, delivered
+from podusv_cli.identify.march import APART, COMMANDS, DELIVERED, HOLDS, SHIFTS, VALUES, Record
+from podusv_cli.identify.reading import SLACK, Marks, Table, Whole, delivered
 
-SLACK = 1e-5  # of a step, to which times of a date are true
 BEGIN = 3.0  # s, from which the velocities at the start are guessed
 FEWEST = 20  # values of the position, or a log says nothing
 POSE = 3  # of the state's numbers, those without which nothing can be followed
@@ -53,24 +52,24 @@ class Log:
         return float(self.times[-1] - self.times[0])
 
 
-def log_of(table: Table, actuator: Actuator, step: float) -> Log:
-    """The log of a table, with at most `step` [s] from one evaluation of the filter to the next.
+def log_of(table: Table, actuator: Actuator, step: float, delay: float = 0.0) -> Log:
+    """The log of a table, with its commands acting so much later [s].
 
     A row stands where something is delivered, and otherwise every `step`; the commands of a row are
     the mean until the next. Raises LogFault where pose or commands are missing.
     """
+    complete(table, actuator)
+    table = table.finer(step)
     nothing = np.full(len(table.times), np.nan)
     new = np.column_stack([delivered(table.columns.get(s.name, nothing)) for s in STATE])
-    _complete(table, actuator, new)
     kept = _rows(table.times, np.any(new, axis=1), step)
-    rows = _record(table, actuator, new, kept)
-    rows[:, STEPS] = np.maximum(1.0, np.ceil(rows[:, HOLDS] / step - SLACK))
+    rows = _record(table, actuator, new, kept, delay)
     counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
     record, words = Record(rows, int(counts.sum())), (table.notes, table.warnings)
     return Log(table.name, table.times[kept], record, _state(table, new), counts, *words)
 
 
-def _complete(table: Table, actuator: Actuator, new: Marks) -> None:
+def complete(table: Table, actuator: Actuator) -> None:
     """Raises LogFault where pose or commands are missing."""
     needed = {s.name for s in (*STATE[:POSE], *actuator.replayed)} - {*actuator.zero_where_missing}
     if lacking := sorted(needed - table.columns.keys()):
@@ -78,17 +77,18 @@ def _complete(table: Table, actuator: Actuator, new: Marks) -> None:
             f"{table.name}: nothing is known of {', '.join(lacking)}; name the columns that have "
             "them under identify.columns, or choose the actuator whose commands the log has"
         )
-    if min(new[:, :POSE].sum(axis=0)) < FEWEST:
+    fewest = min(int(delivered(table.columns[s.name]).sum()) for s in STATE[:POSE])
+    if fewest < FEWEST:
         raise LogFault(
-            f"{table.name}: has {min(new[:, :POSE].sum(axis=0))} values of the pose, at least "
+            f"{table.name}: has {fewest} values of the pose, at least "
             f"{FEWEST} are needed; take a longer part of the log"
         )
 
 
-def _record(table: Table, actuator: Actuator, new: Marks, kept: Whole) -> Vector:
-    """The rows that are kept, but for the number of steps in each."""
+def _record(table: Table, actuator: Actuator, new: Marks, kept: Whole, delay: float) -> Vector:
+    """The rows that are kept."""
     commands, times = actuator.replayed, table.times[kept]
-    rows = np.zeros((len(kept), COMMANDS + 2 * len(commands)))
+    rows = np.zeros((len(kept), COMMANDS + len(SHIFTS) * len(commands)))
     rows[:-1, HOLDS] = np.diff(times)
     for i, signal in enumerate(STATE):
         if signal.name in table.columns:
@@ -97,9 +97,9 @@ def _record(table: Table, actuator: Actuator, new: Marks, kept: Whole) -> Vector
             rows[:, VALUES + i] = np.where(marks, table.columns[signal.name][kept], 0.0)
     for i, signal in enumerate(commands):
         if signal.name in table.columns:
-            held = _held(table.times, table.columns[signal.name], kept)
-            rows[:, COMMANDS + i] = held
-            rows[:, COMMANDS + len(commands) + i] = np.gradient(held, times)
+            for j, shift in enumerate(SHIFTS, COMMANDS + len(SHIFTS) * i):
+                at = times - delay - shift * APART
+                rows[:, j] = _means(at, table, signal.name, lagging=bool(actuator.lagged))
     return rows
 
 
@@ -107,22 +107,30 @@ def _rows(times: Vector, new: Marks, step: float) -> Whole:
     """The rows that are kept: those that deliver something, and one every `step` otherwise."""
     kept, last = [0], times[0]
     for i in range(1, len(times)):
-        if new[i] or times[i] - last >= step * (1.0 - SLACK) or i == len(times) - 1:
+        if i == len(times) - 1 or new[i] or times[i + 1] - last > step * (1.0 + SLACK):
             kept.append(i)
             last = times[i]
     return np.array(kept)
 
 
-def _held(times: Vector, values: Vector, kept: Whole) -> Vector:
-    """The mean from each row that is kept to the next; what is missing is as before."""
-    known = np.flatnonzero(np.isfinite(values))
-    if not len(known):
-        return np.zeros(len(kept))
-    last = np.maximum.accumulate(np.where(np.isfinite(values), np.arange(len(values)), known[0]))
-    whole = values[last]
-    spans = np.append(np.diff(times), 0.0)
-    sums, lengths = np.add.reduceat(whole * spans, kept), np.add.reduceat(spans, kept)
-    return np.where(lengths > 0.0, sums / np.where(lengths > 0.0, lengths, 1.0), whole[kept])
+def _means(at: Vector, table: Table, name: str, *, lagging: bool) -> Vector:
+    """The mean of a quantity from each of these times to the next.
+
+    What lags its command goes straight from value to value; all else stays until the next.
+    """
+    known = np.isfinite(table.columns[name])
+    if not known.any():
+        return np.zeros(len(at))
+    times, values = table.times[known], table.columns[name][known]
+    times, values = np.append(min(at[0], times[0]) - 1.0, times), np.append(values[0], values)
+    slopes, spans = np.zeros(len(times)), np.diff(times)
+    if lagging:
+        slopes[:-1] = np.diff(values) / spans
+    areas = np.cumsum(spans * (values[:-1] + 0.5 * slopes[:-1] * spans))
+    k = np.searchsorted(times, at, "right") - 1
+    since = at - times[k]
+    whole = np.append(0.0, areas)[k] + since * (values[k] + 0.5 * slopes[k] * since)
+    return np.append(np.diff(whole) / np.diff(at), values[k[-1]])
 
 
 def _state(table: Table, new: Marks) -> Vector:

@@ -15,7 +15,7 @@ from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
-from podusv_cli.identify.phrases import far_words, rough_words, thrust_words, worse_words
+from podusv_cli.identify.phrases import far_words, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
 from podusv_cli.process.extras import Extras
@@ -66,7 +66,6 @@ def identify_of(
             *(line for log, _ in logs for line in log.warnings),
             *thrust_words(answer),
             *far_words(answer),
-            *rough_words(answer),
             *worse_words(answer),
         )
         for line in warnings:

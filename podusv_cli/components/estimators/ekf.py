@@ -43,6 +43,7 @@ from podusv_cli.core.signal import Signal
 N = 9  # numbers that are estimated: pose, velocities, loads
 MOVING = 6  # of them, those that something known makes change
 PACKED = N * (N + 1) // 2
+OF_V, OF_R = N + 30, N + 35  # in the filter's state, the variances of v and r
 COVARIANCE = Signal(
     "P_est", "", "covariance of the estimate's errors and the loads', upper triangle by rows; each "
     "entry in the product of two units", "P", ("entry",),
@@ -224,7 +225,7 @@ class ExtendedKalmanFilter(Estimator):
         rate[6] = rate[7] = rate[8] = 0.0
         for i in range(N + PACKED, N + PACKED + 2 * MOVING):
             rate[i] = 0.0
-        slopes(state, b, cosine, sine, k, f)
+        slopes(state, state[OF_V], state[OF_R], b, cosine, sine, k, f)
         wanderings(k, q)
         spread(f, tail(state, N), q, tail(rate, N))
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
+
+import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel, scratch
 
@@ -10,25 +13,32 @@ WIDTH = 9  # columns: x, y, psi, u, v, r, then the load north, east, about the v
 
 
 @kernel
-def sign(x: float) -> float:
-    """1 or -1."""
+def sign(x: float, variance: float) -> float:
+    """The mean of the sign of a number that is known so well, to 0.02; 1 or -1 where it is exact.
+
+    For a normal error it is erf(x/sqrt(2 variance)); this has the same slope at 0.
+    """
+    if variance > 0.0:
+        return float(x / np.sqrt(x * x + 0.5 * math.pi * variance))
     return 1.0 if x >= 0.0 else -1.0
 
 
 @kernel
-def force_slopes(u: float, v: float, r: float, k: Any, s: Vector) -> None:
+def force_slopes(
+    u: float, v: float, r: float, unsure_v: float, unsure_r: float, k: Any, s: Vector
+) -> None:
     """Derivatives of (surge force, sway force, yaw moment) by (u, v, r), row by row."""
     s[0] = k.X_u + 2.0 * k.X_uu * abs(u) + 3.0 * k.X_uuu * u * u
     s[1] = k.coriolis * (k.m22 * r)
     s[2] = k.coriolis * (k.m22 * v + 2.0 * k.m23 * r)
     s[3] = -k.coriolis * (k.m11 * r)
-    s[4] = k.Y_v + 2.0 * k.Y_vv * abs(v) + k.Y_rv * abs(r) + k.Y_vr * sign(v) * r
-    s[5] = k.Y_rv * sign(r) * v + k.Y_r + k.Y_vr * abs(v) + 2.0 * k.Y_rr * abs(r)
+    s[4] = k.Y_v + 2.0 * k.Y_vv * abs(v) + k.Y_rv * abs(r) + k.Y_vr * sign(v, unsure_v) * r
+    s[5] = k.Y_rv * sign(r, unsure_r) * v + k.Y_r + k.Y_vr * abs(v) + 2.0 * k.Y_rr * abs(r)
     s[5] -= k.coriolis * (k.m11 * u)
     s[6] = k.coriolis * ((k.m11 - k.m22) * v - k.m23 * r)
-    s[7] = k.N_v + 2.0 * k.N_vv * abs(v) + k.N_rv * abs(r) + k.N_vr * sign(v) * r
+    s[7] = k.N_v + 2.0 * k.N_vv * abs(v) + k.N_rv * abs(r) + k.N_vr * sign(v, unsure_v) * r
     s[7] += k.coriolis * ((k.m11 - k.m22) * u)
-    s[8] = k.N_rv * sign(r) * v + k.N_r + k.N_vr * abs(v) + 2.0 * k.N_rr * abs(r)
+    s[8] = k.N_rv * sign(r, unsure_r) * v + k.N_r + k.N_vr * abs(v) + 2.0 * k.N_rr * abs(r)
     s[8] -= k.coriolis * (k.m23 * u)
 
 
@@ -42,10 +52,13 @@ def accelerated(column: int, surge: float, sway: float, yaw: float, k: Any, f: V
 
 
 @kernel
-def slopes(state: Vector, b: Vector, cosine: float, sine: float, k: Any, f: Vector) -> None:
+def slopes(
+    state: Vector, unsure_v: float, unsure_r: float, b: Vector, cosine: float, sine: float, k: Any,
+    f: Vector,
+) -> None:  # fmt: skip
     """Rows 0 to 5 of F: derivatives of the rates of (x, y, psi, u, v, r); b is in the body frame.
 
-    By the heading, R^T b has the derivative (b_v, -b_u, 0).
+    By the heading, R^T b has the derivative (b_v, -b_u, 0). `unsure` are variances of v and r.
     """
     u, v, r = state[3], state[4], state[5]
     s = scratch(9)
@@ -54,7 +67,7 @@ def slopes(state: Vector, b: Vector, cosine: float, sine: float, k: Any, f: Vect
     f[2], f[3], f[4] = -sine * u - cosine * v, cosine, -sine
     f[WIDTH + 2], f[WIDTH + 3], f[WIDTH + 4] = cosine * u - sine * v, sine, cosine
     f[2 * WIDTH + 5] = 1.0
-    force_slopes(u, v, r, k, s)
+    force_slopes(u, v, r, unsure_v, unsure_r, k, s)
     for i in range(3):
         accelerated(3 + i, s[i], s[3 + i], s[6 + i], k, f)
     accelerated(2, b[1], -b[0], 0.0, k, f)
