@@ -68,13 +68,15 @@ PRINTED_START = (-10.0, -10.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep what tests compile out of the user's cache; ask no speed of a property."""
-    unhurried = [HealthCheck.too_slow]
+    """Keep what tests compile out of the user's cache, in one that all checkouts share.
+
+    Its pieces are named by what they were made from, so a new clone finds those of another one.
+    """
+    unhurried = [HealthCheck.too_slow]  # no speed is asked of a property
     settings.register_profile("podusv", deadline=None, suppress_health_check=unhurried)
     settings.load_profile("podusv")
-    cache = getattr(config, "cache", None)  # absent under `-p no:cacheprovider`
-    if cache is not None:
-        os.environ.setdefault("PODUSV_CACHE", str(cache.mkdir("podusv")))
+    caches = File(os.environ.get("XDG_CACHE_HOME") or File.home() / ".cache")
+    os.environ.setdefault("PODUSV_CACHE", str(caches / "podusv-tests"))
 
 
 def vessel(name: str) -> Vessel:

@@ -19,11 +19,15 @@ from podusv_cli.studies.bench.standing import PLACE, leaderboard, table
 ROOT = Path(__file__).parents[1]
 BOATS = ROOT / "configs" / "bench_boats"
 RUNS = pd.read_csv(ROOT / "results" / "bench" / "boats.csv")
-BOARD = leaderboard(RUNS)
 PAGE, GUIDE = (
     " ".join((ROOT / name).read_text().split()) for name in ("results/bench.md", "docs/bench.md")
 )
 LENGTHS = {"otter": 2.0, "wamv": 4.9}
+
+
+@pytest.fixture(scope="module")
+def board() -> Any:
+    return leaderboard(RUNS)
 
 
 def chosen(overrides: tuple[str, ...] = (), **names: str) -> list[Any]:
@@ -50,7 +54,7 @@ def test_a_case_run_now_is_the_committed_one(vessel: str) -> None:
     np.testing.assert_allclose(fresh.iae, kept.iae, rtol=5e-6)  # six digits are kept
 
 
-def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
+def test_the_table_and_its_findings_are_those_of_the_runs(board: Any) -> None:
     assert as_markdown(RUNS) in (ROOT / "results" / "bench.md").read_text()
     failed = RUNS[RUNS.status != "finished"]
     counts = failed.groupby("law").size()
@@ -61,7 +65,7 @@ def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
     assert f"of these {len(of_them)} failures {(of_them.vessel == 'wamv').sum()} are on" in PAGE
     iae = RUNS.pivot_table("iae", PLACE, "law")
     better = (iae.momentum_vector < iae.ardupilot_l1).sum()
-    ratio = [f"{BOARD.median_ratio[law]:.2f}" for law in ("ardupilot_l1", "ardupilot")]
+    ratio = [f"{board.median_ratio[law]:.2f}" for law in ("ardupilot_l1", "ardupilot")]
     assert "at {} (L1) and {} (position controller) times the best law".format(*ratio) in PAGE
     assert f"`momentum_vector` is better than L1 in {better} of 48 cases" in PAGE
     ranks = RUNS.pivot_table("rank", "law", "condition")
@@ -73,7 +77,7 @@ def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
     gentle = leaderboard(RUNS[RUNS.task.isin(["reach", "zigzag"])]).median_ratio
     said = "L1 is at {:.2f} and the position controller at {:.2f} times the best law), slowing"
     assert said.format(gentle.ardupilot_l1, gentle.ardupilot) in PAGE
-    costs = BOARD.variation
+    costs = board.variation
     beside = sorted(costs[["momentum_vector", "velocity_vector", "alos", "ilos"]])
     assert costs.ardupilot == pytest.approx(costs.ardupilot_l1, rel=0.01)
     numbers = [f"{cost:.3g}" for cost in (costs.ardupilot_l1, costs.px4, beside[0], beside[-1])]
@@ -82,11 +86,11 @@ def test_the_table_and_its_findings_are_those_of_the_runs() -> None:
     windy = failed[(failed.law == "px4") & (failed.vessel == "wamv")]
     assert not windy.condition.isin(["calm", "current"]).any()
     assert f"On the WAM-V in wind it fails in {len(windy)} of 16 cases" in PAGE
-    assert f"({BOARD.median_ratio.los_pid:.2f} times the best), but fails nowhere" in PAGE
+    assert f"({board.median_ratio.los_pid:.2f} times the best), but fails nowhere" in PAGE
 
 
-def test_the_table_of_laws_for_boats_says_what_the_runs_say() -> None:
-    ratio, failed, costs = BOARD.median_ratio, BOARD.failed, BOARD.variation
+def test_the_table_of_laws_for_boats_says_what_the_runs_say(board: Any) -> None:
+    ratio, failed, costs = board.median_ratio, board.failed, board.variation
     assert not failed[["momentum_vector", "ardupilot_l1", "ardupilot", "los_pid"]].any()
     assert f"| {ratio.momentum_vector:.2f} times the best in the median, no failure in 48" in GUIDE
     own = [failed[f"{law}_firmware"] for law in ("ardupilot", "ardupilot_l1")]

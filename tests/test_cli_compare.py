@@ -251,7 +251,7 @@ def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, mo
     several = ", ".join(f"{label}: {{K_Pu: {i + 1.0}}}" for i, label in enumerate(labels))
     config = write("laws.yaml", f"{SHORT_BASE}controllers: {{{several}}}\n")
     on_a_terminal(monkeypatch)
-    out = podusv(config, "--out", "x", "--force").out
+    out = podusv(config, "--out", "x", "--force", "--no-figures").out
     assert max(map(len, out.splitlines())) <= 80
     table = out.partition("\n* best of those")[0].splitlines()
     if laws < 5:  # a column each
@@ -261,7 +261,7 @@ def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, mo
     else:  # a line each
         assert [line.split()[0] for line in table[-laws:]] == labels
         assert {len(line.split()) for line in table[-laws:]} == {6}
-    whole = podusv(config, "--out", "y", "-v").out
+    whole = podusv(config, "--out", "y", "-v", "--no-figures").out
     assert "squared surge force" in whole
     assert "squared" not in out
 
@@ -285,7 +285,7 @@ def test_a_metric_that_no_run_has_is_warned_of(podusv, monkeypatch, others, term
     if terminal:
         on_a_terminal(monkeypatch, 100)
     chosen = [word for name in ("path_done", *others) for word in ("--metric", name)]
-    said = podusv(config, "--out", "x", *chosen)
+    said = podusv(config, "--out", "x", "--no-figures", *chosen)
     assert said.code == 0
     assert "warning: no run here has path_done; tables are without it\n" in said.err
     assert "path_done" not in said.out

@@ -102,7 +102,9 @@ def test_the_command_draws_it_and_tells_the_numbers(podusv: Command):
     assert set(METRICS) <= rows.keys()
     assert float(rows["log_distance_rms"]["momentum"]) > 0.0
     assert rows["iae"]["LOG"] == ""
-    again = podusv("compare", "both/momentum", "LOG.csv", "--json", "--out", "third")
+    again = podusv(
+        "compare", "both/momentum", "LOG.csv", "--json", "--out", "third", "--no-figures"
+    )
     runs = json.loads(again.out)["runs"]
     assert [run["controller"] for run in runs] == ["momentum_vector", "measured"]
 
@@ -136,7 +138,7 @@ def test_recorded_commands_have_no_target_and_the_distance_to_the_log_is_the_hea
         "simulation: {duration: 7.9, step: 0.02}\nidentify: {columns: {x: north, y: east}}\n",
     )
     log("LOG.csv", "time,north,east,psi", [[0.0, 0.0, 3.0, 0.2], [7.0, 0.0, 3.0, 0.2]])
-    said = podusv("compare", "replay.yaml", "LOG.csv", "--out", "both", "--figure", "all")
+    said = podusv("compare", "replay.yaml", "LOG.csv", "--out", "both", "--figure", "trajectory")
     assert "warning" not in said.out + said.err
     run = p.open_run(Path("both/schedule"))
     with pytest.raises(KeyError, match="z_e"):

@@ -1,7 +1,7 @@
 """Figures by their data: which line shows which numbers, under which label, on which scale."""
 
 import math
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,8 @@ from podusv_cli.figures.style import STYLES, WIDTHS, Look, house_style, image, n
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.members import from_folder
+
+QUICK = ("errors", "trajectory", "pods", "adaptation")
 
 
 @pytest.fixture(scope="module")
@@ -207,12 +209,19 @@ def test_every_figure_is_as_wide_as_its_page_and_names_its_axes(two, name, colum
     assert any(axes.get_xlabel() for axes in figure.axes)
 
 
-@pytest.mark.parametrize("columns", [1, 2])
-@pytest.mark.parametrize("name", FIGURES)
+def pages(styles, quick):
+    """Every figure in these styles and both widths; but for the `quick` ones they are slow."""
+    return [
+        pytest.param(*page, marks=[pytest.mark.slow] * (not quick(*page)))
+        for page in product(FIGURES, styles, (1, 2))
+    ]
+
+
 @pytest.mark.parametrize(
-    ("style", "widths"), [("ieee", (88.9, 181.864)), ("elsevier", (90.0, 190.0))]
+    ("name", "style", "columns"),
+    pages(("ieee", "elsevier"), lambda name, style, columns: name in QUICK and style == "ieee"),
 )
-def test_type_can_be_read_at_the_widths_of_publishers(two, name, columns, style, widths):
+def test_type_can_be_read_at_the_widths_of_publishers(two, name, columns, style):
     if not FIGURES[name].fits(two):
         pytest.skip("the sample logs lack what this figure shows")
     look = Look(columns, style=STYLES[style])
@@ -220,15 +229,17 @@ def test_type_can_be_read_at_the_widths_of_publishers(two, name, columns, style,
         figure = look.given_to(FIGURES[name].family(two, columns))
         assert image(figure, "pdf")[:4] == b"%PDF"
         texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
+    widths = {"ieee": (88.9, 181.864), "elsevier": (90.0, 190.0)}[style]
     assert figure.get_size_inches()[0] * 25.4 == pytest.approx(widths[columns - 1])  # mm
     assert min(text.get_fontsize() for text in texts) >= 7.0
 
 
-@pytest.mark.parametrize("columns", [1, 2])
-@pytest.mark.parametrize("style", ["podusv", "ieee"])
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize(
+    ("name", "style", "columns"),
+    pages(("podusv", "ieee"), lambda name, style, columns: style == "podusv" and columns == 1),
+)
 def test_no_text_leaves_the_page_and_no_label_title_or_name_covers_another(
-    two, name, columns, style
+    two, name, style, columns
 ):
     if not FIGURES[name].fits(two):
         pytest.skip("the sample logs lack what this figure shows")
@@ -308,7 +319,6 @@ SCENARIO = SOUND.replace("kind: ideal", "kind: pod, preset: otter").replace("pid
     "{kind: none}", "[{kind: wind, speed: 1.0}, {kind: current, speed: 0.1}]"
 )  # fmt: skip
 SCENARIO += "measurement: {kind: sensors}\n"
-QUICK = ("errors", "trajectory", "pods")
 BRIEF = "name: x\nsimulation: {step: 0.01, duration: 0.1, compiled: false}\n"
 
 

@@ -210,7 +210,7 @@ PUSHED = np.repeat([10.0, 30.0, 50.0, 20.0], 100)  # N
 @pytest.mark.parametrize(
     ("push", "noise", "determined"),
     [
-        (PUSHED, (0.1, 0.02, 0.01), {"m11", "X_u"}),
+        pytest.param(PUSHED, (0.1, 0.02, 0.01), {"m11", "X_u"}, marks=pytest.mark.slow),
         (PUSHED, (0.0, 0.0, 0.0), {"m11", "X_u"}),  # as only simulators make it
         (STILL, (0.01, 0.005, 0.002), set()),  # moored
     ],

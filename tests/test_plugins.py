@@ -170,8 +170,8 @@ def test_a_run_of_before_is_looked_at_where_its_components_are_at_hand(podusv):
     shutil.move("laws/my_law.py", "own.py")
     pictures = []
     for folder in ("with", "without"):
-        said = podusv("plot", "c/pid", "c/soft", "--out", folder, "--plugin", "own.py")
-        assert said.code == 0
+        given = ("--out", folder, "--plugin", "own.py", "--figure", "errors")
+        assert podusv("plot", "c/pid", "c/soft", *given).code == 0
         pictures.append({path.name: path.read_bytes() for path in Path(folder).iterdir()})
         if folder == "with":
             without_about("c/pid")
@@ -187,7 +187,7 @@ def test_a_run_of_before_is_looked_at_where_its_components_are_at_hand(podusv):
         assert "unknown kind 'cross_track'" in said.err
         assert "podusv rerun c/soft --trust --out NEW" in one_line(said.err)
     Path("own.py").write_text(LAW + "\n")
-    assert podusv("plot", "c/soft", "--plugin", "own.py").code == 2
+    assert podusv("plot", "c/soft", "--plugin", "own.py", "--figure", "errors").code == 2
 
 
 def test_a_run_says_about_itself_what_its_plug_in_would_say(podusv):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 from podusv_cli import __version__
 from podusv_cli.core.kernel import Vector
@@ -18,6 +19,9 @@ from podusv_cli.export.law import (
     ExportedLaw,
     Number,
 )
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 IN_A_LINE = 4
 # Vectors of the loop that a law by itself has, as the C file calls them
@@ -39,14 +43,18 @@ def sources(law: ExportedLaw) -> dict[str, str]:
 
 def rendered(name: str, about: Mapping[str, Any]) -> str:
     """A file of this name from its template."""
+    return _environment().get_template(f"{name}.j2").render(about)
+
+
+@cache  # templates are compiled once in a process
+def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
 
-    environment = Environment(
+    return Environment(
         loader=PackageLoader("podusv_cli.export"), undefined=StrictUndefined,
         autoescape=lambda template: template is not None and ".xml" in template,
         trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
     )  # fmt: skip
-    return environment.get_template(f"{name}.j2").render(about)
 
 
 def template_values(law: ExportedLaw) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from podusv_cli.core import quantities
@@ -34,6 +35,7 @@ class Picture(NamedTuple):
         return self.caption.partition(";")[0].partition(":")[0].partition(",")[0]
 
 
+@cache  # templates are compiled once in a process
 def environment(package: str) -> Environment:
     """A package's templates and the shared ones; what they show is text, escaped as such."""
     from jinja2 import (  # slow to import

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
@@ -268,12 +269,25 @@ def tree_yaml(loaded: Loaded) -> str:
 
 def yaml_text(data: Mapping[str, Any]) -> str:
     """Plain data as YAML that podusv reads back to the same values."""
-    text = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
+    with suppress(UnicodeEncodeError):  # libyaml has no lone surrogates
+        return _dumped(data, _Fast)
+    return _dumped(data, _Dumper)
+
+
+def _dumped(data: Mapping[str, Any], dumper: Any) -> str:
+    text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
     return str(text)
 
 
 class _Dumper(yaml.SafeDumper):
     """Blocks for mappings, brackets for lists of scalars, quotes around all text but words."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+class _Fast(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """The same text by libyaml, which PyYAML can lack."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -295,6 +309,7 @@ def _kind_first(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.MappingNo
     return dumper.represent_mapping("tag:yaml.org,2002:map", ordered, flow_style=False)
 
 
-_Dumper.add_representer(str, _text)
-_Dumper.add_representer(tuple, _list)
-_Dumper.add_representer(dict, _kind_first)
+for _dumper in (_Dumper, _Fast):
+    _dumper.add_representer(str, _text)
+    _dumper.add_representer(tuple, _list)
+    _dumper.add_representer(dict, _kind_first)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from podusv_cli.components.vessels.vessel import Vessel
@@ -62,7 +63,8 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
     return {"$schema": DIALECT, "title": TITLE} | scenario | {"definitions": definitions}
 
 
-def schema_text(codes: Sequence[str], plugins: Plugins = ()) -> str:
+@cache  # it is made of all models
+def schema_text(codes: tuple[str, ...], plugins: Plugins = ()) -> str:
     """The schema as a file, ending with a newline; arguments as for `json_schema`."""
     return json.dumps(json_schema(codes, plugins), indent=2) + "\n"
 

@@ -89,7 +89,7 @@ def repeatable(folder: Path) -> dict[str, Any]:
 
 def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
     """The loop's recording from machine code and from plain Python."""
-    grid = TimeGrid(0.002, 150, hold_every=hold_every)
+    grid = TimeGrid(0.002, 60, hold_every=hold_every)
     probe = metrics_probe(Plan(loop, grid), steady_fraction=0.25, settling_radius=2.0)
     one, other = (simulate(loop, grid, probe=probe, compiled=c) for c in (True, False))
     return one, other
