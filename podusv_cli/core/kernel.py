@@ -236,6 +236,7 @@ def unpacker(names: tuple[str, ...], alike: Collection[str] = ()) -> Callable[[V
     fields = ", ".join(
         f"shared(p[{i}])" if name in alike else f"p[{i}]" for i, name in enumerate(names)
     )
-    scope: dict[str, Any] = {"Constants": constants_type(names), "shared": shared}
-    exec(f"def named(p):\n    return Constants({fields})", scope)  # noqa: S102
+    text = f"def named(p):\n    return Constants({fields})"
+    scope: dict[str, Any] = {"Constants": constants_type(names), "shared": shared, TEXT: text}
+    exec(text, scope)  # noqa: S102
     return kernel(scope["named"])  # type: ignore[no-any-return]

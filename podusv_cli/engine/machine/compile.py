@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 from podusv_cli.core.errors import LawError
-from podusv_cli.engine.machine import object_cache, signatures
+from podusv_cli.engine.machine import finish, object_cache, shipped, signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import available_workers, run_all
 
 # What compiles kernels for a run, and for lanes
 ALONE_BY, LANES_BY = "compile_numba", "wide.object_code"
+SYMBOLS = {ALONE_BY: finish.SYMBOL, LANES_BY: "podusv_lanes"}
 SHARE = 40_000  # size of what a process of its own compiles at least: about 3 s
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
@@ -50,10 +51,19 @@ class Piece(NamedTuple):
         """How much there is to compile, as the length of all byte code."""
         return sum(map(len, object_cache.ingredients(self.function, {})))
 
+    @property
+    def shipped(self) -> bytes | None:
+        """Its bitcode, if it came with podusv."""
+        return shipped.bitcode(self.function, self.prototype, self.compiler)
+
     def compile(self) -> object_cache.Code:
         """Its object code. Raises TypeError."""
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
         with interrupts_deferred():
+            if ready := self.shipped:
+                alone, name = self.compiler == ALONE_BY, self.function.__qualname__
+                with suppress(RuntimeError):  # of an LLVM that cannot read it
+                    return finish.object_code(ready, SYMBOLS[self.compiler], name, alone)
             module = import_module(f"podusv_cli.engine.machine.{self.compiler}")
             return cast(object_cache.Code, module.object_code(self.function, self.prototype))
 
@@ -88,7 +98,9 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
             tell(sum(done) / whole)
 
     advance(0, 0.0)
-    import_module(f"podusv_cli.engine.machine.{missing[0].compiler}")  # once, before the forks
+    for piece in missing:
+        if not piece.shipped:  # numba is needed, and then imported once, before the forks
+            import_module(f"podusv_cli.engine.machine.{piece.compiler}")
     if len(shares) == 1:
         _keep(shares[0], partial(advance, 0))
         return

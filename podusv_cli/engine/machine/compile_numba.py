@@ -21,7 +21,8 @@ from numba.core.typing.ctypes_utils import from_ctypes
 from numba.extending import intrinsic
 
 from podusv_cli.core import kernel
-from podusv_cli.engine.machine.object_cache import Code, target
+from podusv_cli.engine.machine import finish
+from podusv_cli.engine.machine.object_cache import Code
 
 # Kernels are inlined: to pass a law's constants to another function takes as long as the law.
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "forceinline": True}
@@ -71,12 +72,19 @@ def object_code(function: Any, prototype: Any) -> Code:
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-    symbol = "podusv_kernel"
-    return Code(symbol, target().emit_object(module(function, prototype, symbol)))
+    code = bitcode(function, prototype)
+    return finish.object_code(code, finish.SYMBOL, function.__qualname__, True)
 
 
 def module(function: Any, prototype: Any, symbol: str) -> Any:
     """The same before it is object code, with the C function under this name."""
+    made = finish.module(bitcode(function, prototype), function.__qualname__)
+    made.get_function(finish.SYMBOL).name = symbol
+    return made
+
+
+def bitcode(function: Any, prototype: Any) -> bytes:
+    """The same for any machine. Raises TypeError for what numba cannot type."""
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
         typed = signature(prototype, from_ctypes)
@@ -84,11 +92,9 @@ def module(function: Any, prototype: Any, symbol: str) -> Any:
             compiled = cfunc(typed, **OPTIONS)(_with_inlined(function))
     except NumbaError as error:
         raise TypeError(in_short(str(error))) from error
-    made, name = llvm.parse_assembly(compiled.inspect_llvm()), compiled.native_name
-    _optimise(made, target())
-    check_calls(made, function.__qualname__)
-    made.get_function(name).name = symbol
-    return made
+    made = llvm.parse_assembly(compiled.inspect_llvm())
+    made.get_function(compiled.native_name).name = finish.SYMBOL
+    return finish.simplified(made, finish.SYMBOL)
 
 
 @contextmanager
@@ -104,31 +110,6 @@ def unoptimised() -> Iterator[None]:
             yield
         finally:
             config.OPT = before
-
-
-def _optimise(made: Any, machine: Any) -> None:
-    """Optimise a module whose kernels are to be inlined.
-
-    They are inlined and their loops brought into the form that LLVM vectorises; then each function
-    is simplified and the whole optimised. Without the first two the march is slower by up to 10 %.
-    At last what numba would do about an error goes, where no kernel has any.
-    """
-    inlining = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(0))
-    passes = inlining.getModulePassManager()
-    passes.add_sroa_pass()
-    passes.add_loop_rotate_pass()
-    passes.add_instruction_combine_pass()
-    passes.add_jump_threading_pass()
-    passes.add_refprune_pass()
-    passes.run(made, inlining)
-    whole = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(3))
-    for function in made.functions:
-        whole.getFunctionPassManager().run(function, whole)
-    passes = whole.getModulePassManager()
-    passes.add_ipsccp_pass()
-    passes.add_simplify_cfg_pass()
-    passes.add_global_dead_code_eliminate_pass()
-    passes.run(made, whole)
 
 
 @cache
@@ -169,15 +150,3 @@ def signature(prototype: Any, type_of: Any) -> Any:
         return type_of(kind)
 
     return typed(prototype._restype_)(*map(typed, prototype._argtypes_))
-
-
-def check_calls(module: Any, name: str) -> None:
-    """Refuse code that calls an unknown function: loading it would end the process silently."""
-    process = ctypes.CDLL(None)
-    declared = [f.name for f in module.functions if f.is_declaration]
-    for wanted in declared:
-        if not wanted.startswith("llvm.") and not hasattr(process, wanted):
-            raise TypeError(
-                f"{name} needs {wanted}, which is no function of the mathematical library: it "
-                "allocates, prints or raises"
-            )

@@ -132,22 +132,30 @@ def _circumstances() -> tuple[str, ...]:
     return (*settings, *versions, *cpu, llvm.get_host_cpu_features().flatten())
 
 
-def ingredients(function: Any, numbered: dict[Any, int]) -> Iterator[str]:
-    """Everything that the machine code of a kernel depends on, the kernels it calls included.
-
-    `told` counts the functions and attributes of modules that have been told already.
-    """
-    numbered[function] = len(numbered)
-    names: dict[str, None] = {}
+def byte_code(function: Any) -> Iterator[str]:
+    """A function by itself, as this version of Python runs it."""
     for code in _codes(function.__code__):
         yield code.co_code.hex()
         yield repr([c for c in code.co_consts if not isinstance(c, CodeType)])
         yield repr((code.co_names, code.co_varnames))
-        names |= dict.fromkeys(code.co_names)
+
+
+def ingredients(
+    function: Any, numbered: dict[Any, int], alone: Callable[[Any], Iterable[str]] = byte_code
+) -> Iterator[str]:
+    """Everything that the machine code of a kernel depends on, the kernels it calls included.
+
+    `numbered` counts the functions and attributes of modules that have been told already, and
+    `alone` tells of a function by itself.
+    """
+    numbered[function] = len(numbered)
+    yield from alone(function)
     # Names of attributes are among these names, too. That one of them may add to the digest what
     # the kernel does not use does no harm.
+    names = sorted({name for code in _codes(function.__code__) for name in code.co_names})
     for name in names:
-        yield from _described(function.__globals__.get(name), names, numbered)
+        yield name
+        yield from _described(function.__globals__.get(name), names, numbered, alone)
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
@@ -159,7 +167,9 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 @singledispatch
-def _described(thing: Any, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
+def _described(
+    thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any
+) -> Iterator[str]:
     """What stands behind a name of a function that uses these names.
 
     A class or a function of a library is told by what it is called. What has no name is told by its
@@ -170,38 +180,46 @@ def _described(thing: Any, names: Iterable[str], numbered: dict[Any, int]) -> It
     fields = getattr(thing, "_fields", ())  # of a named tuple
     yield repr((getattr(thing, "__module__", ""), called or thing, fields, members))
     if source := getattr(thing, "py_func", None):  # of what numba's own decorators made
-        yield from _described(source, names, numbered)
+        yield from _described(source, names, numbered, alone)
 
 
 @_described.register
-def _(thing: FunctionType, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
+def _(
+    thing: FunctionType, names: Iterable[str], numbered: dict[Any, int], alone: Any
+) -> Iterator[str]:
     if thing in numbered:
         yield str(numbered[thing])
     else:
-        yield from ingredients(thing, numbered)
+        yield from ingredients(thing, numbered, alone)
 
 
 @_described.register
-def _(thing: ModuleType, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
+def _(
+    thing: ModuleType, names: Iterable[str], numbered: dict[Any, int], alone: Any
+) -> Iterator[str]:
     """A module, by what it has of these names: `settings.GAIN`."""
     yield thing.__name__
     for name in names:
         if (thing, name) not in numbered and hasattr(thing, name):
             numbered[thing, name] = len(numbered)
             yield name
-            yield from _described(getattr(thing, name), names, numbered)
+            yield from _described(getattr(thing, name), names, numbered, alone)
 
 
 @_described.register
-def _(thing: tuple, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:  # type: ignore[type-arg]
+def _(  # type: ignore[type-arg]
+    thing: tuple, names: Iterable[str], numbered: dict[Any, int], alone: Any
+) -> Iterator[str]:
     yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
     for item in thing:
-        yield from _described(item, names, numbered)
+        yield from _described(item, names, numbered, alone)
 
 
 @_described.register(np.ndarray)
 @_described.register(np.generic)
-def _(thing: Any, names: Iterable[str], numbered: dict[Any, int]) -> Iterator[str]:
+def _(
+    thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any
+) -> Iterator[str]:
     yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
 
 

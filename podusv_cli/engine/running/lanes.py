@@ -80,10 +80,10 @@ def marcher(
 
 
 def is_compiled(plan: Plan) -> bool:
-    """Whether the march of runs like this loop is on the disk, or in memory."""
+    """Whether the march of runs like this loop is on the disk, or next to it: half a second."""
     from podusv_cli.engine.machine import object_cache
 
-    return all(object_cache.is_cached(piece.name) for piece in _pieces(plan))
+    return all(object_cache.is_cached(p.name) or p.shipped for p in _pieces(plan))
 
 
 def _pieces(plan: Plan) -> list[Any]:

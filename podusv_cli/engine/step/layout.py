@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.plugins import TEXT
 from podusv_cli.core.signal import DEMAND
 
 Function = Callable[..., None]
@@ -45,6 +46,7 @@ def spread(march: Any) -> Any:
     given = f"Parts({', '.join(parts)}), {', '.join(names)}"
     text = f"def {march.__name__}({', '.join((*parts, *names))}):\n    return march({given})"
     scope: dict[str, Any] = {"march": march, "Parts": Parts, "__name__": march.__module__}
+    scope[TEXT] = text
     exec(text, scope)  # noqa: S102
     return kernel(scope[march.__name__])
 

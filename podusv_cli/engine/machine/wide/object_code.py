@@ -20,8 +20,8 @@ from numba.extending import intrinsic
 
 from podusv_cli.core import kernel
 from podusv_cli.core.errors import in_a_line
-from podusv_cli.engine.machine import compile_numba
-from podusv_cli.engine.machine.object_cache import Code, target
+from podusv_cli.engine.machine import compile_numba, finish
+from podusv_cli.engine.machine.object_cache import Code
 from podusv_cli.engine.machine.signatures import LANE_VECTOR
 from podusv_cli.engine.machine.wide import widening
 from podusv_cli.engine.machine.wide.masks import LANES_MEMORY, PLAIN_MEMORY
@@ -35,9 +35,8 @@ def object_code(function: Any, prototype: Any) -> Code:
     TypeError where that need not be so the next time.
     """
     try:
-        module = _module(function, prototype)
-        compile_numba.check_calls(module, function.__qualname__)
-        return Code(widening.NAME, target().emit_object(module))
+        code = bitcode(function, prototype)
+        return finish.object_code(code, widening.NAME, function.__qualname__, False)
     except (MemoryError, OSError) as error:
         raise TypeError(in_a_line(error)) from error
     except NumbaError as error:
@@ -52,7 +51,8 @@ def object_code(function: Any, prototype: Any) -> Code:
         return Code("", reason.encode())
 
 
-def _module(function: Any, prototype: Any) -> Any:
+def bitcode(function: Any, prototype: Any) -> bytes:
+    """The kernel for lanes, for any machine. Raises what `object_code` gives as a reason."""
     signature = compile_numba.signature(prototype, _type)
     compiled = njit(**compile_numba.INNER)(_with_inlined(function))
     with compile_numba.unoptimised():  # which `widening` works on
@@ -62,7 +62,9 @@ def _module(function: Any, prototype: Any) -> Any:
     memory = [_memory(kind) for kind in prototype._argtypes_]
     result = "i64" if prototype._restype_ else ""
     name = scalar.fndesc.llvm_func_name
-    return widening.widened(module, name, memory, result, target())
+    machine = finish.neutral_machine()
+    made = widening.widened(module, name, memory, result, machine)
+    return finish.bare(made, widening.NAME)
 
 
 def _type(kind: Any) -> Any:

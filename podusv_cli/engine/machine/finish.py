@@ -1,0 +1,111 @@
+# mypy: disable-error-code="no-untyped-call,attr-defined"
+"""From LLVM bitcode that suits any machine to object code for this one, without numba."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from functools import cache
+from typing import Any
+
+import llvmlite.binding as llvm
+
+from podusv_cli.engine.machine.object_cache import Code, target
+
+SYMBOL = "podusv_kernel"
+NEUTRAL = "x86_64-unknown-linux-gnu"  # its triple and layout are replaced by those of this machine
+
+
+@cache
+def neutral_machine() -> Any:
+    """What kernels are simplified for before they are for one machine: nothing it has matters."""
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    return llvm.Target.from_triple(NEUTRAL).create_target_machine(
+        cpu="x86-64", features="", opt=3, reloc="pic", codemodel="jitdefault", jit=True
+    )
+
+
+def simplified(made: Any, symbol: str) -> bytes:
+    """Bitcode of a module with one function, into which all kernels that it calls are inlined.
+
+    Loops are brought into the form that LLVM vectorises: without this the march is slower by up to
+    10 %. What numba would do about an error goes, where no kernel has any.
+    """
+    machine = neutral_machine()
+    made.triple, made.data_layout = machine.triple, str(machine.target_data)
+    _hide(made, symbol)
+    passes, builder = _passes(machine, 0)
+    passes.add_always_inliner_pass()
+    passes.add_sroa_pass()
+    passes.add_loop_rotate_pass()
+    passes.add_instruction_combine_pass()
+    passes.add_jump_threading_pass()
+    passes.add_ipsccp_pass()
+    passes.add_simplify_cfg_pass()
+    passes.run(made, builder)
+    return bare(made, symbol)
+
+
+def bare(made: Any, symbol: str) -> bytes:
+    """Bitcode of a module, of which only one function is seen from outside, without names."""
+    _hide(made, symbol)
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.add_strip_dead_prototype_pass()
+    passes.add_strip_symbols_pass()
+    passes.run(made, _passes(neutral_machine(), 0)[1])
+    # In names that metadata have numba counts what it compiled before.
+    unnamed = re.sub(r', !"_ZN[^"]*"|^source_filename.*', "", str(made), flags=re.MULTILINE)
+    return bytes(llvm.parse_assembly(unnamed).as_bitcode())
+
+
+def _hide(made: Any, symbol: str) -> None:
+    for part in (*made.functions, *made.global_variables):
+        if not part.is_declaration and part.name != symbol:
+            part.linkage = "internal"
+
+
+def module(bitcode: bytes, name: str) -> Any:
+    """The same, optimised for this machine. Raises TypeError as `check_calls`."""
+    made, machine = read(bitcode), target()
+    passes, whole = _passes(machine, 3)
+    for function in made.functions:
+        whole.getFunctionPassManager().run(function, whole)
+    passes.add_ipsccp_pass()
+    passes.add_simplify_cfg_pass()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.run(made, whole)
+    check_calls(made, name)
+    return made
+
+
+def object_code(bitcode: bytes, symbol: str, name: str, alone: bool) -> Code:
+    """Object code for this machine; what is for lanes is optimised before it is widened."""
+    made = module(bitcode, name) if alone else read(bitcode)
+    check_calls(made, name)
+    return Code(symbol, target().emit_object(made))
+
+
+def read(bitcode: bytes) -> Any:
+    """A module for this machine."""
+    made, machine = llvm.parse_bitcode(bitcode), target()
+    made.triple, made.data_layout = machine.triple, str(machine.target_data)
+    return made
+
+
+def _passes(machine: Any, speed: int) -> tuple[Any, Any]:
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed))
+    return builder.getModulePassManager(), builder
+
+
+def check_calls(module: Any, name: str) -> None:
+    """Refuse code that calls an unknown function: loading it would end the process silently."""
+    process = ctypes.CDLL(None)
+    declared = [f.name for f in module.functions if f.is_declaration]
+    for wanted in declared:
+        if not wanted.startswith("llvm.") and not hasattr(process, wanted):
+            raise TypeError(
+                f"{name} needs {wanted}, which is no function of the mathematical library: it "
+                "allocates, prints or raises"
+            )

@@ -1,0 +1,85 @@
+"""Kernels of podusv's own that come with it as LLVM bitcode, so that a first run needs no numba.
+
+They lie in one file, under a digest of the source of a kernel and of all that it calls or reads,
+which is the same in every version of Python. What other translators made is not used.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import inspect
+import json
+import linecache
+import lzma
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from podusv_cli.core.plugins import TEXT
+from podusv_cli.engine.machine import object_cache
+
+FILE = Path(__file__).with_name("kernels.xz")
+
+
+def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
+    """That of this kernel as a C function with this prototype, if it came with podusv."""
+    return _kernels().get(digest(function, prototype, compiler)) if _kernels() else None
+
+
+@cache
+def digest(function: Any, prototype: Any, compiler: str) -> str:
+    """What a kernel is kept under; empty where a source is not there."""
+    try:
+        words = [compiler, _typed(prototype), *object_cache.ingredients(function, {}, written)]
+    except OSError:
+        return ""
+    return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
+
+
+@cache
+def _kernels() -> Mapping[str, bytes]:
+    """All of them; none where there are none, or other files translate by now."""
+    with suppress(OSError, lzma.LZMAError, ValueError):
+        head, _, body = lzma.decompress(FILE.read_bytes()).partition(b"\n")
+        translators, sizes = json.loads(head)
+        if translators == object_cache.translators():
+            kernels, at = {}, 0
+            for name, size in sizes.items():
+                kernels[name] = body[at : at + size]
+                at += size
+            return kernels
+    return {}
+
+
+def write(kernels: Mapping[str, bytes]) -> None:
+    """Make the file."""
+    head = [object_cache.translators(), {name: len(code) for name, code in kernels.items()}]
+    whole = json.dumps(head).encode() + b"\n" + b"".join(kernels.values())
+    FILE.write_bytes(lzma.compress(whole, preset=9))
+
+
+def written(function: Any) -> tuple[str, ...]:
+    """A function as its file has it; of one that podusv wrote out itself, the whole text."""
+    code = function.__code__
+    if (text := function.__globals__.get(TEXT)) is not None:
+        return code.co_name, str(code.co_firstlineno), text
+    lines = linecache.getlines(code.co_filename)[code.co_firstlineno - 1 :]
+    if not lines:
+        raise OSError(f"{code.co_filename} has no line {code.co_firstlineno}")
+    return code.co_name, "".join(inspect.getblock(lines))
+
+
+def _typed(kind: Any) -> str:
+    """A type of ctypes, alike on all systems."""
+    if kind is None:
+        return "none"
+    if issubclass(kind, ctypes._CFuncPtr):
+        return f"{_typed(kind._restype_)}({','.join(map(_typed, kind._argtypes_))})"
+    if issubclass(kind, ctypes._Pointer):
+        return f"{_typed(kind._type_)}*"
+    if issubclass(kind, ctypes.Array):
+        return f"{kind._length_}x{_typed(kind._type_)}"
+    return f"{'f' if kind is ctypes.c_double else 'i'}{ctypes.sizeof(kind)}"
