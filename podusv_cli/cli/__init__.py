@@ -25,7 +25,7 @@ from podusv_cli.cli.exit_codes import (
 COMMANDS = (
     "init", "start", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins",
     "optimum", "explain", "list", "schema", "new", "bench", "tune", "doubt", "identify", "docs",
-    "demo", "runs", "export", "pack", "unpack",
+    "demo", "runs", "export", "pack", "unpack", "live",
 )  # fmt: skip
 
 # What others call it, and the command that does it.

@@ -22,8 +22,8 @@ MILLIMETRES = 3  # digits of all others
 FAR = 1e9  # m; diverged runs end beyond any map
 
 
-def chase(runs: Sequence[Shown]) -> dict[str, Any]:
-    """Where runs and targets are at up to FRAMES instants; {} where there is nothing to show."""
+def chase(runs: Sequence[Shown], frames: int = FRAMES) -> dict[str, Any]:
+    """Where runs and targets are at up to so many instants; {} where there is nothing to show."""
     moving = [run for run in runs if all(run.has(name) for name in WHERE)]
     if not moving:
         return {}
@@ -32,7 +32,7 @@ def chase(runs: Sequence[Shown]) -> dict[str, Any]:
     return {
         "box": _rounded((west - half, south - half, east + half, north + half)),
         "end": _rounded([max(run.end for run in moving)], DIGITS["time"])[0],
-        "runs": [_track(run) for run in moving],
+        "runs": [_track(run, frames) for run in moving],
     }
 
 
@@ -51,9 +51,9 @@ def as_json(content: dict[str, Any]) -> str:
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _track(run: Shown) -> dict[str, Any]:
+def _track(run: Shown, frames: int) -> dict[str, Any]:
     count = len(run.recording["time"])
-    rows = np.linspace(0, count - 1, min(count, FRAMES)).round().astype(int)
+    rows = np.linspace(0, count - 1, min(count, frames)).round().astype(int)
     names = ("time", *WHERE, *(("x_d", "y_d") if run.has("z_e") else ()))
     away = next(filter(run.has, AWAY), None)
     legs = np.array(run.about.waypoints if run.about.follows else ())

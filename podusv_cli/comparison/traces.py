@@ -23,14 +23,14 @@ FIRST = (DISTANCE, "e_ct", "psi_e", "tau_u", "tau_r")  # which readers look at f
 NEXT = ("x_e", "y_e")  # which follow from the log
 
 
-def traces(runs: Sequence[Shown]) -> dict[str, Any]:
+def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
     """The scalar signals that a run has, with meaning, symbol, unit and scale; {} where is none.
 
     Every curve is over the whole run, thinned by `thinned` and encoded by `encoded`; null where a
     run lacks the signal. `first` is how many signals readers look at first.
     """
     runs = [run for run in runs if len(run.recording["time"])]
-    shown = _scalar(runs)[: max(MOST, CURVES // max(1, len(runs)))]
+    shown = names or _scalar(runs)[: max(MOST, CURVES // max(1, len(runs)))]
     if not shown:
         return {}
     return {

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -51,6 +51,7 @@ class Bounded(Component):
         low, high = self.within or (-math.inf, math.inf)
         return self._share_below(low), self._share_below(high)
 
+    @lru_cache(maxsize=256)  # noqa: B019  (a value; each takes a hundred looks at the distribution)
     def _share_below(self, x: float) -> float:
         low, high = 0.0, 1.0
         for _ in range(HALVINGS):

@@ -147,7 +147,7 @@ def _assigned(place: str, of: Key, *, of_kinds: bool = True) -> Iterator[tuple[s
             continue
         if of_kinds or not key.kind:
             name = f"{place}.{dotted(given)}".removeprefix(".")
-            for word in _choices(key) or BOOLEANS.get(key.type_in_words, ("",)):
+            for word in choices_of(key) or BOOLEANS.get(key.type_in_words, ("",)):
                 yield f"{name}={word}", _meaning(key)
 
 
@@ -211,7 +211,7 @@ def _row(key: Key) -> Row:
     path, meaning = dotted(key.path), _meaning(key)
     if key.keys:
         return Row(path, meaning, "kinds" if key.kinds else "keys", choices=tuple(key.keys))
-    choices = _choices(key)
+    choices = choices_of(key)
     named = key.name in ("preset", "kind")
     words = [*choices, *([ANY_FILE] if key.name == "preset" else [])]
     kind = either(words) if named else key.type_in_words
@@ -225,7 +225,7 @@ def _meaning(key: Key) -> str:
     return key.field.description or f"which {key.path[-2]} it is"
 
 
-def _choices(key: Key) -> tuple[str, ...]:
+def choices_of(key: Key) -> tuple[str, ...]:
     """The words that a value may be; of a kind, all that its section has."""
     if key.name == "preset" and key.model.presets:
         return preset_names(key.model.presets, key.scenario.plugged)

@@ -1,13 +1,11 @@
-(() => {
-  const { signals, runs } = JSON.parse(document.getElementById("curves-data").textContent);
-  const card = document.getElementById("plot"), plot = card.querySelector(".curves"), output = card.querySelector("output");
+// Panels of curves over time; what it returns shows signals of runs, and again other ones.
+const curvesOn = (card) => {
+  let signals = [], runs = [], choice = [], boxes = [], values = [], START = 0, END = 0, held = null;
+  const plot = card.querySelector(".curves"), output = card.querySelector("output");
   const [whole, log] = [card.querySelector("button"), card.querySelector("input.log")];
-  const choice = [...card.querySelectorAll(".choice input")];
-  const boxes = [...card.querySelectorAll(".key input")], values = [...card.querySelectorAll(".key small")];
   const LEFT = 72, RIGHT = 14, TOP = 20, BASE = 26, LOW = 110, NEAR = 6; // pixels
   const PAPER = 720; // pixels, the width on a printed page
-  const START = Math.min(...runs.map((run) => run.start)), END = Math.max(...runs.map((run) => run.end));
-  let from = START, to = END, width = 0, height = 0, panels = [], pressed = null, now = null, cursor, picked;
+  let from = 0, to = 0, width = 0, height = 0, panels = [], pressed = null, now = null, cursor, picked;
 
   const decoded = new Map();
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -61,8 +59,12 @@
       if (t >= from && t <= to && !Number.isNaN(y)) [low, high] = [Math.min(low, on(signal, y)), Math.max(high, on(signal, y))];
     });
     if (low > high) [low, high] = [0, 1];
+    if (held) { // while values move, axes only grow, so that curves can be compared
+      const last = held[signal.name] ?? [low, high];
+      [low, high] = held[signal.name] = [Math.min(low, last[0]), Math.max(high, last[1])];
+    }
     const room = 0.05 * (high - low) || 0.05 * Math.abs(high) || 1;
-    return { place, signal, tall, top: TOP + row * (tall + TOP), low: low - room, high: high + room };
+    return { place, signal, tall, ends: [low, high], top: TOP + row * (tall + TOP), low: low - room, high: high + room };
   };
   // Text with what stands below the line in it, in turns.
   const formula = (text, pieces) => pieces.forEach(([plain, below]) => {
@@ -87,11 +89,11 @@
         d += `${pen}${across(t).toFixed(1)} ${up(one, y).toFixed(1)}`;
         pen = "L";
       });
-      make(inside, "path", { ...line(run, 1.4), d });
+      make(inside, "path", { ...line(run, 1.4), d, opacity: run.kept ? 0.35 : 1 });
     }
   };
   const draw = (wide = plot.clientWidth) => {
-    const chosen = signals.map((_, place) => place).filter((place) => choice[place].checked);
+    const chosen = signals.map((_, place) => place).filter((place) => !choice.length || choice[place].checked);
     width = Math.max(200, wide);
     const tall = chosen.length > 1 ? LOW : Math.round(Math.min(330, Math.max(190, 0.4 * width)));
     height = TOP + chosen.length * (tall + TOP) - TOP + BASE;
@@ -143,9 +145,27 @@
     event.preventDefault();
   });
   whole.addEventListener("click", () => zoom(START, END));
-  for (const box of [log, ...choice, ...boxes]) box.addEventListener("change", () => draw());
+  card.addEventListener("change", () => draw());
   addEventListener("resize", () => draw());
   addEventListener("beforeprint", () => draw(PAPER));
   addEventListener("afterprint", () => draw());
-  draw();
-})();
+  return {
+    // With `hold`, axes only grow from those before.
+    show(data, hold = false) {
+      const whole = from === START && to === END;
+      ({ signals, runs } = data);
+      choice = [...card.querySelectorAll(".choice input")];
+      boxes = [...card.querySelectorAll(".key input")];
+      values = [...card.querySelectorAll(".key small")];
+      START = Math.min(...runs.map((run) => run.start));
+      END = Math.max(...runs.map((run) => run.end));
+      if (whole) [from, to] = [START, END];
+      held = hold ? held ?? Object.fromEntries(panels.map(({ signal, ends }) => [signal.name, ends])) : null;
+      decoded.clear();
+      draw();
+    },
+  };
+};
+if (document.getElementById("curves-data")) {
+  curvesOn(document.getElementById("plot")).show(JSON.parse(document.getElementById("curves-data").textContent));
+}

@@ -1,6 +1,6 @@
-(() => {
-  const { box, end, runs } = JSON.parse(document.getElementById("chase-data").textContent);
-  const stage = document.getElementById("stage");
+// The map with a trace below it or beside it; what it returns shows runs, and again other ones.
+const chaseOn = (stage) => {
+  let box, end = 0, runs = [], traced = [], low = 0, high = 0;
   const one = (selector) => stage.querySelector(selector);
   const map = one(".map"), trace = one(".trace"), slider = one("input[type=range]"), output = one("output");
   const button = one(".play"), speed = one("select"), near = one("input[type=checkbox]");
@@ -31,19 +31,28 @@
 
   const points = (north, east) => north.map((x, i) => (x === null || east[i] === null ? "" : `${east[i]},${x}`));
   const world = make(map, "g", { class: "world" }), over = make(map, "g");
-  for (const run of runs) {
+  const lay = () => {
+    for (const group of [world, over]) group.replaceChildren();
+    for (const run of runs) {
     run.points = points(run.x, run.y);
     const course = run.x_d ? [run.x_d, run.y_d] : run.legs;
     if (course.length) make(world, "polyline", { points: points(...course).join(" "), class: "course", "stroke-width": 0.8 });
     make(world, "polyline", { points: run.points.join(" "), stroke: run.color, "stroke-width": 1.2, class: "ghost" });
     run.trail = make(world, "polyline", line(run, 2));
-  }
-  for (const run of runs) {
+    if (run.kept) run.trail.classList.add("lost");
+    }
+    for (const run of runs) {
     run.ring = make(over, "circle", { class: "ring" });
     run.cross = make(over, "path", { d: "M-5 0H5M0 -5V5", class: "cross", "stroke-width": 1.6 });
     run.hull = make(over, "polygon", { fill: run.color, "fill-opacity": 0.55, stroke: run.color });
     run.stern = make(over, "line", { class: "stern", "stroke-width": 1.5 });
-  }
+    }
+    traced = runs.filter((run) => run.distance.length);
+    const settled = traced.filter((run) => !run.ending);
+    const tops = (settled.length ? settled : traced).flatMap((run) => run.distance).filter((z) => z !== null);
+    high = Math.ceil(Math.log10(Math.max(10 * LOW, tops.reduce((a, b) => Math.max(a, b), 0))));
+    low = Math.max(Math.log10(LOW), Math.floor(Math.log10(Math.max(LOW, tops.reduce((a, b) => Math.min(a, b), Infinity)))));
+  };
   const bar = make(map, "path", { class: "compass" }), barText = make(map, "text", { "text-anchor": "middle" });
   make(make(map, "g", { transform: "translate(14 26)", class: "compass" }), "path", { d: "M0 6V-10M-4 -4L0 -10L4 -4" });
   make(map, "text", { x: 14, y: 46, "text-anchor": "middle" }, "N");
@@ -76,7 +85,7 @@
         .map(([a, b]) => [ox + k * y + a * s + b * c, oy - k * x - a * c + b * s]);
       set(run.hull, "points", corners.join(" "));
       [["x1", 2, 0], ["y1", 2, 1], ["x2", 3, 0], ["y2", 3, 1]].forEach(([name, corner, axis]) => set(run.stern, name, corners[corner][axis]));
-      for (const part of [run.hull, run.stern]) part.classList.toggle("lost", !!over);
+      for (const part of [run.hull, run.stern]) part.classList.toggle("lost", !!(over || run.kept));
       for (const part of [run.cross, run.ring]) part.style.display = over || !run.x_d ? "none" : "";
       set(run.cross, "transform", `translate(${ox + k * east} ${oy - k * north})`);
       [["cx", ox + k * east], ["cy", oy - k * north], ["r", k * run.standoff]].forEach(([name, value]) => set(run.ring, name, value));
@@ -88,10 +97,6 @@
     slider.value = now;
   };
 
-  const traced = runs.filter((run) => run.distance.length), settled = traced.filter((run) => !run.ending);
-  const tops = (settled.length ? settled : traced).flatMap((run) => run.distance).filter((z) => z !== null);
-  const high = Math.ceil(Math.log10(Math.max(10 * LOW, tops.reduce((a, b) => Math.max(a, b), 0))));
-  const low = Math.max(Math.log10(LOW), Math.floor(Math.log10(Math.max(LOW, tops.reduce((a, b) => Math.min(a, b), Infinity)))));
   const across = (t) => LEFT + (wide - LEFT - RIGHT) * t / end;
   const up = (z) => TOP + (tall - TOP - BASE) * (high - Math.log10(Math.min(Math.max(z, LOW), 10 ** (high + 1)))) / (high - low);
   let cursor;
@@ -143,7 +148,7 @@
   const seek = (t) => { toggle(false); now = Math.min(end, Math.max(0, t)); draw(); };
 
   for (const factor of [0.1, 0.5, 1, 2, 5, 10, 20, 50, 100]) speed.add(new Option(`${factor}\u00d7`, factor));
-  speed.value = [...speed.options].map((option) => option.value).findLast((factor) => factor <= Math.max(0.1, end / 25));
+  const pace = () => speed.value = [...speed.options].map((option) => option.value).findLast((factor) => factor <= Math.max(0.1, end / 25));
   button.addEventListener("click", () => toggle());
   slider.addEventListener("input", () => seek(slider.valueAsNumber));
   near.addEventListener("change", draw);
@@ -156,13 +161,29 @@
     event.preventDefault();
   });
   addEventListener("resize", place);
+  return {
+    seek, toggle,
+    // Runs to show at a time, by default at that of the runs before.
+    show(data, t = now) {
+      const first = !runs.length;
+      ({ box, end, runs } = data);
+      slider.max = end;
+      if (first) pace();
+      now = Math.min(end, t);
+      lay();
+      place();
+    },
+  };
+};
+if (document.getElementById("chase-data")) {
+  const stage = document.getElementById("stage"), { show, seek, toggle } = chaseOn(stage);
+  show(JSON.parse(document.getElementById("chase-data").textContent));
   const asked = () => /^#t=([\d.]+)$/.exec(location.hash);
   addEventListener("hashchange", () => { if (asked()) { seek(+asked()[1]); stage.scrollIntoView(); } });
-  place();
   if (asked()) { seek(+asked()[1]); stage.scrollIntoView(); }
   else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) {
     new IntersectionObserver((seen, observer) => {
       if (seen.some((entry) => entry.isIntersecting)) { observer.disconnect(); toggle(true); }
     }, { threshold: 0.3 }).observe(stage);
   }
-})();
+}

@@ -1,0 +1,55 @@
+"""`podusv live`: a page in the browser whose sliders move a scenario's values."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from functools import partial
+from typing import Annotated
+
+import typer
+
+from podusv_cli.cli import options
+from podusv_cli.cli.terminal import echo
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def live(
+    config: options.Config,
+    assign: options.Assignments = None,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Of `controllers`, to be shown; repeatable."),
+    ] = None,
+    port: Annotated[int, typer.Option(min=0, help="Port; 0: any that is free.")] = 0,
+    browser: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
+    ] = True,
+) -> None:
+    """Move gains, hull, sea and start on a page that simulates as you move; Ctrl-C ends it.
+
+    Only this machine can reach the page, and only with the address that is printed.
+    """
+    from podusv_cli.process.local_page import serve
+    from podusv_cli.workflows.live import Live, page
+
+    shown = Live(config, assign or (), controller or ())
+    shown.frame({}, (), rest=True, wanted=True)  # errors are for the terminal, and code is compiled
+
+    # A command is over before its garbage counts; this one stays, and looks through none of what is
+    # imported.
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000)
+
+    def started(address: str) -> None:
+        import webbrowser
+
+        has_display = sys.platform == "darwin" or any(map(os.environ.get, DISPLAYS))
+        opened = browser and has_display and webbrowser.open(address)
+        echo(f"{'opened' if opened else 'open in a browser:'} {address}", "Ctrl-C ends it")
+        sys.stdout.flush()
+
+    serve(partial(page, config), shown.answer, started, port)

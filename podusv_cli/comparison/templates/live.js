@@ -1,0 +1,165 @@
+(() => {
+  const one = (id) => document.getElementById(id), REST = 250; // ms without a move
+  const tracks = chaseOn(one("stage")), curves = curvesOn(one("plot"));
+  let latest = "", moved = new Map(), rows = new Map(), signals = [], last = null, ghost = null, busy = false, wanted = null, pause = 0;
+  const add = (parent, tag, properties = {}) => parent.appendChild(Object.assign(document.createElement(tag), properties));
+  const ask = async (name, question) => (await fetch(BASE + name, {
+    method: "POST", headers: { "Content-Type": "application/json" },
+    body: JSON.stringify({ moved: Object.fromEntries(moved), ...question }),
+  })).json();
+
+  // One question at a time; what moves meanwhile is asked next, and only the newest.
+  const want = (question = {}) => {
+    wanted = { signals, rest: false, controls: false, ...(wanted ?? {}), ...question, since: wanted?.since ?? performance.now() };
+    clearTimeout(pause);
+    one("state").textContent = "...";
+    if (!busy) send();
+  };
+  const send = async () => {
+    const question = wanted, late = setTimeout(() => { one("state").textContent = "simulating or translating ..."; }, 400);
+    [busy, wanted] = [true, null];
+    try {
+      const frame = await ask("frame", question);
+      if (wanted) send(); else busy = false;
+      show(frame, question);
+      if (!wanted && !question.rest) pause = setTimeout(() => want({ rest: true }), REST);
+    } catch {
+      [busy, one("state").textContent] = [false, "podusv live has ended; start it again and reload this page"];
+    }
+    clearTimeout(late);
+  };
+
+  const show = (frame, question) => {
+    document.querySelectorAll(".value .no, #told .refused").forEach((old) => old.remove());
+    if (frame.refused) {
+      one("state").textContent = "refused; the curves are those before";
+      for (const { key, text } of frame.refused) {
+        if (text.startsWith("missing")) lack(key);
+        add((rows.get(key) ?? rows.get(latest))?.row ?? add(one("told"), "p", { className: "no refused" }), "div", { className: "no", textContent: text, role: "alert" });
+      }
+      return;
+    }
+    last = frame;
+    if (frame.controls) lay(frame);
+    draw(!question.rest && !question.controls);
+    one("command").textContent = frame.command;
+    if (frame.findings) { // at rest, as an address for every move would be too many for browsers
+      history.replaceState(null, "", `#${[...moved].map(([key, value]) => `${key}=${encodeURIComponent(value)}`).join("&")}`);
+      one("told").replaceChildren();
+      for (const [text, labels] of frame.findings) add(one("told"), "p", { className: "shown", textContent: `${labels.join(", ")}: ${text}` });
+    }
+    one("state").textContent = frame.findings ? "" : "...";
+    window.seen = { since: question.since, cpu: frame.cpu, frames: (window.seen?.frames ?? 0) + 1 };
+    requestAnimationFrame(() => setTimeout(() => { window.seen.drawn = performance.now(); window.spans?.push([window.seen.drawn - question.since, frame.cpu]); }));
+  };
+  const named = ({ label, ...run }) => ({ label: `${label}, kept`, ...run, kept: true });
+  const draw = (hold) => {
+    const runs = [...(ghost?.curves.runs ?? []), ...last.curves.runs], tracked = [...(ghost?.chase.runs ?? []), ...last.chase.runs];
+    legend(one("stage").querySelector(".key"), tracked, false);
+    legend(one("plot").querySelector(".key"), runs, true);
+    const same = ghost && JSON.stringify(ghost.curves.signals.map((s) => s.name)) === JSON.stringify(last.curves.signals.map((s) => s.name));
+    curves.show({ signals: last.curves.signals, runs: same ? runs : last.curves.runs }, hold);
+    tracks.show({ ...last.chase, runs: tracked }, last.chase.end);
+    const told = (x) => (typeof x === "number" ? `${+x.toPrecision(4)}` : x ?? "-"), old = (name, i) => ghost.numbers.find((row) => row.name === name)?.values[i];
+    table(one("numbers"), [
+      ["", "unit", ...runs.map((run) => run.label)],
+      ...last.numbers.map(({ name, row, unit, values }) => [row, unit, ...(ghost?.curves.runs ?? []).map((_, i) => told(old(name, i))), ...values.map(told)]),
+    ]);
+    one("endings").textContent = Object.entries(last.endings).map(([label, text]) => `${label} ${text.split(";")[0]}`).join("\n");
+  };
+  // Only texts that differ are written, as a table that is made anew costs the page a layout.
+  const table = (place, lines) => {
+    const shape = lines.map((cells) => cells.length).join();
+    if (place.dataset.shape !== shape) {
+      [place.dataset.shape, place.textContent] = [shape, ""];
+      lines.forEach((cells, row) => { const line = add(place, "tr"); cells.forEach((_, i) => add(line, row ? "td" : "th", { className: i > 1 ? "number" : "" })); });
+    }
+    lines.forEach((cells, row) => cells.forEach((text, i) => { const cell = place.rows[row].cells[i]; if (cell.textContent !== text) cell.textContent = text; }));
+  };
+  const legend = (list, runs, boxes) => {
+    const names = runs.map((run) => run.label).join("\n");
+    if (list.dataset.names === names) return;
+    list.dataset.names = names;
+    list.replaceChildren();
+    for (const run of runs) {
+      const label = add(add(list, "li"), "label");
+      if (boxes) add(label, "input", { type: "checkbox", checked: true });
+      make(make(label, "svg", { viewBox: "0 0 32 10", width: 32, height: 10 }), "path", { d: "M1 5H31", ...line(run, 2.5), opacity: run.kept ? 0.35 : 1 });
+      label.append(` ${run.label}`);
+      add(label.parentNode, "small");
+    }
+  };
+
+  const shown = (x) => +(+x).toPrecision(3);
+  const lay = (frame) => {
+    const open = new Set([...document.querySelectorAll("#parts details[open]")].map((part) => part.dataset.part));
+    rows = new Map();
+    one("parts").replaceChildren();
+    one("name").value ||= `${frame.name}_live`;
+    const parts = new Map();
+    for (const control of frame.controls) {
+      if (!parts.has(control.part)) {
+        const part = add(one("parts"), "details", { open: parts.size === 0 || open.has(control.part) });
+        part.dataset.part = control.part;
+        add(part, "summary", { textContent: control.part });
+        parts.set(control.part, part);
+      }
+      rows.set(control.key, slide(parts.get(control.part), control));
+    }
+    if (one("signals").children.length === 1) for (const name of frame.signals) {
+      const box = add(add(one("signals"), "label", { textContent: `${name} ` }), "input", { type: "checkbox", value: name, checked: frame.curves.signals.some((s) => s.name === name) });
+      box.addEventListener("change", () => { signals = [...one("signals").querySelectorAll("input:checked")].map((b) => b.value); want({ signals }); });
+    }
+  };
+  // A box for a number that a kind needs and nobody gave yet.
+  const lack = (key) => {
+    if (rows.has(key)) return;
+    const row = add(rows.get(latest)?.row.parentNode ?? one("parts"), "div", { className: "value" });
+    const box = add(add(row, "label", { textContent: key }), "input", { type: "number", step: "any", id: `v-${key}` });
+    box.addEventListener("change", () => { moved.set(key, +box.value); want({ controls: true, rest: true }); });
+    rows.set(key, { row });
+  };
+  const slide = (part, { key, name, meaning, value, unit, range, low, high, log, quantum, choices, by_rule, default: usual }) => {
+    const row = add(part, "div", { className: "value" }), id = `v-${key}`;
+    const label = add(row, "label", { htmlFor: id, title: `${key} ${range} [${unit}], default ${usual}` });
+    add(label, "b", { textContent: name }); label.append(` ${unit && `[${unit}]`} `); add(label, "small", { textContent: meaning + (by_rule ? " (follows from hull and actuator)" : "") });
+    row.classList.toggle("moved", moved.has(key));
+    const move = (x, question) => { latest = key; moved.set(key, x); row.classList.add("moved"); want(question); };
+    if (choices.length) {
+      const menu = add(row, "select", { id });
+      for (const word of choices) add(menu, "option", { value: word, textContent: word, selected: word === value });
+      menu.addEventListener("change", () => {
+        if (name === "kind") for (const other of [...moved.keys()]) if (other.startsWith(key.slice(0, -4)) && other !== key) moved.delete(other);
+        move(menu.value, { controls: true, rest: true });
+      });
+      return { row };
+    }
+    // Of a logarithmic slider the numbers have one sign, and `low` is not 0.
+    const sign = low < 0 ? -1 : 1, to = (x) => (log ? sign * Math.log(Math.abs(x)) : x), from = (p) => (log ? sign * Math.exp(sign * p) : p);
+    const snap = (x) => (quantum ? +(Math.round(x / quantum) * quantum).toPrecision(9) : shown(x));
+    const range_ = add(row, "input", { type: "range", id, min: to(low), max: to(high), step: (to(high) - to(low)) / 1000, value: to(value) });
+    const typed = add(row, "input", { type: "number", step: "any", value: shown(value) });
+    typed.setAttribute("aria-label", `${key}, typed`);
+    range_.setAttribute("aria-valuetext", `${shown(value)} ${unit}`);
+    range_.addEventListener("input", () => { typed.value = snap(from(+range_.value)); range_.setAttribute("aria-valuetext", `${typed.value} ${unit}`); move(+typed.value); });
+    range_.addEventListener("dblclick", () => { moved.delete(key); want({ controls: true, rest: true }); });
+    typed.addEventListener("change", () => { if (typed.value !== "") move(+typed.value, { controls: true, rest: true }); });
+    return { row };
+  };
+
+  one("keep").addEventListener("click", () => {
+    ghost = ghost ? null : { ...last, curves: { ...last.curves, runs: last.curves.runs.map(named) }, chase: { ...last.chase, runs: last.chase.runs.map(named) } };
+    one("keep").textContent = ghost ? "Let go" : "Keep";
+    draw(false);
+  });
+  one("undo").addEventListener("click", () => { moved = new Map(); want({ controls: true, rest: true }); });
+  one("save").addEventListener("click", async () => {
+    const told = await ask("save", { name: one("name").value });
+    one("saved").textContent = told.refused ? told.refused.map(({ text }) => text).join("\n") : `${told.file}\n\n${told.text}\n${told.command}`;
+  });
+  for (const pair of location.hash.slice(1).split("&").filter(Boolean)) {
+    const [key, text] = pair.split("="), value = decodeURIComponent(text);
+    moved.set(key, value === "" || Number.isNaN(+value) ? value : +value);
+  }
+  want({ controls: true, rest: true });
+})();

@@ -1,0 +1,125 @@
+"""What a person may move in a scenario: numbers with a range to slide in, and choices of words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from podusv_cli.core.component import Component
+from podusv_cli.core.phrases import as_yaml
+from podusv_cli.scenario.address import is_whole
+from podusv_cli.scenario.explain import choices_of
+from podusv_cli.scenario.keys import NO_DEFAULT, Key, keys_of, limits
+from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.yaml_tree import Route, dotted, route
+
+REACH = 30.0  # from its number, a logarithmic slider reaches so many times up and down
+WIDE = 3.0  # a linear one so many times the number's size
+# The size of a number that is 0 and has no default, by its unit; in metres the hull's length.
+SIZES = {"m/s": 1.0, "rad": math.pi, "rad/s": 1.0, "s": 1.0, "N": 10.0, "N m": 10.0}
+AFTER = (
+    "vessel", "actuator", "disturbance", "path", "start", "measurement", "estimator", "control",
+    "simulation",
+)  # fmt: skip
+TIMES = ("control.period", "simulation.duration")  # whole numbers of steps
+
+
+@dataclass(frozen=True)
+class Control:
+    """A value at a key: its meaning, and a slider from `low` to `high` or the words it may be.
+
+    `log`: the slider is even in the number's logarithm. `quantum` is what it is a multiple of.
+    """
+
+    key: str
+    part: str
+    name: str
+    meaning: str
+    value: Any
+    default: str
+    unit: str = ""
+    range: str = ""
+    by_rule: bool = False
+    low: float = 0.0
+    high: float = 0.0
+    log: bool = False
+    quantum: float = 0.0
+    choices: tuple[str, ...] = ()
+
+
+def controls(scenario: Scenario, laws: Sequence[str]) -> list[Control]:
+    """Those of these laws (`controller`, `controllers.pid`), then of the sections in AFTER."""
+    ruled = {*scenario.keys_by_rule()}
+    seas = list(scenario.disturbances())
+    names = [n for name in AFTER for n in (seas if name == "disturbance" else [name])]
+    return [
+        control
+        for part in (*laws, *names)
+        for control in _of_part(scenario, part, route(part), ruled)
+    ]
+
+
+def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Control]:
+    component: Any = scenario
+    way: Route = ()
+    for step in at:
+        inside = isinstance(component, (dict, tuple))
+        component = component[step] if inside else getattr(component, str(step))
+        kind = getattr(component, "kind", "")
+        way = (*way, step, kind) if kind else (*way, step)
+    key, *_ = keys_of(type(scenario)).follow(way)  # a kind before a key of its name
+    own = vars(type(component)).get("__annotations__", {})  # what the kind adds stands first
+    for name, content in sorted(dict(component).items(), key=lambda entry: entry[0] not in own):
+        if isinstance(content, Component):
+            yield from _of_part(scenario, f"{part}.{name}", (*at, name), ruled)
+        elif found := _control(scenario, part, (*at, name), key.keys[name], content):
+            yield Control(**found, by_rule=(*at, name) in ruled)
+
+
+def _control(
+    scenario: Scenario, part: str, at: Route, key: Key, content: Any
+) -> dict[str, Any] | None:
+    place, default = dotted(at), key.default
+    words = {
+        "key": place, "part": part, "name": key.name, "value": content, "unit": key.unit,
+        "range": key.range,
+        "meaning": (key.field and key.field.description) or f"which {part.partition('.')[0]} it is",
+        "default": "" if default is NO_DEFAULT else as_yaml(default),
+    }  # fmt: skip
+    choices = choices_of(key) or (("true", "false") if bool in key.types else ())
+    if choices and key.name != "preset":
+        shown = str(content).lower() if isinstance(content, bool) else content
+        return {**words, "value": shown, "choices": choices}
+    if isinstance(content, (int, float)) and not isinstance(content, bool):
+        usual = default if isinstance(default, (int, float)) else 0.0
+        quantum = scenario.simulation.step if place in TIMES else float(is_whole(key))
+        length = scenario.vessel.length if key.unit == "m" else 0.0
+        return {**words, **_span(key, float(content), float(usual), length), "quantum": quantum}
+    return None
+
+
+def _span(key: Key, now: float, usual: float, length: float) -> dict[str, Any]:
+    """The slider's ends: the key's own where it has both, else around the number."""
+    bounds = limits(key.field)
+    low = bounds.get("gt", bounds.get("ge"))
+    high = bounds.get("lt", bounds.get("le"))
+    size = abs(now) or abs(usual) or length or SIZES.get(key.unit, 1.0)
+    if low is not None and high is not None:
+        return {"low": min(low, now), "high": max(high, now)}
+    if low is not None and low >= 0.0 and now > 0.0:
+        return {"low": max(now / REACH, low), "high": now * REACH, "log": True}
+    if low is not None and low >= 0.0:
+        return {"low": low, "high": 10.0 * size}
+    if key.unit == "rad":
+        return {"low": -max(math.pi, abs(now)), "high": max(math.pi, abs(now))}
+    if (
+        key.path[0] == "vessel" and key.unit != "m" and now
+    ):  # as published: negative where it brakes
+        ends = sorted((now / REACH, now * REACH))
+        return {"low": ends[0], "high": ends[1], "log": True}
+    if key.path[0] == "vessel" and key.unit == "m":
+        size /= 2.0 * WIDE  # of a point within the hull
+    return {"low": max(now - WIDE * size, low if low is not None else -math.inf),
+            "high": min(now + WIDE * size, high if high is not None else math.inf)}  # fmt: skip
