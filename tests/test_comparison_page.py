@@ -7,9 +7,10 @@ from comparison_samples import FRAME, about, scenario, verdicts
 from drawn_samples import recording, shown
 from html_tree import tree
 
-from podusv_cli.comparison import chase, report, table
+from podusv_cli.comparison import report, table
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.finding import Finding
+from podusv_cli.figures import chase
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import Picture
 from podusv_cli.scenario.about import about_of

@@ -16,10 +16,10 @@ from podusv_cli.doubt.compared import compared
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.ranges import Range
 from podusv_cli.doubt.together import Draws
+from podusv_cli.figures.sketch import ON_PHONE
 from podusv_cli.figures.style import house_style
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.sweep import Quantity
-from podusv_cli.studies.sketch import ON_PHONE
 
 
 def choice(name, own, unit):

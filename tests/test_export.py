@@ -37,6 +37,7 @@ from podusv_cli.components.actuators.command import Command, Failure
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.engine.running import simulate
 from podusv_cli.export import c, link, objects
 from podusv_cli.export import check as checking
 from podusv_cli.export import fmu as units
@@ -121,12 +122,13 @@ def test_a_run_that_diverges_is_told_and_one_that_is_interrupted_exports_nothing
     tmp_path, monkeypatch
 ):
     said: list[str] = []
-    simulated = workflow.simulated
+    marched = simulate.run
 
     def ended(status):
         monkeypatch.setattr(
-            workflow, "simulated",
-            lambda *given: replace(simulated(*given), status=status, message="diverged at once"),
+            simulate, "run", lambda *given, **how: replace(
+                marched(*given, **how), status=status, message="diverged at once"
+            ),
         )  # fmt: skip
 
     ended("diverged")
@@ -308,7 +310,7 @@ def test_what_cannot_be_exported_gets_a_sentence(tmp_path, options, says):
 def test_an_export_says_which_law_it_takes_where_nobody_chose(tmp_path, monkeypatch):
     """The scenario has a `controller` of its base beside those that it compares."""
     said: list[str] = []
-    monkeypatch.setattr(workflow, "simulated", raised := Mock(side_effect=KeyboardInterrupt))
+    monkeypatch.setattr(workflow, "to_end", raised := Mock(side_effect=KeyboardInterrupt))
     for chosen in ("", "velocity_vector"):
         request = workflow.Request(
             tmp_path / f"law-{chosen}", ["simulation.duration=1"], chosen, c=True, fmu=False,

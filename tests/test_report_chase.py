@@ -16,7 +16,8 @@ from html_tree import tree
 from PIL import Image
 from test_comparison_page import ERRORS, page, theory
 
-from podusv_cli.comparison import chase, table
+from podusv_cli.comparison import table
+from podusv_cli.figures import chase
 from podusv_cli.scenario.load import load_text
 
 NO_STANDOFF = """

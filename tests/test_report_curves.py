@@ -15,9 +15,10 @@ from known_signals import ABOUT
 from test_comparison_page import page
 from test_report_chase import browsed, needs_browser
 
-from podusv_cli.comparison import traces
+from podusv_cli import pages
 from podusv_cli.core.quantities import lettered
-from podusv_cli.theory.derived import DERIVED
+from podusv_cli.figures import traces
+from podusv_cli.figures.signals import DERIVED
 
 ODD = "</script><script>alert(1)</script><!--"
 
@@ -49,7 +50,7 @@ def test_the_page_puts_a_spike_at_its_time():
     numbers = np.zeros(31_001)
     numbers[20_001] = 7.5
     curve = traces.encoded(*traces.thinned(numbers))
-    template = Path(traces.__file__).parent / "templates" / "curves.js"
+    template = Path(pages.__file__).parent / "templates" / "curves.js"
     (function,) = re.findall(r"^  const decoded = .*?^  };$", template.read_text(), re.M | re.S)
     script = f"""{function}
       const run = {{ start: 100.0, end: 410.0, curves: [{json.dumps(curve)}] }};
@@ -126,7 +127,7 @@ def test_an_axis_is_logarithmic_where_the_figure_s_is_and_from_the_same_size_on(
     ],
 )
 def test_numbers_that_are_no_powers_have_a_place_on_a_logarithmic_axis(floor, numbers, places):
-    template = Path(traces.__file__).parent / "templates" / "curves.js"
+    template = Path(pages.__file__).parent / "templates" / "curves.js"
     (function,) = re.findall(r"^  const warped = .*?^  };$", template.read_text(), re.M | re.S)
     (inverse,) = re.findall(r"^  const number = .*$", template.read_text(), re.M)
     script = f"""{function}{inverse}

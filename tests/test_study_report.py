@@ -243,7 +243,7 @@ def test_an_interrupt_while_figures_are_drawn_costs_figures_alone(drawn, tmp_pat
     folder = tmp_path / "stopped"
     shutil.copytree(drawn.folder, folder)
     (folder / "summary.csv").unlink()
-    monkeypatch.setattr("podusv_cli.studies.sketch.rendered", interrupted)
+    monkeypatch.setattr("podusv_cli.figures.sketch.rendered", interrupted)
     with pytest.raises(KeyboardInterrupt, match=f"podusv sweep report {folder}"):
         sweep.report(folder, sweep.Request())
     same = (drawn.folder / "summary.csv").read_bytes()

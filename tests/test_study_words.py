@@ -4,7 +4,7 @@ import pytest
 
 from podusv_cli.scenario.distributions import WAYS
 from podusv_cli.scenario.sweep import Quantity
-from podusv_cli.studies.making.words import WORDS, in_words
+from podusv_cli.scenario.words import WORDS, in_words
 
 
 @pytest.mark.parametrize(

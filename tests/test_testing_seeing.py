@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from conftest import kinds
 
-from podusv_cli import testing_seeing
 from podusv_cli.components.estimators.low_pass import LowPass
 from podusv_cli.components.measurements.base import FRESH, OWN, Measurement
 from podusv_cli.components.measurements.sensors import MEASURED
 from podusv_cli.core.kernel import Vector, call, kernel
 from podusv_cli.testing import checks, keeps_its_declaration
+from podusv_cli.testing import seeing as testing_seeing
 
 SOUND = [
     kind()

@@ -19,11 +19,11 @@ from podusv_cli.components.controllers.polar_backstepping import PolarBacksteppi
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.signals import DERIVED
 from podusv_cli.figures.stability import FAR, POINTS
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log
 from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, sway_bound, ultimate_bound
-from podusv_cli.theory.derived import DERIVED
 from podusv_cli.theory.ideal_weights import exponents, node_distance
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import ERRORS, NETWORKS, WINDOWS

@@ -13,9 +13,9 @@ from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording, Status
+from podusv_cli.figures import signals as derived
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.storage.run_folder import FinishedRun
-from podusv_cli.theory import derived
 
 UNKNOWN = "a metric of a plug-in that is not here; its unit is in the run's metrics.csv"
 # What claims can check of a run. Arguments: what it says about itself, and how it ended (None

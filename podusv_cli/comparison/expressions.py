@@ -35,8 +35,8 @@ from podusv_cli.expressions.reading import (
     syntax_tree,
 )
 from podusv_cli.expressions.walk import Condition, Walk
+from podusv_cli.figures.signals import DERIVED
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.theory.derived import DERIVED
 
 EXAMPLE = "a.iae < b.iae"
 STRICT = (ast.Lt, ast.Gt)  # too close to tell where the difference is within the tolerance

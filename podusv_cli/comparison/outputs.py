@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from podusv_cli.comparison import chase, claims, report, table, traces
+from podusv_cli.comparison import claims, report, table
 from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.plugins import Plugins
+from podusv_cli.figures import chase, traces
 from podusv_cli.figures.shown import dressed
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture

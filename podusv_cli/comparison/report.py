@@ -9,15 +9,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from podusv_cli.comparison import chase, stability
+from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
 from podusv_cli.comparison.table import Row, Table, leaders, rows
-from podusv_cli.comparison.traces import PIECES
 from podusv_cli.core.about import MetricAbout, RunAbout, SettingAbout
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.phrases import value_text
 from podusv_cli.expressions.verdict import by_answer
+from podusv_cli.figures import chase
+from podusv_cli.figures.traces import PIECES
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture, environment, flat
 

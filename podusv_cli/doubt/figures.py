@@ -18,8 +18,8 @@ from podusv_cli.doubt.answer import Answer, DoubtReport, reached
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import counted
 from podusv_cli.figures.looks import nth_style
+from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
-from podusv_cli.studies.sketch import COLUMNS, Sketch
 
 TURNED, RANGE = nth_style(1)[0], "#BBBBBB"
 MARKS = ((nth_style(0)[0], "."), (TURNED, "."), ("#444444", "x"))  # kept, turned, cannot tell

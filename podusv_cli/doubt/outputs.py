@@ -16,9 +16,9 @@ from podusv_cli.doubt.answer import Answer, DoubtReport, as_json, place
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.scenario.words import in_words as rows_in_words
 from podusv_cli.storage import csv_files, json_files
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.studies.making.words import in_words as rows_in_words
 
 HEAD = ("claim", "verdict", "in draws", "turns at", "hangs on")
 
@@ -64,10 +64,7 @@ def row(answer: Answer) -> list[str]:
     return [answer.verdict.name, answer.verdict.in_words, kept, turns, in_words(answer)]
 
 
-def write(
-    writer: RunWriter, report: DoubtReport, text: str, origin: Mapping[str, Any], extras: Extras, *,
-    figures: bool,
-) -> None:  # fmt: skip
+def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -> None:
     """All files of the folder but the manifest; `text` is the scenario's file."""
     writer.add("scenario.yaml", text.encode())
     for name, text in report.scenario.plugin_files().items():
@@ -80,12 +77,11 @@ def write(
         "draws.csv": _draws(report),
     }.items():  # fmt: skip
         writer.add(name, csv_files.lines(rows).encode())
-    pictures = _pictures(report, extras) if figures else []
+    pictures = _pictures(report, writer.extras) if figures else []
     for picture in pictures:
         writer.add(f"figures/{picture.name}.png", picture.file)
+    origin = writer.add_origin(report.scenario.plugged)
     writer.add("report.html", page(report, pictures, origin).encode())
-    writer.add_json("provenance.json", origin)
-    writer.add_missing(extras)
 
 
 def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
@@ -128,7 +124,7 @@ def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
 
 def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
     from podusv_cli.doubt.figures import sketches  # matplotlib is slow to import
-    from podusv_cli.studies.sketch import rendered
+    from podusv_cli.figures.sketch import rendered
 
     return rendered(sketches(report), extras)[1]
 

@@ -15,8 +15,8 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
+from podusv_cli.figures import signals as derived
 from podusv_cli.figures.looks import nth_style
-from podusv_cli.theory import derived
 
 MARKS = 24  # on the curves of a panel together
 FEWEST, MOST = 3, 8  # on a curve

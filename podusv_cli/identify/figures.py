@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from podusv_cli.core import escaping
 from podusv_cli.figures.looks import nth_style
+from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.judge import WHO, FreeRun
-from podusv_cli.studies.sketch import COLUMNS, Sketch
 
 MEASURED: dict[str, Any] = {
     "color": "#777777",

@@ -65,9 +65,8 @@ class Identified:
 
 
 def write(
-    writer: RunWriter, answer: Answer, text: str, origin: Mapping[str, Any], extras: Extras, *,
-    warnings: Sequence[str], figures: bool,
-) -> None:  # fmt: skip
+    writer: RunWriter, answer: Answer, text: str, *, warnings: Sequence[str], figures: bool
+) -> None:
     """All files of the folder but the manifest; `text` is the scenario's file."""
     writer.add("scenario.yaml", text.encode())
     writer.add(IDENTIFIED, (HEADING + yaml_text(given(answer))).encode())
@@ -81,12 +80,11 @@ def write(
         POSTERIOR: drawn(answer),
     }.items():
         writer.add(name, csv_files.records(rows, DIGITS).encode())
-    pictures = _pictures(answer, extras) if figures else []
+    pictures = _pictures(answer, writer.extras) if figures else []
     for picture in pictures:
         writer.add(f"figures/{picture.name}.png", picture.file)
+    origin = writer.add_origin(answer.problem.scenario.plugged)
     writer.add("report.html", page(answer, pictures, origin, warnings).encode())
-    writer.add_json("provenance.json", origin)
-    writer.add_missing(extras)
 
 
 def given(answer: Answer) -> dict[str, Any]:
@@ -108,8 +106,8 @@ def drawn(answer: Answer) -> list[dict[str, float]]:
 
 
 def _pictures(answer: Answer, extras: Extras) -> list[Picture]:
+    from podusv_cli.figures.sketch import rendered
     from podusv_cli.identify.figures import sketches  # matplotlib is slow to import
-    from podusv_cli.studies.sketch import rendered
 
     return rendered(sketches(answer), extras)[1]
 

@@ -19,13 +19,13 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins, installed
 from podusv_cli.core.recording import Recording
+from podusv_cli.figures import signals as derived
 from podusv_cli.interface.border import explained
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.files import read_text
 from podusv_cli.storage.run_folder import RESOLVED
-from podusv_cli.theory import derived
 
 if TYPE_CHECKING:
     import xarray
@@ -237,7 +237,7 @@ class Animation:
 
 def animation(runs: Mapping[str, Run]) -> Animation:
     """Runs chasing their target. Raises UsageError where no run has two rows."""
-    from podusv_cli.comparison.chase import page
+    from podusv_cli.figures.chase import page
     from podusv_cli.figures.shown import dressed
 
     shown = dressed([(label, *run._looked_at) for label, run in runs.items()])

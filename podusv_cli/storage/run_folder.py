@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -17,10 +17,11 @@ from typing import Any, Self
 
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import StorageError
+from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.process.extras import Extras
-from podusv_cli.storage import files, json_files, manifest
+from podusv_cli.storage import files, json_files, manifest, provenance
 from podusv_cli.storage.files import read_text
 from podusv_cli.storage.staging import Staging, Taken, remove_abandoned
 
@@ -62,13 +63,18 @@ class RunWriter:
 
     If another process takes the name during the run, a number is appended. With `named`, which
     says that the user gave the name, this is an error after the folder is saved.
+
+    `extras` has what could not be made, and whether the user ended it: `finish` writes missing.json
+    and the status by it.
     """
 
     def __init__(
-        self, final: Path, *, force: bool = False, named: bool = True, needed: float = 0.0
-    ) -> None:
+        self, final: Path, *, force: bool = False, named: bool = True, needed: float = 0.0,
+        argv: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
         self.final, self._force, self._named = final, force and named, named
+        self._argv, self._began, self.extras = argv, datetime.now(UTC), Extras()
         remove_abandoned(final.parent)  # may put back a run folder that a killed run was replacing
         _check_replaceable(final, force)
         self._staging = Staging(final)
@@ -91,19 +97,28 @@ class RunWriter:
         """Write a new JSON file, null for numbers that are not finite."""
         self.add(name, json_files.encode(content))
 
-    def add_missing(self, extras: Extras) -> None:
-        """Write missing.json where something could not be made."""
-        if extras.missing:
-            self.add_json(MISSING, extras.as_json())
+    def add_origin(self, plugins: Iterable[Plugin] = (), **more: Any) -> dict[str, Any]:
+        """Write provenance.json; what is in it, for a page."""
+        origin = provenance.collect(self._argv, self._began, datetime.now(UTC), plugins)
+        self.add_json(PROVENANCE, {**origin, **more})
+        return origin
 
-    def finish(self, status: Status, missing: str = "") -> Path:
+    @property
+    def status(self) -> Status:
+        """As the manifest has it of a folder that is no run."""
+        return "interrupted" if self.extras.interrupted else "finished"
+
+    def finish(self, status: Status | None = None, missing: str = "") -> Path:
         """Write the manifest and rename the folder to its final path, which is returned.
 
         An interrupted result, or an incomplete one (`missing` says why), replaces nothing: a number
         is appended to its name. The StorageError for a name that is taken says where the complete
         folder was saved instead.
         """
+        status = status or self.status
         whole = status != "interrupted"
+        if self.extras.missing:
+            self.add_json(MISSING, self.extras.as_json())
         remove_abandoned(self.folder)  # left by killed processes of a comparison
         manifest.write(self.folder, status)
         for inner, _, _ in os.walk(self.folder):

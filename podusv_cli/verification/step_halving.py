@@ -9,7 +9,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Status
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.model import Scenario
 
@@ -42,13 +42,9 @@ def refined(scenario: Scenario, halvings: int) -> TimeGrid:
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
     """Run a scenario of one law with its step halved `halvings` times."""
-    loop, grid = scenario.closed_loop(), refined(scenario, halvings)
-    probe = scenario.probe(grid)
-    compiled = scenario.simulation.compiled
-    out = simulate(loop, grid, probe=probe, compiled=compiled, progress=progress)
-    if out.status == "interrupted":
-        raise KeyboardInterrupt
-    whole = out.status == "finished" and out.seen is not None
-    metrics = probe.summary(out.seen) if whole and out.seen is not None else {}
-    position = np.array([out["x"][-1], out["y"][-1]]) if whole else np.full(2, np.nan)
-    return Level(grid.step, out.status, out.message, metrics, position)
+    plan = scenario.plan(refined(scenario, halvings))
+    out = to_end(plan, compiled=scenario.simulation.compiled, progress=progress)
+    seen = out.seen if out.status == "finished" else None
+    metrics = {} if seen is None else plan.probe.summary(seen)
+    position = np.full(2, np.nan) if seen is None else np.array([out["x"][-1], out["y"][-1]])
+    return Level(plan.grid.step, out.status, out.message, metrics, position)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
-from podusv_cli.storage import csv_files, provenance
+from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.studies.bench import optima, page, standing
 from podusv_cli.studies.bench.cases import BenchCase, Selection, cases
@@ -76,8 +75,9 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
     """
     if request.optimum:
         casadi()
-    started, every, extras = datetime.now(UTC), list(cases(wanted)), Extras()
-    with RunWriter(request.out, force=request.force) as writer:
+    every = list(cases(wanted))
+    with RunWriter(request.out, force=request.force, argv=request.argv) as writer:
+        extras = writer.extras
         scenarios = [scenario for case in every for scenario in case.laws.values()]
         for position, scenario in enumerate(scenarios, 1):
             scenario.ready()
@@ -92,10 +92,8 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
             plugins = dict.fromkeys(
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
-            origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
-            _write(writer, made, figures, origin, solved)
-            writer.add_missing(extras)
-            return Benched(writer.finish("finished"), made, tuple(map(str, extras.missing)))
+            _write(writer, made, figures, writer.add_origin(plugins), solved)
+            return Benched(writer.finish(), made, tuple(map(str, extras.missing)))
 
 
 def _simulated(
@@ -156,8 +154,8 @@ def _play(case: BenchCase, tell: Callable[[float], None]) -> list[BenchRun]:
 
 
 def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -> list[Picture]:
+    from podusv_cli.figures.sketch import rendered
     from podusv_cli.studies.bench.figures import sketches  # matplotlib is slow to import
-    from podusv_cli.studies.sketch import rendered
 
     return rendered(sketches(runs, made), extras)[1]
 
@@ -171,7 +169,6 @@ def _write(
     writer.add(REPORT, page.page(made, figures, origin, solved).encode())
     if solved:
         writer.add(OPTIMA, _csv(optima.table(solved)))
-    writer.add_json(ORIGIN, origin)
     for figure in figures:
         writer.add(f"figures/{figure.name}.png", figure.file)
 

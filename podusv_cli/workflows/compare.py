@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -36,7 +35,7 @@ from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
-from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened
+from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened, writer_of
 
 if TYPE_CHECKING:
     from podusv_cli.doubt.outputs import Doubted
@@ -134,7 +133,6 @@ def compare_gathered(
 
     `loaded` is the scenario whose verdicts are doubted, if any.
     """
-    started, argv = datetime.now(UTC), list(request.argv)
     check_asked(request, [member.plugins for member in given.members])
     _check_metrics(request, given.members)
     for finding in merged({member.label: member.noticed for member in given.members}):
@@ -145,7 +143,8 @@ def compare_gathered(
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
         outcomes = make_runs(given.members, writer.folder, request, progress)
         lost = unwritten(outcomes.values())
-        extras = Extras(interrupted=any(outcome.interrupted for outcome in outcomes.values()))
+        extras = writer.extras
+        extras.interrupted = any(outcome.interrupted for outcome in outcomes.values())
         result = collect(given.members, outcomes, given.claims, extras)
         result = replace(result, chosen=request.metrics, ratios=request.ratios)
         if extras.interrupted and not result.entries:
@@ -159,14 +158,11 @@ def compare_gathered(
             doubted = doubt_of(loaded, own, progress)
             result = replace(result, doubts=[HEAD, *map(row, doubted.answers)])
             extras.interrupted = doubted.status == "interrupted"
-        origin = provenance.collect(argv, started, datetime.now(UTC), result.plugins)
         outputs.write(writer, result, extras)
+        origin = writer.add_origin(result.plugins)
         _add_report(writer, result, given.name, origin, extras, progress, request)
-        writer.add_json("provenance.json", origin)
-        writer.add_missing(extras)
-        status: Status = "interrupted" if extras.interrupted else "finished"
-        folder = writer.finish(status, lost)
-        return Compared(folder, result, status, tuple(extras.missing), doubted)
+        folder = writer.finish(missing=lost)
+        return Compared(folder, result, writer.status, tuple(extras.missing), doubted)
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
@@ -195,7 +191,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
     space = needed(sizes(members), request.workers or available_workers())
-    return RunWriter(target, force=request.force, named=request.out is not None, needed=space)
+    return writer_of(request, target, space)
 
 
 def sizes(members: Sequence[Member]) -> list[Size]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from podusv_cli.comparison.entries import Entry, metrics_of
 from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
-from podusv_cli.core.recording import Status
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.alone import TriedChoice, explored
 from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
@@ -25,6 +23,7 @@ from podusv_cli.doubt.compared import ClaimNumber, compared
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.together import Draws, drawn
+from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
@@ -36,11 +35,10 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import find, placed
-from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import InMemory, RunWriter, default_folder
+from podusv_cli.storage.run_folder import InMemory, default_folder
 from podusv_cli.workflows.doubt_study import doubt_study
-from podusv_cli.workflows.execute import Stopwatch, examined, monitored, simulated, summary, warm_up
-from podusv_cli.workflows.run import RESULTS, Request, opened
+from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
+from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of
 
 Progress = Callable[[str, float], None]
 BATCH = 10  # draws that a process makes before it tells
@@ -61,18 +59,17 @@ def doubt(config: Path, request: Request, progress: Progress | None = None) -> o
 
 def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None) -> outputs.Doubted:
     """The same for a scenario that is loaded and checked."""
-    started, scenario = datetime.now(UTC), loaded.scenario
-    world = comparison(loaded)
+    scenario, world = loaded.scenario, comparison(loaded)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with (
         interrupts_deferred(),
-        RunWriter(target, force=request.force, named=request.out is not None) as writer,
+        writer_of(request, target) as writer,
     ):
-        report, extras = doubted(world, scenario, request, progress)
-        origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
-        outputs.write(writer, report, loaded.text, origin, extras, figures=request.figures)
-        status: Status = "interrupted" if extras.interrupted else "finished"
-        return outputs.Doubted(writer.finish(status), report.answers, status, tuple(extras.missing))
+        report, writer.extras.interrupted = doubted(world, scenario, request, progress)
+        outputs.write(writer, report, loaded.text, figures=request.figures)
+        return outputs.Doubted(
+            writer.finish(), report.answers, writer.status, tuple(writer.extras.missing)
+        )
 
 
 @dataclass(frozen=True)
@@ -108,8 +105,8 @@ def comparison(loaded: Loaded) -> Subject:
 
 def doubted(
     subject: Subject, scenario: Scenario, request: Request, progress: Progress | None
-) -> tuple[DoubtReport, Extras]:
-    """All that is tried, and what it says of every claim."""
+) -> tuple[DoubtReport, bool]:
+    """All that is tried, and what it says of every claim; whether an interrupt ended it."""
     cases = {label: Case.of(single) for label, single in subject.singles.items()}
     for case in cases.values():
         examined(case)
@@ -120,7 +117,7 @@ def doubted(
     judge, asked = judging(subject, entries), scenario.doubt or Doubt()
     tried = search(subject, judge, asked, request.workers, progress)
     whole = len(choices(subject.singles, asked)), asked.draws
-    extras = Extras(interrupted=(len(tried.alone), len(tried.worlds)) != whole)
+    interrupted = (len(tried.alone), len(tried.worlds)) != whole
     verdicts = [
         RunsVerdict(
             claim.name,
@@ -131,7 +128,7 @@ def doubted(
         for claim in subject.parsed
     ]
     events = {claim.name: nearest_event(claim, entries) for claim in subject.parsed}
-    return DoubtReport(scenario, answers(verdicts, tried, events), tried), extras
+    return DoubtReport(scenario, answers(verdicts, tried, events), tried), interrupted
 
 
 def search(
@@ -211,9 +208,7 @@ def _changed(subject: Subject, label: str, world: World) -> Scenario:
 
 def _entry(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> Entry:
     """A run in memory, with what a comparison adds to it that these claims name."""
-    recording = simulated(case, Stopwatch())
-    if recording.status == "interrupted":
-        raise KeyboardInterrupt
+    recording = to_end(case.plan, compiled=case.scenario.simulation.compiled)
     whole, _ = monitored(case, recording)
     numbers: dict[str, float | None] = {**summary(case, recording, Extras())}
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,9 @@ from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.of_study import overrides, study_choices
 from podusv_cli.doubt.together import Draws
-from podusv_cli.process.extras import Extras, Failure
+from podusv_cli.process.extras import Failure
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import Loaded
-from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.studies.counting.verdict import StudyVerdict
 from podusv_cli.workflows import many_runs, sweep
@@ -73,7 +71,7 @@ def doubt_study(
     Every study stays in the folder, so that an interrupted search goes on where it was. Raises
     ScenarioError, StorageError.
     """
-    started, scenario = datetime.now(UTC), loaded.scenario
+    scenario = loaded.scenario
     folder = request.out or RESULTS / f"{scenario.name}-doubt"
     studies, moving = Studies(config, folder, request), study_choices(scenario)
     tell = progress or (lambda what, fraction: None)
@@ -92,13 +90,11 @@ def doubt_study(
         ) from stop
     tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
     report = DoubtReport(scenario, answers(verdicts, tried), tried)
-    origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
-    extras = Extras()
-    extras.missing += _failed(alone)
-    with RunWriter(folder / "answer", force=True, named=True) as writer:
-        outputs.write(writer, report, loaded.text, origin, extras, figures=False)
-        at, missing = writer.finish("finished"), tuple(extras.missing)
-        return outputs.Doubted(at, report.answers, "finished", missing)
+    with RunWriter(folder / "answer", force=True, argv=request.argv) as writer:
+        writer.extras.missing += _failed(alone)
+        outputs.write(writer, report, loaded.text, figures=False)
+        missing = tuple(writer.extras.missing)
+        return outputs.Doubted(writer.finish(), report.answers, writer.status, missing)
 
 
 def _failed(alone: Sequence[TriedChoice]) -> Iterator[Failure]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -33,7 +33,7 @@ def write(config: Path, wanted: Identify) -> list[Path]:
 
 def _log(single: Scenario) -> str:
     single.ready()
-    recording = simulate(single.closed_loop(), single.time_grid(), probe=single.probe())
+    recording = to_end(single.plan())
     columns = [
         (recording[name] if place is None else recording[name][:, place]) * factor
         for name, place, factor in COLUMNS.values()

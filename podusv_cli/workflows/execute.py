@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,7 +29,7 @@ from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enable
 from podusv_cli.process.workers import Outcome
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import csv_files, files, provenance
+from podusv_cli.storage import csv_files, files
 from podusv_cli.storage import run_folder as folder
 from podusv_cli.theory import monitor
 from podusv_cli.theory.report import as_json as theory_report
@@ -125,18 +124,19 @@ def execute(
     after the simulation costs the figures or the law's cost, nothing else; what fails after it is
     left out, and missing.json says why. Raises StorageError.
     """
-    started, watch, case = datetime.now(UTC), watch or Stopwatch(), case or Case.of(task.scenario)
+    watch, case = watch or Stopwatch(), case or Case.of(task.scenario)
     size = estimate(case.scenario, case.plan)
     with (
         interrupts_deferred(),
         folder.RunWriter(
-            task.target, force=task.force, named=task.named, needed=size.needed
+            task.target, force=task.force, named=task.named, needed=size.needed, argv=task.argv
         ) as writer,
     ):
         long = size.content > task.held and not task.scenario.log.compress
         allocate = partial(files.disk_array, writer.folder) if long else np.empty
         recording = simulated(case, watch, progress, allocate, task.compiling)
-        extras = Extras(recording.status == "interrupted")
+        extras = writer.extras
+        extras.interrupted = recording.status == "interrupted"
         with watch.part("metrics"):
             gather = partial(summary, case, recording, extras)
             metrics = extras.made("the metrics", gather) or {}
@@ -165,11 +165,7 @@ def execute(
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
         with watch.part("write"):
-            origin = provenance.collect(
-                task.argv, started, datetime.now(UTC), task.scenario.plugged
-            )
-            writer.add_json("provenance.json", origin)
-            writer.add_missing(extras)
+            writer.add_origin(task.scenario.plugged)
             final = writer.finish(status)
     message = recording.message or ("" if status == "finished" else UNDRAWN)
     return Finished(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -13,18 +12,18 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Recording
+from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.export import c, objects
 from podusv_cli.export.check import ABOUT, FMU, SAMPLES
 from podusv_cli.export.fmu import fmu
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.export.link import linker, this_machine
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.plugins import of_files
-from podusv_cli.storage import csv_files, provenance
+from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.workflows.execute import Stopwatch, simulated
 from podusv_cli.workflows.run import others, single
 
 
@@ -47,7 +46,6 @@ class Request:
 
 def export(config: Path, request: Request) -> Path:
     """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
-    started = datetime.now(UTC)
     platforms, linked = _platforms(request), _linked(request) if request.fmu else {}
     too_large = limits(allow_large=False)
     checks, plugged = (unknown_codes, too_large), of_files(request.trust)
@@ -60,13 +58,12 @@ def export(config: Path, request: Request) -> Path:
             f"too many of them in {scenario.simulation.duration:g} s; simulate less, as --set "
             "simulation.duration=100 [s]"
         )
-    with RunWriter(request.to, force=request.force) as writer:
+    with RunWriter(request.to, force=request.force, argv=request.argv) as writer:
         if names := ", ".join(others(loaded, request.controller)):
             request.say(f"exporting `controller`; --controller chooses among {names}")
         request.say("simulating the run that the law is checked against")
-        run = simulated(Case(law.scenario, law.plan), Stopwatch())
-        if run.status == "interrupted":
-            raise KeyboardInterrupt
+        law.scenario.ready()
+        run = to_end(law.plan, compiled=law.scenario.simulation.compiled)
         seen = law.samples(run)
         samples = law.by_itself(seen)
         of_run = np.array_equal(samples, seen)
@@ -84,9 +81,8 @@ def export(config: Path, request: Request) -> Path:
         writer.add(SAMPLES, _table(law, samples).encode())
         about = law.as_json(platforms, objects.library_functions(text))
         writer.add_json(ABOUT, {**about, "of_run": of_run})
-        origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
-        writer.add_json("provenance.json", origin)
-        return writer.finish("finished")
+        writer.add_origin(scenario.plugged)
+        return writer.finish()
 
 
 def _platforms(request: Request) -> Sequence[str]:

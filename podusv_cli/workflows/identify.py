@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.recording import Status
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.identify import estimate, outputs
 from podusv_cli.identify.answer import Answer
@@ -18,15 +16,13 @@ from podusv_cli.identify.judge import FreeRun, free_runs, scores
 from podusv_cli.identify.phrases import far_words, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
-from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import RunWriter, default_folder
-from podusv_cli.workflows.run import RESULTS, Request, opened
+from podusv_cli.storage.run_folder import default_folder
+from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of
 
 Progress = Callable[[str, float], None]
 SETTLES = 30  # rounds, after which a search has usually settled
@@ -48,7 +44,7 @@ def identify_of(
     loaded: Loaded, request: Request, progress: Progress | None = None
 ) -> outputs.Identified:
     """The same for a scenario that is loaded and checked."""
-    started, scenario = datetime.now(UTC), loaded.scenario
+    scenario = loaded.scenario
     if scenario.identify is None or not scenario.identify.logs:
         raise UsageError(
             f"{scenario.name} names no logs; write them under identify.logs, as podusv docs "
@@ -58,7 +54,7 @@ def identify_of(
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with (
         interrupts_deferred(),
-        RunWriter(target, force=request.force, named=request.out is not None) as writer,
+        writer_of(request, target) as writer,
     ):
         with interrupts_enabled():
             answer = answered(scenario, scenario.identify, logs, progress)
@@ -70,14 +66,11 @@ def identify_of(
         )
         for line in warnings:
             request.warn(line)
-        extras = Extras()
-        origin = provenance.collect(request.argv, started, datetime.now(UTC), scenario.plugged)
-        outputs.write(
-            writer, answer, loaded.text, origin, extras, warnings=warnings, figures=request.figures
+        writer.extras.interrupted = answer.estimate.interrupted
+        outputs.write(writer, answer, loaded.text, warnings=warnings, figures=request.figures)
+        return outputs.Identified(
+            writer.finish(), answer, writer.status, warnings, tuple(writer.extras.missing)
         )
-        status: Status = "interrupted" if answer.estimate.interrupted else "finished"
-        folder, missing = writer.finish(status), tuple(extras.missing)
-        return outputs.Identified(folder, answer, status, warnings, missing)
 
 
 def _read(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario.limits import limits
-from podusv_cli.storage import csv_files, provenance
+from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
 from podusv_cli.workflows.run import Request, opened, single
@@ -60,7 +59,6 @@ def margins(config: Path, request: Request, at: float | None = None) -> MarginsO
     """
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
-    started = datetime.now(UTC)
     checks = (unknown_codes, limits(insist=""))
     loaded = opened(config, request, checks)
     duration, label = loaded.scenario.simulation.duration, request.controller
@@ -71,14 +69,12 @@ def margins(config: Path, request: Request, at: float | None = None) -> MarginsO
     if request.out is None:
         return find()
     _check_formats(request.formats)
-    with RunWriter(request.out, force=request.force) as writer:
+    with RunWriter(request.out, force=request.force, argv=request.argv) as writer:
         result = find()
         with interrupts_deferred():
-            plugins = loaded.scenario.plugged
-            origin = provenance.collect(request.argv, started, datetime.now(UTC), plugins)
             _write(writer, result, request.formats)
-            writer.add_json("provenance.json", origin)
-            return replace(result, folder=writer.finish("finished"))
+            writer.add_origin(loaded.scenario.plugged)
+            return replace(result, folder=writer.finish())
 
 
 def _of_laws(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> MarginsOfLaws:

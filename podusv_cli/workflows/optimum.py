@@ -13,7 +13,7 @@ from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
@@ -124,13 +124,7 @@ def _guesses(scenario: Scenario) -> dict[str, Motion]:
 
 def _run(scenario: Scenario) -> Recording:
     scenario.ready()
-    log = simulate(
-        scenario.closed_loop(), scenario.time_grid(), probe=scenario.probe(),
-        compiled=scenario.simulation.compiled,
-    )  # fmt: skip
-    if log.status == "interrupted":
-        raise KeyboardInterrupt
-    return log
+    return to_end(scenario.plan(), compiled=scenario.simulation.compiled)
 
 
 def _repeating(scenario: Scenario, wanted: Problem, motion: Motion) -> Scenario:

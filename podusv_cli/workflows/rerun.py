@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,8 +21,8 @@ from podusv_cli.scenario.limits import limits, needed
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import loaded
-from podusv_cli.storage import manifest, provenance, run_folder
-from podusv_cli.storage.run_folder import LOG, PROVENANCE, FinishedRun
+from podusv_cli.storage import manifest, run_folder
+from podusv_cli.storage.run_folder import LOG, FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
@@ -125,7 +124,6 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
-    started = datetime.now(UTC)
     again = [
         Member(
             run.folder.name, about_of(scenario), run.resolved_yaml,
@@ -136,7 +134,9 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
     with _passing(request) as place:
         target = request.out or place / "again"
         room = needed(sizes(again), available_workers())
-        with run_folder.RunWriter(target, force=request.force, needed=room) as writer:
+        with run_folder.RunWriter(
+            target, force=request.force, needed=room, argv=request.argv
+        ) as writer:
             outcomes = make_runs(again, writer.folder, request, progress)
             missing = unwritten(outcomes.values())
             ended = zip((run for run, _ in runs), outcomes.items(), strict=True)
@@ -144,10 +144,10 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
                 {label: _repeated(run, end.result) for run, (label, end) in ended if end.result},
                 {label: end.failure for label, end in outcomes.items() if not end.result},
             )
-            origin = provenance.collect(request.argv, started, datetime.now(UTC))
             # the order in which compare and rerun take them, as no table here has it
-            writer.add_json(PROVENANCE, {**origin, "runs": [member.label for member in again]})
-            writer.finish("interrupted" if done.interrupted else "finished", missing)
+            writer.add_origin(runs=[member.label for member in again])
+            writer.extras.interrupted = done.interrupted
+            writer.finish(missing=missing)
         return done
 
 

@@ -18,7 +18,7 @@ from podusv_cli.scenario.load import Check, Loaded, load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.yaml_tree import dotted
-from podusv_cli.storage.run_folder import default_folder
+from podusv_cli.storage.run_folder import RunWriter, default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
 
 RESULTS = Path("results")
@@ -61,6 +61,14 @@ def opened(config: Path, request: Request, checks: Sequence[Check]) -> Loaded:
     """The scenario of a file; warns of values that it loses. Raises ScenarioError."""
     loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
     return loaded.told(request.warn)
+
+
+def writer_of(request: Request, target: Path, needed: float = 0.0) -> RunWriter:
+    """What writes the folder that a request asks for."""
+    return RunWriter(
+        target, force=request.force, named=request.out is not None, needed=needed,
+        argv=request.argv,
+    )  # fmt: skip
 
 
 def run_loaded(

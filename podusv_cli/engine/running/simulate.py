@@ -67,6 +67,16 @@ def run(
         return replace(recorded(plan, vectors, ending), about=about)
 
 
+def to_end(
+    plan: Plan, *, compiled: bool = True, progress: Callable[[float], None] | None = None
+) -> Recording:
+    """The same without an early end. Raises KeyboardInterrupt."""
+    recording = run(plan, compiled=compiled, progress=progress)
+    if recording.status == "interrupted":
+        raise KeyboardInterrupt
+    return recording
+
+
 def ready(plan: Plan, compiled: bool, compiling: Callable[[float], None] | None = None) -> None:
     """Make every check of a run before its first step, and have its march compiled and loaded.
 

@@ -14,10 +14,10 @@ from matplotlib.figure import Figure
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.looks import nth_style
+from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.bench.runs import BenchRun
 from podusv_cli.studies.bench.standing import leaderboard, profile
-from podusv_cli.studies.sketch import COLUMNS, Sketch
 
 WORST = 4.0  # times the best law's IAE; the end of the profile's axis
 SMALL = 0.62  # inches, the side of a small multiple

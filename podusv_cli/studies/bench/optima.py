@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from podusv_cli.core.errors import NotConvergedError, UsageError
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
 from podusv_cli.optimum.problem import Motion, Problem, problem
@@ -79,7 +79,7 @@ def least(of: Task, tell: Callable[[float], None]) -> Least:
         raise UsageError(f"{', '.join(case.place)}: no law reached its target to begin from")
     scenarios = {law: case.laws[law] for law in of.laws}
     guesses = {
-        law: Motion.of(simulate(scenario.closed_loop(), scenario.time_grid()))
+        law: Motion.of(to_end(scenario.plan(), compiled=scenario.simulation.compiled))
         for law, scenario in scenarios.items()
     }
     stages = _searched(problem(scenarios[of.laws[0]], "iae"), guesses, tell)

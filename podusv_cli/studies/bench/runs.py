@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from podusv_cli.core.errors import PodusvError, in_a_line
 from podusv_cli.core.kernel import Vector
-from podusv_cli.engine.running.simulate import simulate
+from podusv_cli.engine.running.simulate import to_end
+from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.studies.bench.cases import BenchCase
 
@@ -63,13 +64,9 @@ def crashed(case: BenchCase, law: str, cause: str) -> BenchRun:
 
 
 def _run(case: BenchCase, law: str, scenario: Scenario) -> BenchRun:
-    probe, grid = scenario.probe(), _thinned(scenario).time_grid()
-    recording = simulate(
-        scenario.closed_loop(), grid, probe=probe, compiled=scenario.simulation.compiled
-    )
-    if recording.status == "interrupted":
-        raise KeyboardInterrupt
-    numbers = probe.summary(recording.seen) if recording.seen is not None else {}
+    plan = scenario.plan(_thinned(scenario.time_grid()))
+    recording = to_end(plan, compiled=scenario.simulation.compiled)
+    numbers = plan.probe.summary(recording.seen) if recording.seen is not None else {}
     track = np.stack([recording[name] for name in ("x", "y", "x_d", "y_d")], axis=1)
     settled = numbers.get("e_steady", math.nan)
     if recording.status != "finished" or scenario.at_target(numbers):
@@ -88,7 +85,6 @@ def _first(message: str) -> str:
     return message.partition(";")[0]
 
 
-def _thinned(scenario: Scenario) -> Scenario:
-    """The scenario with so few logged rows as a track needs."""
-    every = max(1, scenario.time_grid().steps // POINTS)
-    return scenario.model_copy(update={"log": scenario.log.model_copy(update={"every": every})})
+def _thinned(grid: TimeGrid) -> TimeGrid:
+    """The grid with so few logged rows as a track needs."""
+    return replace(grid, log_every=max(1, grid.steps // POINTS))

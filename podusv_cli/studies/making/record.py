@@ -14,11 +14,11 @@ from podusv_cli.core.plugins import digest
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import FOLDER
 from podusv_cli.scenario.sweep import Sweep
+from podusv_cli.scenario.words import in_words
 from podusv_cli.storage import files, json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making.draws import SWEEP
 from podusv_cli.studies.making.plan import StudyPlan
-from podusv_cli.studies.making.words import in_words
 
 FORMAT = 2
 

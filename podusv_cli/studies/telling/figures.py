@@ -22,10 +22,10 @@ from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.quantities import raised
 from podusv_cli.figures.looks import TARGET_LOOK, nth_style
+from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.counting import statistics
 from podusv_cli.studies.counting.expressions import FINISHED, parse_success, succeeded
-from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.telling.keep import Track
 from podusv_cli.studies.telling.results import Results
 from podusv_cli.studies.telling.summary import column_of

@@ -60,7 +60,7 @@ def write_report(
 
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
-        from podusv_cli.studies.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.figures.sketch import rendered  # matplotlib is slow to import
         from podusv_cli.studies.telling.figures import sketches
 
         drawn, shown = rendered(sketches(results, tracks(kept, extras)), extras)

@@ -19,8 +19,8 @@ from matplotlib.ticker import NullFormatter
 
 from podusv_cli.core import escaping
 from podusv_cli.figures.looks import TARGET_LOOK, nth_style
+from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
-from podusv_cli.studies.sketch import COLUMNS, Sketch
 from podusv_cli.studies.telling.figures import ratios
 from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.space import Gain, units_of

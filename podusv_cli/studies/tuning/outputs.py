@@ -29,7 +29,7 @@ def write_report(folder: Path, results: SearchResults, extras: Extras, *, figure
 
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
-        from podusv_cli.studies.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.figures.sketch import rendered  # matplotlib is slow to import
         from podusv_cli.studies.tuning.figures import sketches
 
         drawn, shown = rendered(sketches(results), extras)

@@ -12,9 +12,9 @@ import pandas as pd
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Failure
+from podusv_cli.scenario.words import in_words
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.making.sessions import sessions
-from podusv_cli.studies.making.words import in_words
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.space import units_of

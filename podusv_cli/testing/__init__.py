@@ -43,6 +43,7 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.figures import signals as derived
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style, image
@@ -51,8 +52,7 @@ from podusv_cli.metrics.table import metrics_probe, metrics_with
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import BASES
-from podusv_cli.testing_seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
-from podusv_cli.theory import derived
+from podusv_cli.testing.seeing import ESTIMATOR_CHECKS, MEASUREMENT_CHECKS, usual_vessel
 
 Check = Callable[[Any], None]
 STATES = 50  # random ones

@@ -41,7 +41,7 @@ def page(runs: Sequence[Shown]) -> str:
     from markupsafe import Markup  # with jinja2
 
     moving = chase(runs)
-    template = environment("podusv_cli.comparison").get_template("play.html.j2")
+    template = environment("podusv_cli.pages").get_template("play.html.j2")
     title = ", ".join(run.label for run in runs)
     return template.render(title=title, chase=moving, chase_json=Markup(as_json(moving)))
 
