@@ -332,7 +332,7 @@ class Problem:
             rows = [np.append(self.constants(y, f), self.start(log, f, y)) for y, f in both]
             # What another log begins with changes nothing here.
             each, of = np.unique(rows, axis=0, return_inverse=True)
-            constants, starts = each[:, : len(NAMES)], each[:, len(NAMES) :]
+            constants, starts = list(each[:, : len(NAMES)]), list(each[:, len(NAMES) :])
             for i, run in enumerate(self._runs(log, constants, starts, tracked=False)):
                 for lane in range(run.innovations.shape[1]):
                     columns = np.flatnonzero(of.ravel() == LANES * i + lane)

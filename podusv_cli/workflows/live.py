@@ -15,12 +15,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from podusv_cli.comparison.chase import chase
-from podusv_cli.comparison.traces import FIRST, traces
 from podusv_cli.core.errors import PodusvError, ScenarioError, StorageError, UsageError, in_a_line
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.running.simulate import run
+from podusv_cli.figures.chase import chase
 from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.traces import FIRST, traces
 from podusv_cli.findings.finding import Case, postflight, unknown_codes
 from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras

@@ -206,10 +206,8 @@ def _(
             yield from _described(getattr(thing, name), names, numbered, alone)
 
 
-@_described.register
-def _(  # type: ignore[type-arg]
-    thing: tuple, names: Iterable[str], numbered: dict[Any, int], alone: Any
-) -> Iterator[str]:
+@_described.register(tuple)
+def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) -> Iterator[str]:
     yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
     for item in thing:
         yield from _described(item, names, numbered, alone)
@@ -217,9 +215,7 @@ def _(  # type: ignore[type-arg]
 
 @_described.register(np.ndarray)
 @_described.register(np.generic)
-def _(
-    thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any
-) -> Iterator[str]:
+def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) -> Iterator[str]:
     yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
 
 

@@ -76,7 +76,7 @@ def _typed(kind: Any) -> str:
     """A type of ctypes, alike on all systems."""
     if kind is None:
         return "none"
-    if issubclass(kind, ctypes._CFuncPtr):
+    if issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
         return f"{_typed(kind._restype_)}({','.join(map(_typed, kind._argtypes_))})"
     if issubclass(kind, ctypes._Pointer):
         return f"{_typed(kind._type_)}*"
