@@ -111,6 +111,32 @@ def test_truncation_is_exact(cut: Bounded) -> None:
     assert middle == pytest.approx(back, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    "bounds", [(-7.0, 0.3), (-8.2, -4.0), (-1e-3, 7.9), (0.0, 6.0), (-0.123456789, 1 / 3)]
+)
+@pytest.mark.parametrize("sigma", [1.0, 0.15, 3.7e-3])
+def test_shares_are_those_of_one_bisection_after_another(
+    bounds: tuple[float, float], sigma: float
+) -> None:
+    """Drawn numbers depend on the last bit of a share, so many looks at once change none."""
+    for whole in (Normal(mean=0.3, sigma=sigma), LogNormal(median=2.5, sigma=sigma)):
+        within = tuple(sigma * z + 0.3 for z in bounds)
+        if isinstance(whole, LogNormal):
+            within = tuple(2.5 * math.exp(sigma * z) for z in bounds)
+        expected = [bisected_share(whole, x) for x in within]
+        assert list(whole.changed({"within": within}).shares) == expected
+
+
+def bisected_share(whole: Bounded, x: float) -> float:
+    low, high = 0.0, 1.0
+    while low < (middle := 0.5 * (low + high)) < high and high - low > 2.0**-60:
+        if whole.whole(np.array([middle]))[0] <= x:
+            low = middle
+        else:
+            high = middle
+    return high if high == 1.0 else low
+
+
 def test_choices_and_whole_numbers_are_equally_likely_and_keep_their_types() -> None:
     words = Distribution(choice=("a", 2, 2.5, True)).at(U)
     counts = Counter(map(repr, words.tolist()))

@@ -23,6 +23,7 @@ from podusv_cli.core.portable import exponential, logarithm, standard_normal
 LEAST = 1e-6  # the share of a distribution that `within` has to leave
 LARGEST = 2**53  # whole number: all up to this are exact as floats
 HALVINGS = 60  # of (0, 1), until nothing is left between two numbers
+LEVELS = 6  # of these, side by side
 Interval = tuple[float, float]
 Numbers = npt.NDArray[Any]  # floats, whole numbers, or Python objects
 
@@ -51,15 +52,23 @@ class Bounded(Component):
         low, high = self.within or (-math.inf, math.inf)
         return self._share_below(low), self._share_below(high)
 
-    @lru_cache(maxsize=256)  # noqa: B019  (a value; each takes a hundred looks at the distribution)
+    @lru_cache(maxsize=256)  # noqa: B019  (a value; a draw asks for it again and again)
     def _share_below(self, x: float) -> float:
+        """The share of the whole distribution at or below x, by bisection.
+
+        One look at the distribution gives the answers to the next LEVELS questions, whichever
+        way each is answered.
+        """
         low, high = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if not low < middle < high:
-                break
-            below = self.whole(np.array([middle]))[0] <= x
-            low, high = (middle, high) if below else (low, middle)
+        for _ in range(HALVINGS // LEVELS):
+            edges = _halved(low, high)
+            below = self.whole(edges[1:-1]) <= x
+            first, last = 0, len(below) + 1
+            while last - first > 1 and low < (middle := edges[(first + last) // 2]) < high:
+                if below[(first + last) // 2 - 1]:
+                    first, low = (first + last) // 2, float(middle)
+                else:
+                    last, high = (first + last) // 2, float(middle)
         return high if high == 1.0 else low
 
     @model_validator(mode="after")
@@ -97,6 +106,16 @@ class LogNormal(Bounded):
     def whole(self, u: Vector) -> Vector:
         """The values without `within`."""
         return self.median * exponential(self.sigma * standard_normal(u))
+
+
+def _halved(low: float, high: float) -> Vector:
+    """All places that LEVELS halvings can come to, with both ends: 2^LEVELS + 1 in order."""
+    edges = np.array([low, high])
+    for _ in range(LEVELS):
+        halves = np.empty(2 * len(edges) - 1)
+        halves[::2], halves[1::2] = edges, 0.5 * (edges[:-1] + edges[1:])
+        edges = halves
+    return edges
 
 
 def _ordered(name: str, bounds: tuple[float, ...]) -> None:
