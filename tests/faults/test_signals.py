@@ -335,7 +335,7 @@ def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
 
 
 def test_an_interrupted_verification_says_that_nothing_was_written(podusv, monkeypatch):
-    monkeypatch.setattr(step_halving, "simulate", soon(signal.SIGINT, step_halving.simulate))
+    monkeypatch.setattr(step_halving, "to_end", soon(signal.SIGINT, step_halving.to_end))
     said = podusv("verify", write("long.yaml", LONG), "--out", "x.json")
     text = "long.yaml: interrupted before all steps were simulated; nothing was written\n"
     assert said == (130, "", text)

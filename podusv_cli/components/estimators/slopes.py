@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from podusv_cli.core.kernel import Vector, kernel, scratch
 
 WIDTH = 9  # columns: x, y, psi, u, v, r, then the load north, east, about the vertical
@@ -19,7 +17,7 @@ def sign(x: float, variance: float) -> float:
     For a normal error it is erf(x/sqrt(2 variance)); this has the same slope at 0.
     """
     if variance > 0.0:
-        return float(x / np.sqrt(x * x + 0.5 * math.pi * variance))
+        return float(x / math.sqrt(x * x + 0.5 * math.pi * variance))
     return 1.0 if x >= 0.0 else -1.0
 
 
