@@ -35,7 +35,7 @@ JUDGED := hull_and_sea unknown_dynamics rivals learned
 DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN))
 
 .DEFAULT_GOAL := help
-.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest dist bench checks lint types contracts clean
+.PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest kernels dist bench checks lint types contracts clean
 
 help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -151,7 +151,11 @@ test-oldest: ## the tests with every dependency at its lower bound, in $(OLDEST)
 test-newest: ## the tests with the newest versions, in $(NEWEST); make PYTHON=python3.14 test-newest
 	@$(call SEPARATE,$(NEWEST),)
 
-dist: ## sdist and wheel into dist/, checked with twine
+kernels: $(VENV)/dev.done ## podusv's own kernels as bitcode, which its wheel has: after a change of kernels
+	@$(BIN)/python -m benchmarks.ship_kernels
+
+dist: $(VENV)/dev.done ## sdist and wheel into dist/, checked with twine; all kernels have to be in kernels.xz
+	@$(BIN)/python -m benchmarks.ship_kernels --check
 	@$(PYTHON) -m venv --clear .venv-dist
 	@.venv-dist/bin/pip install --quiet --disable-pip-version-check build twine
 	@rm -rf dist && .venv-dist/bin/python -m build --outdir dist .

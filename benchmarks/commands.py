@@ -26,6 +26,28 @@ PODUSV = ("-m", "podusv_cli")
 LIBRARIES = ("-c", "import numpy, h5py, pydantic, typer, yaml, llvmlite.binding")
 RUN = ("run", str(SCENARIO), "--json")
 FIRST = "podusv run --no-figures, for the first time"
+BOAT = (
+    "start", "boat", "--length", "2", "--beam", "0.8", "--mass", "60", "--thrusters", "2x50N@0.3"
+)  # fmt: skip
+# What somebody does first, each with nothing compiled.
+FIRST_RUNS = {
+    "podusv run podusv:own_vessel.yaml --no-figures": (
+        "run", "podusv:own_vessel.yaml", "--no-figures"
+    ),
+    "podusv run podusv:mu_2017/corrected.yaml --no-figures": (
+        "run", "podusv:mu_2017/corrected.yaml", "--no-figures"
+    ),
+    "podusv demo": ("demo", "--no-browser"),
+    "podusv compare of a scenario of podusv start": ("compare", "boat.yaml"),
+}  # fmt: skip
+# podusv as a checkout without kernels.xz has it: numba compiles.
+BY_NUMBA = """
+from pathlib import Path
+from podusv_cli.engine.machine import shipped
+shipped.FILE = Path("none")
+from podusv_cli.__main__ import main
+main()
+"""
 STUDY, SHORT = (
     "podusv sweep run of {} draws, --no-figures",
     "a run of 1000 steps of a study, 1000 T",
@@ -130,6 +152,31 @@ def commands() -> dict[str, dict[str, Any]]:
         return found
 
 
+def first_runs() -> dict[str, tuple[float, float, float]]:
+    """Processors' seconds of first runs: kernels shipped, by numba, and once more thereafter.
+
+    The least of three each, measured in turn.
+    """
+    found = {}
+    for label, arguments in FIRST_RUNS.items():
+        rounds = [_first_run(arguments) for _ in range(3)]
+        found[label] = tuple(map(min, zip(*rounds, strict=True)))
+    return found
+
+
+def _first_run(arguments: Sequence[str]) -> tuple[float, float, float]:
+    busy = []
+    for program in (PODUSV, ("-c", BY_NUMBA)):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            if arguments[-1] == "boat.yaml":
+                spent(BOAT, folder)
+            busy.append(spent((*arguments, "--out", "first"), folder, program)["busy"])
+            if program is PODUSV:
+                later = spent((*arguments, "--out", "later"), folder)["busy"]
+    return busy[0], busy[1], later
+
+
 def _apart(arguments: Sequence[str], folder: Path) -> Sequence[str]:
     if arguments[0] not in ("run", "compare"):
         return arguments
@@ -161,6 +208,10 @@ def main() -> None:
     ]
     for cells in (["command", "T", "peak memory, MB"], ["---"] * 3, *rows):
         print(f"| {' | '.join(cells)} |")
+    print("\n| first run, processors' seconds | kernels shipped | by numba | once more |")
+    print("| --- | --- | --- | --- |")
+    for label, times in first_runs().items():
+        print(f"| {label} | {' | '.join(f'{seconds:.2f}' for seconds in times)} |")
     print(f"\none more run of 1000 steps in a study: {short_run(found):.2f} thousandths of T")
 
 

@@ -397,9 +397,7 @@ def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(
         raise AttributeError("no attribute 'add_always_inliner_pass'")
 
     monkeypatch.setattr(object_code.widening, "widened", without_a_pass)
-    (piece,) = [
-        p for p in lanes._pieces(Plan(loop("pid"), GRID)) if p.label.startswith("lanes_law")
-    ]
+    (piece,) = [p for p in lanes.pieces(Plan(loop("pid"), GRID)) if p.label.startswith("lanes_law")]
     code = object_code.object_code(piece.function, piece.prototype)
     assert code.symbol == ""
     assert b"cannot be widened: AttributeError: no attribute 'add_always" in code.content

@@ -9,7 +9,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
-from podusv_cli.engine.machine import compile_numba
+from podusv_cli.engine.machine import finish
 from podusv_cli.engine.machine.compile import Piece
 
 # Functions that give a number and round correctly everywhere
@@ -58,11 +58,12 @@ PLATFORMS: Mapping[str, Platform] = {
 def together(pieces: Mapping[str, Piece]) -> str:
     """One module of LLVM's language with these functions, and no other that is seen outside.
 
-    Raises TypeError as `compile_numba.object_code`.
+    Raises TypeError as `Piece.bitcode`.
     """
     whole: Any = None
     for name, piece in pieces.items():
-        module = compile_numba.module(piece.function, piece.prototype, name)
+        module = finish.module(piece.bitcode(), piece.function.__qualname__)
+        module.get_function(finish.SYMBOL).name = name
         for part in (*module.functions, *module.global_variables):
             if not part.is_declaration and part.name != name:
                 part.linkage = INTERNAL

@@ -153,6 +153,18 @@ FILTERED_LANES = (
 Follow = Callable[[Record, Sequence[Vector], Sequence[Vector], bool], Followed]
 
 
+def pieces(actuator: Actuator) -> list[Any]:
+    """What is compiled for the filter along a log of this actuator's commands."""
+    from podusv_cli.engine.machine import compile
+
+    names = tuple(actuator.constants())
+    return [
+        compile.lane_adapter("actuator", actuator.replay, names, frozenset(names)),
+        compile.lane_adapter("follow", ExtendedKalmanFilter.follow, NAMES, frozenset()),
+        compile.Piece(filtered, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
+    ]
+
+
 def side_by_side(actuator: Actuator) -> Follow:
     """A function that follows a record with several constants and starts, in compiled code.
 
@@ -162,16 +174,10 @@ def side_by_side(actuator: Actuator) -> Follow:
     """
     from podusv_cli.engine.machine import compile
 
-    constants = actuator.constants()
-    every = frozenset(constants)
-    pieces = [
-        compile.lane_adapter("actuator", actuator.replay, tuple(constants), every),
-        compile.lane_adapter("follow", ExtendedKalmanFilter.follow, NAMES, frozenset()),
-        compile.Piece(filtered, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
-    ]
-    compile.prepare(pieces)
-    loads, follow, march = map(compile.routine, pieces)
-    a = _in_lanes([np.array([*constants.values(), 0.0])])
+    compiled = pieces(actuator)
+    compile.prepare(compiled)
+    loads, follow, march = map(compile.routine, compiled)
+    a = _in_lanes([np.array([*actuator.constants().values(), 0.0])])
     table = _in_lanes([actuator.table()])
 
     def followed(

@@ -22,6 +22,10 @@ from podusv_cli.process.workers import available_workers, run_all
 # What compiles kernels for a run, and for lanes
 ALONE_BY, LANES_BY = "compile_numba", "wide.object_code"
 SYMBOLS = {ALONE_BY: finish.SYMBOL, LANES_BY: "podusv_lanes"}
+NO_NUMBA = (
+    "its machine code does not come with podusv, and numba, which makes it, is not installed; "
+    "pip install numba"
+)
 SHARE = 40_000  # size of what a process of its own compiles at least: about 3 s
 RULES = (
     "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
@@ -56,16 +60,33 @@ class Piece(NamedTuple):
         """Its bitcode, if it came with podusv."""
         return shipped.bitcode(self.function, self.prototype, self.compiler)
 
-    def compile(self) -> object_cache.Code:
-        """Its object code. Raises TypeError."""
+    def bitcode(self) -> bytes:
+        """LLVM bitcode that suits any machine: what came with podusv, or what numba makes now.
+
+        Raises TypeError for a kernel that cannot become machine code, and without numba.
+        """
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
+        with interrupts_deferred():
+            made = self.shipped or self.translator().bitcode(self.function, self.prototype)
+            return cast(bytes, made)
+
+    def compile(self) -> object_cache.Code:
+        """Its object code. Raises TypeError as `bitcode`."""
         with interrupts_deferred():
             if ready := self.shipped:
                 alone, name = self.compiler == ALONE_BY, self.function.__qualname__
-                with suppress(RuntimeError):  # of an LLVM that cannot read it
-                    return finish.object_code(ready, SYMBOLS[self.compiler], name, alone)
-            module = import_module(f"podusv_cli.engine.machine.{self.compiler}")
-            return cast(object_cache.Code, module.object_code(self.function, self.prototype))
+                return finish.object_code(ready, SYMBOLS[self.compiler], name, alone)
+            made = self.translator().object_code(self.function, self.prototype)
+            return cast(object_cache.Code, made)
+
+    def translator(self) -> Any:
+        """The module that makes its code. Raises TypeError without numba."""
+        try:
+            return import_module(f"podusv_cli.engine.machine.{self.compiler}")
+        except ModuleNotFoundError as error:
+            if error.name != "numba":
+                raise
+            raise TypeError(NO_NUMBA) from error
 
 
 @cache  # it reads all byte code of a piece
@@ -100,7 +121,8 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
     advance(0, 0.0)
     for piece in missing:
         if not piece.shipped:  # numba is needed, and then imported once, before the forks
-            import_module(f"podusv_cli.engine.machine.{piece.compiler}")
+            with suppress(TypeError):  # `compiled` says that it is missing
+                piece.translator()
     if len(shares) == 1:
         _keep(shares[0], partial(advance, 0))
         return

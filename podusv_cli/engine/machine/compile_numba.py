@@ -76,15 +76,8 @@ def object_code(function: Any, prototype: Any) -> Code:
     return finish.object_code(code, finish.SYMBOL, function.__qualname__, True)
 
 
-def module(function: Any, prototype: Any, symbol: str) -> Any:
-    """The same before it is object code, with the C function under this name."""
-    made = finish.module(bitcode(function, prototype), function.__qualname__)
-    made.get_function(finish.SYMBOL).name = symbol
-    return made
-
-
 def bitcode(function: Any, prototype: Any) -> bytes:
-    """The same for any machine. Raises TypeError for what numba cannot type."""
+    """LLVM bitcode of the same, for any machine. Raises TypeError for what numba cannot type."""
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
         typed = signature(prototype, from_ctypes)

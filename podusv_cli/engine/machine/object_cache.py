@@ -17,7 +17,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache, singledispatch
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple
@@ -127,9 +127,16 @@ def fingerprint(function: Any) -> str:
 @cache
 def _circumstances() -> tuple[str, ...]:
     settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k.startswith("NUMBA_"))
-    versions = [sys.version, *(version(package) for package in ("numba", "llvmlite"))]
+    versions = [sys.version, version("llvmlite"), numba_version()]
     cpu = [llvm.get_process_triple(), llvm.get_host_cpu_name()]
     return (*settings, *versions, *cpu, llvm.get_host_cpu_features().flatten())
+
+
+def numba_version() -> str:
+    """That of the numba that is installed; empty without one, which podusv's kernels need not."""
+    with suppress(PackageNotFoundError):
+        return version("numba")
+    return ""
 
 
 def byte_code(function: Any) -> Iterator[str]:
@@ -220,8 +227,8 @@ def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) ->
 
 
 @cache
-def translators() -> str:
+def translators(patterns: tuple[str, ...] = TRANSLATORS) -> str:
     """Digest of podusv's files that turn kernels into machine code."""
     package = Path(__file__).resolve().parents[2]
-    files = sorted(path for pattern in TRANSLATORS for path in package.glob(pattern))
+    files = sorted(path for pattern in patterns for path in package.glob(pattern))
     return _digest(b"\0".join(path.read_bytes() for path in files))

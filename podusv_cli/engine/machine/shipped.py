@@ -1,7 +1,8 @@
 """Kernels of podusv's own that come with it as LLVM bitcode, so that a first run needs no numba.
 
 They lie in one file, under a digest of the source of a kernel and of all that it calls or reads,
-which is the same in every version of Python. What other translators made is not used.
+which is the same in every version of Python. What other files of podusv made, or a newer LLVM, is
+not used: numba makes it then.
 """
 
 from __future__ import annotations
@@ -15,13 +16,21 @@ import lzma
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
+
+import llvmlite.binding as llvm
 
 from podusv_cli.core.plugins import TEXT
 from podusv_cli.engine.machine import object_cache
 
 FILE = Path(__file__).with_name("kernels.xz")
+# The files of podusv that make bitcode, from the package's folder.
+MAKERS = (
+    "core/kernel.py", "engine/machine/compile_numba.py", "engine/machine/finish.py",
+    "engine/machine/wide/*.py",
+)  # fmt: skip
 
 
 def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
@@ -41,22 +50,22 @@ def digest(function: Any, prototype: Any, compiler: str) -> str:
 
 @cache
 def _kernels() -> Mapping[str, bytes]:
-    """All of them; none where there are none, or other files translate by now."""
-    with suppress(OSError, lzma.LZMAError, ValueError):
+    """All of them; none where the file is missing or damaged, or made by others than are here."""
+    with suppress(OSError, lzma.LZMAError, ValueError, TypeError):
         head, _, body = lzma.decompress(FILE.read_bytes()).partition(b"\n")
-        translators, sizes = json.loads(head)
-        if translators == object_cache.translators():
-            kernels, at = {}, 0
-            for name, size in sizes.items():
-                kernels[name] = body[at : at + size]
-                at += size
-            return kernels
+        makers, version, sizes = json.loads(head)
+        # A newer LLVM reads the bitcode of an older one, not the other way round.
+        if makers == object_cache.translators(MAKERS) and tuple(version) <= llvm.llvm_version_info:
+            ends = [*accumulate(sizes.values())]
+            begins = [0, *ends[:-1]]
+            return {name: body[a:b] for name, a, b in zip(sizes, begins, ends, strict=True)}
     return {}
 
 
 def write(kernels: Mapping[str, bytes]) -> None:
-    """Make the file."""
-    head = [object_cache.translators(), {name: len(code) for name, code in kernels.items()}]
+    """Make the file of the bitcode of kernels, by their digests."""
+    sizes = {name: len(code) for name, code in kernels.items()}
+    head = [object_cache.translators(MAKERS), llvm.llvm_version_info, sizes]
     whole = json.dumps(head).encode() + b"\n" + b"".join(kernels.values())
     FILE.write_bytes(lzma.compress(whole, preset=9))
 

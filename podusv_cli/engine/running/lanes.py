@@ -57,9 +57,9 @@ def marcher(
     """
     from podusv_cli.engine.machine import compile  # only what marches side by side needs it
 
-    pieces = _pieces(plan)
-    compile.prepare(pieces, compiling)
-    *adapters, march = map(compile.routine, pieces)
+    every = pieces(plan)
+    compile.prepare(every, compiling)
+    *adapters, march = map(compile.routine, every)
 
     def ready(lanes: Lanes, h: float) -> March:
         vectors = lanes.vectors
@@ -83,11 +83,15 @@ def is_compiled(plan: Plan) -> bool:
     """Whether the march of runs like this loop is on the disk, or next to it: half a second."""
     from podusv_cli.engine.machine import object_cache
 
-    return all(object_cache.is_cached(p.name) or p.shipped for p in _pieces(plan))
+    return all(object_cache.is_cached(p.name) or p.shipped for p in pieces(plan))
 
 
-def _pieces(plan: Plan) -> list[Any]:
-    """What is compiled for lanes: the parts, with what is alike in them, and the march."""
+def pieces(plan: Plan) -> list[Any]:
+    """What is compiled for lanes: the parts, with what is alike in them, and the march.
+
+    Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
+    would read what is not there.
+    """
     from podusv_cli.engine.machine import compile
 
     shared = shared_constants(plan)
