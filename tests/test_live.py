@@ -1,0 +1,158 @@
+"""`podusv live`: moved values give the numbers of `podusv run`; only this page may move them."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from http.client import HTTPConnection
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from podusv_cli.workflows.live import Live
+
+OWN = "podusv:own_vessel.yaml"
+SHORT = ("simulation.duration=20.0",)
+# Of every part, at numbers that nobody chose; a hull's also change what the law is told.
+MOVED: list[dict[str, float | str]] = [
+    {"controller.K_Pu": 77.7}, {"vessel.m": 51.3, "vessel.X_u": -13.7}, {"start.psi": -2.13},
+    {"path.speed": 0.613, "path.course": 1.9}, {"actuator.surge_limit": 31.7},
+    {"path.kind": "circle", "path.radius": 7.3},
+    {"control.period": 0.1125, "simulation.step": 0.0125},
+]  # fmt: skip
+
+
+def framed(live: Live, moved: Mapping[str, float | str], *, rest: bool) -> dict[str, Any]:
+    return live.answer("frame", {"moved": moved, "signals": [], "rest": rest, "controls": False})
+
+
+@pytest.fixture(scope="module")
+def live() -> Live:
+    live = Live(OWN, SHORT)
+    live.frame({}, (), rest=True, wanted=True)
+    return live
+
+
+@pytest.mark.parametrize("moved", MOVED, ids=lambda moved: next(iter(moved)))
+def test_both_ways_to_a_scenario_give_the_numbers_of_run(live: Live, moved, podusv) -> None:
+    moving, rest = (framed(live, moved, rest=rest) for rest in (False, True))
+    for part in ("numbers", "curves", "chase", "endings", "command"):
+        assert moving[part] == rest[part], part
+    said = podusv(*rest["command"].split()[1:], "--no-figures", "--out", "r", "--json")
+    assert said.code == 0, said.err
+    metrics = json.loads(said.out)["metrics"]
+    shown = {row["name"]: row["values"][0] for row in rest["numbers"]}
+    numbers = {name: x for name, x in shown.items() if isinstance(x, float) and name != "law_ns"}
+    assert len(numbers) > 3
+    assert numbers == {name: metrics[name] for name in numbers}
+
+
+def test_a_refused_value_has_the_sentence_of_podusv_at_its_key_and_the_page_goes_on(live) -> None:
+    for rest in (False, True):
+        answer = framed(live, {"vessel.X_u": 200.0}, rest=rest)
+        (fault,) = answer["refused"]
+        assert fault["key"] == "vessel.X_u"
+        assert "must be a number not above 0 [kg/s]" in fault["text"]
+    assert "refused" not in framed(live, {}, rest=False)
+
+
+def test_what_is_saved_is_what_is_shown(live: Live, podusv) -> None:
+    moved = {"controller.K_Pu": 77.7, "vessel.m": 51.3, "start.psi": -2.13}
+    saved = live.answer("save", {"moved": moved, "name": "mine"})
+    assert saved["command"] == "podusv run mine.yaml"
+    assert podusv("run", "mine.yaml", "--no-figures", "--out", "r").code == 0
+    other = framed(live, moved, rest=True)["command"].split()[1:]
+    assert podusv(*other, "--no-figures", "--out", "s").code == 0
+    with h5py.File("r/log.h5") as saved_log, h5py.File("s/log.h5") as shown_log:
+        arrays = [
+            {name: x[()] for name, x in log.items() if isinstance(x, h5py.Dataset)}
+            for log in (saved_log, shown_log)
+        ]
+    assert arrays[0].keys() == arrays[1].keys()
+    for name, array in arrays[0].items():
+        np.testing.assert_array_equal(array, arrays[1][name])
+    again = live.answer("save", {"moved": moved, "name": "mine"})["refused"][0]["text"]
+    assert again == "mine.yaml is there already; take another name"
+
+
+@pytest.mark.parametrize("name", ["../evil", "a/b", "", "a.yaml", "a\n", "/tmp/x", "-"])
+def test_a_name_that_is_none_writes_nothing(live: Live, name: str, podusv) -> None:
+    before = sorted(Path().rglob("*"))
+    assert "is no name" in live.answer("save", {"moved": {}, "name": name})["refused"][0]["text"]
+    assert sorted(Path().rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    "moved",
+    [
+        {"plugins.x.py": "evil.py"}, {"extends": "evil.yaml"}, {"name": "x"},
+        {"path.kind": "../x"}, {"controller.K_Pu": "{evil}"}, {"controller.K_Pu": [1.0]},
+        {"disturbance.file": "secret.csv"},
+    ],
+)  # fmt: skip
+def test_only_what_was_offered_may_move(live: Live, moved: dict[str, Any]) -> None:
+    (refused,) = live.answer(
+        "frame", {"moved": moved, "signals": [], "rest": True, "controls": False}
+    )["refused"]
+    assert "not among the values that this page moves" in refused["text"]
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[tuple[str, str]]:
+    """Host and path of a page that is served, which Ctrl-C ends with exit code 130."""
+    command = [sys.executable, "-m", "podusv_cli", "live", OWN, "--no-open", "--set", *SHORT]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout
+        found = re.search(r"http://([^/]+)(/\S+)", process.stdout.readline())
+        assert found
+        yield found[1], found[2]
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == 130
+
+
+QUESTION = json.dumps({"moved": {}, "signals": [], "rest": False, "controls": False})
+
+
+def asked(host: str, path: str, headers: Mapping[str, str], body: str = QUESTION) -> int:
+    connection = HTTPConnection(host, timeout=60)
+    connection.request("POST", path, body, {"Content-Type": "application/json", **headers})
+    return connection.getresponse().status
+
+
+def test_the_page_is_answered_under_its_own_name_alone(address: tuple[str, str]) -> None:
+    host, base = address
+    assert host.startswith("127.0.0.1:")
+    own = f"http://{host}"
+    assert asked(host, f"{base}frame", {"Origin": own}) == 200
+    assert asked(host, f"{base}frame", {}) == 200
+    refused = {
+        "another page": ({"Origin": "http://evil.example"}, f"{base}frame", QUESTION),
+        "a page of no origin": ({"Origin": "null"}, f"{base}frame", QUESTION),
+        "a foreign name": ({"Host": "evil.example"}, f"{base}frame", QUESTION),
+        "a form": ({"Content-Type": "text/plain"}, f"{base}frame", QUESTION),
+        "no token": ({}, "/frame", QUESTION),
+        "another token": ({}, f"/{'x' * (len(base) - 2)}/frame", QUESTION),
+        "no question": ({}, f"{base}frame", "{"),
+    }
+    codes = {what: asked(host, path, sent, body) for what, (sent, path, body) in refused.items()}
+    assert all(code in (400, 403, 404) for code in codes.values()), codes
+    assert asked(host, f"{base}frame", {"Origin": own}) == 200  # and goes on
+
+
+def test_the_page_names_no_other_place(address: tuple[str, str]) -> None:
+    host, base = address
+    connection = HTTPConnection(host, timeout=60)
+    connection.request("GET", base)
+    answer = connection.getresponse()
+    page, policy = answer.read().decode(), answer.getheader("Content-Security-Policy") or ""
+    assert answer.status == 200
+    assert "default-src 'none'" in policy
+    assert "frame-ancestors 'none'" in policy
+    assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
