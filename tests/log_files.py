@@ -7,7 +7,7 @@ import struct
 import numpy as np
 
 from podusv_cli.core.signal import STATE, TAU
-from podusv_cli.identify.reading import Named, table
+from podusv_cli.identify.logs.reading import Named, table
 
 
 def write_bag(folder, begin=1_700_000_000_000_000_000):

@@ -37,6 +37,7 @@ from podusv_cli.identify.estimate import (
     Estimate,
     directions,
 )
+from podusv_cli.identify.logs.reading import Table, delivered
 from podusv_cli.identify.march import (
     APART,
     COMMANDS,
@@ -50,7 +51,6 @@ from podusv_cli.identify.march import (
 from podusv_cli.identify.outputs import drawn
 from podusv_cli.identify.phrases import summary, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem, hull_numbers
-from podusv_cli.identify.reading import Table, delivered
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load

@@ -13,14 +13,14 @@ from log_files import read, written
 
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.errors import UsageError
-from podusv_cli.identify.checks import checked
-from podusv_cli.identify.commands import acted, held
-from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.intake import logs_of, pieces
+from podusv_cli.identify.logs.checks import checked
+from podusv_cli.identify.logs.commands import acted, held
+from podusv_cli.identify.logs.formats import LogFault
+from podusv_cli.identify.logs.reading import Table
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.phrases import far_words
 from podusv_cli.identify.problem import Problem
-from podusv_cli.identify.reading import Table
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load

@@ -18,7 +18,7 @@ def is_log(path: Path) -> bool:
     """Whether an argument is a log, and neither a scenario nor a folder."""
     if path.suffix in ("", *YAML) or path.is_dir():
         return False
-    from podusv_cli.identify.formats import READERS  # h5py is slow to import
+    from podusv_cli.identify.logs.formats import READERS  # h5py is slow to import
 
     return path.suffix.lower() in READERS
 
@@ -29,7 +29,7 @@ def track(path: Path, identify: Sequence[Identify]) -> Track:
     A row stands where a position is new; all else is straight between its own values. Raises
     UsageError where the log has no pose.
     """
-    from podusv_cli.identify.reading import Named, delivered, table
+    from podusv_cli.identify.logs.reading import Named, delivered, table
 
     named = Named(identify[0].columns, identify[0].frame) if identify else Named()
     log = table(path, STATE, named)

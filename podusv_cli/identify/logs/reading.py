@@ -17,8 +17,8 @@ from podusv_cli.core import units
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.units import allowed, spelled
-from podusv_cli.identify.formats import TIME, Columns, LogFault, columns_of
-from podusv_cli.identify.frames import LAT, LON, local_plane, turned
+from podusv_cli.identify.logs.formats import TIME, Columns, LogFault, columns_of
+from podusv_cli.identify.logs.frames import LAT, LON, local_plane, turned
 
 Marks = npt.NDArray[np.bool_]
 Whole = npt.NDArray[np.int64]

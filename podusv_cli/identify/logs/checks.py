@@ -18,8 +18,8 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.formats import LogFault
-from podusv_cli.identify.reading import UNITS, Marks, Table, Whole
+from podusv_cli.identify.logs.formats import LogFault
+from podusv_cli.identify.logs.reading import UNITS, Marks, Table, Whole
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
 FINER = {unit: UNITS["s"][unit] for unit in ("ms", "us", "ns")}

@@ -12,9 +12,9 @@ import numpy as np
 
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.checks import FINER, SLOWEST
-from podusv_cli.identify.formats import TIME, Columns, columns_of
-from podusv_cli.identify.reading import UNITS, clock_of, delivered, listed, parted
+from podusv_cli.identify.logs.checks import FINER, SLOWEST
+from podusv_cli.identify.logs.formats import TIME, Columns, columns_of
+from podusv_cli.identify.logs.reading import UNITS, clock_of, delivered, listed, parted
 
 SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
