@@ -24,7 +24,7 @@ controllers: {velocity: {kind: velocity_vector}, momentum: {kind: momentum_vecto
 simulation: {duration: 7.9, step: 0.02}
 log: {every: 5}
 """
-ROWS = [[0.0, 0.0, 0.0, 0.1], [3.1, 0.4, 0.1, 0.3], [6.2, 1.0, 0.2, 0.2]]
+ROWS = [[0.62 * i, 0.1 * i, 0.02 * i, 0.1 + 0.02 * i] for i in range(11)]
 LEGS = "path: {kind: legs, points: [[0, 0], [3, 0], [3, 3]], speed: 0.2}"
 METRICS = ("log_distance_rms", "log_distance_max", "log_heading_rms")
 
@@ -78,11 +78,12 @@ def test_sensors_may_come_at_different_times_and_the_log_last_longer():
     x[::4], psi[2::4] = 0.3 * times[::4], 0.1
     log("LOG.csv", "t,x,y,psi", np.column_stack([times, x, 0.0 * x + 1.3, psi]))
     names = "identify: {columns: {time: t}}"
-    write("names.yaml", f"extends: task.yaml\n{names}\n")
+    longer = "simulation: {duration: 11.9, step: 0.02}"
+    write("names.yaml", f"extends: task.yaml\n{names}\n{longer}\n")
     done = compared("names.yaml", "LOG.csv")
     for label in ("velocity", "momentum"):
         run = p.open_run(Path("both") / label)
-        at = np.arange(0.0, 7.5)
+        at = np.arange(0.0, 11.5)
         off = np.hypot(np.interp(at, run["time"], run["x"]) - 0.3 * at,
                        np.interp(at, run["time"], run["y"]) - 1.3)  # fmt: skip
         assert numbers(done, label)[:2] == pytest.approx(
@@ -137,7 +138,7 @@ def test_recorded_commands_have_no_target_and_the_distance_to_the_log_is_the_hea
         "path: {kind: line, speed: 9.0}\ncontroller: {kind: schedule, file: commands.csv}\n"
         "simulation: {duration: 7.9, step: 0.02}\nidentify: {columns: {x: north, y: east}}\n",
     )
-    log("LOG.csv", "time,north,east,psi", [[0.0, 0.0, 3.0, 0.2], [7.0, 0.0, 3.0, 0.2]])
+    log("LOG.csv", "time,north,east,psi", [[0.7 * i, 0.0, 3.0, 0.2] for i in range(11)])
     said = podusv("compare", "replay.yaml", "LOG.csv", "--out", "both", "--figure", "trajectory")
     assert "warning" not in said.out + said.err
     run = p.open_run(Path("both/schedule"))

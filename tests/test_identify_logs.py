@@ -16,7 +16,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.identify.intake import logs_of, pieces
 from podusv_cli.identify.logs.checks import checked
 from podusv_cli.identify.logs.commands import acted, held
-from podusv_cli.identify.logs.formats import LogFault
+from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import Table
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.phrases import far_words
@@ -185,8 +185,8 @@ def test_what_is_only_unlikely_is_a_warning(weaving, changes, sentence):
 def test_a_position_that_jumps_is_a_warning(weaving):
     x = weaving.columns["x"] + np.where(weaving.times < 30.0, 0.0, 40.0)
     (line,) = checked(replace(weaving, columns={**weaving.columns, "x": x}), Ideal())
-    jump = re.search(r"jumps at 29\.5 s \(a speed of (.*?) m/s", line)
-    assert float(jump[1]) == pytest.approx(40.0 / 2.0, abs=1.5)  # over two bins of a second
+    jump = re.search(r"x jumps by (.*?) at 30 s", line)
+    assert float(jump[1]) == pytest.approx(40.0, abs=0.2)
 
 
 def test_a_straight_run_at_one_speed_tells_little():
@@ -219,7 +219,7 @@ def test_rows_twice_and_rows_without_a_time_are_left_out(tmp_path):
     )
     log = read(path)
     assert log.times.tolist() == [0.0, 1.0, 2.0]
-    assert "1 rows are there twice" in " ".join(log.warnings)
+    assert "1 rows have the time of the row before" in " ".join(log.warnings)
     assert "1 rows without a number under 'time'" in " ".join(log.warnings)
 
 

@@ -22,6 +22,8 @@ def _show_columns(log: Path, as_json: bool) -> None:
     from podusv_cli.identify.logs.listing import listing
 
     found = listing(log)
+    for line in found.warnings:
+        echo(f"warning: {line}", err=True)
     echo_result(found, lambda: _report_columns(found), as_json=as_json, quiet=False)
 
 

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from podusv_cli.identify import estimate
-from podusv_cli.identify.logs.formats import LogFault
+from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import Table
 from podusv_cli.identify.march import DELAY
 from podusv_cli.identify.problem import WALKS, Problem

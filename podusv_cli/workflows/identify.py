@@ -12,7 +12,7 @@ from podusv_cli.identify import estimate, outputs
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
-from podusv_cli.identify.logs.formats import LogFault
+from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.phrases import far_words, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log

@@ -1,0 +1,194 @@
+"""Logs of messages that come by topic: ROS bags, PX4's ULog, ArduPilot's DataFlash.
+
+A column has its own times: "topic.field" those in "topic.time" [s]. The libraries that read these
+formats meet damage wherever they iterate; whatever they raise there becomes a sentence.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import math
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import replace
+from functools import wraps
+from numbers import Real
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO, Any
+
+import numpy as np
+
+from podusv_cli.core.errors import UsageError
+from podusv_cli.core.escaping import visible
+from podusv_cli.core.kernel import Vector
+from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
+
+TIME = "time"
+LONGEST = 16  # numbers of an array in a message; longer ones are pictures and clouds
+OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simulation's clock set it
+Reader = Callable[[Path], Contents]
+
+
+def _fenced(read: Reader) -> Reader:
+    """The reader; what a library raises on a damaged file is a LogFault, what it prints a warning.
+
+    A LogFault, too, where no message has numbers.
+    """
+
+    @wraps(read)
+    def fenced(path: Path) -> Contents:
+        with TemporaryFile("w+", errors="replace") as printed:
+            try:
+                with _printed_into(printed):
+                    contents = read(path)
+            except UsageError:
+                raise
+            except Exception as error:
+                what = visible(f"{type(error).__name__}: {error}")
+                raise LogFault(f"{path}: cannot be read: it is damaged ({what})") from error
+            printed.seek(0)
+            lines = [line for line in printed.read().splitlines() if line.strip()]
+        if not contents.columns:
+            raise LogFault(f"{path}: holds no messages with numbers and times")
+        if lines:
+            more = f", and {len(lines) - 1} more of this" if len(lines) > 1 else ""
+            damage = f"it is damaged, and what is whole was read: {visible(lines[0])}{more}"
+            return replace(contents, warnings=(*contents.warnings, damage))
+        return contents
+
+    return fenced
+
+
+@contextmanager
+def _printed_into(file: IO[str]) -> Iterator[None]:
+    """What is printed in the block goes into a file, also by libraries in C."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [(end, os.dup(end)) for end in (1, 2)]
+    try:
+        for end, _ in kept:
+            os.dup2(file.fileno(), end)
+        with redirect_stdout(file), redirect_stderr(file):
+            yield
+    finally:
+        file.flush()
+        for end, own in kept:
+            os.dup2(own, end)
+            os.close(own)
+
+
+@_fenced
+def read_ros(path: Path) -> Contents:
+    """Every topic of a ROS 2 bag: "topic.field.field"; of a quaternion also its `yaw` [rad].
+
+    Times are those of the header where a message has one, and otherwise those of its arrival.
+    """
+    reader, typesys = _library("rosbags.highlevel", path), _library("rosbags.typesys", path)
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    topics = _Messages()
+    with reader.AnyReader([path], default_typestore=store) as bag:
+        for connection, arrival, raw in bag.messages():
+            message = bag.deserialize(raw, connection.msgtype)
+            since = (arrival - bag.start_time) * 1e-9
+            if stamp := getattr(getattr(message, "header", None), "stamp", None):
+                nanoseconds = int(stamp.sec) * 10**9 + int(stamp.nanosec)
+                stamped = (nanoseconds - bag.start_time) * 1e-9
+                since = stamped if abs(stamped - since) < OTHER_CLOCK else since
+            topics.add(connection.topic.strip("/"), since, dict(_numbers(message, "")))
+    return Contents(topics.columns())
+
+
+def _numbers(content: Any, name: str) -> Iterator[tuple[str, float]]:
+    """The numbers in a message, by field; names begin with a dot."""
+    if dataclasses.is_dataclass(content):
+        parts = {f.name: getattr(content, f.name) for f in dataclasses.fields(content)}
+        if {"x", "y", "z", "w"} == {n for n in parts if not n.startswith("_")}:
+            yield f"{name}.yaw", float(_yaw(parts["w"], parts["x"], parts["y"], parts["z"]))
+        for field, part in parts.items():
+            if field != "header":
+                yield from _numbers(part, f"{name}.{field}")
+    elif isinstance(content, Real):
+        yield name, float(content)
+    elif isinstance(content, list | np.ndarray) and len(content) <= LONGEST:
+        for i, part in enumerate(content):
+            yield from _numbers(part, f"{name}[{i}]")
+
+
+def _yaw(w: Any, x: Any, y: Any, z: Any) -> Any:
+    """The angle about z of a quaternion, or of several: of turns about z, y, x in this order."""
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+@_fenced
+def read_ulog(path: Path) -> Contents:
+    """Every message of a PX4 log: "message.field"; of attitudes q also their `yaw` [rad]."""
+    pyulog = _library("pyulog", path)
+    log = pyulog.ULog(str(path))
+    columns: dict[str, Vector] = {}
+    for data in log.data_list:
+        own = data.name + (f"_{data.multi_id}" if data.multi_id else "")
+        fields = {name: np.asarray(values, float) for name, values in data.data.items()}
+        columns[f"{own}.{TIME}"] = (fields.pop("timestamp") - log.start_timestamp) * 1e-6
+        if "q[3]" in fields:
+            fields["q.yaw"] = np.array(
+                [_yaw(*q) for q in zip(*[fields[f"q[{i}]"] for i in range(4)], strict=True)]
+            )
+        columns |= {f"{own}.{name}": values for name, values in fields.items()}
+    damage = "some of its messages are damaged; their values may be wrong"
+    return Contents(columns, warnings=(damage,) if log.file_corruption else ())
+
+
+@_fenced
+def read_dataflash(path: Path) -> Contents:
+    """Every message of an ArduPilot log: "MESSAGE.Field", a second sensor's "MESSAGE_1.Field"."""
+    library = _library("pymavlink.DFReader", path)
+    log = library.DFReader_binary(str(path), zero_time_base=True)
+    messages, first = _Messages(), math.nan
+    while (message := log.recv_msg()) is not None:
+        content = message.to_dict()
+        clock = content.pop("TimeUS", None)
+        if clock is None:
+            continue
+        first = clock if math.isnan(first) else first
+        which = content.get(message.fmt.instance_field, 0)
+        name = message.get_type() + (f"_{which}" if which else "")
+        numbers = {f".{n}": float(x) for n, x in content.items() if isinstance(x, Real)}
+        messages.add(name, (clock - first) * 1e-6, numbers)
+    return Contents(messages.columns())
+
+
+class _Messages:
+    """Messages by topic, as they come in."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, list[float]] = defaultdict(list)
+        self.contents: dict[str, list[Mapping[str, float]]] = defaultdict(list)
+
+    def add(self, topic: str, time: float, numbers: Mapping[str, float]) -> None:
+        self.times[topic].append(time)
+        self.contents[topic].append(numbers)
+
+    def columns(self) -> Columns:
+        """A column for each field of each topic; NaN where a message lacks it."""
+        columns: dict[str, Vector] = {}
+        for topic, contents in self.contents.items():
+            columns[f"{topic}.{TIME}"] = np.array(self.times[topic])
+            for field in dict.fromkeys(name for numbers in contents for name in numbers):
+                values = [numbers.get(field, math.nan) for numbers in contents]
+                columns[topic + field] = np.array(values)
+        return columns
+
+
+def _library(name: str, path: Path) -> Any:
+    """A library that reads a format. Raises UsageError where it is not installed."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        raise UsageError(
+            f"{path}: reading it needs {name.partition('.')[0]}: pip install 'podusv[logs]'"
+        ) from error
