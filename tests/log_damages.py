@@ -273,7 +273,7 @@ def header_of_other_separators(rng: random.Random, columns: Columns) -> Damaged:
 def other_unit(rng: random.Random, columns: Columns) -> Damaged:
     changes = [
         ("time", 1e3, "ms"), ("time", 1e6, "us"), ("time", 1e9, "ns"), ("time", 1 / 3600, "hours"),
-        ("time", 1 / 60, "units of time"), ("psi", 180 / math.pi, "deg"),
+        ("time", 1 / 60, "units of time|minutes"), ("psi", 180 / math.pi, "deg"),
         ("r", 180 / math.pi, "deg/s"), ("u", 3600 / 1852, "kn"), ("u", 3.6, "km/h"),
     ]  # fmt: skip
     name, factor, says = rng.choice(changes)

@@ -38,6 +38,10 @@ DEGREE = 111e3  # m, of latitude
 CALL_THEM = (
     'write lat: "COLUMN", lon: "COLUMN" under identify.columns, or call the columns lat and lon'
 )
+HEADING_IN_DEGREES = (
+    'if so, write psi: "COLUMN [deg]" under identify.columns, or "psi [deg]" as the name of the '
+    "column"
+)
 LOOK_AT_UNITS = (
     "look at the units of time, x and y, and name them in brackets, as in "
     'time: "COLUMN [ms]" under identify.columns'
@@ -124,6 +128,12 @@ class Motion:
         known = np.isfinite(values)
         values[known] = np.unwrap(values[known], period=turn)
         return self.mean("psi", values) * (RADIANS / turn)
+
+    @cached_property
+    def first_heading(self) -> float:
+        """In the log's own numbers."""
+        psi = self.table.columns["psi"]
+        return float(psi[np.isfinite(psi)][0])
 
     @cached_property
     def velocity(self) -> Vector:
@@ -310,19 +320,17 @@ def _degrees(motion: Motion, own: Reading, degrees: Reading) -> Iterator[str]:
 
     Raises LogFault where they begin beyond a turn, which headings in radians do not.
     """
-    psi = motion.table.columns["psi"]
-    first, span = float(psi[np.isfinite(psi)][0]), float(np.nanmax(psi) - np.nanmin(psi))
     aside, nearer = (abs(cmath.phase(reading.mean)) for reading in (own, degrees))
-    lacks = (1.0 - abs(reading.mean) for reading in (own, degrees))
-    better = nearer < 0.5 * aside or next(lacks) * BETTER > next(lacks)
-    if abs(degrees.mean) < ALIKE or not better:
+    lack, less = (1.0 - abs(reading.mean) for reading in (own, degrees))
+    if abs(degrees.mean) < ALIKE or not (nearer < 0.5 * aside or less < BETTER * lack):
         return
+    psi = motion.table.columns["psi"]
+    span = float(np.nanmax(psi) - np.nanmin(psi))
     what = (
-        f"psi begins at {first:.4g} and goes through {span:.3g} rad; in degrees it agrees with "
-        f'the course of the track; write psi: "COLUMN [deg]" under identify.columns, or '
-        '"psi [deg]" as the name of the column'
+        f"psi begins at {motion.first_heading:.4g} and goes through {span:.3g} rad; in degrees it "
+        f"agrees with the course of the track; {HEADING_IN_DEGREES}"
     )
-    if abs(first) > TURN_AND_MORE:
+    if abs(motion.first_heading) > TURN_AND_MORE:
         raise LogFault(what)
     if abs(own.mean) < ALIKE:
         yield what
@@ -332,6 +340,8 @@ def _courses(motion: Motion) -> Iterator[str]:
     """Heading in degrees, counted to port, or axes exchanged: by the course of the track."""
     moving = motion.moving
     if np.sum(moving) < FEWEST_BINS:
+        if abs(motion.first_heading) > TURN_AND_MORE:
+            yield f"psi begins at {motion.first_heading:.4g} rad; in degrees? {HEADING_IN_DEGREES}"
         return
     course = np.angle(motion.velocity[moving])
 

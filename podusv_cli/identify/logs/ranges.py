@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.frames import LAT, LON
 
+Marks = npt.NDArray[np.bool_]
 PLACES = {LAT.name: ("latitude", 90.0), LON.name: ("longitude", 180.0)}  # and most [deg]
 SELDOM = 0.05  # of the values, that may be out of range
 MINUTES = 100.0  # a degree, where degrees and minutes are written as one number
@@ -39,10 +41,15 @@ def without_none(values: Vector) -> tuple[Vector, str]:
         if not (np.isclose(value, NONE, rtol=1e-9, atol=0.0).any() and len(rest)):
             continue
         if abs(value - float(most(rest))) > APART * float(np.ptp(rest)):
-            several = f"{alike.sum()} times" if alike.sum() > 1 else "once"
-            words.append(f"is {value:.10g} {several}, which stands for no value and is left out")
+            words.append(
+                f"is {value:.10g} {_often(alike)}, which stands for no value and is left out"
+            )
             values = np.where(alike, np.nan, values)
     return values, " and ".join(words)
+
+
+def _often(marks: Marks) -> str:
+    return f"{marks.sum()} times" if marks.sum() > 1 else "once"
 
 
 def on_earth(signal: Signal, values: Vector) -> tuple[Vector, str]:
@@ -57,7 +64,9 @@ def on_earth(signal: Signal, values: Vector) -> tuple[Vector, str]:
     first = float(values[beyond][0])
     what = f"{word} {first:.10g} is beyond {most:g} deg"
     if beyond.sum() <= SELDOM * np.isfinite(values).sum():
-        return np.where(beyond, np.nan, values), f"{what}, {beyond.sum()} times; left out"
+        return np.where(
+            beyond, np.nan, values
+        ), f"is out of range {_often(beyond)}: {what}; it is left out"
     raise LogFault(f"{what}; {_reason(signal.name, values[np.isfinite(values)], most)}")
 
 
