@@ -333,3 +333,12 @@ def test_aligning_needs_a_log_and_a_word(items, align, says):
     log("LOG.csv", "time,x,y,psi", ROWS)
     with pytest.raises(PodusvError, match=says):
         compared(*items, align=align)
+
+
+def test_a_log_that_begins_before_the_run_is_moved_by_the_first_common_instant():
+    run = made_run()
+    t, x, y, psi = (run[name][:75:3] for name in ("time", "x", "y", "psi"))
+    before = np.column_stack([[-2.0, -1.0], [50.0, 51.0], [9.0, 9.0], [0.0, 0.0]])
+    log("LOG.csv", "time,x,y,psi", [*before, *np.column_stack([t, x + 7.0, y - 2.0, psi])])
+    done = compared("run", "LOG.csv", align="start")
+    assert numbers(done, "run")[1] == pytest.approx(0.0, abs=1e-9)

@@ -35,6 +35,8 @@ QUIET = 0.1  # m, rad, m/s or rad/s: smaller steps are no jumps
 GAP = 2.5  # usual distances of values: a step over more says nothing
 OTHER_UNIT = 300.0  # times a speed, that no current explains
 DEGREE = 111e3  # m, of latitude
+NARROW = 0.5  # deg, within which a log's track stays
+THRICE = 3.0  # times a speed, that two measures of it are apart
 CALL_THEM = (
     'write lat: "COLUMN", lon: "COLUMN" under identify.columns, or call the columns lat and lon'
 )
@@ -238,8 +240,16 @@ def _speeds_apart(motion: Motion) -> Iterator[str]:
     speed = float(np.nanquantile(speeds, FAST)) if np.isfinite(speeds).any() else 0.0
     if not (speed and motion.fastest) or 1.0 / OTHER_UNIT < motion.fastest / speed < OTHER_UNIT:
         return
-    degrees = abs(math.log(motion.fastest * DEGREE / speed)) < math.log(SCALED)
-    hint = f"x and y in degrees? Then {CALL_THEM}" if degrees else LOOK_AT_UNITS
+    x, y = (motion.table.columns[name] for name in ("x", "y"))
+    wide = max(float(np.nanmax(values) - np.nanmin(values)) for values in (x, y))
+    ratio = motion.fastest / speed
+    times = (unit for unit, f in UNITS["s"].items() if abs(math.log(ratio / f)) < math.log(THRICE))
+    unit = next(times, "")
+    hint = f'if its times are in {unit}, write time: "COLUMN [{unit}]" under identify.columns'
+    if wide < NARROW and abs(math.log(ratio * DEGREE)) < math.log(SCALED):
+        hint = f"x and y in degrees? Then {CALL_THEM}"
+    elif not unit:
+        hint = LOOK_AT_UNITS
     raise LogFault(f"its track makes {motion.fastest:.2g} m/s, while u is {speed:.3g} m/s; {hint}")
     yield
 

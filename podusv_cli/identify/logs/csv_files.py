@@ -12,6 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import compress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -140,8 +141,9 @@ def _whole_rows(
     Cells beyond the names are allowed where they are empty; the last line may be cut.
     """
     count = len(names)
-    rows = [line for line in body if len(line.cells) >= count and not any(line.cells[count:])]
-    broken = [line for line in body if len(line.cells) < count or any(line.cells[count:])]
+    whole = [len(line.cells) >= count and not any(line.cells[count:]) for line in body]
+    rows = [*compress(body, whole)]
+    broken = [line for line, fits in zip(body, whole, strict=True) if not fits]
     if not broken:
         return rows, []
     first = broken[0]
