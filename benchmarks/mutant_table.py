@@ -27,7 +27,7 @@ TABLE: dict[str, list[Row]] = {
      "test_what_python_takes_for_a_number_is_none_in_a_log"),
     ('if "_" in c or not c.isascii()]', "if False]",
      "test_what_python_takes_for_a_number_is_none_in_a_log"),
-    ('names = [" ".join(name.split()) for name in head.cells]', "names = [*head.cells]",
+    ("    if count > 1:\n        raise LogFault", "    if False:\n        raise LogFault",
      "test_a_first_line_that_gives_no_names"),
     ("known == 0.0 or (doubt and known < 0.5)", "doubt and known < 0.5",
      "test_a_needed_column_without_numbers_is_an_error"),
