@@ -307,6 +307,27 @@ def test_what_pods_did_follows_from_their_commands():
     assert acted(own, actuator) is own
 
 
+@pytest.mark.parametrize(("every", "count"), [(1, 0), (2, 0), (4, 1)])
+def test_rows_that_are_long_beside_a_lag_are_doubted(tmp_path, sailed, every, count):
+    """Rows of 0.1, 0.2 and 0.4 s, and propellers with a lag of 0.1 s."""
+    times = np.arange(0.0, 60.0, 0.1)[::every]
+    columns = {n: np.interp(times, sailed.times, c) for n, c in sailed.columns.items()}
+    columns |= {"n_1": 10.0 + np.sin(times), "n_2": 10.0 - np.sin(times)}
+    del columns["tau_u"], columns["tau_r"]
+    path = written(tmp_path / "a.csv", {"time": times, **columns, "delta_1": 0 * times,
+                                        "delta_2": 0 * times})  # fmt: skip
+    pods = load(
+        "podusv:trials/base.yaml",
+        [
+            "vessel={preset: cybership2}", "actuator={kind: pod, preset: cybership2_pod}",
+            "controller={kind: pid}",
+        ],
+    ).scenario.model_copy(update={"identify": Identify(logs=LOGS)})  # fmt: skip
+    (log,) = logs_of(path, LogFile(file="a.csv", delay=0.0), pods)
+    said = [line for line in log.warnings if "s apart, and the actuator's shortest lag is" in line]
+    assert len(said) == count
+
+
 def later(table, delay):
     """The log with its commands acting so much later."""
     at = np.maximum(np.searchsorted(table.times, table.times - delay + 1e-9, "right") - 1, 0)

@@ -134,7 +134,8 @@ def early_words(answer: Answer) -> list[str]:
         f"delay is {p.value:.2g} s ({p.low:.2g} to {p.high:.2g}): the boat moves before its "
         "commands. Half the distance of rows comes from commands that change between the rows of a "
         "log, and the fit takes that out; more is a clock that is off. Log commands more often, or "
-        "log what the actuator did."
+        "log what the actuator did: with rows of five lags inertia came out 3 % off, outside its "
+        "interval, and with rows of two lags within 0.6 %."
         for p in answer.parameters
         if p.name == DELAY and p.high < 0.0
     ]
