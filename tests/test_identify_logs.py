@@ -242,6 +242,23 @@ def test_names_that_are_not_there_are_answered_with_near_ones(tmp_path):
         read(path, {"psi": "heading"}).part(5.0, 9.0)
 
 
+def test_two_boots_in_a_file_are_two_logs_with_currents_of_their_own(tmp_path, sailed):
+    columns = {"time": sailed.times, **sailed.columns}
+    twice = {name: np.append(values, values[:200]) for name, values in columns.items()}
+    path = written(tmp_path / "a.csv", twice)
+    given = scenario()
+    logs = logs_of(path, LogFile(file="a.csv", delay=0.0), given)
+    assert [log.name for log in logs] == ["a.csv, boot 1", "a.csv, boot 2"]
+    numbers = [number.name for number in Problem(given, given.identify, logs).numbers]
+    assert len(numbers) == len(set(numbers))
+    assert "its clock steps back from 89.8 to 0 s" in logs[0].warnings[0]
+    alone = written(tmp_path / "b.csv", columns)
+    (whole,) = logs_of(alone, LogFile(file="b.csv", delay=0.0), given)
+    assert logs[0].record.rows == pytest.approx(whole.record.rows)
+    late = logs_of(path, LogFile(file="a.csv", delay=0.0, span=(50.0, 80.0)), given)
+    assert [log.name for log in late] == ["a.csv from 50 to 80 s, boot 1"]
+
+
 def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
     with pytest.raises(LogFault, match="has 10 values of the pose, at least 20"):
         log_of(sailed.part(0.0, 2.0), Ideal(), 0.05)
