@@ -15,8 +15,8 @@ from podusv_cli.identify.estimate import (
     estimated,
     prior_kept,
 )
+from podusv_cli.identify.logs.reading import Table
 from podusv_cli.identify.problem import Problem
-from podusv_cli.identify.reading import Table
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load

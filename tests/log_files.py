@@ -5,13 +5,17 @@ from __future__ import annotations
 import struct
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from podusv_cli.core.signal import STATE, TAU
-from podusv_cli.identify.reading import Named, table
+from podusv_cli.identify.logs.reading import Named, table
 
 
-def write_bag(folder, begin=1_700_000_000_000_000_000):
-    """Odometry at 10 Hz, whose stamps are 5 ms older than its arrival, and a thruster at 4 Hz."""
+def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, tilted=None):
+    """Odometry at 10 Hz, whose stamps are 5 ms older than its arrival, and a thruster at 4 Hz.
+
+    Stamps may be those of another clock [ns]; `tilted` turns the boat about its own axes first.
+    """
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -26,12 +30,13 @@ def write_bag(folder, begin=1_700_000_000_000_000_000):
         thruster = writer.add_connection("/left", "std_msgs/msg/Float64", typestore=store)
         for i in range(25):
             now = begin + i * 100_000_000
-            stamp = make("builtin_interfaces/msg/Time", now // 10**9, now % 10**9)
-            half = 0.5 * 0.1 * i
+            stamped = now if stamped_from is None else stamped_from + i * 100_000_000
+            stamp = make("builtin_interfaces/msg/Time", stamped // 10**9, stamped % 10**9)
+            turn = Rotation.from_euler("z", 0.1 * i) * (tilted or Rotation.identity())
             pose = make(
                 "geometry_msgs/msg/Pose",
                 make("geometry_msgs/msg/Point", 2.0 * i, 3.0 * i, 0.0),
-                make("geometry_msgs/msg/Quaternion", 0.0, 0.0, np.sin(half), np.cos(half)),
+                make("geometry_msgs/msg/Quaternion", *map(float, turn.as_quat())),
             )
             twist = make(
                 "geometry_msgs/msg/Twist",
@@ -54,7 +59,7 @@ def write_bag(folder, begin=1_700_000_000_000_000_000):
     return folder
 
 
-def write_ulog(path):
+def write_ulog(path, turns=None):
     """Attitude at 10 Hz from 2 s after the start, and positions of two receivers.
 
     After the file format of the PX4 user guide: header, flags, formats, subscriptions, data.
@@ -73,8 +78,9 @@ def write_ulog(path):
     for kind, number, name in ((0, 0, b"vehicle_attitude"), (0, 1, b"gps"), (1, 2, b"gps")):
         out.append(message("A", struct.pack("<BH", kind, number) + name))
     for i in range(20):
-        time, half = 7_000_000 + 100_000 * i, 0.5 * 0.1 * i
-        q = struct.pack("<Qffff", time, np.cos(half), 0.0, 0.0, np.sin(half))
+        time = 7_000_000 + 100_000 * i
+        x, y, z, w = (turns[i] if turns else Rotation.from_euler("z", 0.1 * i)).as_quat()
+        q = struct.pack("<Qffff", time, w, x, y, z)
         out.append(message("D", struct.pack("<H", 0) + q))
         for receiver in (1, 2):
             body = struct.pack("<HQi", receiver, time, 590_000_000 + receiver)

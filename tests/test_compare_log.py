@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from scenario_samples import write
 
 import podusv as p
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.storage.run_folder import open_run
 from podusv_cli.workflows import compare as comparing
+from podusv_cli.workflows.measured import track
 from podusv_cli.workflows.run import Request
 
 TASK = """
@@ -24,15 +27,16 @@ controllers: {velocity: {kind: velocity_vector}, momentum: {kind: momentum_vecto
 simulation: {duration: 7.9, step: 0.02}
 log: {every: 5}
 """
-ROWS = [[0.0, 0.0, 0.0, 0.1], [3.1, 0.4, 0.1, 0.3], [6.2, 1.0, 0.2, 0.2]]
+ROWS = [[0.62 * i, 0.1 * i, 0.02 * i, 0.1 + 0.02 * i] for i in range(11)]
 LEGS = "path: {kind: legs, points: [[0, 0], [3, 0], [3, 3]], speed: 0.2}"
-METRICS = ("log_distance_rms", "log_distance_max", "log_heading_rms")
+METRICS = ("log_distance_rms", "log_distance_max", "log_heading_rms", "log_instants")
 
 
 @pytest.fixture(autouse=True)
 def _in_a_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write("task.yaml", TASK)
+    write("pods.yaml", TASK.replace("{kind: ideal}", "{kind: pod, preset: cybership2_pod}"))
 
 
 def log(name, head, rows):
@@ -61,7 +65,7 @@ def test_a_track_beside_a_run_is_as_far_away_as_it_was_put():
     ))  # fmt: skip
     done = compared("run", "LOG.csv")
     rms = math.sqrt((1.7**2 + (len(t) - 1) * 0.5**2) / len(t))
-    assert numbers(done, "run") == pytest.approx([rms, 1.7, 0.31], rel=1e-9)
+    assert numbers(done, "run") == pytest.approx([rms, 1.7, 0.31, len(t)], rel=1e-9)
     assert all(math.isnan(x) for x in numbers(done, "LOG"))
     measured = done.result.entries[-1]
     assert measured.label == "LOG"
@@ -78,11 +82,12 @@ def test_sensors_may_come_at_different_times_and_the_log_last_longer():
     x[::4], psi[2::4] = 0.3 * times[::4], 0.1
     log("LOG.csv", "t,x,y,psi", np.column_stack([times, x, 0.0 * x + 1.3, psi]))
     names = "identify: {columns: {time: t}}"
-    write("names.yaml", f"extends: task.yaml\n{names}\n")
+    longer = "simulation: {duration: 11.9, step: 0.02}"
+    write("names.yaml", f"extends: task.yaml\n{names}\n{longer}\n")
     done = compared("names.yaml", "LOG.csv")
     for label in ("velocity", "momentum"):
         run = p.open_run(Path("both") / label)
-        at = np.arange(0.0, 7.5)
+        at = np.arange(0.0, 11.5)
         off = np.hypot(np.interp(at, run["time"], run["x"]) - 0.3 * at,
                        np.interp(at, run["time"], run["y"]) - 1.3)  # fmt: skip
         assert numbers(done, label)[:2] == pytest.approx(
@@ -137,7 +142,7 @@ def test_recorded_commands_have_no_target_and_the_distance_to_the_log_is_the_hea
         "path: {kind: line, speed: 9.0}\ncontroller: {kind: schedule, file: commands.csv}\n"
         "simulation: {duration: 7.9, step: 0.02}\nidentify: {columns: {x: north, y: east}}\n",
     )
-    log("LOG.csv", "time,north,east,psi", [[0.0, 0.0, 3.0, 0.2], [7.0, 0.0, 3.0, 0.2]])
+    log("LOG.csv", "time,north,east,psi", [[0.7 * i, 0.0, 3.0, 0.2] for i in range(11)])
     said = podusv("compare", "replay.yaml", "LOG.csv", "--out", "both", "--figure", "trajectory")
     assert "warning" not in said.out + said.err
     run = p.open_run(Path("both/schedule"))
@@ -178,10 +183,162 @@ def test_what_is_wrong_with_the_log_is_a_sentence(items, head, says):
     assert says in str(caught.value)
 
 
-def test_times_that_are_not_those_of_the_run_are_told():
-    log("LOG.csv", "time,x,y,psi", [[1.78e9, 0.1, 0.2, 0.3], [1.78e9 + 1, 0.7, 0.9, 0.2]])
-    with pytest.raises(PodusvError, match="times go from 1780000000 to 1780000001 s, and the run"):
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        ([1.78e9 + 0.1 * i for i in range(79)], "to 1780000008 s.*count the log's time from where"),
+        ([100.0 * i for i in range(79)], r'if its times are in ms, write time: "COLUMN \[ms\]"'),
+        ([1e5 * i for i in range(79)], r'if its times are in us, write time: "COLUMN \[us\]"'),
+        ([0.8 * i for i in range(9)], "to 6.4 s.*with 9 common positions, where 10 are needed"),
+        ([7.0 + 0.101 * i for i in range(79)], "with 9 common positions"),
+    ],
+)
+def test_times_that_are_not_those_of_the_run_are_told(times, says):
+    log("LOG.csv", "time,x,y,psi", [[t, 0.1 * i, 0.2, 0.3] for i, t in enumerate(times)])
+    with pytest.raises(PodusvError, match=says):
         compared("task.yaml", "LOG.csv")
+
+
+def test_a_track_of_one_position_is_none():
     log("LOG.csv", "time,x,y,psi", [[1.0, 0.1, 0.2, 0.3]])
     with pytest.raises(PodusvError, match=r"fewer than two positions|has 1 row"):
         compared("task.yaml", "LOG.csv")
+
+
+def made_run(name="run"):
+    alone = {"controllers": None, "controller": {"kind": "momentum_vector"}}
+    return p.run("task.yaml", alone, out=name)
+
+
+def warnings_of(done):
+    return [finding.text for finding in done.warnings() if finding.code == "measured-log"]
+
+
+def test_a_run_that_ends_early_has_no_distance_over_a_few_instants():
+    log("LOG.csv", "time,x,y,psi", [[0.79 * i, 0.1 * i, 0.0, 0.0] for i in range(11)])
+    made_run()
+    run = open_run(Path("run")).recording
+    short = replace(run, signals={n: values[:58] for n, values in run.signals.items()})
+    known = track(Path("LOG.csv"), ())
+    assert short["time"][-1] == pytest.approx(5.7)
+    assert known.departures(short) == {"log_instants": 8.0}
+    assert known.departures(run).keys() == {*METRICS}
+
+
+def test_mistakes_that_a_motion_shows_are_refused_as_identify_does():
+    write("longer.yaml", "extends: task.yaml\nsimulation: {duration: 30, step: 0.02}\n")
+    times = np.arange(0.0, 29.9, 0.1)
+    psi = 0.4 + 1.5 * np.sin(0.3 * times)
+    x, y = np.cumsum(np.cos(psi)) * 0.1, np.cumsum(np.sin(psi)) * 0.1
+    head = "time,x,y,psi,u"
+    u = np.ones(len(times))
+    log("LOG.csv", head, np.column_stack([times, x, y, psi, u]))
+    assert not warnings_of(compared("longer.yaml", "LOG.csv"))
+    for changed, says in (
+        ([times, x, y, np.degrees(psi) % 360.0, u], r'psi: "COLUMN \[deg\]"'),
+        ([times, x, y, psi, u / 0.5144444], r'u: "COLUMN \[kn\]"'),
+        ([times, 59.0 + x / 111e3, 10.0 + y / 57e3, psi, u], "x and y .*latitude and longitude"),
+        ([times / 3600.0, x, y, psi, u], r'if its times are in hours .*time: "COLUMN \[h\]"'),
+    ):
+        log("LOG.csv", head, np.column_stack(changed))
+        with pytest.raises(PodusvError, match=says):
+            compared("longer.yaml", "LOG.csv")
+
+
+def test_an_empty_heading_is_a_sentence():
+    log("LOG.csv", "time,x,y,psi", [[*row[:3], math.nan] for row in ROWS])
+    with pytest.raises(PodusvError, match=r"LOG\.csv: psi has no numbers"):
+        compared("task.yaml", "LOG.csv")
+
+
+def test_what_is_doubtful_about_a_log_is_told_and_in_the_report(podusv: Command):
+    rows = [",".join(map(str, row)) for row in ROWS]
+    write("LOG.csv", "\n".join(["time,x,y,psi", *rows, "6.5,oops,0.2,0.3", ""]))
+    said = podusv("compare", "task.yaml", "LOG.csv", "--out", "both", "--no-figures")
+    line = "x has 1 cell that is no number, the first 'oops' in line 13; they are left out"
+    assert line in " ".join(said.err.split())
+    assert "that is no number" in Path("both/report.html").read_text()
+
+
+def test_a_track_in_other_units_than_the_run_s_is_doubted():
+    """Cybership II makes 0.2 m/s or so; no boat of its size makes 60."""
+    run = made_run()
+    rows = slice(0, 79)
+    columns = [run[name][rows] for name in ("time", "x", "y", "psi")]
+    log("LOG.csv", "time,x,y,psi", np.column_stack(columns))
+    assert warnings_of(compared("run", "LOG.csv")) == []
+    columns[1:3] = [30.0 * column for column in columns[1:3]]
+    log("LOG.csv", "time,x,y,psi", np.column_stack(columns))
+    (line,) = warnings_of(compared("run", "LOG.csv"))
+    assert "m/s on average and run" in line
+    columns[1:3] = [10.0 * column for column in columns[1:3]]
+    log("LOG.csv", "time,x,y,psi", np.column_stack(columns))
+    with pytest.raises(PodusvError, match=r"track makes .* m/s, and the boat .* at full thrust"):
+        compared("pods.yaml", "LOG.csv")
+
+
+# Places on earth
+
+
+@pytest.fixture
+def sailed_on_earth():
+    """The run's own track as latitude and longitude that begin at its eighth row, 2 s late."""
+    run = made_run()
+    t, x, y, psi = (run[name][8:68:3] for name in ("time", "x", "y", "psi"))
+    lat = 59.0 + (x - x[0]) / 111_393.5  # WGS 84 at 59 deg, from the tables of a degree's length
+    lon = 10.0 + (y - y[0]) / 57_477.0
+    log("LOG.csv", "time,lat,lon,psi", np.column_stack([t, lat, lon, psi]))
+    return run
+
+
+def test_a_log_on_earth_has_no_common_place_with_a_run(sailed_on_earth):
+    done = compared("run", "LOG.csv")
+    (line,) = warnings_of(done)
+    assert line.startswith("the log and the runs have no common place")
+    off = math.hypot(*(sailed_on_earth[name][8] - 0.0 for name in ("x", "y")))
+    assert numbers(done, "run")[0] == pytest.approx(off, rel=1e-3)
+
+
+def test_a_log_on_earth_is_moved_to_the_run_when_asked(podusv: Command, sailed_on_earth):
+    done = compared("run", "LOG.csv", align="start")
+    assert warnings_of(done) == []
+    assert numbers(done, "run")[1] < 1e-4
+    measured = done.result.entries[-1].recording
+    assert measured["x"][0] == pytest.approx(sailed_on_earth["x"][8], abs=1e-12)
+    podusv("compare", "run", "LOG.csv", "--align", "start", "--out", "both", "--force")
+    with Path("both/comparison.csv").open() as file:
+        rows = {row["metric"]: row for row in csv.DictReader(file)}
+    assert float(rows["log_distance_max"]["run"]) < 1e-4
+    made = p.compare(["run", "LOG.csv"], out="made", figures=False, align="start")
+    assert made.table.loc["log_distance_max", "run"] < 1e-4
+
+
+def test_a_log_in_metres_stays_where_it_is_unless_asked():
+    run = made_run()
+    columns = np.column_stack([run[name][4:60:5] for name in ("time", "x", "y", "psi")])
+    log("LOG.csv", "time,x,y,psi", columns + np.array([0.0, 3.0, -4.0, 0.0]))
+    assert numbers(compared("run", "LOG.csv"), "run")[:2] == pytest.approx([5.0, 5.0])
+    done = compared("run", "LOG.csv", align="start")
+    assert numbers(done, "run")[1] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("items", "align", "says"),
+    [
+        (["task.yaml"], "start", "--align start: no log is given that could be moved"),
+        (["task.yaml", "LOG.csv"], "end", "--align end: unknown; write --align start"),
+    ],
+)
+def test_aligning_needs_a_log_and_a_word(items, align, says):
+    log("LOG.csv", "time,x,y,psi", ROWS)
+    with pytest.raises(PodusvError, match=says):
+        compared(*items, align=align)
+
+
+def test_a_log_that_begins_before_the_run_is_moved_by_the_first_common_instant():
+    run = made_run()
+    t, x, y, psi = (run[name][:75:3] for name in ("time", "x", "y", "psi"))
+    before = np.column_stack([[-2.0, -1.0], [50.0, 51.0], [9.0, 9.0], [0.0, 0.0]])
+    log("LOG.csv", "time,x,y,psi", [*before, *np.column_stack([t, x + 7.0, y - 2.0, psi])])
+    done = compared("run", "LOG.csv", align="start")
+    assert numbers(done, "run")[1] == pytest.approx(0.0, abs=1e-9)

@@ -37,6 +37,7 @@ from podusv_cli.identify.estimate import (
     Estimate,
     directions,
 )
+from podusv_cli.identify.logs.reading import Table, delivered
 from podusv_cli.identify.march import (
     APART,
     COMMANDS,
@@ -48,9 +49,8 @@ from podusv_cli.identify.march import (
     side_by_side,
 )
 from podusv_cli.identify.outputs import drawn
-from podusv_cli.identify.phrases import summary, thrust_words, worse_words
+from podusv_cli.identify.phrases import early_words, summary, thrust_words, worse_words
 from podusv_cli.identify.problem import Problem, hull_numbers
-from podusv_cli.identify.reading import Table, delivered
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
@@ -343,6 +343,18 @@ def test_thrust_that_is_found_is_said_since_the_hull_has_no_place_for_it(boat):
         assert len(lines) == count
     assert lines[0].startswith("thrust is 0.8 (")
     assert "multiply the actuator's thrust" in lines[0]
+
+
+@pytest.mark.parametrize(("off", "count"), [(-1.5, 1), (-0.1, 0), (0.0, 0), (1.5, 0)])
+def test_a_boat_that_moves_before_its_commands_is_doubted(boat, off, count):
+    """A delay has a prior of one step of the filter, 0.05 s; here it is known to 0.1 of that."""
+    given = problem(boat[2:], free=("N_r",), prior=0.5)
+    size = len(given.numbers)
+    y = np.array([off * (n.name == "delay") for n in given.numbers])
+    found = Estimate(y, 0.0, 0.01 * np.eye(size), 1, True)
+    lines = early_words(Answer(given, found, directions(np.eye(size), 2), (), ()))
+    assert len(lines) == count
+    assert all(line.startswith("delay is -0.075 s (-0.085 to -0.065)") for line in lines)
 
 
 def test_a_hull_times_a_factor_under_thrust_times_it_moves_as_before():

@@ -13,14 +13,14 @@ from log_files import read, written
 
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.errors import UsageError
-from podusv_cli.identify.checks import checked
-from podusv_cli.identify.commands import acted, held
-from podusv_cli.identify.formats import LogFault
 from podusv_cli.identify.intake import logs_of, pieces
+from podusv_cli.identify.logs.checks import checked
+from podusv_cli.identify.logs.commands import acted, held
+from podusv_cli.identify.logs.contents import LogFault
+from podusv_cli.identify.logs.reading import Table
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.phrases import far_words
 from podusv_cli.identify.problem import Problem
-from podusv_cli.identify.reading import Table
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
@@ -185,8 +185,8 @@ def test_what_is_only_unlikely_is_a_warning(weaving, changes, sentence):
 def test_a_position_that_jumps_is_a_warning(weaving):
     x = weaving.columns["x"] + np.where(weaving.times < 30.0, 0.0, 40.0)
     (line,) = checked(replace(weaving, columns={**weaving.columns, "x": x}), Ideal())
-    jump = re.search(r"jumps at 29\.5 s \(a speed of (.*?) m/s", line)
-    assert float(jump[1]) == pytest.approx(40.0 / 2.0, abs=1.5)  # over two bins of a second
+    jump = re.search(r"x jumps by (.*?) at 30 s", line)
+    assert float(jump[1]) == pytest.approx(40.0, abs=0.2)
 
 
 def test_a_straight_run_at_one_speed_tells_little():
@@ -219,7 +219,7 @@ def test_rows_twice_and_rows_without_a_time_are_left_out(tmp_path):
     )
     log = read(path)
     assert log.times.tolist() == [0.0, 1.0, 2.0]
-    assert "1 rows are there twice" in " ".join(log.warnings)
+    assert "1 rows have the time of the row before" in " ".join(log.warnings)
     assert "1 rows without a number under 'time'" in " ".join(log.warnings)
 
 
@@ -240,6 +240,23 @@ def test_names_that_are_not_there_are_answered_with_near_ones(tmp_path):
         read(path, {"psi": "heading [grad]"})
     with pytest.raises(LogFault, match=r"nothing lies between 5 and 9 s; the log goes from 0 to 1"):
         read(path, {"psi": "heading"}).part(5.0, 9.0)
+
+
+def test_two_boots_in_a_file_are_two_logs_with_currents_of_their_own(tmp_path, sailed):
+    columns = {"time": sailed.times, **sailed.columns}
+    twice = {name: np.append(values, values[:200]) for name, values in columns.items()}
+    path = written(tmp_path / "a.csv", twice)
+    given = scenario()
+    logs = logs_of(path, LogFile(file="a.csv", delay=0.0), given)
+    assert [log.name for log in logs] == ["a.csv, boot 1", "a.csv, boot 2"]
+    numbers = [number.name for number in Problem(given, given.identify, logs).numbers]
+    assert len(numbers) == len(set(numbers))
+    assert "its clock steps back from 89.8 to 0 s" in logs[0].warnings[0]
+    alone = written(tmp_path / "b.csv", columns)
+    (whole,) = logs_of(alone, LogFile(file="b.csv", delay=0.0), given)
+    assert logs[0].record.rows == pytest.approx(whole.record.rows)
+    late = logs_of(path, LogFile(file="a.csv", delay=0.0, span=(50.0, 80.0)), given)
+    assert [log.name for log in late] == ["a.csv from 50 to 80 s, boot 1"]
 
 
 def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
@@ -305,6 +322,27 @@ def test_what_pods_did_follows_from_their_commands():
     assert "n_1, delta_1 follow from commands" in log.notes[0]
     own = replace(log, notes=())
     assert acted(own, actuator) is own
+
+
+@pytest.mark.parametrize(("every", "count"), [(1, 0), (2, 0), (4, 1)])
+def test_rows_that_are_long_beside_a_lag_are_doubted(tmp_path, sailed, every, count):
+    """Rows of 0.1, 0.2 and 0.4 s, and propellers with a lag of 0.1 s."""
+    times = np.arange(0.0, 60.0, 0.1)[::every]
+    columns = {n: np.interp(times, sailed.times, c) for n, c in sailed.columns.items()}
+    columns |= {"n_1": 10.0 + np.sin(times), "n_2": 10.0 - np.sin(times)}
+    del columns["tau_u"], columns["tau_r"]
+    path = written(tmp_path / "a.csv", {"time": times, **columns, "delta_1": 0 * times,
+                                        "delta_2": 0 * times})  # fmt: skip
+    pods = load(
+        "podusv:trials/base.yaml",
+        [
+            "vessel={preset: cybership2}", "actuator={kind: pod, preset: cybership2_pod}",
+            "controller={kind: pid}",
+        ],
+    ).scenario.model_copy(update={"identify": Identify(logs=LOGS)})  # fmt: skip
+    (log,) = logs_of(path, LogFile(file="a.csv", delay=0.0), pods)
+    said = [line for line in log.warnings if "s apart, and the actuator's shortest lag is" in line]
+    assert len(said) == count
 
 
 def later(table, delay):

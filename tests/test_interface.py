@@ -2,6 +2,7 @@
 
 import ast
 import doctest
+import hashlib
 import inspect
 import json
 import math
@@ -21,7 +22,7 @@ from test_cli_words import python
 
 import podusv
 from podusv_cli import interface
-from podusv_cli.core.errors import ScenarioError, UsageError
+from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.engine.running import batch
 from podusv_cli.interface import functions, scenarios, session, studies
 from podusv_cli.metrics.table import CLOCKED
@@ -174,6 +175,23 @@ def test_a_run_in_memory_has_the_log_and_metrics_of_the_one_in_a_folder(kept):
     pd.testing.assert_series_equal(run.metrics, kept.metrics.drop([*CLOCKED, "law_operations"]))
     assert run.scenario == kept.scenario == podusv.load(SHORT)
     assert podusv.open_run(str(kept.folder)).metrics.equals(kept.metrics)
+
+
+@pytest.mark.parametrize(
+    "finding", ["text", 5, {"code": "a"}, {"code": 1, "where": "", "text": ""}]
+)
+def test_a_finding_that_is_none_is_a_damaged_file(tmp_path, finding):
+    run = podusv.run(SHORT, out=tmp_path / "run", figures=False)
+    path = run.folder / "metrics.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "warnings": [finding]}))
+    manifest = run.folder / "manifest.json"
+    listed = json.loads(manifest.read_text())
+    content = path.read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    listed["files"]["metrics.json"] = {"sha256": digest, "bytes": len(content)}
+    manifest.write_text(json.dumps(listed))
+    with pytest.raises(StorageError, match=r"metrics\.json: damaged, .*\(warnings\.0"):
+        podusv.open_run(run.folder)
 
 
 def test_the_log_is_that_of_the_file(kept):

@@ -57,8 +57,12 @@ def test_number_with_a_unit(text, unit, number):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "5", "fast", "21/s", "0x5 m", "017 deg", "nan deg", "5 m 3", "1e999 m", "deg 5"]
-)
+    "text",
+    [
+        "", "5", "fast", "21/s", "0x5 m", "017 deg", "nan deg", "5 m 3", "1e999 m", "deg 5",
+        "1e308 km", "-1e308 nmi",
+    ],
+)  # fmt: skip
 def test_text_that_is_no_number_in_metres(text):
     assert units.number(text, "m") is None
 
@@ -74,6 +78,24 @@ def test_every_unit_of_the_table_is_exact():
         assert all(units.spelled(name) == name for name in (own, *others))
 
 
+# What one of each is in podusv's unit, from the definitions: the yard of 1959, the pound, the knot.
+WORTH = {
+    "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "mm": 1e-3, "cm": 1e-2,
+    "km": 1e3, "ft": 0.3048, "nmi": 1852.0, "cm2": 1e-4, "ft2": 0.09290304,
+    "deg": 0.017453292519943295, "cm/s": 1e-2, "mm/s": 1e-3, "ft/s": 0.3048,
+    "km/h": 0.2777777777777778, "kn": 0.5144444444444445, "cm/s2": 1e-2,
+    "deg/s": 0.017453292519943295, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "g/cm3": 1e3, "kN": 1e3,
+    "kgf": 9.80665, "kN m": 1e3, "rpm": 1.0 / 60.0, "rpm/s": 1.0 / 60.0, "mHz": 1e-3, "%": 1e-2,
+}  # fmt: skip
+
+
+def test_every_unit_of_the_table_is_worth_what_its_definition_says():
+    assert {name for others in units.UNITS.values() for name in others} == WORTH.keys()
+    for own, others in units.UNITS.items():
+        for name in others:
+            assert units.number(f"3 {name}", own) == pytest.approx(3.0 * WORTH[name], rel=1e-15)
+
+
 @pytest.mark.parametrize(
     ("text", "unit", "told"),
     [
@@ -81,6 +103,7 @@ def test_every_unit_of_the_table_is_exact():
         ("5 kg", "kg m2", "; kg does not fit (units here: kg m2)"),
         ("0.7 rad", "", "; it has no unit here: write 0.7"),
         ("1e999 m", "m", "; it is too large, numbers must be finite"),
+        ("1e308 km", "m", "; it is too large, numbers must be finite"),
         ("5 ft", "m", ""),
         ("fast", "m", ""),
     ],

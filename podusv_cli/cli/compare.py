@@ -58,6 +58,14 @@ def compare(
     ratios: Annotated[
         bool, typer.Option("--ratios", help="Ratios to the first run in comparison.tex, too.")
     ] = False,
+    align: Annotated[
+        str,
+        typer.Option(
+            "--align",
+            metavar="start",
+            help="Move a log to where the first run is at the first common instant.",
+        ),
+    ] = "",
     doubt: Annotated[
         bool, typer.Option("--doubt", help="Say what each verdict hangs on, as podusv doubt does.")
     ] = False,
@@ -85,7 +93,7 @@ def compare(
         request = Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), [name.strip() for name in form.split(",")], workers,
-            metrics=metric or (), ratios=ratios, doubt=doubt, trust=trust,
+            metrics=metric or (), ratios=ratios, align=align, doubt=doubt, trust=trust,
             compiling=compiling(progress),
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)

@@ -14,14 +14,16 @@ from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from podusv_cli.identify.listing import Listing
+    from podusv_cli.identify.logs.listing import Listing
     from podusv_cli.identify.outputs import Identified
 
 
 def _show_columns(log: Path, as_json: bool) -> None:
-    from podusv_cli.identify.listing import listing
+    from podusv_cli.identify.logs.listing import listing
 
     found = listing(log)
+    for line in found.warnings:
+        echo(f"warning: {line}", err=True)
     echo_result(found, lambda: _report_columns(found), as_json=as_json, quiet=False)
 
 
@@ -66,7 +68,7 @@ def identify(
     if not config:
         raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
     from podusv_cli.cli.progress import progress_bars
-    from podusv_cli.identify.formats import READERS
+    from podusv_cli.identify.logs.formats import READERS
     from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
     from podusv_cli.workflows.run import Request
 

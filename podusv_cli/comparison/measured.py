@@ -4,33 +4,60 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from podusv_cli.core.about import RunAbout
+from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE
-from podusv_cli.metrics.measured import OF_LOG
+from podusv_cli.metrics.measured import OF_LOG, log_instants
 from podusv_cli.storage.run_folder import FinishedRun, InMemory
 
 POSE = tuple(signal.name for signal in STATE[:3])
 TARGET = ("x_d", "y_d")
 NO_LAW = "measured"
+ABOUT_LOG = "measured-log"  # code of what is doubtful about it
+FEWEST = 10  # common instants, below which a distance says nothing
+SCALED = 20.0  # times the mean speed of a run, that only another unit explains
+Marks = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Track:
     """What a log measured: times [s], and x, y, psi at each; u, v, r where it has them.
 
-    Times are those of the runs.
+    Times are those of the runs. `remarks` say what is doubtful about it. `at_start`: it is to begin
+    where a run is at that time.
     """
 
     file: Path
     times: Vector
     signals: Mapping[str, Vector]
+    remarks: tuple[Finding, ...] = ()
+    at_start: bool = False
+
+    def common(self, begin: float, end: float) -> Marks:
+        """Which of its times lie in a span [s]."""
+        return (self.times >= begin) & (self.times <= end)
+
+    def placed(self, run: Recording) -> Track:
+        """It, moved so that its first position at a time of the run is the run's."""
+        if not self.at_start:
+            return self
+        rows = np.flatnonzero(self.common(run["time"][0], run["time"][-1]))
+        if not len(rows):
+            return self
+        moved = {
+            name: self.signals[name] + np.interp(self.times[rows[0]], run["time"], run[name])
+            - self.signals[name][rows[0]]
+            for name in POSE[:2]
+        }  # fmt: skip
+        return replace(self, signals={**self.signals, **moved})
 
     def about(self, run: RunAbout) -> RunAbout:
         """What it says about itself beside a run: the same task, as long as it lasts, no law."""
@@ -55,15 +82,38 @@ class Track:
         return InMemory(self.file, "finished", {}, {}, "", kept=log)
 
     def departures(self, run: Recording) -> dict[str, float]:
-        """How far a run is from it where times agree, by metric; nothing where none do."""
+        """How far a run is from it where times agree, by metric; over FEWEST instants at least."""
         times = run["time"]
-        rows = (self.times >= times[:1]) & (self.times <= times[-1:])
-        if not rows.any():
-            return {}
+        rows = self.common(times[0], times[-1]) if len(times) else np.zeros(len(self.times), bool)
+        count = int(np.count_nonzero(rows))
+        if count < FEWEST:
+            return {log_instants.name: float(count)}
         x, y, psi = (
             np.interp(self.times[rows], times, run[name]) - self.signals[name][rows]
             for name in POSE
         )
         distances, turned = np.hypot(x, y), np.remainder(psi + math.pi, 2.0 * math.pi) - math.pi
         numbers = (np.sqrt(np.mean(distances**2)), distances.max(), np.sqrt(np.mean(turned**2)))
-        return {metric.name: float(x) for metric, x in zip(OF_LOG, numbers, strict=True)}
+        return {m.name: float(x) for m, x in zip(OF_LOG, (*numbers, count), strict=True)}
+
+    def beside_speeds(self, label: str, run: Recording) -> list[Finding]:
+        """A remark where it is much faster or slower than a run, as in other units."""
+        own, other = _path(self.times, self.signals), _path(run["time"], run.signals)
+        if not own or not other or 1.0 / SCALED < own / other < SCALED:
+            return []
+        text = (
+            f"the track makes {own:.2g} m/s on average and {label} {other:.2g}; look at the units "
+            "of time, x and y, which stand in brackets behind the names of columns"
+        )
+        return [self.remark(text)]
+
+    def remark(self, text: str) -> Finding:
+        """A sentence about it."""
+        return Finding(ABOUT_LOG, str(self.file), text)
+
+
+def _path(times: Vector, signals: Mapping[str, Vector]) -> float:
+    """The length of a track over its duration [m/s]; 0 where it has none."""
+    span = float(np.ptp(times)) if len(times) > 1 else 0.0
+    steps = np.hypot(np.diff(signals["x"]), np.diff(signals["y"]))
+    return float(steps.sum()) / span if span else 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from fractions import Fraction
 
 from podusv_cli.core.phrases import did_you_mean
@@ -11,6 +12,7 @@ from podusv_cli.core.phrases import did_you_mean
 # A number as scenarios and files write it; Python takes 1_0 and digits of other scripts, too.
 NUMBER = re.compile(r"[-+]?(\.[0-9]+|(0|[1-9][0-9]*)(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 PI = Fraction(math.pi)
+LARGEST = Fraction(sys.float_info.max)
 PURE = "1"  # stands for no unit
 # Of each of podusv's units, those that may stand in its place, and what one of them is in it.
 # They are exact: 57 cm are 0.57 m, and 180 deg are math.pi to the last digit.
@@ -79,6 +81,8 @@ def number(text: str, unit: str) -> int | float | None:
     if parts is None or factor is None or not math.isfinite(float(parts[0])):
         return None
     own = Fraction(repr(float(parts[0]))) * factor  # its text may have an exponent of any size
+    if abs(own) > LARGEST:
+        return None
     return int(parts[0]) if factor == 1 and parts[0].lstrip("+-").isdigit() else float(own)
 
 
@@ -97,7 +101,7 @@ def misfit(text: str, unit: str) -> str:
     if parts is None or number(text, unit) is not None:
         return ""
     units = allowed(unit)
-    if not math.isfinite(float(parts[0])):
+    if spelled(parts[1]) in units or not math.isfinite(float(parts[0])):
         return "; it is too large, numbers must be finite"
     if list(units) == [PURE, "%"]:
         return f"; it has no unit here: write {parts[0]}"

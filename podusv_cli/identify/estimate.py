@@ -15,7 +15,7 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.reading import Whole
+from podusv_cli.identify.logs.reading import Whole
 
 SHIFT = 1e-4  # of a point's coordinate, for slopes
 LONGEST = 1.0  # of a coordinate, in one step

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.checks import checked
-from podusv_cli.identify.commands import acted
-from podusv_cli.identify.frames import LAT, LON
+from podusv_cli.identify.logs.checks import checked
+from podusv_cli.identify.logs.commands import acted
+from podusv_cli.identify.logs.frames import LAT, LON
+from podusv_cli.identify.logs.reading import CLOCK, Named, Table, tables
 from podusv_cli.identify.offsets import Clocks
-from podusv_cli.identify.reading import CLOCK, Named, Table, table
 from podusv_cli.identify.records import FEWEST, POSE, Log, complete, log_of
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
 
+LONG = 3.0  # times a lag, from which on rows of commands are long
 GAP, ROWS = 2.0, 10.0  # s without a row, and usual distances of rows: a gap that ends a piece
 
 
@@ -30,12 +32,14 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     assert wanted is not None
     signals = (*STATE, *actuator.replayed, *actuator.lagged)
     _all_taken(wanted.columns, {signal.name for signal in (*signals, CLOCK, LAT, LON)})
-    whole = table(path, signals, Named(wanted.columns, wanted.frame), name=given.name)
-    part = whole.part(*given.span) if given.span else whole
-    at_rows = acted(part, actuator)
-    complete(at_rows, actuator)  # says what is missing before anything else is looked at
-    part = replace(part, warnings=(*part.warnings, *checked(at_rows, actuator)))
-    found = [acted(piece.finer(wanted.step), actuator) for piece in pieces(part)]
+    boots = tables(path, signals, Named(wanted.columns, wanted.frame), name=given.name)
+    found = []
+    for boot in boots if given.span is None else _within(boots, given.span):
+        at_rows = acted(boot, actuator)
+        complete(at_rows, actuator)  # says what is missing before anything else is looked at
+        doubts = [*checked(at_rows, actuator, scenario.facts.U), *_long_rows(boot, actuator)]
+        part = replace(boot, warnings=(*boot.warnings, *doubts))
+        found += [acted(piece.finer(wanted.step), actuator) for piece in pieces(part)]
     longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
@@ -45,6 +49,27 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
         delay = 0.0
     found[0] = replace(found[0], warnings=(*found[0].warnings, *lines))
     return [log_of(piece, actuator, wanted.step, delay) for piece in found]
+
+
+def _long_rows(log: Table, actuator: Actuator) -> list[str]:
+    """A sentence where rows are so long beside a lag that what acts between them is not known."""
+    names = {signal.name for signal in (*actuator.replayed, *actuator.lagged)}
+    acts = [np.isfinite(values) for name, values in log.columns.items() if name in names]
+    rows = np.diff(log.times[np.any(acts, axis=0)]) if acts else np.zeros(0)
+    lag = actuator.shortest_lag()
+    if not len(rows) or np.median(rows) < LONG * lag:
+        return []
+    return [
+        f"{log.name}: its commands are {np.median(rows):.3g} s apart, and the actuator's shortest "
+        f"lag is {lag:.3g} s. What acts between rows is guessed: with rows of five lags inertia "
+        "came out 3 to 4 % off, with rows of two lags within 0.6 %. Log them more often."
+    ]
+
+
+def _within(boots: Sequence[Table], span: tuple[float, float]) -> list[Table]:
+    """What each of the tables has in a span [s]. Raises LogFault where none has anything."""
+    inside = [boot for boot in boots if np.any((boot.times >= span[0]) & (boot.times < span[1]))]
+    return [boot.part(*span) for boot in (inside or boots[:1])]
 
 
 def _all_taken(columns: Mapping[str, str], taken: Collection[str]) -> None:

@@ -17,6 +17,7 @@ from podusv_cli.components.vessels.vessel import COEFFICIENTS, INERTIA, Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.identify.estimate import Search
+from podusv_cli.identify.logs.reading import Whole
 from podusv_cli.identify.march import (
     CURRENT,
     DELAY,
@@ -29,7 +30,6 @@ from podusv_cli.identify.march import (
     Followed,
     side_by_side,
 )
-from podusv_cli.identify.reading import Whole
 from podusv_cli.identify.records import Log
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.identify import DAMPING, GROUPS, Identify

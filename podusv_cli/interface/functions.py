@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 import pandas as pd
+from pydantic import BaseModel
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import UsageError
@@ -45,6 +46,12 @@ from podusv_cli.workflows.gather import (
 from podusv_cli.workflows.measured import is_log
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
+
+
+class _Noticed(BaseModel):
+    """What metrics.json has of findings."""
+
+    warnings: list[Finding] = []
 
 
 def simulate(source: Source, changes: Changes | None = None) -> Run:
@@ -114,12 +121,14 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
 def compare(
     sources: Source | Run | Iterable[Source | Run], changes: Changes | None = None, *,
     out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+    align: Literal["", "start"] = "",
 ) -> Comparison:  # fmt: skip
     """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
 
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
-    mixture; beside them a log of a boat, such as "sea_trial.csv". Raises ScenarioError, UsageError,
-    StorageError.
+    mixture; beside them a log of a boat, such as "sea_trial.csv". With `align="start"` the log is
+    moved to where the first run is at the first instant that both have. Raises ScenarioError,
+    UsageError, StorageError.
 
     >>> import podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
@@ -132,7 +141,7 @@ def compare(
     """
     given = _several(sources)
     files = [_file(source) for source in given]
-    items, options = _items(given, files, changes), request(out, force, figures)
+    items, options = _items(given, files, changes, align), request(out, force, figures)
     runs = gathered(items)
     done = comparing.compare_gathered(runs, [f for f in files if f], options)
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
@@ -297,8 +306,7 @@ def _opened(member: Member) -> Run:
     run = member.run
     assert run is not None  # the members of a folder are finished
     numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
-    warnings = json_files.read(run.folder / "metrics.json").get("warnings", [])
-    warned = tuple(str(Finding(**warning)) for warning in warnings)
+    warned = tuple(map(str, json_files.read_as(run.folder / "metrics.json", _Noticed).warnings))
     law, log = run.recording.controller, run.recording
     return Run(law, member.about, log, numbers, warned, run.folder)
 
@@ -334,7 +342,7 @@ def _file(source: Any) -> Path | None:
 
 
 def _items(
-    given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None
+    given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None, align: str
 ) -> list[Members]:
     logs = [file for file in files if file and is_log(file)]
     others = [(source, f) for source, f in zip(given, files, strict=True) if f not in logs]
@@ -347,4 +355,4 @@ def _items(
         else from_scenario(loaded(source, changes), alone=len(others) == 1)
         for (source, _), folder in zip(others, folders, strict=True)
     ]
-    return [*groups, *measured(logs, groups)]
+    return [*groups, *measured(logs, groups, align)]

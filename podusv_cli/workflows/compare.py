@@ -239,6 +239,7 @@ def collect(
     finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
     runs = {m.label: m.run for m in members if m.run}
     runs |= {label: open_run(done.folder) for label, done in finished.items()}
+    members = _placed(members, runs)
     runs |= _measured(members, runs)
     endings = {
         m.label: outcomes.get(m.label, Outcome()).failure
@@ -281,6 +282,20 @@ def collect(
         meanings=extras.made("what the warnings mean", lambda: _meanings(plugins)) or {},
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
+
+
+def _placed(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> list[Member]:
+    """The members; what was measured where it is to stand, with what the runs show of it."""
+    logs = {label: run.recording for label, run in runs.items() if len(run.recording["time"])}
+    placed = []
+    for member in members:
+        if member.track and logs:
+            label, first = next(iter(logs.items()))
+            remarks = member.track.beside_speeds(label, first)
+            track = member.track.placed(first)
+            member = replace(member, track=track, noticed=[*member.noticed, *remarks])
+        placed.append(member)
+    return placed
 
 
 def _measured(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> dict[str, FinishedRun]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from podusv_cli.comparison.claims import ParsedClaim
+from podusv_cli.comparison.measured import FEWEST, Track
 from podusv_cli.comparison.parsing import parse_claims
+from podusv_cli.core import units
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.scenario.identify import Identify
@@ -19,6 +22,9 @@ from podusv_cli.workflows.measured import is_log, track
 from podusv_cli.workflows.members import Member, distinct, numbered
 from podusv_cli.workflows.members import from_folder as members_of
 from podusv_cli.workflows.run import Request, opened
+
+START = "start"  # of a run, to which a log may be moved
+FINER = {unit: float(factor) for unit, factor in units.UNITS["s"].items() if factor < 1}
 
 
 @dataclass(frozen=True)
@@ -45,12 +51,14 @@ def gather(items: Sequence[Path], request: Request) -> Members:
     logs = [item for item in items if is_log(item)]
     others = [item for item in items if item not in logs]
     groups = [_opened(item, request, alone=len(others) == 1) for item in others]
-    return gathered([*groups, *measured(logs, groups)])
+    return gathered([*groups, *measured(logs, groups, request.align)])
 
 
-def measured(logs: Sequence[Path], groups: Sequence[Members]) -> list[Members]:
+def measured(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -> list[Members]:
     """A log among the arguments as the last of all runs. Raises UsageError."""
     if not logs:
+        if align:
+            raise UsageError(f"--align {align}: no log is given that could be moved; name one")
         return []
     if len(logs) > 1 or not groups:
         given = ", ".join(map(str, logs))
@@ -58,16 +66,36 @@ def measured(logs: Sequence[Path], groups: Sequence[Members]) -> list[Members]:
             f"{given}: runs are compared with one log at a time; name one, and a scenario or a run "
             "beside it"
         )
-    log = track(logs[0], [group.identify for group in groups if group.identify])
-    beside = groups[0].members[0].about
-    first, last = log.times[0], log.times[-1]
-    if first > beside.duration or last < 0.0:
-        raise UsageError(
-            f"{logs[0]}: its times go from {first:.10g} to {last:.10g} s, and the run from 0 to "
-            f"{beside.duration:g} s; count the log's time from where the run begins"
-        )
+    if align not in ("", START):
+        raise UsageError(f"--align {align}: unknown; write --align {START}, or leave it out")
+    members = [member for group in groups for member in group.members]
+    speeds = [member.case.scenario.facts.U if member.case else math.inf for member in members]
+    sections = [group.identify for group in groups if group.identify]
+    log = track(logs[0], sections, max(speeds), at_start=align == START)
+    beside = members[0].about
+    _check_common(log, max(member.about.duration for member in members))
     name, text = logs[0].stem, repr(log.signals["x"].tolist())
-    return [Members(name, [Member(name, log.about(beside), text, track=log)])]
+    own = Member(name, log.about(beside), text, track=log, noticed=log.remarks)
+    return [Members(name, [own])]
+
+
+def _check_common(log: Track, duration: float) -> None:
+    """Raises UsageError where too few instants are common with a run of this duration [s]."""
+    count, first, last = int(log.common(0.0, duration).sum()), log.times[0], log.times[-1]
+    if count >= FEWEST:
+        return
+    span = last - first
+    finer = [unit for unit, f in FINER.items() if last * f <= duration < span and span * f > 1.0]
+    hint = (
+        f'if its times are in {finer[0]}, write time: "COLUMN [{finer[0]}]" under '
+        f'identify.columns, or "time [{finer[0]}]" as the name of the column'
+        if finer
+        else "count the log's time from where the run begins"
+    )
+    raise UsageError(
+        f"{log.file}: its times go from {first:.10g} to {last:.10g} s, and the run from 0 to "
+        f"{duration:g} s, with {count} common positions, where {FEWEST} are needed; {hint}"
+    )
 
 
 def gathered(groups: Sequence[Members]) -> Members:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +15,33 @@ from podusv_cli.core.signal import STATE
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.named_files import YAML
 
+NO_COMMON_PLACE = (
+    "the log and the runs have no common place: its x and y count from its first fix, those of the "
+    "runs from where `start` is; `--align start` moves the log to where the first run is at the "
+    "first common instant."
+)
+
 
 def is_log(path: Path) -> bool:
     """Whether an argument is a log, and neither a scenario nor a folder."""
     if path.suffix in ("", *YAML) or path.is_dir():
         return False
-    from podusv_cli.identify.formats import READERS  # h5py is slow to import
+    from podusv_cli.identify.logs.formats import READERS  # h5py is slow to import
 
     return path.suffix.lower() in READERS
 
 
-def track(path: Path, identify: Sequence[Identify]) -> Track:
+def track(
+    path: Path, identify: Sequence[Identify], top_speed: float = math.inf, *, at_start: bool = False
+) -> Track:
     """The measured track of a log; the first of these sections says what its columns are called.
 
-    A row stands where a position is new; all else is straight between its own values. Raises
-    UsageError where the log has no pose.
+    A row stands where a position is new; all else is straight between its own values. `top_speed`
+    [m/s] is that of the fastest boat beside it. Raises UsageError where the log has no pose, or
+    has mistakes that its motion shows.
     """
-    from podusv_cli.identify.reading import Named, delivered, table
+    from podusv_cli.identify.logs.checks import checked
+    from podusv_cli.identify.logs.reading import Named, delivered, table
 
     named = Named(identify[0].columns, identify[0].frame) if identify else Named()
     log = table(path, STATE, named)
@@ -42,10 +54,15 @@ def track(path: Path, identify: Sequence[Identify]) -> Track:
     rows = delivered(log.columns["x"]) & np.isfinite(log.columns["y"])
     if np.count_nonzero(rows) < 2:
         raise UsageError(f"{path}: has fewer than two positions, which is no track")
+    lines = [*log.warnings, *checked(log, top_speed=top_speed)]
+    if log.from_fix and not at_start:
+        lines.append(NO_COMMON_PLACE)
     signals = {}
     for name, values in log.columns.items():
         known = np.isfinite(values)
         whole = np.unwrap(values[known]) if name == "psi" else values[known]
         if known.any() and name in {signal.name for signal in STATE}:
             signals[name] = np.interp(log.times[rows], log.times[known], whole)
-    return Track(path, log.times[rows], signals)
+    own = Track(path, log.times[rows], signals, at_start=at_start)
+    prefix = f"{log.name}: "
+    return replace(own, remarks=tuple(own.remark(line.removeprefix(prefix)) for line in lines))

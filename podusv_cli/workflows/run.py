@@ -41,6 +41,7 @@ class Request:
     workers: int = 0  # processes at a time; 0: one a core
     controller: str = ""  # which of `controllers` to run
     metrics: Sequence[str] = ()  # those that are asked for; all where empty
+    align: str = ""  # "start" moves a log to where the first run is at the first common instant
     ratios: bool = False  # whether comparison.tex has ratios to the first run
     doubt: bool = False  # whether a comparison also says what its verdicts hang on
     trust: bool = False  # whether plug-in files of a finished run may be executed

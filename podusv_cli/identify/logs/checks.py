@@ -11,24 +11,45 @@ import cmath
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.formats import LogFault
-from podusv_cli.identify.reading import UNITS, Marks, Table, Whole
+from podusv_cli.identify.logs.contents import LogFault
+from podusv_cli.identify.logs.motion import DEGREES, FAST, RADIANS, Motion
+from podusv_cli.identify.logs.reading import SENSED, UNITS, Table, delivered
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
+NEAREST = 2e-3  # s between positions, below which no receiver is
 FINER = {unit: UNITS["s"][unit] for unit in ("ms", "us", "ns")}
-BIN = 1.0  # s, over which values are averaged; at least that of VALUES_A_BIN
-VALUES_A_BIN = 3
+COARSER = ("h", "min")
+STILL = 5e-4  # m/s: a boat at 50 m/s moves so in degrees, and no receiver in metres is so quiet
+FAR = 10.0  # standard deviations of a track, that degrees are away from (0, 0)
+SCALED = 20.0  # times a speed, that no error of a hull's numbers explains
+TWICE = 2.0  # times the speed at full thrust, above which a track is doubted
+FASTEST = 60.0  # m/s, which no boat makes
+QUIET = 0.1  # m, rad, m/s or rad/s: smaller steps are no jumps
+GAP = 2.5  # usual distances of values: a step over more says nothing
+OTHER_UNIT = 300.0  # times a speed, that no current explains
+DEGREE = 111e3  # m, of latitude
+NARROW = 0.5  # deg, within which a log's track stays
+THRICE = 3.0  # times a speed, that two measures of it are apart
+CALL_THEM = (
+    'write lat: "COLUMN", lon: "COLUMN" under identify.columns, or call the columns lat and lon'
+)
+HEADING_IN_DEGREES = (
+    'if so, write psi: "COLUMN [deg]" under identify.columns, or "psi [deg]" as the name of the '
+    "column"
+)
+LOOK_AT_UNITS = (
+    "look at the units of time, x and y, and name them in brackets, as in "
+    'time: "COLUMN [ms]" under identify.columns'
+)
+SPIKE = 10.0  # times the largest of the usual steps: a jump
 FEWEST_BINS = 10
-FAST = 0.95  # quantile of the speed that counts as the fastest
-MOVING = 0.2  # of that, above which a course says something
-JUMP = 5.0  # times that, above which a position has jumped
 ALIKE = 0.9  # correlation or agreement, from which on two quantities are the same one
 SURE = 25.0  # courses times a squared agreement: e to the minus this is its chance without cause
 UNLIKE = 0.005  # of 1, that an agreement lacks in a log with turns
@@ -37,83 +58,24 @@ ABEAM = 0.2  # of an agreement, within which a mean angle means something
 NEAR = math.log(1.1)  # of a ratio, that counts as the ratio of two units
 ODD = math.log(1.4)  # of a ratio, that no unit explains and no sensor has
 ASIDE = 60.0  # deg, a mean angle between course and heading
-RADIANS, DEGREES = 2.0 * math.pi, 360.0  # a full turn
+TURN_AND_MORE = 7.0  # rad, with which no heading in radians begins
 STEADY = 0.05  # of a speed, and in rad of a heading: standard deviations without a manoeuvre
 BEYOND = 1.3  # of what an actuator can do
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A log averaged over bins of some seconds, and the actuator that moved the boat."""
+def checked(
+    table: Table, actuator: Actuator | None = None, top_speed: float = math.inf
+) -> list[str]:
+    """What is doubtful about a log, a sentence each. Raises LogFault where a mistake is certain.
 
-    table: Table
-    actuator: Actuator
-
-    @cached_property
-    def width(self) -> float:
-        """Of a bin [s]."""
-        times = self.table.times[np.isfinite(self.table.columns["x"])]
-        usual = float(np.median(np.diff(times))) if len(times) > 1 else BIN
-        return max(BIN, VALUES_A_BIN * usual)
-
-    @cached_property
-    def _bins(self) -> Whole:
-        since = self.table.times - self.table.times[0]
-        return np.asarray(since // self.width, np.int64)
-
-    def mean(self, name: str, values: Vector | None = None) -> Vector:
-        """Of a quantity in each bin, NaN where it has no value there."""
-        values = self.table.columns[name] if values is None else values
-        known = np.isfinite(values)
-        size = int(self._bins[-1]) + 1
-        counts = np.bincount(self._bins[known], minlength=size)
-        sums = np.bincount(self._bins[known], values[known], minlength=size)
-        return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
-
-    def rate(self, means: Vector) -> Vector:
-        """How fast a quantity changes, by the bins on either side."""
-        return np.asarray(np.gradient(means, self.width))
-
-    def turned(self) -> Vector:
-        """The mean angle in each bin by which the yaw rate says that the boat has turned [rad]."""
-        known = np.isfinite(self.table.columns["r"])
-        rates, times = self.table.columns["r"][known], self.table.times[known]
-        angles = np.full_like(self.table.times, np.nan)
-        angles[known] = np.cumsum(
-            0.5 * (rates + np.roll(rates, 1)) * np.diff(times, prepend=times[:1])
-        )
-        return self.mean("r", angles)
-
-    def heading(self, turn: float = RADIANS) -> Vector:
-        """Of each bin, in the log's own numbers, of which `turn` make a full turn."""
-        values = self.table.columns["psi"].copy()
-        known = np.isfinite(values)
-        values[known] = np.unwrap(values[known], period=turn)
-        return self.mean("psi", values) * (RADIANS / turn)
-
-    @cached_property
-    def velocity(self) -> Vector:
-        """Over ground, north + 1j east [m/s], by positions."""
-        return self.rate(self.mean("x")) + 1j * self.rate(self.mean("y"))
-
-    @cached_property
-    def fastest(self) -> float:
-        """The speed that hardly any bin exceeds [m/s]."""
-        return float(np.nanquantile(np.abs(self.velocity), FAST))
-
-    @cached_property
-    def moving(self) -> Marks:
-        """The bins in which the course of the track says something."""
-        speed = np.abs(self.velocity)
-        return np.asarray((speed > MOVING * self.fastest) & (speed < JUMP * self.fastest))
-
-
-def checked(table: Table, actuator: Actuator) -> list[str]:
-    """What is doubtful about a log, a sentence each. Raises LogFault where a mistake is certain."""
-    motion, lines = Motion(table, actuator), list[str]()
+    `actuator` is that of a log from which a hull is to be found, `top_speed` [m/s] that of the
+    boat.
+    """
+    motion, lines = Motion(table, actuator, top_speed), list[str]()
     try:
-        with np.errstate(invalid="ignore", divide="ignore"):
-            for check in CHECKS:
+        with np.errstate(invalid="ignore", divide="ignore"), catch_warnings():
+            simplefilter("ignore", RuntimeWarning)  # of means over nothing, which are NaN
+            for check in (*(OF_FITS if actuator else ()), *OF_ALL):
                 lines += check(motion)
     except LogFault as error:
         raise LogFault("; also, ".join((f"{table.name}: {error}", *lines))) from error
@@ -122,6 +84,7 @@ def checked(table: Table, actuator: Actuator) -> list[str]:
 
 def _out_of_reach(motion: Motion) -> Iterator[str]:
     """Commands in another unit: by what the actuator can do."""
+    assert motion.actuator
     reaches = motion.actuator.reach
     for signal in motion.actuator.replayed:
         values, reach = motion.table.columns.get(signal.name, np.zeros(1)), reaches.get(signal.name)
@@ -137,9 +100,23 @@ def _out_of_reach(motion: Motion) -> Iterator[str]:
 
 
 def _clock(motion: Motion) -> Iterator[str]:
-    """Times in milliseconds or finer."""
-    times = motion.table.times
-    step = float(np.median(np.diff(times)))
+    """Times in minutes or longer units: rows that are too near for a sensor of positions."""
+    times = motion.table.times[np.isfinite(motion.table.columns["x"])]
+    span = float(np.ptp(times)) if len(times) else 0.0
+    rows = span / max(len(times) - 1, 1)
+    if rows >= NEAREST:
+        return
+    forms = " or ".join(f'time: "COLUMN [{unit}]"' for unit in COARSER)
+    raise LogFault(
+        f"its positions are {rows:.2g} s apart, and the whole log lasts {span:.3g} s; if its times "
+        f"are in hours or minutes, write {forms} under identify.columns"
+    )
+    yield
+
+
+def _slow_rows(motion: Motion) -> Iterator[str]:
+    """Times in milliseconds or finer: rows that are too far apart."""
+    step = float(np.median(np.diff(motion.table.times)))
     if step >= SLOWEST:
         unit = next((u for u, f in FINER.items() if step * f < SLOWEST), "ns")
         raise LogFault(
@@ -149,20 +126,77 @@ def _clock(motion: Motion) -> Iterator[str]:
     yield from ()
 
 
+def _places(motion: Motion) -> Iterator[str]:
+    """Positions in degrees that are called x and y: they hardly move, far from (0, 0)."""
+    x, y = (motion.table.columns[name] for name in ("x", "y"))
+    apart = np.hypot(np.nanstd(x), np.nanstd(y))
+    if not 0.0 < motion.fastest < STILL or np.hypot(np.nanmean(x), np.nanmean(y)) < FAR * apart:
+        return
+    what = (
+        f"x and y move at {motion.fastest:.2g} m/s at most; if they are latitude and longitude in "
+        f"degrees, {CALL_THEM}"
+    )
+    if np.nanstd(motion.heading()) > STEADY:
+        raise LogFault(what)
+    yield what
+
+
+def _speeds_apart(motion: Motion) -> Iterator[str]:
+    """Tracks that are hundreds of times slower or faster than the log's own speed."""
+    speeds = np.abs(motion.table.columns.get("u", np.zeros(1)))
+    speed = float(np.nanquantile(speeds, FAST)) if np.isfinite(speeds).any() else 0.0
+    if not (speed and motion.fastest) or 1.0 / OTHER_UNIT < motion.fastest / speed < OTHER_UNIT:
+        return
+    x, y = (motion.table.columns[name] for name in ("x", "y"))
+    wide = max(float(np.nanmax(values) - np.nanmin(values)) for values in (x, y))
+    ratio = motion.fastest / speed
+    times = (unit for unit, f in UNITS["s"].items() if abs(math.log(ratio / f)) < math.log(THRICE))
+    unit = next(times, "")
+    hint = f'if its times are in {unit}, write time: "COLUMN [{unit}]" under identify.columns'
+    if wide < NARROW and abs(math.log(ratio * DEGREE)) < math.log(SCALED):
+        hint = f"x and y in degrees? Then {CALL_THEM}"
+    elif not unit:
+        hint = LOOK_AT_UNITS
+    raise LogFault(f"its track makes {motion.fastest:.2g} m/s, while u is {speed:.3g} m/s; {hint}")
+    yield
+
+
+def _speed_made_good(motion: Motion) -> Iterator[str]:
+    """Tracks that are faster than the boat can be."""
+    fast, top = motion.fastest, motion.top_speed
+    what = f"its track makes {fast:.3g} m/s"
+    if fast > min(FASTEST, SCALED * top):
+        beside = f", and the boat {top:.3g} at full thrust" if math.isfinite(top) else ""
+        raise LogFault(f"{what}{beside}; {LOOK_AT_UNITS}")
+    if fast > TWICE * top:
+        yield f"{what}, and the boat {top:.3g} at full thrust; look at the units of time, x and y"
+
+
+def _empty(motion: Motion) -> Iterator[str]:
+    """Columns without numbers."""
+    for name, values in motion.table.columns.items():
+        if not np.isfinite(values).any():
+            yield f"{name} has no number at all"
+
+
+def _compass(motion: Motion) -> Iterator[str]:
+    """A heading that stands while the boat turns."""
+    known = motion.table.columns["psi"][np.isfinite(motion.table.columns["psi"])]
+    straight = abs(np.nanmean(np.exp(1j * np.angle(motion.velocity)))) >= ALIKE
+    if np.ptp(known) == 0.0 and not straight:
+        raise LogFault(
+            f"psi is {known[0]:g} throughout while the track turns; its sensor stood still, or "
+            "identify.columns names another column"
+        )
+    yield from ()
+
+
 def _constant(motion: Motion) -> Iterator[str]:
-    """Columns that never change, or have no numbers: a compass that stands while the boat turns."""
+    """Columns that never change, and are not 0."""
     for name, values in motion.table.columns.items():
         known = values[np.isfinite(values)]
-        if not len(known):
-            yield f"{name} has no number at all"
-        elif np.ptp(known) == 0.0:
-            if name == "psi" and abs(np.nanmean(np.exp(1j * np.angle(motion.velocity)))) < ALIKE:
-                raise LogFault(
-                    f"psi is {known[0]:g} throughout while the track turns; its sensor stood "
-                    "still, or identify.columns names another column"
-                )
-            if known[0] != 0.0:
-                yield f"{name} is {known[0]:g} throughout"
+        if len(known) and np.ptp(known) == 0.0 and known[0] != 0.0:
+            yield f"{name} is {known[0]:g} throughout"
 
 
 @dataclass(frozen=True)
@@ -198,10 +232,33 @@ class Reading:
         )
 
 
+def _degrees(motion: Motion, own: Reading, degrees: Reading) -> Iterator[str]:
+    """Headings in degrees of a boat that hardly turns: they are beyond a turn, or go through many.
+
+    Raises LogFault where they begin beyond a turn, which headings in radians do not.
+    """
+    aside, nearer = (abs(cmath.phase(reading.mean)) for reading in (own, degrees))
+    lack, less = (1.0 - abs(reading.mean) for reading in (own, degrees))
+    if abs(degrees.mean) < ALIKE or not (nearer < 0.5 * aside or less < BETTER * lack):
+        return
+    psi = motion.table.columns["psi"]
+    span = float(np.nanmax(psi) - np.nanmin(psi))
+    what = (
+        f"psi begins at {motion.first_heading:.4g} and goes through {span:.3g} rad; in degrees it "
+        f"agrees with the course of the track; {HEADING_IN_DEGREES}"
+    )
+    if abs(motion.first_heading) > TURN_AND_MORE:
+        raise LogFault(what)
+    if abs(own.mean) < ALIKE:
+        yield what
+
+
 def _courses(motion: Motion) -> Iterator[str]:
     """Heading in degrees, counted to port, or axes exchanged: by the course of the track."""
     moving = motion.moving
     if np.sum(moving) < FEWEST_BINS:
+        if abs(motion.first_heading) > TURN_AND_MORE:
+            yield f"psi begins at {motion.first_heading:.4g} rad; in degrees? {HEADING_IN_DEGREES}"
         return
     course = np.angle(motion.velocity[moving])
 
@@ -219,6 +276,7 @@ def _courses(motion: Motion) -> Iterator[str]:
             f"the track's course and psi agree to {abs(own.mean):.2f} of 1 as "
             f"given, but to {abs(best.mean):.2f} if {best.words}; {best.remedy}"
         )
+    yield from _degrees(motion, own, others[1])
     aside = math.degrees(cmath.phase(own.mean))
     if lack < ABEAM and abs(aside) > ASIDE:
         yield (
@@ -228,15 +286,25 @@ def _courses(motion: Motion) -> Iterator[str]:
 
 
 def _jumps(motion: Motion) -> Iterator[str]:
-    """Positions that jump, as of a receiver that finds itself elsewhere."""
-    jumps = np.flatnonzero(np.abs(motion.velocity) > JUMP * motion.fastest)
-    if len(jumps) and len(motion.velocity) > FEWEST_BINS:
-        at = motion.table.times[0] + motion.width * (jumps[0] + 0.5)
-        yield (
-            f"its position jumps at {at:.10g} s (a speed of {abs(motion.velocity[jumps[0]]):.3g} "
-            f"m/s, while {100.0 * FAST:g} % of the log are below {motion.fastest:.3g}); the filter "
-            "takes that for motion, so leave out what is around it, with spans"
+    """Values that jump: of a receiver that finds itself elsewhere, or in a damaged cell."""
+    for name in [name for name in motion.table.columns if name in SENSED]:
+        rows = np.flatnonzero(delivered(motion.table.columns[name]))
+        values, times = motion.table.columns[name][rows], motion.table.times[rows]
+        if len(rows) < FEWEST_BINS:
+            continue
+        steps, spans = np.diff(values), np.diff(times)
+        steps = np.abs(np.angle(np.exp(1j * steps)) if name == "psi" else steps)
+        usual = float(np.quantile(steps, FAST))
+        jumps = np.flatnonzero(
+            (steps > max(SPIKE * usual, QUIET)) & (spans < GAP * np.median(spans))
         )
+        if len(jumps):
+            first, several = jumps[0], "" if len(jumps) == 1 else f" {len(jumps)} times, first"
+            yield (
+                f"{name} jumps{several} by {steps[first]:.4g} at {times[first + 1]:.10g} s, while "
+                f"{100.0 * FAST:g} % of its steps are below {usual:.3g}; that is taken for motion, "
+                "so leave such cells empty, or leave out what is around them, with spans"
+            )
 
 
 def _yaw_rate(motion: Motion) -> Iterator[str]:
@@ -322,6 +390,7 @@ def _manoeuvres(motion: Motion) -> Iterator[str]:
 def _idle(motion: Motion) -> Iterator[str]:
     """Logs in which nothing was commanded."""
     columns = motion.table.columns
+    assert motion.actuator
     given = [columns[s.name] for s in motion.actuator.replayed if s.name in columns]
     if not any(np.any(np.abs(values) > 0.0) for values in given):
         yield (
@@ -330,6 +399,10 @@ def _idle(motion: Motion) -> Iterator[str]:
         )
 
 
-CHECKS: tuple[Callable[[Motion], Iterator[str]], ...] = (
-    _clock, _constant, _courses, _jumps, _yaw_rate, _speeds, _out_of_reach, _idle, _manoeuvres,
+Check = Callable[[Motion], Iterator[str]]
+# Of every log, and of those that a hull is to be found from.
+OF_ALL: tuple[Check, ...] = (
+    _jumps, _clock, _places, _speeds_apart, _speed_made_good, _empty, _compass, _courses, _yaw_rate,
+    _speeds,
 )  # fmt: skip
+OF_FITS: tuple[Check, ...] = (_slow_rows, _out_of_reach, _constant, _idle, _manoeuvres)

@@ -8,7 +8,7 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector, bundle, call
-from podusv_cli.identify.reading import Table
+from podusv_cli.identify.logs.reading import Table
 
 FINE = 0.2  # of the shortest lag, one step at most
 

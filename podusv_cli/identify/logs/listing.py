@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -9,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.checks import FINER, SLOWEST
-from podusv_cli.identify.formats import TIME, Columns, columns_of
-from podusv_cli.identify.reading import UNITS, clock_of, delivered, listed, parted
+from podusv_cli.identify.logs.checks import FINER, SLOWEST
+from podusv_cli.identify.logs.contents import Columns
+from podusv_cli.identify.logs.formats import contents_of
+from podusv_cli.identify.logs.messages import TIME
+from podusv_cli.identify.logs.reading import UNITS, clock_of, delivered, listed, parted
 
 SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
@@ -67,16 +71,17 @@ class Listed:
 
 @dataclass(frozen=True)
 class Listing:
-    """All columns of a log."""
+    """All columns of a log, and what is doubtful about the file."""
 
     columns: list[Listed]
     turned: bool  # whether headings are those of quaternions, which ROS counts from the east
+    warnings: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
             "format": 1, "columns": [asdict(own) for own in self.columns],
-            "mapping": self.mapping(),
+            "mapping": self.mapping(), "warnings": list(self.warnings),
         }  # fmt: skip
 
     def mapping(self) -> list[str]:
@@ -85,7 +90,7 @@ class Listing:
         for own in self.columns:
             if own.quantity:
                 unit = f" [{own.unit}]" if own.unit else ""
-                lines.append(f'  {own.quantity}: "{parted(own.name)[0]}{unit}"')
+                lines.append(f"  {own.quantity}: {_in_quotes(parted(own.name)[0] + unit)}")
         known = {own.quantity for own in self.columns}
         lacking = [names[0] for names in NEEDED if not known & {*names}]
         lines += [f"  # {name}: ?   (not guessed; see podusv docs identify)" for name in lacking]
@@ -97,13 +102,22 @@ class Listing:
         return lines
 
 
+def _in_quotes(text: str) -> str:
+    """Text as YAML has it between double quotes."""
+    dumped: str = yaml.safe_dump(text, default_style='"', allow_unicode=True, width=math.inf)
+    return dumped.strip()
+
+
 def listing(path: Path) -> Listing:
     """The columns of a log. Raises LogFault, StorageError."""
-    columns = columns_of(path)
+    contents = contents_of(path)
+    columns = contents.columns
     guesses = dict(_guesses(columns))
+    doubts = (f"{name!r} {doubt}" for name, doubt in contents.doubts.items() if name in guesses)
     return Listing(
         [_listed(name, columns, guesses) for name in columns],
         any(name.endswith("orientation.yaw") for name in guesses),
+        tuple(f"{path.name}: {line}." for line in (*contents.warnings, *doubts)),
     )
 
 

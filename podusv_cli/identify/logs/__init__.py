@@ -1,0 +1,1 @@
+"""Logs of boats: read, put into podusv's units and frame, and looked at for mistakes."""

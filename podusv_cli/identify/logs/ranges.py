@@ -1,0 +1,87 @@
+"""What the values of a column can be: places on earth have a range, and sensors a word for none."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import Signal
+from podusv_cli.identify.logs.contents import LogFault
+from podusv_cli.identify.logs.frames import LAT, LON
+
+Marks = npt.NDArray[np.bool_]
+PLACES = {LAT.name: ("latitude", 90.0), LON.name: ("longitude", 180.0)}  # and most [deg]
+SELDOM = 0.05  # of the values, that may be out of range
+MINUTES = 100.0  # a degree, where degrees and minutes are written as one number
+SCALE = 1e7  # a degree, where positions are integers
+APART = 0.2  # of the range of all other values, that one for "none" lies beyond them
+# What sensors and buses write where they have no value: the largest numbers of 16 and 32 bits with
+# usual scales, the heading 511 of AIS, and nines.
+NONE = (
+    *(65535.0 * scale for scale in (1.0, 0.1, 0.01, 1e-4)),
+    *(32767.0 * scale for scale in (1.0, 0.1, 0.01, 1e-4)),
+    *(-32768.0 * scale for scale in (1.0, 0.1, 0.01)),
+    *(sign * (2.0**31 - 1.0) * scale for scale in (1.0, 1e-7) for sign in (1.0, -1.0)),
+    4294967295.0, 511.0, *(sign * nines for nines in (999.0, 9999.0, 99999.0) for sign in (1, -1)),
+)  # fmt: skip
+
+
+def without_none(values: Vector) -> tuple[Vector, str]:
+    """The values, NaN for those that stand for none; and which these are, "" where there are none.
+
+    Such a value is a number of `NONE` that is the largest or the least, clearly beyond all others.
+    """
+    words = []
+    for most in (np.nanmax, np.nanmin):
+        known = np.isfinite(values)
+        value = float(most(values, initial=0.0, where=known))
+        alike = values == value
+        rest = values[known & ~alike]
+        if not (np.isclose(value, NONE, rtol=1e-9, atol=0.0).any() and len(rest)):
+            continue
+        if abs(value - float(most(rest))) > APART * float(np.ptp(rest)):
+            words.append(
+                f"is {value:.10g} {_often(alike)}, which stands for no value and is left out"
+            )
+            values = np.where(alike, np.nan, values)
+    return values, " and ".join(words)
+
+
+def _often(marks: Marks) -> str:
+    return f"{marks.sum()} times" if marks.sum() > 1 else "once"
+
+
+def on_earth(signal: Signal, values: Vector) -> tuple[Vector, str]:
+    """Latitudes or longitudes [deg], and how many are left out since they are out of range.
+
+    Raises LogFault, with a sentence that does not name the file, where it is no single damage.
+    """
+    word, most = PLACES[signal.name]
+    beyond = np.abs(values) > most  # false for NaN
+    if not beyond.any():
+        return values, ""
+    first = float(values[beyond][0])
+    what = f"{word} {first:.10g} is beyond {most:g} deg"
+    if beyond.sum() <= SELDOM * np.isfinite(values).sum():
+        return np.where(
+            beyond, np.nan, values
+        ), f"is out of range {_often(beyond)}: {what}; it is left out"
+    raise LogFault(f"{what}; {_reason(signal.name, values[np.isfinite(values)], most)}")
+
+
+def _reason(name: str, values: Vector, most: float) -> str:
+    """What such numbers probably are, and what to write."""
+    size = np.abs(values)
+    if size.max() <= most * MINUTES + MINUTES and np.all(size % MINUTES < 60.0):
+        return (
+            "is it in NMEA's degrees and minutes, ddmm.mmmm? Convert it to degrees: "
+            "dd + mm.mmmm / 60"
+        )
+    if size.max() <= most * SCALE and np.all(values == np.round(values)):
+        unit = "1e-7 deg"
+        return (
+            f'if it is in {unit}, write {name}: "COLUMN [{unit}]" under identify.columns, or '
+            f'"{name} [{unit}]" as the name of the column'
+        )
+    return f"write degrees from {-most:g} to {most:g}"
