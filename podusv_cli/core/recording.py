@@ -53,13 +53,15 @@ class Recording:
         return replace(self, signals={n: a[rows] for n, a in self.signals.items()})
 
     def row_at(self, place: Mapping[str, float]) -> int | None:
-        """The first row that is at a place; None where none is, or `place` is empty.
+        """The first row that is at a place; None where none is, and in a log without such places.
 
         `place` has numbers of signals by name. A row is there where they are reached; the first
         that differs decides. See `Path.passed_by`.
         """
+        if not place or not all(name in self for name in place):
+            return None
         rows = len(self["time"])
-        beyond, equal = np.zeros(rows, dtype=bool), np.full(rows, bool(place))
+        beyond, equal = np.zeros(rows, dtype=bool), np.ones(rows, dtype=bool)
         for name, least in place.items():
             beyond |= equal & (self[name] > least)
             equal &= self[name] == least

@@ -113,6 +113,12 @@ class Metric(MetricAbout):
     of_log: Callable[[Recording], float] | None = field(default=None, kw_only=True)
 
     @property
+    def ends_with_path(self) -> bool:
+        """Whether it may be gathered on a path that has an end, and then ends there."""
+        gathered_there = self.accumulator is not None and not self.accumulator.of_target
+        return gathered_there or self.of_log is not None
+
+    @property
     def about(self) -> MetricAbout:
         """The metric without its functions."""
         return MetricAbout(**{own.name: getattr(self, own.name) for own in fields(MetricAbout)})
