@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +14,9 @@ import pytest
 import podusv
 from podusv import gym
 from podusv_cli.components.paths.legs import Legs
+from podusv_cli.figures.curves import AFTER
+from podusv_cli.figures.drawing import FIGURES
+from podusv_cli.figures.shown import dressed
 
 SCENARIO = """
 name: ends
@@ -188,3 +192,61 @@ def test_a_share_of_the_way_lies_where_it_is_measured_along_the_legs(share: floa
         1.0: {"leg": 3.0},
     }
     assert path.passed_by(share) == pytest.approx(expected[share])
+
+
+def test_a_log_beside_a_run_counts_to_the_end_of_its_path(scenario: Path, tmp_path: Path) -> None:
+    """A boat that stops there and drifts away is not off the track that it was to follow."""
+    run = podusv.run(scenario, out=tmp_path / "run", figures=False)
+    arrival = run.metrics.path_time
+    over = run["time"] > arrival
+    drifted = np.where(over, 100.0, 0.25)
+    table = np.column_stack([run["time"], run["x"] + drifted, run["y"], run["psi"]])[::7]
+    log = tmp_path / "sea.csv"
+    np.savetxt(log, table, "%.17g", ",", header="time,x,y,psi", comments="")
+    done = podusv.compare([run, str(log)], out=tmp_path / "both", figures=False)
+    assert done.table.loc["log_distance_max", "run"] == pytest.approx(0.25, rel=1e-9)
+    assert 100.0 in np.round(table[:, 1] - run["x"][::7], 6)
+
+
+def test_a_metric_of_the_log_is_given_the_rows_up_to_the_end(scenario: Path) -> None:
+    file = scenario.parent / "last.py"
+    file.write_text(
+        "from podusv_cli.plugin import Metric\n"
+        "last = Metric('last_time', 's', 'time of the last row', "
+        "of_log=lambda log: float(log['time'][-1]))\n"
+    )
+    run = podusv.simulate(scenario, {"plugins": [str(file)]})
+    assert run.metrics.last_time == run.metrics.path_time < run["time"][-1]
+
+
+def test_tables_and_pages_say_up_to_when_they_count_and_the_rest_is_grey(
+    scenario: Path, tmp_path: Path
+) -> None:
+    changes = {
+        "controllers": {
+            "one": {"kind": "los_pid"},
+            "late": {"kind": "los_pid", "U": 0.2, "U_min": 0.1},
+        },
+        "simulation.duration": 47.0,
+    }
+    done = podusv.compare(scenario, changes, out=tmp_path / "both", figures=False)
+    assert done.table.loc["path_done", "late"] < 1.0
+    time = done.table.loc["path_time", "one"]
+    words = f"up to the end of the path: one {time:g} s; of the whole run: late"
+    assert words in (tmp_path / "both" / "comparison.md").read_text()
+    page = (tmp_path / "both" / "report.html").read_text()
+    assert words in page
+    chase, curves = (
+        json.loads(page.split(f'id="{name}-data">')[1].split("</script>")[0])
+        for name in ("chase", "curves")
+    )
+    for shown in (chase, curves):
+        assert [run["counts"] for run in shown["runs"]] == [time, 47.0]
+    run = done["one"]
+    shown = dressed([("one", run.recording, run.about, ())])
+    axes = next(
+        axes for axes in FIGURES["path"].family(shown, 2).axes if "e_{ct}" in axes.get_ylabel()
+    )
+    grey, own = sorted(axes.lines, key=lambda line: line.get_color() != AFTER["color"])
+    assert own.get_xdata()[-1] == grey.get_xdata()[0] == time
+    assert grey.get_xdata()[-1] == 47.0
