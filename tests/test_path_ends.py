@@ -250,3 +250,13 @@ def test_tables_and_pages_say_up_to_when_they_count_and_the_rest_is_grey(
     grey, own = sorted(axes.lines, key=lambda line: line.get_color() != AFTER["color"])
     assert own.get_xdata()[-1] == grey.get_xdata()[0] == time
     assert grey.get_xdata()[-1] == 47.0
+
+
+def test_what_was_gathered_before_the_last_part_of_the_way_is_void(scenario: Path) -> None:
+    """From far behind the first waypoint the last part of the time begins before that of the way."""
+    changes = {"metrics.steady_fraction": 0.6, "start.x": -20.0, "simulation.duration": 75.0}
+    run = podusv.simulate(scenario, changes)
+    opens = run["time"][np.argmax((run["leg"] >= 1) & (run["along_leg"] > 0.4 * 41.0 - 12.37))]
+    assert 0.4 * 75.0 + 5.0 < opens < run.metrics.path_time
+    for name, number in looped(run, 0.6).items():
+        assert run.metrics[name] == pytest.approx(number, rel=1e-9), name
