@@ -253,7 +253,7 @@ def test_tables_and_pages_say_up_to_when_they_count_and_the_rest_is_grey(
 
 
 def test_what_was_gathered_before_the_last_part_of_the_way_is_void(scenario: Path) -> None:
-    """From far behind the first waypoint the last part of the time begins before that of the way."""
+    """Started far behind, the last part of the time begins before that of the way."""
     changes = {"metrics.steady_fraction": 0.6, "start.x": -20.0, "simulation.duration": 75.0}
     run = podusv.simulate(scenario, changes)
     opens = run["time"][np.argmax((run["leg"] >= 1) & (run["along_leg"] > 0.4 * 41.0 - 12.37))]
