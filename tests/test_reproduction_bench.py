@@ -84,8 +84,9 @@ def test_ranks_by_vessel_and_condition_are_those_of_the_runs():
     beyond = {
         vessel: leaderboard(rows).median_ratio_e.pid for vessel, rows in by_vessel(RUNS).items()
     }
-    said = "PID is at {cybership2:.3g} times the best law in the median on `cybership2`, {otter:.3g} "
-    said += "on the Otter, {paper_nonlinear:.3g} on `paper_nonlinear` and {revolt:.3g} on ReVolt."
+    said = "PID is at {cybership2:.3g} times the best law in the median on `cybership2`, "
+    said += "{otter:.3g} on the Otter, {paper_nonlinear:.3g} on `paper_nonlinear` and "
+    said += "{revolt:.3g} on ReVolt."
     assert said.format(**beyond) in WORDS
     by = RUNS.pivot_table("rank", "law", "condition")
     assert f"{(by.sea_fixed - by.sea).abs().max():.1f}." in WORDS
