@@ -66,9 +66,9 @@ def rk4(f: Any, s: Any, held: Any) -> Any:
     return s + STEP / 6.0 * (a + 2.0 * b + 2.0 * c + f(s + STEP * c, held))
 
 
-def sailed(law: Any, memory: Any, duration: float) -> Any:
+def sailed(law: Any, memory: Any, duration: float, start: dict[str, float] = START) -> Any:
     """Rows of state and memory at every sample; only the memory moves on in between."""
-    s, m, leg, rows = np.array([*START.values(), 0.0, 0.0]), np.array(memory), 0, []
+    s, m, leg, rows = np.array([*start.values(), 0.0, 0.0]), np.array(memory), 0, []
     for step in range(round(duration / STEP) + 1):
         at = complex(s[0], s[1])
         if leg < len(POINTS) - 1 and abs(complex(*POINTS[leg + 1]) - at) < NEAR:
@@ -155,6 +155,24 @@ def test_ardupilot_sails_as_in_a_plain_loop_at_an_awkward_period(guidance: str) 
     assert out["leg"].max() >= 1
     total = np.abs(out["throttle"]) + np.abs(out["steering"])
     assert total.max() == pytest.approx(1.0), "the mixer has been at work"
+
+
+@pytest.mark.parametrize("across", [-4.3, 4.3])
+def test_l1_turns_the_way_that_its_source_turns_where_a_boat_faces_away(across: float) -> None:
+    """The angle to the path alone is wrapped: beside it and facing away, the sum goes beyond pi.
+
+    Wrapped as a whole it turned the other way round.
+    """
+    start = {"x": 3.0, "y": across, "psi": math.copysign(2.8, across), "u": 0.6}
+    law = {"kind": "ardupilot", "guidance": "l1", "l1_least": 1.2} | GAINS
+    out = podusv.simulate(scenario(law, 26.0) | {"start": start})
+    own = sailed(ardupilot("l1"), np.zeros(3), 26.0, start)[: len(out["time"])]
+    ran = np.array([out[name] for name in ("x", "y", "psi", "u", "v", "r")]).T[: len(own)]
+    np.testing.assert_allclose(ran, own[:, :6], atol=1e-9)
+    assert out["steering"][0] * across < 0.0
+    course, sight = math.atan2(3.0, 12.0), -math.copysign(math.pi / 4, across)
+    facing = (course - start["psi"] + math.pi) % (2.0 * math.pi) - math.pi
+    assert abs(sight + facing) > math.pi
 
 
 def px4() -> Any:

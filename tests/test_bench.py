@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -76,6 +77,24 @@ def test_the_leaderboard_counts_what_the_table_has():
     assert board.close.tolist() == pytest.approx([2 / 3, 2 / 3, 1 / 3])
 
 
+def test_every_hull_has_a_leaderboard_of_its_own():
+    """What is best on one is last on the other; no number is one of both."""
+    other = [replace(run, place=("boat", *run.place[1:]), law="bca"["abc".index(run.law)])
+             for run in RUNS]  # fmt: skip
+    made = table([*RUNS, *other])
+    boards = standing.leaderboards(made)
+    assert boards.loc["ship"].index.tolist() == ["b", "a", "c"]
+    assert boards.loc["boat"].index.tolist() == ["c", "b", "a"]
+    for vessel in ("ship", "boat"):
+        assert boards.loc[vessel].equals(leaderboard(made[made.vessel == vessel]))
+    lines = as_markdown(made).splitlines()
+    heads = [line for line in lines if line.startswith("###")]
+    assert heads == ["### ship", "### boat"]
+    assert sum(line.startswith("| law |") for line in lines) == 2
+    shown = page(made, [], {}).partition('id="cases"')[0]
+    assert shown.count("<th>law</th>") == 2
+
+
 def test_the_interval_of_a_mean_rank_is_over_tasks_and_not_over_their_cases():
     """By hand: means of tasks 1, 2, 6; Student's 0.975 quantile with two degrees is 4.303."""
     rows = pd.DataFrame({"task": [*"aaabbbccc"], "rank": [1, 1, 1, 1, 2, 3, 6, 6, 6]})
@@ -95,7 +114,7 @@ def test_a_column_of_the_leaderboard_is_one_value(monkeypatch):
     monkeypatch.setattr(standing, "BOARD", (*standing.BOARD, worst))
     made = table(RUNS)
     assert leaderboard(made).worst.notna().any()
-    assert "worst [m]" in as_markdown(made).splitlines()[0]
+    assert "worst [m]" in as_markdown(made).splitlines()[2]
     shown = " ".join(page(made, [], {}).split())
     assert "<b>worst [m]</b>: The largest." in shown
     assert "<b>cases</b>" not in shown

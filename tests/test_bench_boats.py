@@ -14,7 +14,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, Selection, cases
 from podusv_cli.studies.bench.page import as_markdown
 from podusv_cli.studies.bench.runs import play
-from podusv_cli.studies.bench.standing import PLACE, leaderboard, table
+from podusv_cli.studies.bench.standing import PLACE, by_vessel, leaderboard, table
 
 ROOT = Path(__file__).parents[1]
 BOATS = ROOT / "configs" / "bench_boats"
@@ -25,9 +25,12 @@ PAGE, GUIDE = (
 LENGTHS = {"otter": 2.0, "wamv": 4.9}
 
 
+HULLS = by_vessel(RUNS)
+
+
 @pytest.fixture(scope="module")
-def board() -> Any:
-    return leaderboard(RUNS)
+def boards() -> Any:
+    return {vessel: leaderboard(rows) for vessel, rows in HULLS.items()}
 
 
 def chosen(overrides: tuple[str, ...] = (), **names: str) -> list[Any]:
@@ -54,52 +57,106 @@ def test_a_case_run_now_is_the_committed_one(vessel: str) -> None:
     np.testing.assert_allclose(fresh.iae, kept.iae, rtol=5e-6)  # six digits are kept
 
 
-def test_the_table_and_its_findings_are_those_of_the_runs(board: Any) -> None:
+TUNED = ["ardupilot_l1", "ardupilot"]
+OWN = ["momentum_vector", "velocity_vector", "alos", "ilos"]
+
+
+def test_the_tables_are_those_of_the_runs() -> None:
     assert as_markdown(RUNS) in (ROOT / "results" / "bench.md").read_text()
-    failed = RUNS[RUNS.status != "finished"]
-    counts = failed.groupby("law").size()
-    own = ["ardupilot_l1_firmware", "ardupilot_firmware", "px4_r1"]
-    said = "L1 fails in {} of 48 cases and the position controller in {}, with the wheels' gains "
-    assert (said + "PX4 in {};").format(*counts[own]) in PAGE
-    of_them = failed[failed.law.isin(own)]
-    assert f"of these {len(of_them)} failures {(of_them.vessel == 'wamv').sum()} are on" in PAGE
+
+
+def test_how_near_autopilots_come_on_each_hull_is_that_of_the_runs(boards: Any) -> None:
+    otter, wamv = (boards[vessel].median_ratio for vessel in ("otter", "wamv"))
+    said = (
+        "on the Otter it is at {:.2f} (L1) and {:.2f} (position controller) times the best law, on "
+    )
+    said = said.format(*otter[TUNED]) + "the WAM-V at {:.2f} and {:.2f}.".format(*wamv[TUNED])
+    assert said in PAGE
+    podusvs = ["momentum_vector", "velocity_vector", "ilos", "alos", "adrc", "sliding_mode"]
+    nearer = (
+        f"({otter[podusvs].min():.2f} to {otter[podusvs].max():.2f} times the best law against "
+    )
+    assert nearer + "{:.2f} and {:.2f})".format(*otter[TUNED]) in PAGE
+    assert otter[podusvs].max() < otter[TUNED].min() < otter.los_pid
+    assert list(wamv.index[wamv < wamv.ardupilot_l1]) == ["momentum_vector"]
+    assert f"({wamv.momentum_vector:.2f} beside {wamv.ardupilot_l1:.2f})" in PAGE
     iae = RUNS.pivot_table("iae", PLACE, "law")
-    better = (iae.momentum_vector < iae.ardupilot_l1).sum()
-    ratio = [f"{board.median_ratio[law]:.2f}" for law in ("ardupilot_l1", "ardupilot")]
-    assert "at {} (L1) and {} (position controller) times the best law".format(*ratio) in PAGE
-    assert f"`momentum_vector` is better than L1 in {better} of 48 cases" in PAGE
-    ranks = RUNS.pivot_table("rank", "law", "condition")
-    wrong = [f"{ranks.loc[law, f'hull_{how}']:.1f}" for law in ("ardupilot_l1", "ilos")
-             for how in ("heavy", "light")]  # fmt: skip
-    assert "(mean ranks {} and {}; `ilos` {} and {})".format(*wrong) in PAGE
-    for condition in ("calm", "current"):
-        assert ranks.loc["ardupilot_l1", condition] > ranks.loc["momentum_vector", condition]
-    gentle = leaderboard(RUNS[RUNS.task.isin(["reach", "zigzag"])]).median_ratio
-    said = "L1 is at {:.2f} and the position controller at {:.2f} times the best law), slowing"
-    assert said.format(gentle.ardupilot_l1, gentle.ardupilot) in PAGE
-    costs = board.variation
-    beside = sorted(costs[["momentum_vector", "velocity_vector", "alos", "ilos"]])
-    assert costs.ardupilot == pytest.approx(costs.ardupilot_l1, rel=0.01)
-    numbers = [f"{cost:.3g}" for cost in (costs.ardupilot_l1, costs.px4, beside[0], beside[-1])]
-    said = "is {} for both of ArduPilot's, {} for PX4, and {} to {} for the four laws before them"
-    assert said.format(*numbers) in PAGE
-    windy = failed[(failed.law == "px4") & (failed.vessel == "wamv")]
+    better = (iae.momentum_vector < iae.ardupilot_l1).groupby("vessel").sum()
+    said = "better than L1 in {} of 24 cases on the Otter and in {} on the WAM-V"
+    assert said.format(better.otter, better.wamv) in PAGE
+    gentle = {
+        vessel: leaderboard(rows[rows.task.isin(["reach", "zigzag"])]).median_ratio[TUNED]
+        for vessel, rows in HULLS.items()
+    }
+    said = (
+        "L1 is at {:.2f} and the position controller at {:.2f} times the best law on the Otter, at "
+    )
+    said = said.format(*gentle["otter"]) + "{:.2f} and {:.2f} on the WAM-V)".format(*gentle["wamv"])
+    assert said in PAGE
+    assert f"({otter.los_pid:.2f} and {wamv.los_pid:.2f} times the best), but fails nowhere" in PAGE
+
+
+def test_where_a_wrong_hull_is_told_ranks_are_those_of_the_runs() -> None:
+    ranks = RUNS.pivot_table("rank", "law", ["vessel", "condition"])
+    for vessel, said in (("wamv", "mean ranks {} and {}; `ilos` {} and {}"),
+                         ("otter", "({} and {}; `ilos` {} and {})")):  # fmt: skip
+        told = [f"{ranks.loc[law, (vessel, f'hull_{how}')]:.1f}"
+                for law in ("ardupilot_l1", "ilos") for how in ("heavy", "light")]  # fmt: skip
+        assert said.format(*told) in PAGE
+        calm = ranks[vessel].calm
+        assert calm.ardupilot_l1 > calm[["alos", "ilos"]].max()
+
+
+def test_who_fails_on_each_hull_is_that_of_the_runs(boards: Any) -> None:
+    failed = {vessel: board.failed for vessel, board in boards.items()}
+    own = ["ardupilot_l1_firmware", "ardupilot_firmware"]
+    said = (
+        "on the Otter in {:.0f} of 24 cases and the position controller in {:.0f}, on the WAM-V in "
+    )
+    said = said.format(*failed["otter"][own]) + "{:.0f} and {:.0f};".format(*failed["wamv"][own])
+    assert said in PAGE
+    wheels = [failed[vessel].px4_r1 for vessel in ("otter", "wamv")]
+    assert "with the wheels' gains PX4 in {:.0f} and {:.0f}.".format(*wheels) in PAGE
+    for board in boards.values():
+        assert not board.failed[["momentum_vector", "ardupilot_l1", "ardupilot", "los_pid"]].any()
+    windy = RUNS[(RUNS.status != "finished") & (RUNS.law == "px4") & (RUNS.vessel == "wamv")]
     assert not windy.condition.isin(["calm", "current"]).any()
     assert f"On the WAM-V in wind it fails in {len(windy)} of 16 cases" in PAGE
-    assert f"({board.median_ratio.los_pid:.2f} times the best), but fails nowhere" in PAGE
 
 
-def test_the_table_of_laws_for_boats_says_what_the_runs_say(board: Any) -> None:
-    ratio, failed, costs = board.median_ratio, board.failed, board.variation
-    assert not failed[["momentum_vector", "ardupilot_l1", "ardupilot", "los_pid"]].any()
-    assert f"| {ratio.momentum_vector:.2f} times the best in the median, no failure in 48" in GUIDE
+def test_what_thrust_varies_on_each_hull_is_that_of_the_runs(boards: Any) -> None:
+    cost = {vessel: board.variation for vessel, board in boards.items()}
+    told = {
+        vessel: [*own[TUNED], own.px4, own[OWN].min(), own[OWN].max()]
+        for vessel, own in cost.items()
+    }
+    said = "{} and {} for ArduPilot's two, {} for PX4, and {} to {} for `momentum_vector`"
+    assert said.format(*(f"{x:.3g}" for x in told["otter"])) in PAGE
+    said = "on the WAM-V {} and {}, {}, and {} to {}."
+    assert said.format(*(f"{x:.3g}" for x in told["wamv"])) in PAGE
+    otter = cost["otter"]
+    podusvs = otter[[*OWN, "adrc", "sliding_mode"]]
+    assert podusvs.min() > 2.0 * otter[TUNED].max()
+
+
+def test_the_table_of_laws_for_boats_says_what_the_runs_say(boards: Any) -> None:
+    ratio = {vessel: board.median_ratio for vessel, board in boards.items()}
+    failed = sum(board.failed for board in boards.values())
+    otter, wamv = ratio["otter"], ratio["wamv"]
+    assert f"{otter.momentum_vector:.2f}" == f"{wamv.momentum_vector:.2f}"
+    said = f"| {otter.momentum_vector:.2f} times the best in the median on either, no failure in 48"
+    assert said in GUIDE
+    said = (
+        "| Otter {:.2f} and {:.2f}, WAM-V {:.2f} and {:.2f}, no failure, a seventh and a third of"
+    )
+    assert said.format(*otter[TUNED[::-1]], *wamv[TUNED[::-1]]) in GUIDE
     own = [failed[f"{law}_firmware"] for law in ("ardupilot", "ardupilot_l1")]
-    said = "| {:.2f} and {:.2f}, no failure, a fifth of the variation of thrust; with the "
-    said += "firmware's gains "
-    said = said.format(ratio.ardupilot, ratio.ardupilot_l1)
-    assert said + "{:.0f} and {:.0f} of 48 fail |".format(*own) in GUIDE
-    assert f"| {ratio.px4:.2f}, fails in {failed.px4:.0f} of 48 |" in GUIDE
-    assert costs.momentum_vector / costs.ardupilot_l1 == pytest.approx(5.0, abs=0.5)
+    assert "with the firmware's gains {:.0f} and {:.0f} of 48 fail |".format(*own) in GUIDE
+    said = f"| Otter {otter.px4:.2f}, WAM-V {wamv.px4:.2f}, fails in {failed.px4:.0f} of 48 |"
+    assert said in GUIDE
+    costs = [board.variation for board in boards.values()]
+    parts = [cost.momentum_vector / cost.ardupilot_l1 for cost in costs]
+    assert parts == pytest.approx([7.0, 3.0], abs=0.5)
 
 
 @pytest.mark.parametrize("vessel", LENGTHS)

@@ -35,6 +35,7 @@ from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.metrics.measured import OF_LOG
 from podusv_cli.metrics.metric import close_integrals
 from podusv_cli.metrics.operations import operations
+from podusv_cli.metrics.spans import WITHIN
 from podusv_cli.metrics.table import METRICS, metrics_probe, metrics_with
 from podusv_cli.metrics.windows import CROSSED, NAMED, SETTLING, find, settle, settled_from
 from podusv_cli.scenario.load import load_text
@@ -159,8 +160,8 @@ def test_a_heading_is_as_consistent_a_turn_further(turns):
     estimate = state + error + 2.0 * math.pi * turns * (np.arange(6) == 2)
     packed = np.diag(variance)[np.triu_indices(6)]
     s, seen = np.concatenate([state, estimate, packed, np.zeros(12)]), np.zeros(consistency.SIZE)
-    k = bundle({"estimate": 6.0, "covariance": 6.0, "order": 6.0, "steady_from": 0.0})
-    consistency.watch(1.0, 1.0, s, k, seen)
+    k = bundle({"estimate": 6.0, "covariance": 6.0, "order": 6.0})
+    consistency.watch(1.0, 1.0, WITHIN, s, k, seen)
     assert seen[consistency.SQUARE] == pytest.approx(np.sum(error**2 / variance), rel=1e-9)
 
 

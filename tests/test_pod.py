@@ -198,6 +198,18 @@ def test_a_demand_out_of_reach_is_an_event_and_no_accident():
         assert np.abs(log["n"]).max() <= 33.0
 
 
+def test_energy_counts_the_work_of_the_force_to_the_side():
+    """Turned pods push sideways, and a hull that drifts takes work from them there, too."""
+    log, got = gathered(corrected(actuator=pods(*TWIN)), steps=2000)
+    work = [0.0, 0.0, 0.0]
+    for i in range(1, len(log["time"])):
+        for axis, (load, speed) in enumerate((("tau_u", "u"), ("tau_v", "v"), ("tau_r", "r"))):
+            ends = [abs(log[load][j] * log[speed][j]) for j in (i - 1, i)]
+            work[axis] += 0.5 * sum(ends) * (log["time"][i] - log["time"][i - 1])
+    assert got["energy"] == pytest.approx(sum(work), rel=1e-9)
+    assert work[1] > 0.01 * got["energy"]
+
+
 def test_energy_and_travel_are_those_of_the_log():
     actuator = pods(*({**pod, "power_nnn": 2e-4} for pod in TWIN))
     log, got = gathered(corrected(actuator=actuator), steps=2000)

@@ -13,7 +13,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from podusv_cli.studies.tuning.searches import compared
+
 RESULTS = Path(__file__).parents[2] / "results"
+LEVEL = 0.95  # of intervals that hold together
+SEEDS = 21  # of resampling; a pair near the limit is apart with some of them
 NUMBER = r"([^\s,;.]+(?:\.\d+)?)"
 PAPERS = ["adaptive_crab", "full_backstepping", "dsc", "adaptive_neural", "los_pid", "pid"]
 
@@ -79,6 +83,10 @@ def sentences() -> Iterator[tuple[Any, ...]]:
         for row in table(case, "searches").itertuples():
             ends = [f"{x:.3f}" for x in (row.ratio, row.ratio_low, row.ratio_high)]
             yield f"`{row.a}` / `{row.b}`: {{}} [{{}}, {{}}]", *ends
+    yield (
+        "Given these 500 draws {} of 91 pairs are apart, {} of them without `pid`",
+        *_apart_given_draws("hull"),
+    )  # fmt: skip
     hulls = ("fresh", "cybership2", "otter")
     fresh, other, otter = (table(f"judged/{hull}").set_index("law") for hull in hulls)
     yield "On CyberShip II {} of 91 pairs are apart", _apart("cybership2")
@@ -123,8 +131,25 @@ def sentences() -> Iterator[tuple[Any, ...]]:
 
 
 def _apart(hull: str) -> int:
-    pairs = table(f"judged/{hull}", "searches")
-    return int(((pairs.ratio_high < 1.0) | (pairs.ratio_low > 1.0)).sum())
+    return len(_those_apart(table(f"judged/{hull}", "searches")))
+
+
+def _those_apart(pairs: pd.DataFrame) -> pd.DataFrame:
+    return pairs[(pairs.ratio_high < 1.0) | (pairs.ratio_low > 1.0)]
+
+
+def _apart_given_draws(case: str) -> tuple[int, int]:
+    """Pairs apart where sets and searches are drawn again, the judging draws are not; without pid.
+
+    A search has one number there, its median over these draws. Both are medians over seeds.
+    """
+    spread = table(case, "spread").sort_values(["search", "training_set"])
+    medians = {law: rows["median"].to_numpy()[:, None] for law, rows in spread.groupby("law")}
+    sets = spread.training_set.nunique()
+    tables = [compared(medians, LEVEL, seed, sets=sets).table() for seed in range(SEEDS)]
+    apart = [_those_apart(table)[["a", "b"]] for table in tables]
+    without = [pairs[~pairs.eq("pid").any(axis=1)] for pairs in apart]
+    return int(np.median([*map(len, apart)])), int(np.median([*map(len, without)]))
 
 
 def filled(page: str) -> str:

@@ -67,8 +67,10 @@ def bench(
 
 
 def _report(done: Benched) -> None:
-    from podusv_cli.studies.bench.standing import written
+    from podusv_cli.studies.bench.standing import by_vessel, written
 
-    head, *rows = written(done.runs)
-    echo_table(head, rows)
+    for vessel, runs in by_vessel(done.runs).items():
+        echo(vessel)
+        head, *rows = written(runs)
+        echo_table(head, rows)
     echo(f"{len(done.runs)} runs: {done.folder / 'report.html'}")

@@ -148,17 +148,17 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool 
 
 
 def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
-    from podusv_cli.comparison.table import NOTE, cells, head
+    from podusv_cli.comparison.table import NOTE, cells, head, window
 
     result = done.result
     rows = cells(result.table, result.metrics, result.unsettled, chosen=metrics)
     echo_table(head(result.table), rows)
-    echo(NOTE)
+    echo(*filter(None, (NOTE, window(result.table))))
 
 
 def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
     """Print the laws side by side, or a line each; False without rows or room for them."""
-    from podusv_cli.comparison.table import rows
+    from podusv_cli.comparison.table import rows, window
 
     result = done.result
     every = rows(
@@ -176,7 +176,8 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
     lines = grid(["", *labels], across, columns()) or grid(["", *names], down, columns())
     typer.echo("\n".join(map(visible, lines)))
     if lines:
-        echo("* best of those that end at their target; -v: every metric, with ratios")
+        note = "* best of those that end at their target; -v: every metric, with ratios"
+        echo(*filter(None, (note, window(result.table))))
     return bool(lines)
 
 

@@ -49,7 +49,8 @@ def explain(
     if key in findings:
         _echo_finding(findings[key])
     elif metric := find(key or "", metrics):
-        echo_entry(key or "", metric.meaning, facts=f"metric [{metric.unit}]")
+        window = "up to the end of a path that has one" if metric.ends_with_path else ""
+        echo_entry(key or "", metric.meaning, window, facts=f"metric [{metric.unit}]")
     else:
         try:
             explained = rows(key, (*findings, *metrics), plugins)

@@ -68,6 +68,8 @@ def run(
 
 def _report(done: Finished, verbose: bool) -> None:
     """All metrics in a pipe and with `verbose`; on a terminal the headlines."""
+    from podusv_cli.comparison.table import table, window
+
     brief = sys.stdout.isatty() and not verbose
     words, numbers = BRIEF if brief else WHOLE
     rows = {n: m for n, m in done.rows.items() if n in done.metrics and (m.headline or not brief)}
@@ -77,6 +79,8 @@ def _report(done: Finished, verbose: bool) -> None:
         if math.isnan(number):
             shown = f"{metric.undefined:>12}"
         echo(f"{metric.row:<{words}} {shown:<{numbers}}  {name}")
+    if counted := window(table({done.controller: done.metrics}, done.rows)):
+        echo(counted)
     if verbose:
         for name, seconds in done.timing.items():
             echo(f"{name:<46} {seconds:>12.4f} s")

@@ -47,6 +47,11 @@ class Entry:
         return self.run.recording
 
     @property
+    def counted(self) -> Recording:
+        """The log up to the end of a path that has one, which metrics count."""
+        return self.recording.up_to(self.about.path_end)
+
+    @property
     def until(self) -> float:
         """The end of the run, or of its log where it did not finish [s]."""
         if self.recording.status == "finished":

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
-from podusv_cli.comparison.table import Row, Table, leaders, rows
+from podusv_cli.comparison.table import Row, Table, leaders, rows, window
 from podusv_cli.core.about import MetricAbout, RunAbout, SettingAbout
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.phrases import value_text
@@ -69,6 +69,7 @@ def page(story: Story) -> str:
         differing=as_text(story.differences),
         answers=by_answer(story.verdicts),
         standings=standings,
+        window=window(story.table),
         ranked=any(standing.names or standing.more for standing in standings.values()),
         noticed=_by_code(story),
         metrics={row.metric.name: row.metric for row in table},

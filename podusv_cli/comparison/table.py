@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 METRIC = "metric"
+END = "path_time"  # the metric that says when a path was over
 HEAD = ("", "unit")  # before the runs
 LAST = "name"  # of a metric in claims and in comparison.csv, after the runs
 NOTE = (
@@ -128,6 +129,19 @@ def _blank(number: float) -> float | str:
 
 def _ratio(number: float, first: float) -> float:
     return number / first if first else math.nan
+
+
+def window(frame: Table) -> str:
+    """Up to when the numbers of each run count, as a sentence; empty where no path has ended."""
+    ends = dict(zip(frame.columns, frame.rows.get(END, ()), strict=False))
+    over = {label: f"{time:.5g} s" for label, time in ends.items() if not math.isnan(time)}
+    if not over:
+        return ""
+    times = next(iter(over.values())) if len(ends) == 1 else ", ".join(map(" ".join, over.items()))
+    others = ", ".join(label for label in ends if label not in over)
+    return f"numbers up to the end of the path: {times}" + (
+        f"; of the whole run: {others}" if others else ""
+    )
 
 
 def rows(
@@ -246,7 +260,7 @@ def as_markdown(
     lines = [top, ["---", "---", *["---:"] * len(frame.columns), "---"], *texts]
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
-        + f"\n\n{NOTE}\n"
+        + f"\n\n{'; '.join(filter(None, (NOTE, escaping.markdown(window(frame)))))}\n"
         + ("\n".join(["", *failures, ""]) if failures else "")
     )
 

@@ -207,12 +207,14 @@ Spans = tuple[tuple[float, float], ...]
 class RunAbout(_Plain):
     """about.json: a run as whoever reads its log has to know it.
 
-    `values` is the scenario as plain data. `metrics` are those that podusv has only with the
-    scenario's plug-ins, windows and radii. `limits` are the largest surge force [N] and yaw moment
-    [N m], None where there is no constant one. `outages` are times without samples of each of x, y,
-    psi, u, v, r. `polar` says that the law is of the first paper's family, `optimum_of` which
-    metric the motion minimises, if it is no law's. `said` is what each part says of itself, by the
-    key of its section; `settings` are what the scenario sets itself, `law` all keys of the law.
+    `values` is the scenario as plain data. `path_end` is where a followed path is over, and
+    `path_steady` where its steady window begins, see `Recording.row_at`; empty without an end.
+    `metrics` are those that podusv has only with the scenario's plug-ins, windows and radii.
+    `limits` are the largest surge force [N] and yaw moment [N m], None where there is no constant
+    one. `outages` are times without samples of each of x, y, psi, u, v, r. `polar` says that the
+    law is of the first paper's family, `optimum_of` which metric the motion minimises, if it is no
+    law's. `said` is what each part says of itself, by the key of its section; `settings` are what
+    the scenario sets itself, `law` all keys of the law.
     """
 
     values: dict[str, Any]
@@ -237,6 +239,8 @@ class RunAbout(_Plain):
     said: dict[str, str]
     settings: tuple[SettingAbout, ...]
     law: tuple[SettingAbout, ...]
+    path_end: dict[str, float] = {}  # runs of older versions have neither
+    path_steady: dict[str, float] = {}
 
     @property
     def name(self) -> str:

@@ -52,6 +52,27 @@ class Recording:
         """Some of the rows, with everything else."""
         return replace(self, signals={n: a[rows] for n, a in self.signals.items()})
 
+    def row_at(self, place: Mapping[str, float]) -> int | None:
+        """The first row that is at a place; None where none is, and in a log without such places.
+
+        `place` has numbers of signals by name. A row is there where they are reached; the first
+        that differs decides. See `Path.passed_by`.
+        """
+        if not place or not all(name in self for name in place):
+            return None
+        rows = len(self["time"])
+        beyond, equal = np.zeros(rows, dtype=bool), np.ones(rows, dtype=bool)
+        for name, least in place.items():
+            beyond |= equal & (self[name] > least)
+            equal &= self[name] == least
+        there = np.flatnonzero(beyond | equal)
+        return int(there[0]) if len(there) else None
+
+    def up_to(self, place: Mapping[str, float]) -> Self:
+        """The rows up to the first one that is at a place, it included; all where none is."""
+        last = self.row_at(place)
+        return self if last is None else self.part(slice(last + 1))
+
     def __contains__(self, name: str) -> bool:
         """Whether there is a signal or fixed array of this name."""
         return name in self.signals or name in self.fixed

@@ -65,6 +65,7 @@ def _track(run: Shown, frames: int) -> dict[str, Any]:
         "length": run.length,
         "beam": run.about.beam,
         "standoff": run.about.standoff,
+        "counts": _rounded([run.counts_to], DIGITS["time"])[0],
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
         "legs": [_rounded(axis) for axis in legs.T],
         "distance": _rounded(np.abs(run.signal(away)[rows]), MILLIMETRES + 1) if away else [],

@@ -68,11 +68,11 @@ def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
     """Names and limits [s] of the parts to show."""
     start, end = min(run.start for run in runs), max(run.end for run in runs)
     period = min(float(np.diff(run.recording["time"][:2])[0]) for run in runs)
-    settled = min(run.steady_from for run in runs)
+    settled, counted = min(run.steady_from for run in runs), max(run.counts_to for run in runs)
     return {
         "early": (start, min(end, start + max(EARLY * (end - start), EARLY_ROWS * period))),
         "whole run": (start, end),
-        "settled": (settled if start < settled < end else start, end),
+        "settled": (settled, counted) if start < settled < counted else (start, end),
     }
 
 

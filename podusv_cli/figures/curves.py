@@ -17,6 +17,7 @@ from podusv_cli.figures.shown import Shown
 THIN: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6}
 MARK: dict[str, Any] = {"markersize": 3.2, "markerfacecolor": "white", "markeredgewidth": 0.7}
 COMMON: dict[str, str] = {"color": "#444444", "linestyle": "-", "label": "all runs"}
+AFTER: dict[str, Any] = {"color": "#b4b4b4", "linewidth": 0.6, "zorder": 1.5}  # the end of a path
 CUT: dict[str, Any] = {"marker": "x", "markersize": 5.0, "markeredgewidth": 1.2, "zorder": 5.0}
 DENSE = 60.0  # ranges that a curve runs through; from there it hides what is below it
 FINE = 0.5  # points, of such a curve
@@ -74,7 +75,7 @@ def draw_signal(
             draw_run(axes, run, curve, fitted=run in fitted, **look)
         elif differ(run, name, beside):
             thin = {**run.line_style, **THIN, "label": f"_{run.name}, {name}"}
-            draw_curve(axes, curve, fitted=run in fitted, **thin)
+            draw_own(axes, run, curve, fitted=run in fitted, **thin)
     sizes = [mean_size(run, name) for run in fitted if run.whole and run.has(name)]
     _widen(axes, max(sizes, default=0.0))
 
@@ -98,7 +99,8 @@ def _draw_components(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fi
     t, vectors = curve
     for number, y in enumerate(vectors.reshape(len(t), -1).T):
         name = run.line_style["label"] if not number else f"_{number}"
-        draw_curve(axes, (t, y), fitted=fitted, **{**run.line_style, **THIN, "label": name})
+        look = {**run.line_style, **THIN, "label": name}
+        draw_own(axes, run, (t, y), fitted=fitted, **look)
 
 
 def draw_shared(axes: Axes, runs: Sequence[Shown], name: str) -> None:
@@ -125,7 +127,7 @@ def draw_run(
 
     A run that did not finish has an x below the instant of its end; the curve may end anywhere.
     """
-    mark(draw_curve(axes, curve, fitted=fitted, **run.line_style, **look), run)
+    mark(draw_own(axes, run, curve, fitted=fitted, **run.line_style, **look), run)
     if not run.whole and len(curve[0]) and curve[0][-1] == run.end:
         below = axes.get_xaxis_transform()
         axes.plot([run.end], [0.0], transform=below, clip_on=False, color=run.color, **CUT)
@@ -160,6 +162,18 @@ def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look
         axes.add_artist(line)
         axes.update_datalim(np.column_stack([t, np.zeros(len(t))]), updatey=False)
     return line
+
+
+def draw_own(
+    axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any
+) -> Line2D:
+    """Plot a curve of a run, grey after the end of its path: no metric and no scale counts that."""
+    t, y = curve
+    last = int(np.searchsorted(t, run.counts_to, side="right"))
+    if 0 < last < len(t):
+        grey = {**look, **AFTER, "label": f"_{run.name}, after its path"}
+        draw_curve(axes, (t[last - 1 :], y[last - 1 :]), fitted=False, **grey)
+    return draw_curve(axes, (t[:last], y[:last]), fitted=fitted, **look)
 
 
 def compress(axes: Axes, runs: Sequence[Shown], name: str) -> None:

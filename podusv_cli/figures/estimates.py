@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.figures.curves import draw_curve, draw_run, thinned
+from podusv_cli.figures.curves import draw_curve, draw_own, draw_run, thinned
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
@@ -93,7 +93,7 @@ def _draw(axes: Axes, run: Shown, name: str, *, fitted: bool, error: bool) -> No
     t, true = run.during(name, None)
     less = true if error else np.zeros_like(true)
     if not error:
-        draw_curve(axes, (t, true), fitted=fitted, color=run.color, label="_true", **TRUE)
+        draw_own(axes, run, (t, true), fitted=fitted, color=run.color, label="_true", **TRUE)
     measured = f"{name}_m"
     if run.has(measured):
         fresh = _fresh(run.signal(measured))

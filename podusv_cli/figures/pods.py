@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import THIN, draw_curve, draw_run
+from podusv_cli.figures.curves import THIN, draw_own, draw_run
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
 from podusv_cli.figures.shown import Shown, axis_label, constants
@@ -51,7 +51,7 @@ def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: b
     actual, asked = names
     thin: dict[str, Any] = {**run.line_style, **THIN, "label": f"_{run.name}, {asked}"}
     if _has(run, asked, pod):
-        draw_curve(axes, _curve(run, asked, pod), fitted=fitted, **thin)
+        draw_own(axes, run, _curve(run, asked, pod), fitted=fitted, **thin)
     if _has(run, actual, pod):
         draw_run(axes, run, _curve(run, actual, pod), fitted=fitted)
 

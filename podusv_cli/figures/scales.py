@@ -43,7 +43,8 @@ def _usual(run: Shown, name: str) -> float:
     Of a run that did not get there, the median.
     """
     values = run.signal(name)
-    settled = values[np.searchsorted(run.recording["time"], run.steady_from) :]
+    counted = slice(*np.searchsorted(run.recording["time"], [run.steady_from, run.counts_to]))
+    settled = values[counted.start : counted.stop + 1]
     if run.whole and len(settled):
         return max(largest(len(settled), lambda rows: settled[rows]), USUAL * mean_size(run, name))
     return float(np.median(np.abs(values)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,10 +62,17 @@ class Shown:
         """Time of the last row [s]."""
         return float(self.recording["time"][-1])
 
-    @property
+    @cached_property
+    def counts_to(self) -> float:
+        """Up to when metrics count [s]: the end of a path that has one, else the last row."""
+        row = self.recording.row_at(self.about.path_end)
+        return self.end if row is None else float(self.recording["time"][row])
+
+    @cached_property
     def steady_from(self) -> float:
-        """Start of the part that counts as settled [s]."""
-        return self.about.steady_from
+        """Start of the part that counts as settled [s], which ends with `counts_to`."""
+        row = self.recording.row_at(self.about.path_steady)
+        return self.about.steady_from if row is None else float(self.recording["time"][row])
 
     @property
     def line_style(self) -> dict[str, Any]:

@@ -31,7 +31,7 @@ HEIGHT = 2.4  # inches
 )  # fmt: skip
 def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
     """Demands in surge and yaw over angular frequency, of runs that got to their settled part."""
-    whole = [run for run in runs if run.end > run.steady_from]
+    whole = [run for run in runs if run.counts_to > run.steady_from]
     figure = new_figure(columns, HEIGHT if columns == 2 else 2 * HEIGHT)
     panels = figure.subplots(1, 2) if columns == 2 else figure.subplots(2, 1)
     for axes, (demand, load) in zip(panels, DEMANDS.items(), strict=True):
@@ -52,7 +52,7 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
 
 def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> Line2D:
     """The harmonics of one signal's settled part."""
-    rates, power = periodogram(*run.during(name, (run.steady_from, run.end)))
+    rates, power = periodogram(*run.during(name, (run.steady_from, run.counts_to)))
     return axes.plot(rates[1:], np.sqrt(power[1:]), **look)[0]
 
 

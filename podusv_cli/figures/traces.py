@@ -43,6 +43,7 @@ def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
                 "dash": [] if run.linestyle == "-" else list(run.linestyle[1]),
                 "start": float(run.recording["time"][0]),
                 "end": run.end,
+                "counts": run.counts_to,
                 "whole": run.whole,
                 "curves": [
                     encoded(*thinned(run.signal(name))) if run.has(name) else None for name in shown

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import CUT, draw_run
+from podusv_cli.figures.curves import AFTER, CUT, draw_run
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.scales import Span, scaling
 from podusv_cli.figures.sheet import figure
@@ -306,4 +306,9 @@ def _draw_tracks(
         if run in shown:
             log, rows = run.recording, rows_of(run.recording, span)
             look = {**run.line_style, "linewidth": width, "solid_capstyle": "butt"}
-            axes.plot(log["y"][rows], log["x"][rows], **look)
+            t, y, x = (log[name][rows] for name in ("time", "y", "x"))
+            last = int(np.searchsorted(t, run.counts_to, side="right"))
+            if last < len(t):
+                grey = {**look, **AFTER, "label": f"_{run.name}, after its path"}
+                axes.plot(y[max(0, last - 1) :], x[max(0, last - 1) :], **grey)
+            axes.plot(y[:last], x[:last], **look)

@@ -8,6 +8,7 @@ from podusv_cli.core.finding import Mask, Sentences, warn_after_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.spectrum import periodogram
+from podusv_cli.findings.span import steady_rows
 from podusv_cli.scenario.model import Scenario
 
 VISIBLE = 0.01  # hull lengths; a smaller swing is no finding
@@ -26,7 +27,7 @@ SPREAD = 2  # harmonics to either side of a line that Hann's window and a broken
 )  # fmt: skip
 def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     """The distance along or across the target's course swings at one frequency, and goes on."""
-    late = log["time"] >= scenario.steady_from()
+    late = steady_rows(scenario, log)
     if log.status != "finished" or late.sum() < 8 * PERIODS or not scenario.controller.aims():
         return
     time, x, y = (log[name][late] for name in ("time", "x", "y"))

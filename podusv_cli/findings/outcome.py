@@ -8,6 +8,7 @@ from podusv_cli.core.finding import Sentences, rows_where, times_of, warn_after_
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.findings.sea import SENSORS
+from podusv_cli.findings.span import counted_rows, steady_rows
 from podusv_cli.metrics.consistency import mean_square
 from podusv_cli.scenario.model import Scenario
 
@@ -35,8 +36,8 @@ def saturated(scenario: Scenario, log: Recording) -> Sentences:
     law = scenario.controller
     winds_up = bool(law.slots()) and not law.wants_loads()
     whole = winds_up or log.status != "finished"
-    begin, span = (0.0, "run") if whole else (scenario.steady_from(), "steady window")
-    counted = log["time"] >= begin
+    rows, span = (counted_rows, "run") if whole else (steady_rows, "steady window")
+    counted = rows(scenario, log)
     limited = counted & rows_where(log, lambda part: part["saturated"] > 0.5)
     share = limited.sum() / max(counted.sum(), 1)
     if share > LONG:
@@ -116,7 +117,7 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
 )  # fmt: skip
 def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     """The estimator's own measure of a sensor's noise says that it is told wrong."""
-    late = np.flatnonzero(log["time"] >= scenario.steady_from())
+    late = np.flatnonzero(steady_rows(scenario, log))
     if "nis_sum" not in log or not late.size:
         return
     from scipy.special import chdtr, chdtrc  # slow to import
@@ -152,7 +153,7 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
 )  # fmt: skip
 def moves_away(scenario: Scenario, log: Recording) -> Sentences:
     """The law does not track: the distance to the target has grown over the run."""
-    late = rows_where(log, lambda part: part["time"] >= scenario.steady_from())
+    late = steady_rows(scenario, log)
     if not late.any():
         return
     start, end = float(log["z_e"][0]), float(log["z_e"][late].mean())
@@ -173,7 +174,7 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
 )  # fmt: skip
 def never_settles(scenario: Scenario, log: Recording) -> Sentences:
     """The run ends without having come to its target; `moves-away` says so of a worse one."""
-    late = rows_where(log, lambda part: part["time"] >= scenario.steady_from())
+    late = steady_rows(scenario, log)
     if log.status != "finished" or not late.any() or any(moves_away.search(scenario, log)):
         return
     approach, radius = scenario.controller.approach(), scenario.metrics.settling_radius

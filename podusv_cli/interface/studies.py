@@ -228,7 +228,7 @@ def tune(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bench(Folder):
-    """Laws over standard tasks: `runs` has a row a run, `board` a row a law, the best first."""
+    """Laws over standard tasks: `runs` has a row a run, `board` those of each hull, best first."""
 
     folder: Path
     runs: pd.DataFrame
@@ -237,7 +237,8 @@ class Bench(Folder):
 
     def __repr__(self) -> str:
         """One line: how many runs there are, and where."""
-        return f"<podusv bench of {len(self.board)} laws: {len(self.runs)} runs, {self.folder}>"
+        laws = self.runs.law.nunique()
+        return f"<podusv bench of {laws} laws: {len(self.runs)} runs, {self.folder}>"
 
     def _repr_html_(self) -> str:
         """The leaderboard."""

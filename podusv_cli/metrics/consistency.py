@@ -14,6 +14,7 @@ from typing import Any
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
+from podusv_cli.metrics.spans import ANEW, WITHIN
 
 TIME, SQUARE, INTEGRALS = range(3)
 SIX = 6
@@ -50,12 +51,14 @@ def squared(error: Vector, lower: Vector) -> float:
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
+def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vector) -> None:
     """Gather squared errors and squared innovations over the steady window.
 
     An error without a positive definite covariance is infinite.
     """
-    if t >= k.steady_from:
+    if steady == ANEW:
+        seen[OPENED] = seen[TIME] = seen[SQUARE] = 0.0
+    if steady >= WITHIN:
         at, order = int(k.estimate), int(k.order)
         after = at + int(k.covariance) + order * (order + 1) // 2
         if seen[OPENED] == 0.0:
@@ -82,7 +85,6 @@ def _constants(layout: Measured) -> dict[str, float]:
     at, order = layout.loop.estimator.covariance
     return {
         "estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order),
-        "steady_from": layout.steady_from,
     }  # fmt: skip
 
 

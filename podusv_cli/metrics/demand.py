@@ -7,21 +7,24 @@ from typing import Any
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, gathered
+from podusv_cli.metrics.spans import ANEW, WITHIN
 
 PEAK_U, PEAK_R, TV_U, TV_R, LAST_U, LAST_R, SETTLED, SIZE = range(8)
 
 
 @kernel
-def watch(t: float, row: Vector, k: Any, seen: Vector) -> None:
+def watch(steady: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the largest demands, and the sum of their changes."""
     u, r = row[int(k.demand)], row[int(k.demand) + 1]
     seen[PEAK_U] = max(seen[PEAK_U], abs(u))
     seen[PEAK_R] = max(seen[PEAK_R], abs(r))
-    if t >= k.steady_from:
+    if steady == ANEW:
+        seen[SETTLED] = seen[TV_U] = seen[TV_R] = 0.0
+    if steady >= WITHIN:
+        if seen[SETTLED] > 0.0:
+            seen[TV_U] += abs(u - seen[LAST_U])
+            seen[TV_R] += abs(r - seen[LAST_R])
         seen[SETTLED] += 1.0
-    if t > k.steady_from:
-        seen[TV_U] += abs(u - seen[LAST_U])
-        seen[TV_R] += abs(r - seen[LAST_R])
     seen[LAST_U] = u
     seen[LAST_R] = r
 
@@ -32,7 +35,7 @@ def _variation(position: int) -> Result:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
-    return {"demand": float(layout.plan.demand), "steady_from": layout.steady_from}
+    return {"demand": float(layout.plan.demand)}
 
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants)

@@ -18,6 +18,7 @@ from podusv_cli.metrics.metric import (
     ratio,
     standoff_of,
 )
+from podusv_cli.metrics.spans import WITHIN
 from podusv_cli.metrics.windows import CROSSED, SETTLING, settle, settled_from
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.
@@ -39,13 +40,15 @@ def watch(t: float, weight: float, row: Vector, k: Any, seen: Vector) -> None:
 
 
 @kernel
-def watch_settled(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def watch_settled(
+    t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
+) -> None:
     """Gather z_e, the error and the squared path errors over the steady window.
 
     The window's first instant has half a weight. Across is positive to the right of the target's
     course, along ahead of it. While the target stands still both count as zero.
     """
-    if t >= k.steady_from:
+    if steady >= WITHIN:
         opens = seen[TIME] == 0.0 and t > 0.0
         share = 0.5 * weight if opens else weight
         x, y = s[0] - row[0], s[1] - row[1]
@@ -59,9 +62,7 @@ def watch_settled(t: float, weight: float, s: Vector, row: Vector, k: Any, seen:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
-    return standoff_of(layout) | {
-        "steady_from": layout.steady_from, "settling_radius": layout.settling_radius,
-    }  # fmt: skip
+    return standoff_of(layout) | {"settling_radius": layout.settling_radius}
 
 
 def _rmse(seen: Vector, step: float) -> float:

@@ -17,7 +17,8 @@ def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, EFFORT_U, weight * row[tau] * row[tau])
     add(seen, INTEGRALS, EFFORT_R, weight * row[tau + 2] * row[tau + 2])
-    add(seen, INTEGRALS, ENERGY, weight * (abs(row[tau] * s[3]) + abs(row[tau + 2] * s[5])))
+    work = abs(row[tau] * s[3]) + abs(row[tau + 1] * s[4]) + abs(row[tau + 2] * s[5])
+    add(seen, INTEGRALS, ENERGY, weight * work)
     if k.saturated >= 0.0:
         add(seen, INTEGRALS, SATURATED, weight * row[int(k.saturated)])
 
@@ -38,8 +39,8 @@ effort_r = Metric(
     words="squared yaw moment, integrated",
 )  # fmt: skip
 energy = Metric(
-    "energy", "J", "integral of |tau_u u| + |tau_r r|, tau on the hull", OF, gathered(ENERGY),
-    place=3, symbol=r"\int|\tau_u u|+|\tau_r r|\,\mathrm{d}t",
+    "energy", "J", "integral of |tau_u u| + |tau_v v| + |tau_r r|, tau on the hull", OF,
+    gathered(ENERGY), place=3, symbol=r"\int|\tau_u u|+|\tau_v v|+|\tau_r r|\,\mathrm{d}t",
     words="effort: work on the hull", headline=True,
 )  # fmt: skip
 saturated_fraction = Metric(

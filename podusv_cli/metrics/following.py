@@ -8,6 +8,7 @@ from typing import Any
 from podusv_cli.components.paths.legs import E_CT, LEG, PLACES
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gathered, ratio
+from podusv_cli.metrics.spans import ANEW, WITHIN
 
 # Positions of the gathered numbers: integrals over the run, then what is no integral.
 TIME, ABSOLUTE, SQUARE, LATE, LATE_ERROR, INTEGRALS = range(6)
@@ -16,14 +17,16 @@ DONE, ARRIVED, SIZE = range(LARGEST + 1, LARGEST + 4)
 
 
 @kernel
-def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
+def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vector) -> None:
     """Gather the cross-track error and the legs that are done."""
     place = int(k.place)
     error, leg = abs(s[place + E_CT]), s[place + LEG]
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, ABSOLUTE, weight * error)
     add(seen, INTEGRALS, SQUARE, weight * error * error)
-    late = weight if t >= k.steady_from else 0.0
+    if steady == ANEW:
+        seen[LATE] = seen[LATE_ERROR] = 0.0
+    late = weight if steady >= WITHIN else 0.0
     add(seen, INTEGRALS, LATE, late)
     add(seen, INTEGRALS, LATE_ERROR, late * error)
     seen[LARGEST] = max(seen[LARGEST], error)
@@ -34,7 +37,7 @@ def watch(t: float, weight: float, s: Vector, k: Any, seen: Vector) -> None:
 
 def _constants(layout: Measured) -> dict[str, float]:
     legs = float(len(layout.loop.path.waypoints()) - 1)
-    return {"steady_from": layout.steady_from, "place": float(layout.plan.place), "legs": legs}
+    return {"place": float(layout.plan.place), "legs": legs}
 
 
 def _rms(seen: Vector, step: float) -> float:

@@ -23,6 +23,7 @@ class Measured:
     plan: Layout
     steady_from: float  # s
     settling_radius: float  # m
+    steady_fraction: float
 
     def column(self, signal: str) -> int:
         """Column of an actuator's signal, of a vector its first number; -1 if there is none."""
@@ -66,11 +67,13 @@ def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
 class Accumulator:
     """Numbers gathered at every step, logged or not, from which metrics are computed.
 
-    The kernel `watch(t, weight, s, row, k, seen)` is called like a probe's, see
-    `Probe`. Its `seen` are `size` numbers, 0 at first; with size 0 it is left out. It reads
-    `constants` from `k`; a name used by several accumulators must have one value. Every run
-    of a batch has constants of its own, and the same size. Runs march side by side only with runs
-    of equal constants, but for those named in `differing`.
+    The kernel `watch(t, weight, steady, s, row, k, seen)` is called like a probe's, see
+    `Probe`, up to the end of a path that has one (`spans`). `steady` is 1 in the steady window, 0
+    before it, and 2 where the window begins anew: what was gathered of it is void. Its `seen` are
+    `size` numbers, 0 at first; with size 0 it is left out. It reads `constants` from `k`; a name
+    used by several accumulators must have one value. Every run of a batch has constants of its own,
+    and the same size. Runs march side by side only with runs of equal constants, but for those
+    named in `differing`.
 
     `of_target`: what is gathered is about the distance to a target. Neither a manoeuvring trial nor
     a path that is followed has one; it is left out there.
@@ -108,6 +111,12 @@ class Metric(MetricAbout):
     accumulator: Accumulator | None = None
     result: Result = lambda seen, step: math.nan
     of_log: Callable[[Recording], float] | None = field(default=None, kw_only=True)
+
+    @property
+    def ends_with_path(self) -> bool:
+        """Whether it may be gathered on a path that has an end, and then ends there."""
+        gathered_there = self.accumulator is not None and not self.accumulator.of_target
+        return gathered_there or self.of_log is not None
 
     @property
     def about(self) -> MetricAbout:

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core import registry
+from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import Vector, kernel, specialise, tail, taking
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
+from podusv_cli.metrics import spans
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, close_integrals
 from podusv_cli.metrics.windows import NONE, Radii, Windows, named
 
@@ -44,23 +46,30 @@ Parts = tuple[tuple[Accumulator, int], ...]
 COUNT = 0  # placeholder: how many numbers `first_kernel` gathers
 
 
-WATCH = ("t", "weight", "s", "row", "k", "seen")  # the arguments of an accumulator's kernel
+# the arguments of an accumulator's kernel
+WATCH = ("t", "weight", "steady", "s", "row", "k", "seen")
 
 
 @kernel
-def first_kernel(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def first_kernel(
+    t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
+) -> None:
     """Placeholder of the first accumulator's kernel; does nothing after the last one."""
 
 
 @kernel
-def other_kernels(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def other_kernels(
+    t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
+) -> None:
     """Placeholder of the other accumulators' kernel."""
 
 
-def chained(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
+def chained(
+    t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
+) -> None:
     """Call the first kernel, then the others."""
-    first_kernel(t, weight, s, row, k, seen)
-    other_kernels(t, weight, s, row, k, tail(seen, COUNT))
+    first_kernel(t, weight, steady, s, row, k, seen)
+    other_kernels(t, weight, steady, s, row, k, tail(seen, COUNT))
 
 
 @cache
@@ -73,6 +82,13 @@ def _watch(parts: Parts) -> Callable[..., None]:
     return specialise(chained, "metrics", COUNT=count, **kernels)  # type: ignore[no-any-return]
 
 
+@cache
+def _within_span(parts: Parts, has_end: bool) -> Callable[..., None]:
+    """The kernel of all parts, shown the instants that count."""
+    span = spans.by_path if has_end else spans.by_time
+    return specialise(span, "metrics", all_kernels=_watch(parts))  # type: ignore[no-any-return]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Metrics(Probe):
     """A probe for `engine.running.simulate` that gathers the numbers of all metrics."""
@@ -81,6 +97,7 @@ class Metrics(Probe):
     step: float  # s
     known: Mapping[str, Metric]
     layout: Measured
+    ahead: int  # numbers ahead of those of the parts
 
     def constants_for(self, loop: ClosedLoop) -> dict[str, float]:
         """The constants of all accumulators in a run of this loop.
@@ -89,7 +106,7 @@ class Metrics(Probe):
         own loop, or has another value than another one for a constant of the same name.
         """
         layout, sizes = replace(self.layout, loop=loop), dict(self.parts)
-        constants: dict[str, float] = {}
+        constants = _asked_span(layout)
         for part, metric in self._accumulators.items():
             size, own = _asked(part, metric, layout)
             if size != sizes.get(part, 0):
@@ -122,7 +139,7 @@ class Metrics(Probe):
 
     def one(self, name: str, seen: Vector) -> Vector:
         """The metric of this name from gathered numbers, a column a run; NaN where undefined."""
-        metric, begin = self.known[name], 0
+        metric, begin = self.known[name], self.ahead
         for part, size in self.parts:
             if part is metric.accumulator:
                 own = close_integrals(seen[begin : begin + size], part.integrals, self.step)
@@ -151,6 +168,7 @@ class Metrics(Probe):
         `seen` has a row a run, too.
         """
         seen = np.where(seen.any(axis=1, keepdims=True), seen, np.nan)  # no instant at all: NaN
+        seen = seen[:, self.ahead :]
         ends = np.cumsum([size for _, size in self.parts])[:-1]
         own = {
             part: np.ascontiguousarray(close_integrals(numbers, part.integrals, self.step).T)
@@ -173,13 +191,15 @@ def metrics_probe(
     metric whose accumulator does not answer.
     """
     since = plan.grid.last_part(steady_fraction)
-    layout = Measured(plan.loop, plan.layout, since, settling_radius)
+    layout = Measured(plan.loop, plan.layout, since, settling_radius, steady_fraction)
     sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
+    has_end = bool(plan.loop.passed_by(1.0))
+    ahead = spans.AHEAD if has_end else 0
     metrics = Metrics(
-        _watch(parts), sum(size for _, size in parts), differing,
-        parts=parts, step=plan.grid.step, known=known, layout=layout,
+        _within_span(parts, has_end), ahead + sum(size for _, size in parts), differing,
+        parts=parts, step=plan.grid.step, known=known, layout=layout, ahead=ahead,
     )  # fmt: skip
     metrics.constants_for(plan.loop)
     return metrics
@@ -188,6 +208,15 @@ def metrics_probe(
 def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
     """Every accumulator, with a metric that is computed from it."""
     return {metric.accumulator: name for name, metric in known.items() if metric.accumulator}
+
+
+def _asked_span(layout: Measured) -> dict[str, float]:
+    """The constants that tell which instants count."""
+    try:
+        return spans.constants(layout)
+    except Exception as error:  # a plug-in's path may raise anything
+        what = f"{describe(layout.loop.path)}, asked where it ends"
+        raise LawError(f"{what}: {in_a_line(error)}") from error
 
 
 def _asked(part: Accumulator, metric: str, layout: Measured) -> tuple[int, dict[str, float]]:

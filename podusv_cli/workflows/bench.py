@@ -50,8 +50,8 @@ class Benched:
 
     @property
     def board(self) -> pd.DataFrame:
-        """The leaderboard, a row for each law."""
-        return standing.leaderboard(self.runs)
+        """The leaderboard of each hull, a row for each law."""
+        return standing.leaderboards(self.runs)
 
     @property
     def crashed(self) -> int:

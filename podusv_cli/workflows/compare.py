@@ -309,7 +309,7 @@ def _with_departures(entries: Sequence[Entry], members: Sequence[Member]) -> lis
     """The entries; runs with how far they are from the measured track, where there is one."""
     measured = {m.label: m.track for m in members if m.track}
     return [
-        replace(entry, cost={**entry.cost, **track.departures(entry.recording)})
+        replace(entry, cost={**entry.cost, **track.departures(entry.counted)})
         if entry.label not in measured
         else entry
         for track in measured.values()

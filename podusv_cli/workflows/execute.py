@@ -232,12 +232,12 @@ def check_figures(scenario: Scenario) -> None:
 
 def summary(case: Case, recording: Recording, extras: Extras) -> dict[str, float]:
     """The metrics of a run that the probe saw; those that raise are missing among the extras."""
-    seen = recording.seen
+    seen, counted = recording.seen, recording.up_to(case.plan.loop.passed_by(1.0))
     numbers = case.plan.probe.summary(seen, extras.note) if seen is not None else {}
     for name, metric in case.scenario.known_metrics().items():
         if metric.of_log and len(recording["time"]):
             try:
-                numbers[name] = float(metric.of_log(recording))
+                numbers[name] = float(metric.of_log(counted))
             except Exception as error:  # a plug-in's function may raise anything
                 extras.note(f"metric {name}", error)
     return numbers

@@ -69,7 +69,8 @@ def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, flo
     sine = clipped(-across / L_1, CAPTURE)
     sight = arctangent(sine, math.sqrt(1.0 - sine * sine))
     learns = k.l1_I * sight if abs(sight) < LEARNS else 0.0
-    off = clipped(wrap(sight + angle_i + course - track), 0.5 * math.pi)
+    # The angle of the velocity is wrapped, the sum is not: facing away, it turns the way back.
+    off = clipped(sight + angle_i + wrap(course - track), 0.5 * math.pi)
     _, turning = cos_sin(off)
     sideways = 4.0 * k.l1_damping * k.l1_damping * speed * speed / L_1 * turning
     over = max(x[3], SLOWEST) if x[3] >= 0.0 else min(x[3], -SLOWEST)

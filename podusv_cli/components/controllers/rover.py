@@ -85,7 +85,10 @@ class Rover(Controller):
     surge: Ruled = value(8.0, "N", "surge force at full throttle", gt=0)
     yaw: Ruled = value(2.5, "N m", "yaw moment at full steering", gt=0)
     mixing: Literal["shared", "separate"] = value(
-        "shared", "", "whether throttle and steering share two thrusters, or have one each"
+        "shared",
+        "",
+        "whether throttle and steering share two thrusters, or each has an actuator of "
+        "its own (podusv's, which neither firmware has)",
     )
     U: Ruled = value(1.0, "m/s", "largest wanted speed", gt=0)
     r_m: Ruled = value(0.955, "rad/s", "largest wanted yaw rate", gt=0)

@@ -77,6 +77,14 @@ class Path(Component):
         """Where waypoints count as reached: centre north and east, and radius [m]; mostly none."""
         return ()
 
+    def passed_by(self, share: float) -> dict[str, float]:
+        """Where this share of the way lies behind the vessel, from 0 to 1: numbers of its `places`.
+
+        It does where they are reached, the first that differs decides. Share 1 is the end of the
+        path. None for a path that has no end.
+        """
+        return {}
+
     def runs_on_from(self) -> float:
         """Time [s] at which the target leaves the given course and goes on; never for most."""
         return math.inf

@@ -50,7 +50,7 @@ def leg_frame(x: Vector, leg: int, table: Vector, at: Vector) -> None:
 class Legs(Path):
     """Straight legs through the points, each followed until the next waypoint is near.
 
-    Past the last waypoint the last leg goes on.
+    Past the last waypoint the last leg goes on, and metrics end.
     """
 
     kind: Literal["legs"] = "legs"
@@ -92,6 +92,18 @@ class Legs(Path):
     def circles(self) -> tuple[tuple[float, float, float], ...]:
         """Every waypoint but the first, with the acceptance radius."""
         return tuple((x, y, self.acceptance) for x, y in self.points[1:])
+
+    def passed_by(self, share: float) -> dict[str, float]:
+        """Legs that are done, and metres [m] along the next one; at the end all legs."""
+        lengths = np.hypot(*np.diff(self.points, axis=0).T)
+        begins = np.concatenate([[0.0], np.cumsum(lengths)])
+        way = share * begins[-1]
+        leg = int(np.searchsorted(begins, way, side="right")) - 1
+        if share <= 0.0:
+            return {"leg": 0.0}  # also where the vessel starts before the first waypoint
+        if share >= 1.0 or leg >= len(lengths):
+            return {"leg": float(len(lengths))}
+        return {"leg": float(leg), "along_leg": float(way - begins[leg])}
 
     def constants(self) -> dict[str, float]:
         """With the number of legs."""

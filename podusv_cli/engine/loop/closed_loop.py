@@ -95,6 +95,14 @@ class ClosedLoop:
         """Whether the distance to the target says how good the law is."""
         return self.controller.aims() and not self.path.follows
 
+    def passed_by(self, share: float) -> dict[str, float]:
+        """Where this share of a path lies behind the vessel, as the path says it.
+
+        None where the path has no end, or nobody follows it.
+        """
+        followed = self.path.follows and self.controller.aims()
+        return self.path.passed_by(share) if followed else {}
+
     def lyapunov(self) -> Any:
         """The law where (46) is its Lyapunov function; None where it sees another target."""
         other = self.path.follows or self.path.fillet_for_law()

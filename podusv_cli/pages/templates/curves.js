@@ -56,7 +56,7 @@ const curvesOn = (card) => {
     const signal = signals[place], having = inView().filter((run) => run.curves[place]), ended = having.filter((run) => run.whole);
     let [low, high] = [Infinity, -Infinity];
     for (const run of ended.length ? ended : having) curve(run, place).forEach(({ t, y }) => {
-      if (t >= from && t <= to && !Number.isNaN(y)) [low, high] = [Math.min(low, on(signal, y)), Math.max(high, on(signal, y))];
+      if (t >= from && t <= Math.min(to, from < run.counts ? run.counts : to) && !Number.isNaN(y)) [low, high] = [Math.min(low, on(signal, y)), Math.max(high, on(signal, y))];
     });
     if (low > high) [low, high] = [0, 1];
     if (held) { // while values move, axes only grow, so that curves can be compared
@@ -83,13 +83,18 @@ const curvesOn = (card) => {
     const clip = make(make(plot, "clipPath", { id: `plotted-${place}` }), "rect", { x: LEFT, y: top, width: width - LEFT - RIGHT, height: tall });
     const inside = make(plot, "g", { "clip-path": `url(#plotted-${place})`, fill: "none" });
     for (const run of inView()) {
-      let pen = "M", d = "";
-      curve(run, place).forEach(({ t, y }) => {
-        if (Number.isNaN(y)) { pen = "M"; return; }
-        d += `${pen}${across(t).toFixed(1)} ${up(one, y).toFixed(1)}`;
-        pen = "L";
-      });
-      make(inside, "path", { ...line(run, 1.4), d, opacity: run.kept ? 0.35 : 1 });
+      const path = (points) => {
+        let pen = "M", d = "";
+        points.forEach(({ t, y }) => {
+          if (Number.isNaN(y)) { pen = "M"; return; }
+          d += `${pen}${across(t).toFixed(1)} ${up(one, y).toFixed(1)}`;
+          pen = "L";
+        });
+        return d;
+      };
+      const points = curve(run, place), last = points.findIndex(({ t }) => t > run.counts); // the end of its path
+      if (last > 0) make(inside, "path", { ...line(run, 1.4), d: path(points.slice(last - 1)), class: "after" });
+      make(inside, "path", { ...line(run, 1.4), d: path(last < 0 ? points : points.slice(0, last)), opacity: run.kept ? 0.35 : 1 });
     }
   };
   const draw = (wide = plot.clientWidth) => {

@@ -38,6 +38,7 @@ const chaseOn = (stage) => {
     const course = run.x_d ? [run.x_d, run.y_d] : run.legs;
     if (course.length) make(world, "polyline", { points: points(...course).join(" "), class: "course", "stroke-width": 0.8 });
     make(world, "polyline", { points: run.points.join(" "), stroke: run.color, "stroke-width": 1.2, class: "ghost" });
+    run.after = make(world, "polyline", { ...line(run, 2), class: "after" }); // the end of its path
     run.trail = make(world, "polyline", line(run, 2));
     if (run.kept) run.trail.classList.add("lost");
     }
@@ -79,7 +80,9 @@ const chaseOn = (stage) => {
     scaleBar(k);
     runs.forEach((run, place) => {
       const { i, x, y, psi, north, east } = at(run, now), over = now >= run.time[run.time.length - 1] && run.ending;
-      set(run.trail, "points", run.points.slice(0, i + 1).join(" ") + ` ${y},${x}`);
+      const last = Math.min(i, row(run, run.counts)), here = ` ${y},${x}`;
+      set(run.trail, "points", run.points.slice(0, last + 1).join(" ") + (now > run.counts ? "" : here));
+      set(run.after, "points", now > run.counts ? run.points.slice(last, i + 1).join(" ") + here : "");
       const size = Math.max(1, LEAST / (k * run.length)) * k, c = Math.cos(psi), s = Math.sin(psi);
       const corners = HULL.map(([a, b]) => [a * run.length * size, b * Math.max(run.beam, run.length / 3.5) * size])
         .map(([a, b]) => [ox + k * y + a * s + b * c, oy - k * x - a * c + b * s]);
@@ -110,7 +113,11 @@ const chaseOn = (stage) => {
     }
     const clip = make(make(trace, "clipPath", { id: "inside" }), "rect", { x: LEFT, y: TOP, width: Math.max(0, wide - LEFT - RIGHT), height: tall - TOP - BASE });
     const inside = make(trace, "g", { "clip-path": "url(#inside)", fill: "none" });
-    for (const run of traced) make(inside, "polyline", { ...line(run, 1.4), points: run.distance.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)).join(" ") });
+    for (const run of traced) {
+      const points = run.distance.map((z, i) => (z === null ? "" : `${across(run.time[i]).toFixed(1)},${up(z).toFixed(1)}`)), last = row(run, run.counts);
+      if (last < points.length - 1) make(inside, "polyline", { ...line(run, 1.4), points: points.slice(last).join(" "), class: "after" });
+      make(inside, "polyline", { ...line(run, 1.4), points: points.slice(0, last + 1).join(" ") });
+    }
     const tick = round(Math.max(end / 5, 110 * end / wide));
     for (let i = 0; i * tick <= end; i++) make(trace, "text", { x: across(i * tick), y: tall - 5, "text-anchor": "middle" }, `${+(i * tick).toPrecision(6)} s`);
     cursor = make(trace, "path", { class: "cursor" });

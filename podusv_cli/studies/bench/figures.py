@@ -17,8 +17,10 @@ from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.bench.runs import BenchRun
-from podusv_cli.studies.bench.standing import leaderboard, profile
+from podusv_cli.studies.bench.standing import by_vessel, profile
 
+BESIDE = 2  # panels of hulls in a row
+RATIO = "IAE over that of the best law of the case, at most"
 WORST = 4.0  # times the best law's IAE; the end of the profile's axis
 SMALL = 0.62  # inches, the side of a small multiple
 MARGIN = 0.15  # of a path's extent, around a small multiple
@@ -32,13 +34,13 @@ APART = {"bottom": 0.01, "right": 0.995, "wspace": 0.06, "hspace": 0.06}
 
 
 def sketches(runs: Sequence[BenchRun], made: pd.DataFrame) -> Iterator[Sketch]:
-    """The profiles of all laws, and the tracks of each vessel."""
+    """The profiles of all laws on each vessel, and their tracks."""
     yield Sketch(
         "profiles",
-        "performance profiles: share of all cases by ratio to the best law's IAE",
+        "performance profiles: share of a hull's cases by ratio to the best law's IAE",
         partial(profiles, made),
     )
-    laws = list(leaderboard(made).index)
+    laws = list(made.law.unique())
     for vessel in dict.fromkeys(run.place[0] for run in runs):
         shown = [run for run in runs if run.place[0] == vessel]
         yield Sketch(
@@ -49,24 +51,32 @@ def sketches(runs: Sequence[BenchRun], made: pd.DataFrame) -> Iterator[Sketch]:
 
 
 def profiles(made: pd.DataFrame) -> Figure:
-    """The share of cases that each law does within so many times the best law's IAE."""
-    figure = new_figure(COLUMNS, 3.2)
-    axes, ratios = figure.add_subplot(), np.geomspace(1.0, WORST, 300)
-    for place, law in enumerate(leaderboard(made).index):
+    """The share of a hull's cases that each law does within so many times the best law's IAE."""
+    vessels = by_vessel(made)
+    rows = -(-len(vessels) // BESIDE)
+    figure = new_figure(COLUMNS, 2.6 * rows + 0.6)
+    panels = figure.subplots(rows, min(len(vessels), BESIDE), squeeze=False).ravel()
+    for axes, (vessel, cases) in zip(panels, vessels.items(), strict=False):
+        _profile(axes, cases)
+        axes.set_title(escaping.figure(vessel))
+    for axes in panels[len(vessels) :]:
+        axes.set_axis_off()
+    legend(figure)
+    return figure
+
+
+def _profile(axes: Axes, made: pd.DataFrame) -> None:
+    ratios = np.geomspace(1.0, WORST, 300)
+    for place, law in enumerate(made.law.unique()):
         color, linestyle, _ = nth_style(place)
         share = 100.0 * profile(made, law, ratios)
         axes.plot(
             ratios, share, color=color, linestyle=linestyle, label=escaping.figure(law), zorder=3
         )
     axes.set_xscale("log")
-    axes.set(
-        xlim=(1.0, WORST), ylim=(0.0, 101.0), ylabel="cases [%]",
-        xlabel="IAE over that of the best law of the case, at most",
-    )  # fmt: skip
+    axes.set(xlim=(1.0, WORST), ylim=(0.0, 101.0), ylabel="cases [%]", xlabel=RATIO)
     axes.set_xticks([1, 1.2, 1.5, 2, 3, 4], ["1", "1.2", "1.5", "2", "3", "4"])
     axes.minorticks_off()
-    legend(figure)
-    return figure
 
 
 def tracks(runs: Sequence[BenchRun], laws: Sequence[str]) -> Figure:

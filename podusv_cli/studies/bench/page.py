@@ -12,7 +12,7 @@ from podusv_cli.core.escaping import markdown
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.studies.bench.optima import Least
-from podusv_cli.studies.bench.standing import CROSS, PLACE, columns, digits, leaderboard, written
+from podusv_cli.studies.bench.standing import CROSS, PLACE, by_vessel, columns, digits, written
 
 FIRST = 60  # failures that the page lists
 DARKEST = 10.0  # times the best law's IAE
@@ -33,15 +33,16 @@ def page(
     optima: Sequence[Least] = (),
 ) -> str:  # fmt: skip
     """The page; `made` is `standing.table` of all runs, `with_optima` where there are any."""
-    board = leaderboard(made)
+    laws = list(made.law.unique())
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
     return environment("podusv_cli.studies.bench").get_template("bench.html.j2").render(
-        title=f"Bench of {len(board)} laws",
-        board=written(made),
+        title=f"Bench of {len(laws)} laws",
+        boards={vessel: written(rows) for vessel, rows in by_vessel(made).items()},
+        laws=laws,
         columns=columns(made),
-        counts=counts | {"cases": len(made) // len(board), "runs": len(made)},
-        heat=list(_heat(made, list(board.index))),
+        counts=counts | {"cases": len(made) // len(laws), "runs": len(made)},
+        heat=list(_heat(made, laws)),
         failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
         more=max(0, len(failed) - FIRST),
         figures=figures,
@@ -51,7 +52,12 @@ def page(
 
 
 def as_markdown(made: pd.DataFrame) -> str:
-    """The leaderboard as a table."""
+    """The leaderboard of each hull as a table below its name."""
+    tables = (f"### {vessel}\n\n{_table(rows)}" for vessel, rows in by_vessel(made).items())
+    return "\n".join(tables)
+
+
+def _table(made: pd.DataFrame) -> str:
     head, *rows = written(made)
     lines = [head, *([markdown(law), *texts] for law, *texts in rows)]
     joined = [f"| {' | '.join(line)} |\n" for line in lines]
@@ -69,12 +75,12 @@ def _grids(optima: Sequence[Least]) -> dict[str, Any]:
 
 def _heat(made: pd.DataFrame, laws: Sequence[str]) -> Iterator[tuple[str, list[Any]]]:
     """For every vessel the rows of its table: task, condition, a cell a law, least IAE."""
-    for vessel, cases in made.groupby("vessel", sort=False):
+    for vessel, cases in by_vessel(made).items():
         rows = [
             (task, condition, _cells(case, laws), _least(case))
             for (task, condition), case in cases.groupby(["task", "condition"], sort=False)
         ]
-        yield str(vessel), rows
+        yield vessel, rows
 
 
 def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[Cell]:

@@ -1,4 +1,7 @@
-"""Who did how well: ratios to the best law of each case, ranks, failures, and the leaderboard."""
+"""Who did how well: ratios to the best law of each case, ranks, failures, and the leaderboards.
+
+Every hull has a leaderboard of its own: a median over several would be a property of none of them.
+"""
 
 from __future__ import annotations
 
@@ -113,7 +116,7 @@ BOARD = (
         "mean_rank", lambda rows: rows["rank"].mean(),
         "mean rank", lambda law: _interval(law.mean_rank, law.rank_low, law.rank_high),
         "By IAE, the integral of the distance from the vessel's origin to the target; 95 % "
-        "intervals over tasks, the vessels and conditions being given. Failed runs share the mean "
+        "intervals over tasks, the hull and the conditions being given. Failed runs share the mean "
         "of the last ranks of their case. A rank depends on which laws take part.",
     ),
     Column(
@@ -159,21 +162,23 @@ OF_OPTIMUM = Column(
 
 
 def columns(made: pd.DataFrame) -> list[Column]:
-    """Of the leaderboard of a table: a rank for each vessel, and one of optima where it has any."""
-    vessels = [_rank_on(str(vessel)) for vessel in made.vessel.unique()]
-    return [*BOARD, *vessels, *([OF_OPTIMUM] if "of_optimum" in made else [])]
+    """Of the leaderboards of a table; with one of optima where it has any."""
+    return [*BOARD, *([OF_OPTIMUM] if "of_optimum" in made else [])]
 
 
-def _rank_on(vessel: str) -> Column:
-    name = f"on {vessel}"
-    return Column(
-        name, lambda rows: rows["rank"][rows.vessel == vessel].mean(),
-        f"rank {name}", lambda law: f"{law[name]:.2f}",
-    )  # fmt: skip
+def by_vessel(made: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """The rows of each hull."""
+    return {str(vessel): rows for vessel, rows in made.groupby("vessel", sort=False)}
+
+
+def leaderboards(made: pd.DataFrame) -> pd.DataFrame:
+    """The leaderboard of each hull, one below the other, with the hull and the law as index."""
+    boards = {vessel: leaderboard(rows) for vessel, rows in by_vessel(made).items()}
+    return pd.concat(boards, names=["vessel"])
 
 
 def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
-    """A row for each law, the best first by mean rank, with the numbers of `columns`."""
+    """Of the runs on one hull: a row for each law, the best first by mean rank; see `columns`."""
     shown = columns(made)
     rows = {
         law: {column.name: column.of(of_law) for column in shown}
@@ -184,7 +189,7 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def written(made: pd.DataFrame) -> list[list[str]]:
-    """The leaderboard in words: its headings, then a row a law."""
+    """The leaderboard of one hull in words: its headings, then a row a law."""
     board, shown = leaderboard(made), [column for column in columns(made) if column.heading]
     rows = [[str(law), *(column.text(row) for column in shown)] for law, row in board.iterrows()]
     return [["law", *(column.heading for column in shown)], *rows]
