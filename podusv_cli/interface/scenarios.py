@@ -90,7 +90,12 @@ def loaded(
 
 
 def assignments(changes: Changes | None) -> list[str]:
-    """Changes as `--set` takes them."""
+    """Changes as `--set` takes them. Raises UsageError for what is no mapping."""
+    if not isinstance(changes, (Mapping, type(None))):
+        raise UsageError(
+            f"changes: found {changes!r}; give a dictionary of dotted keys and values, as in "
+            '{"vessel.m": 24.0}'
+        )
     return [f"{key}={_json(value)}" for key, value in (changes or {}).items()]
 
 

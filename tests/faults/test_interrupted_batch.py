@@ -34,7 +34,10 @@ def test_a_signal_in_a_batch_ends_the_loop_around_it(number, tmp_path):
         with pytest.raises(subprocess.TimeoutExpired):
             child.wait(0.5)
         child.send_signal(number)
-        out, err = child.communicate(timeout=60)
+        try:
+            out, err = child.communicate(timeout=20)
+        finally:
+            child.kill()
     (kept,) = out.splitlines()
     assert " of 400 in turn " in kept
     assert kept.endswith(" of 400 runs are finished, in the attribute `runs` of this exception")
