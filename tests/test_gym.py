@@ -620,11 +620,10 @@ OF_DEAD = ("iae", "energy", metres_a_second, asked_for, lambda a, b: 1.0 / (b.ti
 def test_a_run_that_is_terminated_late_has_time_and_reward_of_a_single_one(reward, demand, after):
     """It ends within a period; the times are of the single one before it had lanes beside it."""
     free = {"actuator": {"kind": "ideal"}, "vessel": {"preset": "paper"}}
-    given: dict[str, Any] = {"limits": (1e300, 1e300), "reward": reward, "period": 0.1,
-                             "observe": lambda now: [now.time, *now.demand, *now.state]}  # fmt: skip
-    one, many = podusv.gym.Env(SCENARIO, free, **given), podusv.gym.VectorEnv(
-        SCENARIO, free, count=2, **given
-    )  # fmt: skip
+    given: dict[str, Any] = {"limits": (1e300, 1e300), "reward": reward, "period": PERIOD}
+    given["observe"] = lambda now: [now.time, *now.demand, *now.state]
+    one = podusv.gym.Env(SCENARIO, free, **given)
+    many = podusv.gym.VectorEnv(SCENARIO, free, count=2, **given)
     one.reset(seed=0)
     many.reset(seed=0)
     for action in ((1.0, 0.1), (1.0, 0.1), (demand, demand)):

@@ -90,9 +90,9 @@ def bitcode(function: Any, prototype: Any) -> bytes:
     return finish.simplified(made, finish.SYMBOL)
 
 
-# Settings of numba while it compiles kernels. Optimised, each kernel would be so by itself and again
-# in the one that has it inlined. The others are a user's, of programs beside podusv: code that is
-# not compiled, or compiled with notes for debuggers and profilers, is no kernel.
+# Settings of numba while it compiles kernels. It would optimise each kernel by itself, and again in
+# the one that has it inlined. The others are a user's, of programs beside podusv: code that is not
+# compiled, or has notes for debuggers and profilers in it, is no kernel.
 SETTINGS = {"OPT": 0, "DISABLE_JIT": 0, "DEBUGINFO_DEFAULT": 0, "ENABLE_PROFILING": 0}
 
 
