@@ -478,8 +478,8 @@ def test_numbers_that_change_how_the_loop_is_put_together_are_refused_as_a_study
     """Waves without spreading come from one direction, and have another kernel."""
     with pytest.raises(ValueError, match=r"spreading = \d changes how the loop is put together"):
         podusv.simulate_many(WAVES, {"disturbance.spreading": given})
+    drawn = {"draws": 4, "vary": {"disturbance.spreading": {"integers": [0, 2]}}}
     with pytest.raises(ScenarioError, match="changes how the loop is put together"):
-        drawn = {"draws": 4, "vary": {"disturbance.spreading": {"integers": [0, 2]}}}
         podusv.sweep(WAVES, {"sweep": drawn}, out="study", figures=False)
 
 

@@ -202,7 +202,7 @@ def test_units_are_those_of_scenarios(podusv):
         ((*BOAT[:-1], "two"), "--thrusters two: write them as 2x180N@1.0: two of 180 N each, 1.0 m "
          "beside the centre line"),
         ((*BOAT[:-1], "2x180kg@1"), "--thrusters 180kg: is no number in N; kg does not fit; did "
-         "you mean 'kgf'? (units here: N, kN, kgf)"),
+         "you mean 'kgf'? (units here: N, kN, kgf, lbf)"),
         ((*BOAT[:-1], "1x180N@0"), "a single thruster that does not turn cannot steer: give --turn "
          "35deg"),
         ((*BOAT, "--length", "-3"), "--length -3: must be above 0 [m]"),

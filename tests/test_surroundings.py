@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import podusv
+from podusv_cli.cli import progress
 
 INLINE = "module://matplotlib_inline.backend_inline"
 PATIENCE = 300  # s
@@ -46,6 +47,7 @@ def test_a_notebook_s_backend_keeps_no_figure_from_being_drawn(place, settings):
 
 DRAWN = f"""
 import podusv
+from podusv_cli.cli import progress
 run = podusv.run("{OWN}", {{"simulation.duration": 2.0}}, out="python", force=True)
 assert (run.folder / "figures/trajectory.png").exists()
 """
@@ -108,3 +110,13 @@ def test_python_without_docstrings_is_refused_in_a_sentence(tmp_path):
 
 def test_what_is_imported_here_has_its_docstrings():
     assert podusv.simulate.__doc__
+
+
+def test_a_pipe_is_told_of_code_that_is_compiled_for_long(monkeypatch, capsys):
+    now = iter([0.0, 0.5, 1.5, 2.5, 9.0])
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(now))
+    tell = progress.compiling(None, wanted=True)
+    for part in (0.0, 0.2, 0.4, 0.7, 1.0):
+        tell(part)
+    assert capsys.readouterr() == ("", "compiling, once\n")
+    assert progress.compiling(None) is None

@@ -7,6 +7,7 @@ import jsonschema
 import pytest
 import yaml
 from scenario_samples import SOUND, loaded, told, write
+from scipy import constants
 
 import podusv
 from podusv_cli.core import units
@@ -99,7 +100,7 @@ def test_every_unit_of_the_table_is_worth_what_its_definition_says():
 @pytest.mark.parametrize(
     ("text", "unit", "told"),
     [
-        ("45 dge", "rad", "; dge does not fit; did you mean 'deg'? (units here: rad, deg)"),
+        ("45 dge", "rad", "; dge does not fit; did you mean 'deg'? (units here: rad, deg, mrad)"),
         ("5 kg", "kg m2", "; kg does not fit (units here: kg m2)"),
         ("0.7 rad", "", "; it has no unit here: write 0.7"),
         ("1e999 m", "m", "; it is too large, numbers must be finite"),
@@ -175,10 +176,10 @@ def test_text_stays_text():
     ("override", "says"),
     [
         ("start.u=5 kg", "a number [m/s], found '5 kg'; kg does not fit (units here: m/s, cm/s, "
-         "mm/s, ft/s, km/h, kn)"),
+         "mm/s, ft/s, km/h, kn, mph)"),
         ("simulation.step=-5 ms", "a number above 0 [s], found -5 ms"),
         ("sweep.vary.start.psi.plus.uniform[1]=3 dge", "a number [rad], found '3 dge'; dge does "
-         "not fit; did you mean 'deg'? (units here: rad, deg)"),
+         "not fit; did you mean 'deg'? (units here: rad, deg, mrad)"),
         ("metrics.steady_fraction=0.5 m", "a number above 0 and not above 1, found '0.5 m'; it has "
          "no unit here: write 0.5"),
         ("sweep.draws=5 runs", "a whole number not below 1 and not above 1e+09, found '5 runs'; it "
@@ -224,3 +225,43 @@ def test_editors_take_what_podusv_takes():
     assert wrong(SOUND + "start: {psi: 45 kg}") == ["$.start.psi"]
     assert wrong(SOUND + "start: {psi: 45°, u: 5 knots}") == []
     assert wrong(SOUND + "sweep: {draws: 5 runs}") == ["$.sweep"]
+
+
+# What each unit is in podusv's own, from scipy where it has it, and powers of ten.
+SAME = {
+    "s": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": constants.minute, "h": constants.hour},
+    "m": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": constants.foot, "nmi": constants.nautical_mile},
+    "m2": {"cm2": 1e-4, "ft2": constants.foot**2},
+    "rad": {"deg": constants.degree, "mrad": 1e-3},
+    "m/s": {
+        "cm/s": 1e-2, "mm/s": 1e-3, "ft/s": constants.foot, "km/h": constants.kmh,
+        "kn": constants.knot, "mph": constants.mph,
+    },
+    "m/s2": {"cm/s2": 1e-2},
+    "rad/s": {"deg/s": constants.degree},
+    "kg": {"g": constants.gram, "t": constants.metric_ton, "lb": constants.pound},
+    "kg/m3": {"g/cm3": 1e3},
+    "N": {"kN": 1e3, "kgf": constants.kgf, "lbf": constants.lbf},
+    "N m": {"kN m": 1e3},
+    "1/s": {"rpm": 1.0 / 60.0},
+    "1/s2": {"rpm/s": 1.0 / 60.0},
+    "Hz": {"mHz": 1e-3},
+    units.PURE: {"%": 1e-2},
+}  # fmt: skip
+
+
+def test_every_unit_of_the_table_is_read_as_others_have_it():
+    assert {own: {*others} for own, others in units.UNITS.items()} == {
+        own: {*others} for own, others in SAME.items()
+    }
+    for own, others in SAME.items():
+        for unit, size in others.items():
+            for text in (f"3.5 {unit}", f"3.5{unit}"):
+                assert units.number(text, own) == pytest.approx(3.5 * size, rel=4e-16), text
+            assert re.match(units.pattern(own), f"3.5 {unit}")
+
+
+def test_other_spellings_are_read():
+    for other, unit in units.SPELLINGS.items():
+        (own, *_) = [own for own in (*units.UNITS,) if unit in units.allowed(own)]
+        assert units.number(f"2 {other}", own) == units.number(f"2 {unit}", own), other
