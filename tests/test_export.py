@@ -444,7 +444,7 @@ def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     told = read_model_description(str(folder / "law.fmu"))
     assert {"m", "rad", "m/s", "N", "N m"} <= {unit.name for unit in told.unitDefinitions}
     units = {variable.name: variable.unit for variable in told.modelVariables}
-    assert (units["x"], units["psi"], units["tau_r"]) == ("m", "rad", "N m")
+    assert (units["x"], units["psi"], units["tau_r_cmd"]) == ("m", "rad", "N m")
 
 
 WINE = shutil.which("wine64", path=f"{os.environ.get('PATH')}:/usr/lib/wine") or "wine64"
