@@ -622,7 +622,7 @@ TABLE: dict[str, list[Row]] = {
 "core": [
     ('"mph": Fraction(1609344, 3600 * 10**3)',
      '"mph": Fraction(1852, 3600)',
-     'test_every_unit_of_the_table_is_read_as_others_have_it'),
+     'test_every_unit_of_the_table_is_worth_what_its_definition_says'),
     ("return trial or numbers.get(", "return numbers.get(",
      "test_an_entry_is_off_its_target_beyond_the_settling_radius_but_in_a_trial"),
     ("low = _cubic(r, r2, E[2], E[3], E[4], E[5])", "low = _cubic(r, r2, E[2], E[3], E[4], E[4])",

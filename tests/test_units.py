@@ -7,7 +7,6 @@ import jsonschema
 import pytest
 import yaml
 from scenario_samples import SOUND, loaded, told, write
-from scipy import constants
 
 import podusv
 from podusv_cli.core import units
@@ -87,6 +86,7 @@ WORTH = {
     "km/h": 0.2777777777777778, "kn": 0.5144444444444445, "cm/s2": 1e-2,
     "deg/s": 0.017453292519943295, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "g/cm3": 1e3, "kN": 1e3,
     "kgf": 9.80665, "kN m": 1e3, "rpm": 1.0 / 60.0, "rpm/s": 1.0 / 60.0, "mHz": 1e-3, "%": 1e-2,
+    "mrad": 1e-3, "mph": 0.44704, "lbf": 4.4482216152605,
 }  # fmt: skip
 
 
@@ -225,40 +225,6 @@ def test_editors_take_what_podusv_takes():
     assert wrong(SOUND + "start: {psi: 45 kg}") == ["$.start.psi"]
     assert wrong(SOUND + "start: {psi: 45°, u: 5 knots}") == []
     assert wrong(SOUND + "sweep: {draws: 5 runs}") == ["$.sweep"]
-
-
-# What each unit is in podusv's own, from scipy where it has it, and powers of ten.
-SAME = {
-    "s": {"ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": constants.minute, "h": constants.hour},
-    "m": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "ft": constants.foot, "nmi": constants.nautical_mile},
-    "m2": {"cm2": 1e-4, "ft2": constants.foot**2},
-    "rad": {"deg": constants.degree, "mrad": 1e-3},
-    "m/s": {
-        "cm/s": 1e-2, "mm/s": 1e-3, "ft/s": constants.foot, "km/h": constants.kmh,
-        "kn": constants.knot, "mph": constants.mph,
-    },
-    "m/s2": {"cm/s2": 1e-2},
-    "rad/s": {"deg/s": constants.degree},
-    "kg": {"g": constants.gram, "t": constants.metric_ton, "lb": constants.pound},
-    "kg/m3": {"g/cm3": 1e3},
-    "N": {"kN": 1e3, "kgf": constants.kgf, "lbf": constants.lbf},
-    "N m": {"kN m": 1e3},
-    "1/s": {"rpm": 1.0 / 60.0},
-    "1/s2": {"rpm/s": 1.0 / 60.0},
-    "Hz": {"mHz": 1e-3},
-    units.PURE: {"%": 1e-2},
-}  # fmt: skip
-
-
-def test_every_unit_of_the_table_is_read_as_others_have_it():
-    assert {own: {*others} for own, others in units.UNITS.items()} == {
-        own: {*others} for own, others in SAME.items()
-    }
-    for own, others in SAME.items():
-        for unit, size in others.items():
-            for text in (f"3.5 {unit}", f"3.5{unit}"):
-                assert units.number(text, own) == pytest.approx(3.5 * size, rel=4e-16), text
-            assert re.match(units.pattern(own), f"3.5 {unit}")
 
 
 def test_other_spellings_are_read():
