@@ -4,7 +4,13 @@
 imported when the first of them is used.
 """
 
+import sys
+
+from podusv_cli import WITHOUT_DOCSTRINGS
 from podusv_cli import __version__ as __version__
+
+if sys.flags.optimize > 1:
+    raise ImportError(WITHOUT_DOCSTRINGS)
 
 __all__ = [
     "Bench", "Comparison", "IdentifiedHull", "PodusvError", "Run", "Scenario", "Study", "Tuning",

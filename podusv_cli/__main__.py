@@ -3,6 +3,8 @@
 import signal
 import sys
 
+from podusv_cli import WITHOUT_DOCSTRINGS
+
 ELSEWHERE = "podusv runs on Linux; on Windows use WSL, on macOS a container or virtual machine"
 
 
@@ -13,6 +15,8 @@ def main() -> None:
     """
     if sys.platform != "linux":
         sys.exit(ELSEWHERE)
+    if sys.flags.optimize > 1:
+        sys.exit(WITHOUT_DOCSTRINGS)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not so under nohup
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from podusv_cli import cli

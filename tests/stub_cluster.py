@@ -42,6 +42,8 @@ class StubFuture:
 
     def result(self, timeout=None):
         if self.function is remote.report:
+            if self.client.lost_reporting:
+                raise self.client.lost_reporting
             return self.client.reports[self.options["workers"][0]]
         if self.status == "cancelled":
             raise RuntimeError("scheduler-connection-lost")
@@ -63,6 +65,7 @@ class StubClient:
     seconds: float = 0.5  # of computing that each run is said to take
     deadly: frozenset = frozenset()
     lost_after: float = float("inf")  # units, after which the scheduler is gone
+    lost_reporting: Exception | None = None  # what a report raises, as the scheduler is gone
     join: dict = field(default_factory=dict)  # workers that join after the first unit
     waiting: list = field(default_factory=list)
     cancelled: list = field(default_factory=list)

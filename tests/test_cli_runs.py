@@ -110,3 +110,11 @@ def test_nothing_is_executed_and_no_link_followed(podusv: Command, results: Path
     assert len(listed(podusv)) == 4
     assert len(runs.runs(results, ["vessel.m=60"])) == 2
     assert not Path("hacked").exists()
+
+
+def test_a_run_says_that_claims_are_for_compare(podusv):
+    claims = "claims: {good: {says: It is., expect: pid.iae >= 0}}\n"
+    Path("c.yaml").write_text(f"extends: a.yaml\n{claims}")
+    said = podusv("run", "c.yaml", "--no-figures")
+    assert "1 claim is not judged by one run; `podusv compare` judges them" in said.err
+    assert "claim" not in podusv("run", "a.yaml", "--no-figures").err

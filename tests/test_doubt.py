@@ -464,3 +464,27 @@ def test_the_filter_that_turns_F7w_turns_single_runs(podusv):
         for w, said in done.items()
     }
     assert (verdicts[2.1]["F7w"], verdicts[2.2]["F7w"]) == ("not reproduced", "reproduced")
+
+
+# Of a heading of 0.3 rad, after docs/doubt.md: "all; 0.2 rad", "all; -", "all; all" of the loads.
+ANGLES = {
+    "start.psi": (math.pi, 0.2),
+    "path.course": (math.pi, None),
+    "disturbance.direction": (math.pi, math.pi),
+}
+
+
+@pytest.mark.parametrize("key", ANGLES)
+def test_angles_move_to_either_side_as_the_page_says(key):
+    several = load_text(
+        "name: a\nvessel: {preset: paper_nonlinear}\nactuator: {kind: saturated}\n"
+        "path: {kind: line, course: 0.3}\nstart: {psi: 0.3}\n"
+        "disturbance: {kind: wind, speed: 2.0, direction: 0.3}\n"
+        "controllers: {a: {kind: pid}, b: {kind: los_pid}}\nsimulation: {duration: 1.0}\n", "a.yaml"
+    ).scenario  # fmt: skip
+    (moved,) = (choice for choice in choices(several.singles()) if choice.name == key)
+    alone, together = ANGLES[key]
+    assert moved.range.alone.plus.uniform == pytest.approx((-alone, alone), rel=1e-15)
+    assert moved.range.scale == 1.0
+    if together:
+        assert moved.range.together.plus.uniform == pytest.approx((-together, together), rel=1e-15)

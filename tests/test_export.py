@@ -30,6 +30,7 @@ from export_samples import (
     task,
 )  # fmt: skip
 from exported_laws import Unit
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import podusv
@@ -440,6 +441,10 @@ def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     assert all(checked.samples == 3001 and not checked.differs for checked in found)
     with zipfile.ZipFile(folder / "law.fmu") as archive:
         assert "modelDescription.xml" in archive.namelist()
+    told = read_model_description(str(folder / "law.fmu"))
+    assert {"m", "rad", "m/s", "N", "N m"} <= {unit.name for unit in told.unitDefinitions}
+    units = {variable.name: variable.unit for variable in told.modelVariables}
+    assert (units["x"], units["psi"], units["tau_r_cmd"]) == ("m", "rad", "N m")
 
 
 WINE = shutil.which("wine64", path=f"{os.environ.get('PATH')}:/usr/lib/wine") or "wine64"

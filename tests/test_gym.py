@@ -1,6 +1,7 @@
 """Environments of Gymnasium: the draws, the bits and the metrics of podusv's own runs."""
 
 import math
+import pickle
 import re
 import subprocess
 import sys
@@ -584,3 +585,82 @@ def test_the_first_action_costs():
     env.reset(seed=0)
     first, second = (env.step((2.0, 0.0))[1] for _ in range(2))
     assert first == pytest.approx(second) == pytest.approx(-0.01 * 2.0**2)
+
+
+def metres_a_second(before: podusv.gym.Moment, now: podusv.gym.Moment) -> Any:
+    """A reward over the time that has passed, which is none where a run is over."""
+    return (now.state[0] - before.state[0]) / (now.time - before.time)
+
+
+def asked_for(before: podusv.gym.Moment, now: podusv.gym.Moment) -> Any:
+    """What was demanded, and when."""
+    return now.demand[0] + now.time
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_reward_over_the_time_that_passed_goes_on_where_episodes_end():
+    many = podusv.gym.VectorEnv(SCENARIO, count=3, reward=metres_a_second)
+    many.reset(seed=0)
+    ends = 0
+    for _ in range(70):  # episodes of 30 periods, and a step in which the next one begins
+        _, gained, _, cut, info = many.step(np.ones((3, 2)))
+        ends += cut.all()
+        assert ((gained == 0.0) == (info["time"] == 0.0)).all()
+    assert ends == 2
+
+
+OF_DEAD = ("iae", "energy", metres_a_second, asked_for, lambda a, b: 1.0 / (b.time - a.time))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("reward", OF_DEAD)
+@pytest.mark.parametrize(
+    ("demand", "after"), [(1e200, 0.21), (1e9, 0.22), (1e5, 0.24), (3e4, 0.27)]
+)
+def test_a_run_that_is_terminated_late_has_time_and_reward_of_a_single_one(reward, demand, after):
+    """It ends within a period; the times are of the single one before it had lanes beside it."""
+    free = {"actuator": {"kind": "ideal"}, "vessel": {"preset": "paper"}}
+    given: dict[str, Any] = {"limits": (1e300, 1e300), "reward": reward, "period": PERIOD}
+    given["observe"] = lambda now: [now.time, *now.demand, *now.state]
+    one = podusv.gym.Env(SCENARIO, free, **given)
+    many = podusv.gym.VectorEnv(SCENARIO, free, count=2, **given)
+    one.reset(seed=0)
+    many.reset(seed=0)
+    for action in ((1.0, 0.1), (1.0, 0.1), (demand, demand)):
+        seen, gained, dead, cut, info = one.step(action)
+        each, rewards, deads, cuts, infos = many.step(np.array([action, (1.0, 0.1)]))
+        assert (gained, dead, cut) == (rewards[0], deads[0], cuts[0])
+        np.testing.assert_array_equal(each[0], seen)
+        assert infos["time"][0] == info["time"]
+    assert (dead, cuts[1]) == (True, True)
+    assert info["time"] == pytest.approx(after)
+    assert infos["time"][1] == pytest.approx(0.3)  # the other one went on
+    assert (seen[0], seen[1]) == (pytest.approx(0.2), 1.0)  # the last numbers that were
+
+
+def test_a_count_in_the_place_of_changes_is_a_sentence():
+    with pytest.raises(UsageError, match=r"3 stands for `changes`; write count=3$"):
+        podusv.gym.VectorEnv(SCENARIO, 3)
+    for wrong in (3, "start.x=1.0"):
+        with pytest.raises(UsageError, match="give a dictionary of dotted keys and values"):
+            podusv.gym.Env(SCENARIO, wrong)
+
+
+def test_an_environment_is_pickled_as_it_is_before_its_first_episode():
+    given: dict[str, Any] = {"period": 0.2, "reward": metres_a_second, "limits": (7.0, 1.5)}
+    one = podusv.gym.Env(SCENARIO, {"start.y": 1.25}, **given)
+    many = podusv.gym.VectorEnv(SCENARIO, {"start.y": 1.25}, count=3, **given)
+    one.reset(seed=5)
+    again, others = pickle.loads(pickle.dumps((one, many)))
+    with pytest.raises(UsageError, match="no episode has begun"):
+        again.step((1.0, 0.1))
+    assert (others.num_envs, again.action_space) == (3, one.action_space)
+    for env in (one, again):
+        env.reset(seed=2)
+    for env in (many, others):
+        env.reset(seed=2)
+    answers = [env.step((1.0, 0.1)) for env in (one, again)]
+    np.testing.assert_array_equal(answers[0][0], answers[1][0])
+    assert answers[0][1:] == answers[1][1:]
+    for a, b in zip(*(env.step(np.ones((3, 2))) for env in (many, others)), strict=True):
+        np.testing.assert_equal(a, b)

@@ -468,3 +468,21 @@ def test_whether_runs_march_side_by_side_is_passed_on(monkeypatch: pytest.Monkey
         podusv.simulate_many(SHORT, {"vessel.m": [20.0]}, side_by_side=wanted)
     podusv.simulate_many(SHORT, {"vessel.m": [20.0]})
     assert asked == [None, True, False, None]
+
+
+WAVES = {**SHORT, "disturbance": {"kind": "waves", "height": 0.05, "period": 1.5}}
+
+
+@pytest.mark.parametrize("given", [[0, 1], [1, 0], [0, 0, 2], [1, 2, 0]])
+def test_numbers_that_change_how_the_loop_is_put_together_are_refused_as_a_study_does(given):
+    """Waves without spreading come from one direction, and have another kernel."""
+    with pytest.raises(ValueError, match=r"spreading = \d changes how the loop is put together"):
+        podusv.simulate_many(WAVES, {"disturbance.spreading": given})
+    drawn = {"draws": 4, "vary": {"disturbance.spreading": {"integers": [0, 2]}}}
+    with pytest.raises(ScenarioError, match="changes how the loop is put together"):
+        podusv.sweep(WAVES, {"sweep": drawn}, out="study", figures=False)
+
+
+def test_numbers_that_leave_it_as_it_is_are_run():
+    runs = podusv.simulate_many(WAVES, {"disturbance.spreading": [1, 2]})
+    assert set(runs["status"]) == {"finished"}

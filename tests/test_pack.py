@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import os
 import shutil
 import stat
 import subprocess
@@ -21,8 +22,9 @@ from installed_sample import LAB, importable, install
 from rerun_samples import SCENARIO, copied, made, replaced, told_otherwise
 from storage_samples import files
 
-from podusv_cli.storage import manifest
+from podusv_cli.storage import archive, manifest
 from podusv_cli.storage.archive import LARGEST_RATIO
+from podusv_cli.workflows import pack as workflow
 
 LAW = '''
 """A law that leaves a trace where it is imported."""
@@ -463,3 +465,23 @@ def test_a_study_is_made_once_more_from_its_archive(tmp_path: Path, podusv: Comm
     config.unlink()
     assert podusv("sweep", "run", "s/scenario.yaml", "--out", "again", "--no-figures").code == 0
     assert Path("again/runs.h5").read_bytes() == Path("s/runs.h5").read_bytes()
+
+
+def test_many_small_files_are_synced_together_and_their_bytes_are_counted(tmp_path, monkeypatch):
+    """A sync a file takes six milliseconds each on a disk, for 3000 logs of a study 18 s."""
+    folder = tmp_path / "many"
+    for i in range(40):
+        (folder / f"logs/{i}").mkdir(parents=True)
+        (folder / f"logs/{i}/about.json").write_text(str(i) * (i + 1))
+    manifest.write(folder, "finished")
+    names = [path.relative_to(folder).as_posix() for path in folder.rglob("*.json")]
+    archive.write(tmp_path / "many.zip", folder, names)
+    parts, syncs, whole = [], [], []
+    monkeypatch.setattr(os, "fsync", syncs.append)
+    monkeypatch.setattr(os, "sync", lambda: whole.append(len(parts)))
+    with workflow.opened(tmp_path / "many.zip") as packed:
+        packed.unpack(tmp_path / "again", parts.append)
+    assert (len(parts), parts == sorted(parts), parts[-1]) == (41, True, 1.0)
+    assert whole == [41]  # after the last file
+    assert len(syncs) < 5  # of folders
+    assert (tmp_path / "again/logs/39/about.json").read_text() == "39" * 40

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_samples import ROOT, commanded
+from command_samples import ROOT, commanded, one_line
 from hull_ratios import ratios, scatter, table
 
 import podusv as library
@@ -202,7 +202,7 @@ def test_units_are_those_of_scenarios(podusv):
         ((*BOAT[:-1], "two"), "--thrusters two: write them as 2x180N@1.0: two of 180 N each, 1.0 m "
          "beside the centre line"),
         ((*BOAT[:-1], "2x180kg@1"), "--thrusters 180kg: is no number in N; kg does not fit; did "
-         "you mean 'kgf'? (units here: N, kN, kgf)"),
+         "you mean 'kgf'? (units here: N, kN, kgf, lbf)"),
         ((*BOAT[:-1], "1x180N@0"), "a single thruster that does not turn cannot steer: give --turn "
          "35deg"),
         ((*BOAT, "--length", "-3"), "--length -3: must be above 0 [m]"),
@@ -281,3 +281,45 @@ def test_what_no_boat_has_is_refused(podusv, changed, fault):
     said = podusv("start", "boat", *(word for pair in given.items() for word in pair))
     assert said.code != 0
     assert fault in said.err
+
+
+BEYOND = {
+    "--length 1e308": "must be from 0.001 to 1000 m",
+    "--length 1e-300": "must be from 0.001 to 1000 m",
+    "--beam 1e308": "must be from 0.001 to 1000 m",
+    "--mass 1e308": "must be from 0.001 to 1e+09 kg",
+    "--thrusters 2x1e308N@0.3": "must be from 0.0001 to 1e+08 N",
+    "--thrusters 2x100N@1e308": "must be from 0.001 to 1000 m",
+    "--speed 1e308": "must be from 0.001 to 100 m/s",
+}
+
+
+@pytest.mark.parametrize("wrong", BEYOND)
+def test_numbers_of_no_boat_are_a_sentence(podusv, wrong):
+    option, number = wrong.split()
+    given = {"--length": "3", "--beam": "1", "--mass": "100", "--thrusters": "2x100N@0.3"}
+    words = [word for pair in (given | {option: number}).items() for word in pair]
+    said = podusv("start", "boat", *words)
+    assert (said.code, said.out) == (2, "")
+    assert BEYOND[wrong] in one_line(said.err)
+    assert not Path("boat.yaml").exists()
+
+
+def test_what_validate_would_refuse_is_not_written(podusv):
+    """100 N drive 37 t at 2.2 mm/s, and the legs take a week."""
+    given = ("--length", "27.6", "--beam", "3.5", "--mass", "37440", "--speed", "0.005")
+    said = podusv("start", "b8", *given, "--thrusters", "2x50N@0.3")
+    assert (said.code, said.out) == (2, "")
+    assert "b8.yaml is not written, since podusv would refuse it: " in one_line(said.err)
+    assert "check length, beam, mass, thrusters and speed" in one_line(said.err)
+    assert not Path("b8.yaml").exists()
+
+
+def test_hulls_too_narrow_name_the_option_that_says_how_wide_they_are(podusv):
+    given = ("--length", "1.6", "--beam", "0.7", "--mass", "45", "--thrusters", "2x50N@0.2")
+    said = podusv("start", "small", *given, "--hulls", "2")
+    assert said.code == 2
+    assert "or give --hull-beam: without it, each hull is a tenth of" in one_line(said.err)
+    assert podusv("start", "small", *given, "--hulls", "2", "--hull-beam", "0.2").code == 0
+    said = podusv("start", "one", *given[:5], "4500", *given[6:])
+    assert "--hull-beam" not in said.err

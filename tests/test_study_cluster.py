@@ -2,7 +2,9 @@
 
 import os
 import signal
+from concurrent.futures import CancelledError
 from queue import SimpleQueue
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -165,3 +167,18 @@ def test_an_interrupt_keeps_what_is_written_and_cancels_the_rest(tmp_path):
     _, _, (tally, whole) = marched(tmp_path / "study", stub())
     assert whole
     assert tally.before == 24
+
+
+@pytest.mark.parametrize("error", [CancelledError("lost"), OSError("Timed out")])
+def test_a_scheduler_that_is_lost_while_workers_report_is_a_sentence(error):
+    client = stub(lost_reporting=error)
+    with pytest.raises(StorageError, match="connection to the scheduler was lost") as lost:
+        cluster(client).check()
+    assert lost.value.exit_code == 5
+
+
+def test_a_scheduler_that_is_lost_before_it_lists_workers_is_a_sentence(monkeypatch):
+    client = stub()
+    monkeypatch.setattr(client, "scheduler_info", Mock(side_effect=OSError("closed")))
+    with pytest.raises(StorageError, match="connection to the scheduler was lost"):
+        cluster(client).check()

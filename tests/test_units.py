@@ -86,6 +86,7 @@ WORTH = {
     "km/h": 0.2777777777777778, "kn": 0.5144444444444445, "cm/s2": 1e-2,
     "deg/s": 0.017453292519943295, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "g/cm3": 1e3, "kN": 1e3,
     "kgf": 9.80665, "kN m": 1e3, "rpm": 1.0 / 60.0, "rpm/s": 1.0 / 60.0, "mHz": 1e-3, "%": 1e-2,
+    "mrad": 1e-3, "mph": 0.44704, "lbf": 4.4482216152605,
 }  # fmt: skip
 
 
@@ -99,7 +100,7 @@ def test_every_unit_of_the_table_is_worth_what_its_definition_says():
 @pytest.mark.parametrize(
     ("text", "unit", "told"),
     [
-        ("45 dge", "rad", "; dge does not fit; did you mean 'deg'? (units here: rad, deg)"),
+        ("45 dge", "rad", "; dge does not fit; did you mean 'deg'? (units here: rad, deg, mrad)"),
         ("5 kg", "kg m2", "; kg does not fit (units here: kg m2)"),
         ("0.7 rad", "", "; it has no unit here: write 0.7"),
         ("1e999 m", "m", "; it is too large, numbers must be finite"),
@@ -175,10 +176,10 @@ def test_text_stays_text():
     ("override", "says"),
     [
         ("start.u=5 kg", "a number [m/s], found '5 kg'; kg does not fit (units here: m/s, cm/s, "
-         "mm/s, ft/s, km/h, kn)"),
+         "mm/s, ft/s, km/h, kn, mph)"),
         ("simulation.step=-5 ms", "a number above 0 [s], found -5 ms"),
         ("sweep.vary.start.psi.plus.uniform[1]=3 dge", "a number [rad], found '3 dge'; dge does "
-         "not fit; did you mean 'deg'? (units here: rad, deg)"),
+         "not fit; did you mean 'deg'? (units here: rad, deg, mrad)"),
         ("metrics.steady_fraction=0.5 m", "a number above 0 and not above 1, found '0.5 m'; it has "
          "no unit here: write 0.5"),
         ("sweep.draws=5 runs", "a whole number not below 1 and not above 1e+09, found '5 runs'; it "
@@ -224,3 +225,9 @@ def test_editors_take_what_podusv_takes():
     assert wrong(SOUND + "start: {psi: 45 kg}") == ["$.start.psi"]
     assert wrong(SOUND + "start: {psi: 45°, u: 5 knots}") == []
     assert wrong(SOUND + "sweep: {draws: 5 runs}") == ["$.sweep"]
+
+
+def test_other_spellings_are_read():
+    for other, unit in units.SPELLINGS.items():
+        (own, *_) = [own for own in (*units.UNITS,) if unit in units.allowed(own)]
+        assert units.number(f"2 {other}", own) == units.number(f"2 {unit}", own), other

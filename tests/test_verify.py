@@ -305,3 +305,12 @@ def test_what_is_not_converged_ends_with_3_and_is_named(podusv):
     strict = podusv("verify", "two.yaml", "--tolerance", "1e-9")
     assert strict.code == 3
     assert verify(two(), 1e-9).unconverged.keys() == {"quick", "slow"}
+
+
+@pytest.mark.parametrize("size", [1e-20, 1e-15, 1e-13])
+def test_what_is_within_a_picometre_of_nothing_has_converged(size):
+    """Rounding errors of 0 differ by all of themselves."""
+    found = estimate([size, -0.5 * size, 0.9 * size])
+    assert found.converged(0.01)
+    assert found.sufficient(0.01) == 1.0
+    assert not estimate([1e10 * size, -0.5e10 * size, 0.9e10 * size]).converged(0.01)

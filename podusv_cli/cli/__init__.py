@@ -106,6 +106,9 @@ def main() -> None:
     # Threads in linear algebra would make the last bits of a sum depend on the number of cores,
     # and starting them takes a tenth of a run. All matrices here are small.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Figures are files. A notebook names a backend of its own to what it starts, which matplotlib
+    # refuses where that module is not installed.
+    os.environ["MPLBACKEND"] = "agg"
     replace_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         # Characters that the terminal's encoding lacks are escaped.

@@ -40,6 +40,7 @@ def bench(
     optimum: Annotated[
         bool, typer.Option("--optimum", help="Find the optimum of each case; a minute or two each.")
     ] = False,
+    trust: options.Trust = False,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -56,7 +57,7 @@ def bench(
     from podusv_cli.workflows import bench as workflow
 
     chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
-    wanted = Selection(folder or shipped_bench(), laws or (), assign or (), chosen)
+    wanted = Selection(folder or shipped_bench(), laws or (), assign or (), chosen, trust)
     request = workflow.Request(out, force, figures, workers, sys.argv, optimum)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.bench(wanted, request, bars)

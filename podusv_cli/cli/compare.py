@@ -94,7 +94,7 @@ def compare(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
             figure or (), [name.strip() for name in form.split(",")], workers,
             metrics=metric or (), ratios=ratios, align=align, doubt=doubt, trust=trust,
-            compiling=compiling(progress),
+            compiling=compiling(progress, wanted=not (quiet or as_json)),
         )  # fmt: skip
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)

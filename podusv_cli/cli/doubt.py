@@ -42,7 +42,7 @@ def doubt(
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         request = Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            workers=workers, trust=trust, compiling=compiling(bars),
+            workers=workers, trust=trust, compiling=compiling(bars, wanted=not (quiet or as_json)),
         )  # fmt: skip
         done = workflow.doubt(Path(config), request, bars)
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)

@@ -23,6 +23,7 @@ def live(
         list[str] | None,
         typer.Option(metavar="NAME", help="Of `controllers`, to be shown; repeatable."),
     ] = None,
+    trust: options.Trust = False,
     port: Annotated[int, typer.Option(min=0, help="Port; 0: any that is free.")] = 0,
     browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
@@ -35,7 +36,7 @@ def live(
     from podusv_cli.process.local_page import serve
     from podusv_cli.workflows.live import Live, page
 
-    shown = Live(config, assign or (), controller or ())
+    shown = Live(config, assign or (), controller or (), trust)
     shown.frame({}, (), rest=True, wanted=True)  # errors are for the terminal, and code is compiled
 
     # A command is over before its garbage counts; this one stays, and looks through none of what is

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from podusv_cli.studies.making.dispatch import Tally
 
 PATIENCE = 0.7  # s before a bar appears
+SILENT = 1.0  # s of compiling before a line is printed where no bar can be
 PERIOD = 0.2  # s between two numbers of a study's line
 ERASED = "\r\x1b[K"
 
@@ -77,9 +78,27 @@ def _stop(bars: Progress) -> None:
         bars.stop()
 
 
-def compiling(bars: Bars | None) -> Callable[[float], None] | None:
-    """The bar of what is compiled once, for all runs to come; it appears at once."""
-    return partial(bars, "compiling, once", patience=0.0) if bars else None
+def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], None] | None:
+    """The bar of what is compiled once, for all runs to come; it appears at once.
+
+    In a pipe, where it is `wanted`, a line on stderr after a while.
+    """
+    if bars:
+        return partial(bars, "compiling, once", patience=0.0)
+    return _say_once_after(SILENT, "compiling, once") if wanted else None
+
+
+def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
+    """A function to call with the fraction done, which prints a line where that takes longer."""
+    begins: list[float] = []
+
+    def tell(fraction: float) -> None:
+        begins.append(time.monotonic())
+        if fraction < 1.0 and begins[-1] - begins[0] > seconds:
+            begins[:] = [math.inf]  # from here on less has passed than nothing
+            echo(text, err=True)
+
+    return tell
 
 
 class StudyLine:

@@ -50,7 +50,8 @@ def run(
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         request = workflow.Request(
             assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            figure or (), controller=controller, trust=trust, compiling=compiling(bars),
+            figure or (), controller=controller, trust=trust,
+            compiling=compiling(bars, wanted=not (quiet or as_json)),
             say=lambda line: warned(f"{config}: {line}"),
         )  # fmt: skip
         done = workflow.run(Path(config), request, partial(bars, str(config)) if bars else None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -28,6 +29,7 @@ def unpack(
     An archive with links, with names that lead elsewhere, or that would become far too large is
     refused whole. Files that exist are not replaced.
     """
+    from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import pack as workflow  # heavy imports only when needed
 
     with workflow.opened(archive) as packed:
@@ -37,7 +39,8 @@ def unpack(
             show(contents)
             sys.stdout.flush()  # before anything is written
         if target:
-            packed.unpack(target)
+            with progress_bars(wanted=not as_json) as bars:
+                packed.unpack(target, *([partial(bars, f"writing {target}")] if bars else ()))
     if as_json:
         echo_json({**contents.as_json(), "folder": target and str(target)})
     elif target:

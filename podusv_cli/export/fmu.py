@@ -61,6 +61,7 @@ def fmu(
     content = "".join([text, *sources.values(), *starts])
     about = {
         **c.template_values(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
+        "units": sorted({variable.unit for variable in shown} - {"", "1"}),
         "variables": shown, "starts": starts, "loads": law.needs_loads,
         "outputs": [i for i, variable in enumerate(shown, 1) if variable.causality == "output"],
         "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),

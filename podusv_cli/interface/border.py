@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from podusv_cli.core.errors import PodusvError, UsageError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
@@ -14,6 +17,18 @@ Result = TypeVar("Result")
 
 class ParameterError(UsageError, ValueError):
     """A Python value that a function of podusv cannot take."""
+
+
+def interrupt_with(runs: pd.DataFrame) -> KeyboardInterrupt:
+    """What ends a batch that was interrupted; its attribute `runs` is the table so far."""
+    finished = int((runs["status"] == "finished").sum())
+    stop = KeyboardInterrupt(
+        f"interrupted; {finished} of {len(runs)} runs are finished, in the attribute `runs` of "
+        "this exception"
+    )
+    # No class of its own: Python tells the shell of an interrupt only where it is this very class.
+    vars(stop)["runs"] = runs
+    return stop
 
 
 def explained(function: Callable[Given, Result]) -> Callable[Given, Result]:

@@ -21,7 +21,7 @@ from podusv_cli.doubt.outputs import table
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.findings.finding import Case, postflight
-from podusv_cli.interface.border import ParameterError
+from podusv_cli.interface.border import ParameterError, interrupt_with
 from podusv_cli.interface.hulls import IdentifiedHull
 from podusv_cli.interface.parameters import check_words, columns, in_si, scenarios
 from podusv_cli.interface.results import Comparison, Run
@@ -192,6 +192,9 @@ def simulate_many(
     takes 10 to 20 s once and is kept on disk; `False` has runs march one by one. No bit of the
     result depends on it.
 
+    Ctrl-C, SIGTERM and SIGHUP end all runs at their next instant. Then KeyboardInterrupt is raised;
+    its attribute `runs` is the table, in which the others are `interrupted`.
+
     Raises ScenarioError, LawError, and ValueError for unknown keys, unequal lengths, values out of
     range and a negative number of workers.
 
@@ -216,7 +219,10 @@ def simulate_many(
         loops, plan.grid, probe=probe, workers=workers, side_by_side=side_by_side
     )
     ends = {"status": done.status, "cause": done.cause}
-    return pd.DataFrame({**given, **ends, **probe.summaries(done.seen)})
+    runs = pd.DataFrame({**given, **ends, **probe.summaries(done.seen)})
+    if done.interrupted:
+        raise interrupt_with(runs)
+    return runs
 
 
 def verify(

@@ -34,6 +34,7 @@ from podusv_cli.interface.session import DEMAND, Session, marcher_of
 try:
     import gymnasium
     from gymnasium.spaces import Box
+    from gymnasium.utils import EzPickle
     from gymnasium.vector import AutoresetMode
     from gymnasium.vector.utils import batch_space
 except ImportError as error:
@@ -55,7 +56,7 @@ def observations(task: Task) -> Any:
     return Box(-most, most, dtype=np.float64)
 
 
-class Env(gymnasium.Env[Vector, Vector]):
+class Env(gymnasium.Env[Vector, Vector], EzPickle):
     """A scenario as an environment of Gymnasium: an agent in place of its controller.
 
     An action is a demand (tau_u [N], tau_r [N m]) that holds for `period` [s], by default
@@ -68,12 +69,13 @@ class Env(gymnasium.Env[Vector, Vector]):
 
     Both may be functions of your own: `reward(before, now)` gives a number of the moments between
     which the action held, `observe(now)` a list of numbers of a `Moment`. Written with numpy, they
-    serve `VectorEnv`, too. Where a number is not finite, `now` has the last numbers that were.
+    serve `VectorEnv`, too. Where a number is not finite, `now` has the last numbers that were, and
+    their time; a reward that is not finite then, as over the time that has passed, counts as 0.
 
     `reset(seed=i)` begins the run of draw i of the scenario's `sweep.vary`, as `podusv sweep` has
     it; `reset()` one that no study has. `session` is the run under way, and its `close("folder")`
-    writes it as a run folder. Raises ScenarioError, and UsageError for what no environment can be
-    made of.
+    writes it as a run folder. An environment that is pickled is the same one before its first
+    episode. Raises ScenarioError, and UsageError for what no environment can be made of.
 
     >>> import podusv.gym
     >>> env = podusv.gym.Env("podusv:mu_2017/corrected.yaml", period=0.1)
@@ -90,7 +92,9 @@ class Env(gymnasium.Env[Vector, Vector]):
         reward: Reward = "iae", observe: Observe | None = None, limits: Limits | None = None,
     ) -> None:  # fmt: skip
         """No episode has begun."""
-        self._task = task = Task(source, changes, Terms(period, reward, observe, limits))
+        terms = Terms(period, reward, observe, limits)
+        self._task = task = Task(source, changes, terms)
+        EzPickle.__init__(self, task.whole, **terms._asdict())
         self.action_space, self.observation_space = demands(task), observations(task)
         self._task.scenario.ready()
         self._march = marcher_of(self._task.scenario)
@@ -140,7 +144,7 @@ class Env(gymnasium.Env[Vector, Vector]):
         return before - self._gathered
 
 
-class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
+class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     """`count` environments like `Env`, whose runs march side by side: a march for eight of them.
 
     Runs that share a march have the same time. When their episodes end, the next `step` begins
@@ -159,9 +163,13 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         limits: Limits | None = None,
     ) -> None:  # fmt: skip
         """No episode has begun."""
+        if whole(changes) >= 0:
+            raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")
         if (number := whole(count)) < 1:
             raise UsageError(f"podusv.gym: count is {count!r}; give a whole number from 1 on")
-        self._task = task = Task(source, changes, Terms(period, reward, observe, limits))
+        terms = Terms(period, reward, observe, limits)
+        self._task = task = Task(source, changes, terms)
+        EzPickle.__init__(self, task.whole, count=number, **terms._asdict())
         self.num_envs = count = number
         self.single_action_space, self.single_observation_space = demands(task), observations(task)
         self.action_space = batch_space(self.single_action_space, count)
@@ -178,7 +186,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self._sorter.choose(plan)
         self._marches: list[SteppedBatch] = []
         self._parts, self._demands = np.zeros((PARTS, count)), np.zeros((OUTPUTS, count))
-        self._times, self._gathered = np.zeros((2, count))
+        # A terminated run's moment is the last one that was, and earlier than where it ended.
+        self._times, self._ends, self._gathered = np.zeros((3, count))
 
     @explained
     def reset(
@@ -201,8 +210,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)
         for march in self._marches:
-            march.law_table[DEMAND] = self._demands[:, march.places] = given[:, march.places]
+            march.law_table[DEMAND] = given[:, march.places]
             march.advance(march.grid.hold_every)
+            going = np.array(march.places)[march.alive]
+            self._demands[:, going] = given[:, going]
             dead[march.places], cut[march.places] = ~march.alive, march.over & march.alive
             self._look(march)
         rewards = self._own_rewards(before) if before else self._rewards()
@@ -248,7 +259,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
         """Take in the next instant of runs; of one that is terminated the last numbers stay."""
         places = np.array(march.places)[march.alive]
         self._parts[:, places] = march.view()[:, march.alive]
-        self._times[march.places] = march.time
+        self._times[places], self._ends[march.places] = march.time, march.times()
 
     def _moment(self) -> Moment:
         return moment(self._times.copy(), self._parts, self._demands)
@@ -256,7 +267,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any]):
     def _observed(self) -> tuple[Vector, Info]:
         """What all see, and the time of every run [s]."""
         now = self._moment()
-        info = {"time": now.time, "_time": np.ones(self.num_envs, bool)}
+        info = {"time": self._ends.copy(), "_time": np.ones(self.num_envs, bool)}
         return self._task.observation(now).T.copy(), info
 
     def _checked(self, actions: Vector) -> Vector:

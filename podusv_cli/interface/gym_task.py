@@ -67,7 +67,8 @@ def looked(x: Vector, target: Vector, signals: Vector) -> None:
 def moment(time: Any, parts: Vector, demand: Vector) -> Moment:
     """A moment of what `looked` has written; all are copies."""
     own, target = parts.copy(), INPUTS + len(STATE)  # where the target begins
-    return Moment(time, own[:INPUTS], own[INPUTS:target], own[target:], demand.copy())
+    # One number, too, is numpy's: over no time a rate is NaN then, and no ZeroDivisionError.
+    return Moment(np.float64(time), own[:INPUTS], own[INPUTS:target], own[target:], demand.copy())
 
 
 class Task:
@@ -76,7 +77,7 @@ class Task:
     def __init__(self, source: Source, changes: Changes | None, terms: Terms) -> None:
         """Raises ScenarioError, and UsageError for what no environment can be made of."""
         whole = loaded(source, changes, (*CHECKS, sweep_faults)).scenario
-        self.sweep = whole.sweep or Sweep(draws=1)
+        self.whole, self.sweep = whole, whole.sweep or Sweep(draws=1)
         self._check_sweep()
         self.scenario, self.period = waiting(whole, terms.period)
         self.limits = self._limits(terms.limits)
@@ -109,9 +110,16 @@ class Task:
         return moment(now.time, parts, demand)
 
     def gained(self, before: Moment, now: Moment) -> Vector:
-        """The user's own reward, a number or one for every run. Raises UsageError for none."""
+        """The user's own reward, a number or one for every run. Raises UsageError for none.
+
+        Where no time is between the moments, as the run is terminated or over, what is not finite
+        counts as 0: nothing was gained.
+        """
         assert self.own is not None
-        return _finite(self.own(before, now), np.shape(now.time), "reward", now.time)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a sentence says so where it matters
+            given = self.own(before, now)
+        idle = np.equal(before.time, now.time)
+        return _finite(given, np.shape(now.time), "reward", now.time, idle)
 
     def observation(self, now: Moment) -> Vector:
         """What an agent is given of a moment. Raises UsageError for no list of numbers."""
@@ -206,10 +214,16 @@ class Task:
             )
 
 
-def _finite(given: Any, shape: tuple[int, ...], whose: str, time: Any) -> Vector:
-    """Numbers of a user's function in this shape, also where they are the same for all runs."""
+def _finite(
+    given: Any, shape: tuple[int, ...], whose: str, time: Any, idle: Flags | bool = False
+) -> Vector:  # fmt: skip
+    """Numbers of a user's function in this shape, also where they are the same for all runs.
+
+    Those of `idle` runs may be none, and are 0 then.
+    """
     try:
         array = np.broadcast_to(numbers(given), shape)
+        array = np.where(idle & ~np.isfinite(array), 0.0, array)
         fine = bool(np.isfinite(array).all())
     except ValueError:
         fine = False

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from podusv_cli.core.component import Component
+from podusv_cli.core.errors import PodusvError
 from podusv_cli.core.phrases import as_yaml, unknown
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
@@ -97,8 +99,10 @@ def _steps(scenario: Scenario, name: str) -> Route:
 def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns) -> None:
     """Check the law with every combination of words that the runs have.
 
-    Raises LawError, and ValueError where words change how the loop is put together.
+    Raises LawError, and ValueError where words, or the least or largest of numbers, change how the
+    loop is put together.
     """
+    _check_ends(scenario, loops, given)
     words = {key: column for key, column in given.items() if any(map(_is_word, column))}
     rows = list(enumerate(zip(*words.values(), strict=True)))
     first_rows = {combination: row for row, combination in reversed(rows)}
@@ -112,6 +116,26 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
                 f"row {row}: {_told(words, own)} changes how the loop is put together, and row 0 "
                 f"has {_told(words, rows[0][1])}; make a batch for each"
             )
+
+
+def _check_ends(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns) -> None:
+    """Raise ValueError where the ends of numbers differ in structure from the first run.
+
+    A loop that cannot be made at all is left to the batch, which says so in its row.
+    """
+    numbers = {key: column for key, column in given.items() if not any(map(_is_word, column))}
+    grid = scenario.time_grid()
+    for key, column in numbers.items() if loops else ():
+        first = Plan(loops[0], grid).structure
+        for row in sorted({int(np.argmin(column)), int(np.argmax(column))} - {0}):
+            other = first
+            with suppress(PodusvError):
+                other = Plan(loops[row], grid).structure
+            if other != first:
+                raise ParameterError(
+                    f"row {row}: {key} = {column[row]:g} changes how the loop is put together, and "
+                    f"row 0 has {column[0]:g}; make a batch for each"
+                )
 
 
 def _told(words: Columns, own: Iterable[Any]) -> str:

@@ -17,7 +17,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario import model, plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Check, Loaded, load_text, yaml_text
+from podusv_cli.scenario.load import Check, Loaded, Plugged, load_text, yaml_text
 from podusv_cli.scenario.load import load as load_file
 
 Changes = Mapping[str, Any]
@@ -51,13 +51,16 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
     return loaded({**(sections or {}), **more}).scenario
 
 
-def load(source: Source, changes: Changes | None = None) -> model.Scenario:
+def load(
+    source: Source, changes: Changes | None = None, *, trust: bool = False
+) -> model.Scenario:  # fmt: skip
     """The scenario of a file, a dictionary or another scenario, with some values changed.
 
     `source` may name a scenario of podusv (`podusv:mu_2017/corrected.yaml`). `changes` are what
     `--set` is on the command line: dotted keys and values. A vessel that is changed without
     `nominal` is also the one that the controller is told about, unless `source` is a scenario: that
-    has a `nominal` of its own. Raises ScenarioError with every fault.
+    has a `nominal` of its own. `trust` executes plug-in files that a file names in the folder of a
+    run, study or search, which anybody may have made. Raises ScenarioError with every fault.
 
     >>> import podusv
     >>> scenario = podusv.load("podusv:mu_2017/corrected.yaml", {"controller.k_ze": 0.2})
@@ -66,7 +69,7 @@ def load(source: Source, changes: Changes | None = None) -> model.Scenario:
     >>> podusv.load(scenario, {"path": {"kind": "circle", "radius": 20.0}}).path.radius
     20.0
     """
-    return loaded(source, changes).scenario
+    return loaded(source, changes, trust=trust).scenario
 
 
 CHECKS = (unknown_codes, limits(read_back=True, insist=""))
@@ -74,44 +77,51 @@ CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 def loaded(
     source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS,
-    *, silent: bool = False,
+    *, silent: bool = False, trust: bool = False,
 ) -> Loaded:  # fmt: skip
-    """A scenario with its text and the origin of each value. Raises ScenarioError.
+    """A scenario with its text and the origin of each value, see `load`. Raises ScenarioError.
 
     Unless it is `silent`, a UserWarning names values that a section loses with its kind.
     """
-    result = _loaded(source, assignments(changes), checks)
+    result = _loaded(source, assignments(changes), checks, plugins.of_files(trust))
     if silent:
         return result
     return result.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
 
 
 def assignments(changes: Changes | None) -> list[str]:
-    """Changes as `--set` takes them."""
+    """Changes as `--set` takes them. Raises UsageError for what is no mapping."""
+    if not isinstance(changes, (Mapping, type(None))):
+        raise UsageError(
+            f"changes: found {changes!r}; give a dictionary of dotted keys and values, as in "
+            '{"vessel.m": 24.0}'
+        )
     return [f"{key}={_json(value)}" for key, value in (changes or {}).items()]
 
 
 @singledispatch
-def _loaded(source: Any, overrides: list[str], checks: Sequence[Check]) -> Loaded:
-    return load_file(os.fspath(source), overrides, checks)
+def _loaded(source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged) -> Loaded:
+    return load_file(os.fspath(source), overrides, checks, plugged=plugged)
 
 
 @_loaded.register
-def _(source: model.Scenario, overrides: list[str], checks: Sequence[Check]) -> Loaded:
+def _(
+    source: model.Scenario, overrides: list[str], checks: Sequence[Check], plugged: Plugged
+) -> Loaded:
     derived = {plugins.KEY, *(["controller"] if source.open_choice else [])}
     sections = {key: part for key, part in source.as_given().items() if key not in derived}
     files = [plugin for plugin in source.plugged if plugin.text]  # as they were when it was loaded
     text = yaml_text(sections)
-    return load_text(text, source.name, overrides, checks, files, placed=False)
+    return load_text(text, source.name, overrides, checks, files, plugged, placed=False)
 
 
 @_loaded.register
 def _(
     source: Mapping,  # type: ignore[type-arg]
-    overrides: list[str], checks: Sequence[Check],
+    overrides: list[str], checks: Sequence[Check], plugged: Plugged,
 ) -> Loaded:  # fmt: skip
     text = yaml_text(_plain(source))
-    return load_text(text, IN_PYTHON, overrides, checks, placed=False)
+    return load_text(text, IN_PYTHON, overrides, checks, plugged=plugged, placed=False)
 
 
 def _json(value: Any) -> str:

@@ -86,7 +86,7 @@ def _bases(node: Node, source: str, faults: list[Fault]) -> Iterator[Node | None
     while waiting:
         name, sources = waiting.pop()
         base = _read_base(name, sources, faults)
-        tree = _mapping(base[1], base[0], faults) if base else None
+        tree = _mapping(base[1], base[0], faults, above=sources) if base else None
         yield tree and _without_extends(tree)
         if base and tree:
             waiting += [(further, (*sources, base[0])) for further in extended_files(tree)]
@@ -106,9 +106,10 @@ def extended_files(node: Node) -> tuple[Node, ...]:
 
 
 def _mapping(
-    text: str, source: str, faults: list[Fault], placed: bool = True, most: int = MAX_NODES
+    text: str, source: str, faults: list[Fault], placed: bool = True, most: int = MAX_NODES,
+    above: tuple[str, ...] = (),
 ) -> Node | None:  # fmt: skip
-    node = read(text, source, faults, placed=placed, most=most)
+    node = read(text, source, faults, placed=placed, most=most, above=above)
     if node and not isinstance(node.content, dict):
         # The text is not shown: the file may be one that the user may not read.
         what = "text" if isinstance(node.content, str) else found(node.content, node.text)

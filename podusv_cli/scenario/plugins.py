@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -15,7 +16,7 @@ from podusv_cli.core.plugins import Plugin, Plugins, from_file, installed
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import BASES, Scenario, scenario_class
 from podusv_cli.scenario.presets import preset_names
-from podusv_cli.scenario.shipped import relative_to
+from podusv_cli.scenario.shipped import is_shipped, relative_to
 from podusv_cli.scenario.yaml_text import read_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
@@ -69,21 +70,21 @@ def _listed(own: Node) -> list[tuple[Node, Node]]:
 
 
 def loaded(
-    root: Node, faults: list[Fault], *, trusted: bool = True, own: bool = False
+    root: Node, faults: list[Fault], *, trusted: bool = False, own: bool = True
 ) -> tuple[Node, Plugins]:
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
 
     There a file is named as in the run's folder, with its digest, and an installed package stands
     where the scenario uses a component of it. Where a plug-in cannot be loaded, or its components
-    are none, there is a fault; so there is for every file that the tree names where it is not
-    `trusted`, as loading a file executes it. With `own`, files that are named outside the folder of
-    a run, study or search need no trust.
+    are none, there is a fault. Loading a file executes it, so there is a fault for every file that
+    is not `trusted` and is named in the folder of a run, study or search, at any depth, or by what
+    a scenario in one extends; without `own`, for every file that the tree names.
     """
     given = root.mapping.get(KEY) or Node({}, root.mark)
     entries: dict[str, Node] = {}
     known: dict[str, Plugin] = {}
     for name, wanted in [] if given.faulty else _listed(given):
-        allowed = trusted or (own and not _in_folder(name.mark.source))
+        allowed = trusted or (own and not _is_foreign(name.mark))
         if plugin := _plugin(name, wanted, faults, allowed):
             place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
             entries[place] = _required(plugin, name.mark, wanted)
@@ -98,7 +99,12 @@ def loaded(
 
 def of_files(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
     """What loads plug-ins of scenarios on the command line, some of them `trusted` alone."""
-    return partial(loaded, trusted=trusted, own=True)
+    return partial(loaded, trusted=trusted)
+
+
+def of_folder(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
+    """What loads plug-ins that the folder of a run, study or search keeps, where `trusted`."""
+    return partial(loaded, trusted=trusted, own=False)
 
 
 def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
@@ -108,9 +114,17 @@ def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plu
     )  # fmt: skip
 
 
+def _is_foreign(mark: Mark) -> bool:
+    """Whether a place, or a scenario by whose `extends` it is read, may be somebody else's."""
+    return any(map(_in_folder, (mark.source, *mark.above)))
+
+
 def _in_folder(source: str) -> bool:
-    """Whether a file is in the folder of a run, study or search, which anybody may have made."""
-    return any((File(source).parent / name).exists() for name in FINISHED)
+    """Whether a file is anywhere in the folder of a run, study or search, or a link leads there."""
+    if is_shipped(source):
+        return False
+    above = {*File(os.path.abspath(source)).parents, *File(os.path.realpath(source)).parents}
+    return any(os.path.lexists(folder / name) for folder in above for name in FINISHED)
 
 
 def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
@@ -158,7 +172,10 @@ def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plu
     is_file = name.content.endswith(".py")
     if is_file and name.mark.line and not trusted:
         path = relative_to(name.mark.source, name.content)
-        text = f"this would execute the plug-in file {path}; read it, then allow it with --trust"
+        text = (
+            f"this would execute the plug-in file {path}; read it, then allow it with --trust "
+            "(in Python: podusv.load(..., trust=True))"
+        )
         faults.append(Fault(name.mark, KEY, text))
         return None
     plugin = _file(name, faults) if is_file else _package(name, faults)

@@ -43,13 +43,18 @@ def present(name: str) -> str:
     return f"{PREFIX}{renamed().get(first, first)}{slash}{rest}"
 
 
+def is_shipped(name: str) -> bool:
+    """Whether this names a file that comes with podusv."""
+    return name.startswith(PREFIX)
+
+
 def file_of(name: str) -> str:
     """The file that a name in a scenario or on the command line stands for.
 
     Any name but that of a shipped scenario is a file's own. Raises ValueError for a name that
     starts like a shipped one and is none.
     """
-    if not name.startswith(PREFIX):
+    if not is_shipped(name):
         return name
     if present(name) not in (*names(), *names("safetensors")):
         hint = did_you_mean(name, names())
@@ -59,9 +64,9 @@ def file_of(name: str) -> str:
 
 def relative_to(source: str, name: str) -> str:
     """The file that `source`, a file or a shipped scenario, calls `name`."""
-    if name.startswith(PREFIX):
+    if is_shipped(name):
         return name
-    if not source.startswith(PREFIX):
+    if not is_shipped(source):
         return os.path.join(os.path.dirname(source), name)
     beside = os.path.join(os.path.dirname(source.removeprefix(PREFIX)), name)
     return PREFIX + os.path.normpath(beside)

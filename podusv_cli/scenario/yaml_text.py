@@ -160,13 +160,15 @@ def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: 
 
 
 def read(
-    text: str, source: str, faults: list[Fault], *, placed: bool = True, most: int = MAX_NODES
-) -> Node | None:
+    text: str, source: str, faults: list[Fault], *, placed: bool = True, most: int = MAX_NODES,
+    above: tuple[str, ...] = (),
+) -> Node | None:  # fmt: skip
     """The tree of a single YAML document of at most `most` values; None if that is not possible.
 
-    Every fault is appended to `faults`. Marks have lines only where `placed`.
+    Every fault is appended to `faults`. Marks have lines only where `placed`, and then the files
+    `above` that extend this one.
     """
-    reader = _Reader(text, source, faults, placed, most)
+    reader = _Reader(text, source, faults, placed, most, above)
     try:
         return reader.document()
     except _CannotContinue as stop:
@@ -200,9 +202,11 @@ class _Reader:
     """Reads one document from the parser's events."""
 
     def __init__(
-        self, text: str, source: str, faults: list[Fault], placed: bool, most: int
-    ) -> None:
+        self, text: str, source: str, faults: list[Fault], placed: bool, most: int,
+        above: tuple[str, ...],
+    ) -> None:  # fmt: skip
         self._text, self._source, self._placed, self._most = text, source, placed, most
+        self._above = above
         self._events = _events(text)
         self._faults = faults
         self._nodes = 0
@@ -254,7 +258,9 @@ class _Reader:
         return _CannotContinue(place, text.format(problem=problem))
 
     def _mark(self, line: int, column: int) -> Mark:
-        return Mark(self._source, line + 1, column + 1) if self._placed else Mark(self._source)
+        if not self._placed:
+            return Mark(self._source)
+        return Mark(self._source, line + 1, column + 1, self._above)
 
     def _start(self, event: Any) -> Mark:
         return self._mark(event.start_mark.line, event.start_mark.column)

@@ -27,11 +27,15 @@ DISTRIBUTIONS = QUANTITY - {"keys"}
 
 @dataclass(frozen=True)
 class Mark:
-    """A position: a source with line and column from 1; line 0 if the source has no lines."""
+    """A position: a source with line and column from 1; line 0 if the source has no lines.
+
+    `above` are the files by whose `extends` the source was read, the scenario's own first.
+    """
 
     source: str
     line: int = 0
     column: int = 0
+    above: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """`file:line:column`, or just the source."""

@@ -125,8 +125,10 @@ def create(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def new_file(path: Path, size: int) -> Iterator[BinaryIO]:
+def new_file(path: Path, size: int, *, sync: bool = True) -> Iterator[BinaryIO]:
     """A new file of `size` bytes, open for writing in the block and synced after it.
+
+    Without `sync` it is not, and whoever writes several files syncs them together.
 
     Raises StorageError as `create` does, and for every OSError in the block.
     """
@@ -134,7 +136,8 @@ def new_file(path: Path, size: int) -> Iterator[BinaryIO]:
         descriptor = os.open(path, _CREATE, 0o666)
         with os.fdopen(descriptor, "wb", buffering=0) as file:
             yield file
-            os.fsync(descriptor)
+            if sync:
+                os.fsync(descriptor)
 
 
 def disk_array(folder: Path, size: int) -> Vector:

@@ -18,6 +18,9 @@ import numpy as np
 LEAST_ORDER = 0.5  # below this the differences hardly shrink
 LARGEST_ORDER = 5.0  # RK4 has order 4
 ROUNDING = 1e-12  # relative to the scale; smaller differences are rounding errors
+# In the number's own unit (m, N, J, ...). A picometre is what rounding leaves of a place 1 km away
+# after thousands of steps; what is that near to 0 has no relative error.
+FLOOR = 1e-12
 SAFETY = 4.0  # error over the largest difference, where there is no order
 
 
@@ -35,8 +38,8 @@ class Estimate:
 
     @property
     def relative(self) -> float:
-        """The error over the scale; 0 where the number does not change with the step."""
-        if self.error == 0.0:
+        """The error over the scale; 0 where the error is within `FLOOR`."""
+        if self.error <= FLOOR:
             return 0.0
         return self.error / self.scale if self.scale else math.inf
 

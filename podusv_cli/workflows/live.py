@@ -29,6 +29,7 @@ from podusv_cli.scenario.controls import Control, controls
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, load_text, yaml_text
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted, plain, route
 from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
 
@@ -45,13 +46,15 @@ class Live:
     source: str
     given: Sequence[str] = ()
     laws: Sequence[str] = ()
+    trust: bool = False  # whether plug-in files of somebody's folder may be executed
     offered: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words by key; none: numbers
     _puts: dict[str, tuple[Any, Case]] = field(default_factory=dict)  # the last one of each law
     _bases: dict[str, tuple[dict[str, Case], bool]] = field(default_factory=dict)  # by words
 
     def loaded(self, moved: Moved) -> Loaded:
         """The scenario with the values moved. Raises ScenarioError."""
-        return load(self.source, [*self.given, *assigned(moved)], (unknown_codes, limits()))
+        moves, checks = [*self.given, *assigned(moved)], (unknown_codes, limits())
+        return load(self.source, moves, checks, plugged=of_files(self.trust))
 
     def singles(self, scenario: Scenario) -> dict[str, Scenario]:
         """The scenario of each law that is shown, by label. Raises UsageError."""
@@ -234,7 +237,8 @@ class Live:
             inner[str(steps[end - 1])] = plain(node.mapping[str(steps[end - 1])])
         base = self.source if self.source.startswith("podusv:") else os.path.relpath(self.source)
         text = yaml_text({"extends": base, **changed})
-        new = load_text(text, str(file)).scenario.model_copy(update={"name": loaded.scenario.name})
+        new = load_text(text, str(file), plugged=of_files(self.trust)).scenario
+        new = new.model_copy(update={"name": loaded.scenario.name})
         if new != loaded.scenario:
             raise StorageError(f"{file}: what differs does not load to what is shown")
         try:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from podusv_cli.comparison.parsing import parse_claims
@@ -70,7 +69,7 @@ def loaded_for(
     if not isinstance(config, Path):
         loaded = config(checks)
     elif config.is_dir():
-        loaded = kept_scenario(config, *given, partial(plugins.loaded, trusted=request.trust))
+        loaded = kept_scenario(config, *given, plugins.of_folder(request.trust))
     else:
         loaded = load(config, *given, plugins.of_files(request.trust))
     loaded.told(lambda lost: request.warn(lost.removeprefix("warning: ")))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path, PurePosixPath
@@ -130,7 +130,7 @@ class Packed:
     contents: Contents
     _archive: archive.Archive
 
-    def unpack(self, out: Path) -> None:
+    def unpack(self, out: Path, tell: Callable[[float], object] = lambda part: None) -> None:
         """Write the folder, which appears whole; no file of it is imported or executed.
 
         Raises StorageError, also where `out` exists or a file is not the one that was packed.
@@ -141,7 +141,7 @@ class Packed:
         remove_abandoned(out.parent)
         staging = Staging(out)
         try:
-            self._archive.extract(staging.folder)
+            self._archive.extract(staging.folder, tell)
             manifest.check(staging.folder, optional=LOG)
             staging.publish(replace=False)
         finally:

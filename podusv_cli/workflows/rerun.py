@@ -20,7 +20,7 @@ from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.limits import limits, needed
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import loaded
+from podusv_cli.scenario.plugins import of_folder
 from podusv_cli.storage import manifest, run_folder
 from podusv_cli.storage.run_folder import LOG, FinishedRun
 from podusv_cli.storage.staging import Staging, remove_abandoned
@@ -109,7 +109,7 @@ def _scenario(run: FinishedRun, request: Request) -> Scenario:
     return load_stored(
         run.resolved_yaml, str(run.folder / run_folder.RESOLVED),
         checks=(limits(request.allow_large, read_back=True),),
-        plugged=partial(loaded, trusted=request.trust),
+        plugged=of_folder(request.trust),
     ).scenario  # fmt: skip
 
 

@@ -87,6 +87,9 @@ def run_loaded(
         noticed = examined(case)
     for line in _choices(scenario, others(loaded, request.controller)):
         request.say(line)
+    if claims := loaded.scenario.claims:
+        each = "claim is" if len(claims) == 1 else "claims are"
+        request.say(f"{len(claims)} {each} not judged by one run; `podusv compare` judges them")
     for finding in noticed:
         request.warn(finding)
     task = Task(

@@ -15,15 +15,17 @@ from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimated
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core import units
 from podusv_cli.core.component import unit_of
-from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import installed
-from podusv_cli.findings.finding import finding_kinds
+from podusv_cli.findings.finding import finding_kinds, unknown_codes
+from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.schema import schema_text
 from podusv_cli.scenario.yaml_text import resolve
 from podusv_cli.storage import files as storage
+from podusv_cli.studies.making.check import sweep_faults
 from podusv_cli.workflows.init import SCHEMA
 
 RADIUS = 2.0  # boat lengths, of the turn that is left at full moment
@@ -35,6 +37,9 @@ AFT = 0.4  # of the length, that thrusters are behind the middle
 BESIDE = "path: {kind: line}\ndisturbance: {kind: none}\ncontroller: {kind: los_pid}\n"
 THRUSTERS = re.compile(r"(\d)\s*x\s*([^@]+)@\s*(.+)")
 EXAMPLE = "2x180N@1.0: two of 180 N each, 1.0 m beside the centre line"
+# From models that fit in a hand to the largest ships; far beyond, the formulas overflow.
+SIZES = {"m": (1e-3, 1e3), "kg": (1e-3, 1e9), "N": (1e-4, 1e8), "m/s": (1e-3, 100.0)}
+NO_HULL_BEAM = ", or give --hull-beam: without it, each hull is a tenth of the length wide"
 # What is drawn in a study: a factor on each of these keys, by the name in `SCATTER`.
 FACTORS = {
     "I_z": ("I_z",), "X_udot": ("X_udot",), "Y_vdot": ("Y_vdot",), "N_rdot": ("N_rdot",),
@@ -94,12 +99,23 @@ def start_from(preset: str, out: Path) -> Path:
 def _written(out: Path, text: str) -> Path:
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
-    load_text(text, str(out))  # so that nothing is written that does not load
+    _check(text, out)
     plugins, schema = installed(), out.with_name(SCHEMA)
     storage.make_folder(out.parent)
     known = schema_text(tuple(finding_kinds(plugins)), plugins)
     storage.write_all({out: text.encode(), schema: known.encode()})
     return out
+
+
+def _check(text: str, out: Path) -> None:
+    """Raise UsageError for a scenario that `podusv validate` would refuse."""
+    try:
+        load_text(text, str(out), checks=(unknown_codes, limits(insist=""), sweep_faults))
+    except ScenarioError as error:
+        raise UsageError(
+            f"{out} is not written, since podusv would refuse it: {str(error).splitlines()[0]}; "
+            "check length, beam, mass, thrusters and speed, whether they are those of one boat"
+        ) from error
 
 
 def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
@@ -131,6 +147,7 @@ def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
         raise UsageError(
             f"{hull.mass:g} kg would make hulls of {hull.length:g} m by {hull.narrow:.3g} m "
             f"{hull.draught:.3g} m deep, deeper than they are wide; check length, beam and mass"
+            + (NO_HULL_BEAM if boat.hulls > 1 and not boat.hull_beam else "")
         )
     return hull, thrusters
 
@@ -147,6 +164,9 @@ def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
         raise UsageError(f"{option}: is no number in {unit}{wrong}")
     if not (0.0 < number < math.inf or (zero and number == 0.0)):
         raise UsageError(f"{option}: must be above 0 [{unit}]")
+    least, most = SIZES.get(unit, (0.0, math.inf))
+    if number and not least <= number <= most:
+        raise UsageError(f"{option}: is no boat's; must be from {least:g} to {most:g} {unit}")
     return float(number)
 
 

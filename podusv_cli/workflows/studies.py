@@ -87,7 +87,7 @@ def planned(study: Path, *, trusted: bool) -> StudyPlan:
     damaged or names another file; ScenarioError where its plug-ins are not trusted.
     """
     check_study(study)
-    made = plan(kept_scenario(study, plugged=partial(plugins.loaded, trusted=trusted)))
+    made = plan(kept_scenario(study, plugged=plugins.of_folder(trusted)))
     noted, ours = record.begun(study).identity, json_files.plain(made.identity)
     if keys := [key for key in differing(noted, ours) if not key.endswith(KERNELS)]:
         raise UsageError(

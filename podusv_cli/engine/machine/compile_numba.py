@@ -81,7 +81,7 @@ def bitcode(function: Any, prototype: Any) -> bytes:
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
         typed = signature(prototype, from_ctypes)
-        with unoptimised():
+        with plain_code():
             compiled = cfunc(typed, **OPTIONS)(_with_inlined(function))
     except NumbaError as error:
         raise TypeError(in_short(str(error))) from error
@@ -90,19 +90,24 @@ def bitcode(function: Any, prototype: Any) -> bytes:
     return finish.simplified(made, finish.SYMBOL)
 
 
-@contextmanager
-def unoptimised() -> Iterator[None]:
-    """Have numba leave its code as it comes.
+# Settings of numba while it compiles kernels. It would optimise each kernel by itself, and again in
+# the one that has it inlined. The others are a user's, of programs beside podusv: code that is not
+# compiled, or has notes for debuggers and profilers in it, is no kernel.
+SETTINGS = {"OPT": 0, "DISABLE_JIT": 0, "DEBUGINFO_DEFAULT": 0, "ENABLE_PROFILING": 0}
 
-    It would optimise each kernel by itself, and again the one that has it inlined.
-    """
+
+@contextmanager
+def plain_code() -> Iterator[None]:
+    """Have numba compile, and leave its code as it comes, whatever a user's NUMBA_* asks for."""
     with global_compiler_lock:
-        before = config.OPT
-        config.OPT = type(before)(0)
+        before = {name: getattr(config, name) for name in SETTINGS}
+        for name, number in SETTINGS.items():
+            setattr(config, name, type(before[name])(number))
         try:
             yield
         finally:
-            config.OPT = before
+            for name, setting in before.items():
+                setattr(config, name, setting)
 
 
 @cache

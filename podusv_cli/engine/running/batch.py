@@ -132,7 +132,8 @@ class Batch:
     invalid       its loop cannot be made, or has another structure than the others
     interrupted   an interrupt stopped it, or kept it from beginning
 
-    A run that did not begin has 0 instants reached and NaN in its rows.
+    A run that did not begin has 0 instants reached and NaN in its rows. `interrupted` says that an
+    interrupt came, whatever it stopped; it ends here, and the caller has to pass it on.
     """
 
     status: npt.NDArray[np.str_]  # (N,)
@@ -140,6 +141,7 @@ class Batch:
     reached: npt.NDArray[np.int64]  # (N,), good instants; steps + 1 for a finished run
     state: Vector  # (N, 6), the vessel's state where the march ended
     seen: Vector  # (N, probe.size)
+    interrupted: bool = False
 
     def note(self, run: BatchRun, ending: Ending) -> None:
         """Enter how a run ended."""
@@ -180,8 +182,7 @@ def simulate_many(
     with interrupts_deferred():
         plan = Plan.with_probe(like, grid, probe) if like else None
         runs = _Runs(loops, grid, batch, probe, plan, progress, side_by_side)
-        runs.march(workers or available_workers())
-    return batch
+        return replace(batch, interrupted=runs.march(workers or available_workers()))
 
 
 class InvalidLoop(Exception):
@@ -203,8 +204,11 @@ class _Runs:
         self._busy: list[MarchThread] = []
         self._over, self._settled = 0, False
 
-    def march(self, workers: int) -> None:
-        """March over all runs; an interrupt or an error stops those that are under way."""
+    def march(self, workers: int) -> bool:
+        """March over all runs; an interrupt or an error stops those that are under way.
+
+        Whether it was an interrupt.
+        """
         try:
             for position in range(len(self._loops)):
                 self._begin(position)
@@ -216,9 +220,10 @@ class _Runs:
                 if self._busy:
                     self._wait()
         except KeyboardInterrupt:
-            pass
+            return True
         finally:
             self._stop()
+        return False
 
     def _begin(self, position: int) -> None:
         """Make a run, and have it march alone, or wait for others to march beside it."""

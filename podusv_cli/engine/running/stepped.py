@@ -208,6 +208,11 @@ class SteppedBatch:
         """The time of the next instant [s], or of the last."""
         return min(self.reached, self.grid.steps) * self.grid.step
 
+    def times(self) -> Vector:
+        """The time of each run [s]: of its next instant, or of the one that it did not get past."""
+        ended = self._lanes.under_way[REACHED : REACHED + len(self.places)]
+        return np.where(self.alive, self.time, ended * self.grid.step)
+
     def view(self) -> Vector:
         """What `look` writes at the next instant; a run that has ended repeats another one."""
         self._aim(self.time)

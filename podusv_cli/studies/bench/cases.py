@@ -18,6 +18,7 @@ from podusv_cli.scenario import shipped
 from podusv_cli.scenario.layers import composed
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.yaml_text import read_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark
 
@@ -37,6 +38,7 @@ class Selection:
     laws: Sequence[Path] = ()
     overrides: Sequence[str] = ()
     chosen: Mapping[str, Sequence[str]] | None = None  # names by axis
+    trust: bool = False  # whether plug-in files of somebody's folder may be executed
 
 
 @dataclass(frozen=True)
@@ -77,9 +79,8 @@ def cases(wanted: Selection) -> Iterator[BenchCase]:
             f"extends: {names}\nname: {task}-{condition}-{vessel}\n"
             f"description: {task}, {condition}, {vessel}\n"
         )
-        loaded = load_text(
-            text, str(wanted.folder / f"{task}, {condition}, {vessel}"), wanted.overrides
-        )
+        place = str(wanted.folder / f"{task}, {condition}, {vessel}")
+        loaded = load_text(text, place, wanted.overrides, plugged=of_files(wanted.trust))
         yield BenchCase(vessel, task, condition, loaded.scenario.singles())
 
 

@@ -6,9 +6,11 @@ workers may join and restart. It gets no units where that is not what this proce
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import astuple, dataclass, replace
 from queue import Empty, SimpleQueue
@@ -27,6 +29,8 @@ WINDOW = 2  # units under way for each thread of a worker, so that none waits fo
 LOOK = 2.0  # s, after which it is looked again which workers there are
 PATIENCE = 30.0  # s for the connection
 REPORTING = 300.0  # s for the reports; a worker that is later is checked before its first unit
+LOST = (OSError, CancelledError)  # what Dask raises where the scheduler is gone
+TALKERS = ("distributed.client", "distributed.utils")  # they log tracebacks of what is raised here
 KILLED = "KilledWorker"  # Dask's exception for a task whose worker died, time after time
 
 
@@ -72,6 +76,8 @@ def _client(address: str) -> Any:
         from distributed import Client
     except ImportError:
         raise UsageError("--scheduler needs Dask: pip install 'podusv[cluster]'") from None
+    for name in TALKERS:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -115,6 +121,8 @@ class Cluster:
             report = future.result(timeout=patience)
         except TimeoutError:  # it is slow, or gone
             return
+        except LOST as error:
+            raise lost_scheduler(error) from error
         except Exception as error:  # podusv or Dask may be another one there, or miss
             raise UsageError(f"worker {worker} cannot load the study: {_words(error)}") from error
         finally:
@@ -201,10 +209,7 @@ class Cluster:
         try:
             reply: Reply = future.result()
         except Exception as error:
-            raise StorageError(
-                f"the connection to the scheduler was lost ({_words(error)}); all finished units "
-                "are kept: run it again to continue"
-            ) from error
+            raise lost_scheduler(error) from error
         future.release()
         return reply
 
@@ -230,7 +235,10 @@ class Cluster:
         if time.monotonic() - self._looked < LOOK:
             return
         self._looked = time.monotonic()
-        workers = self._client.scheduler_info(n_workers=-1)["workers"]
+        try:
+            workers = self._client.scheduler_info(n_workers=-1)["workers"]
+        except LOST as error:
+            raise lost_scheduler(error) from error
         self._threads = {name: worker["nthreads"] for name, worker in workers.items()}
         for future, task in list(self._running.items()):
             if task.allowed is not None and task.allowed.isdisjoint(self._threads):
@@ -253,6 +261,14 @@ class Cluster:
             for worker, tasks in self._made.items()
         ]  # fmt: skip
         return {"workers": workers, "refused": self._refused}
+
+
+def lost_scheduler(error: BaseException) -> StorageError:
+    """What to say where the scheduler does not answer any more."""
+    return StorageError(
+        f"the connection to the scheduler was lost ({_words(error)}); all finished units are kept: "
+        "run it again to continue"
+    )
 
 
 def _joined(units: Iterable[Unit]) -> Iterator[str]:

@@ -17,6 +17,7 @@ import podusv_cli
 from podusv_cli.process.interrupts import Interrupts
 from podusv_cli.process.workers import Outcome, outcome_of
 from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage.provenance import processor
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making.dispatch import timed
@@ -44,7 +45,8 @@ def _placed(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
         place = Path(folder.name, name)
         place.parent.mkdir(exist_ok=True)
         place.write_text(text, encoding="utf-8")
-    return plan(load_text(recipe.text, str(Path(folder.name, "scenario.yaml")))), folder
+    source = str(Path(folder.name, "scenario.yaml"))
+    return plan(load_text(recipe.text, source, plugged=of_files(trusted=True))), folder
 
 
 def _plan(recipe: StudyText) -> StudyPlan:

@@ -54,8 +54,8 @@ def object_code(function: Any, prototype: Any) -> Code:
 def bitcode(function: Any, prototype: Any) -> bytes:
     """The kernel for lanes, for any machine. Raises what `object_code` gives as a reason."""
     signature = compile_numba.signature(prototype, _type)
-    compiled = njit(**compile_numba.INNER)(_with_inlined(function))
-    with compile_numba.unoptimised():  # which `widening` works on
+    with compile_numba.plain_code():  # which `widening` works on
+        compiled = njit(**compile_numba.INNER)(_with_inlined(function))
         compiled.compile(signature.args)
     scalar = compiled.overloads[signature.args]
     module = llvm.parse_assembly(scalar.library.get_llvm_str())
