@@ -7,6 +7,7 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from uuid import uuid4
 
 import pytest
 from command_samples import BASE, PATIENCE, TWO, Said, commanded, under_way, write
@@ -332,6 +333,18 @@ def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):
         "podusv verify one.yaml --set 'description=two words'"
     )
     assert podusv("x", "--out", "y").err.endswith(": podusv verify SCENARIO\n")
+
+
+def test_numbers_that_verify_has_found_converged_are_not_doubted_again(podusv, monkeypatch, capsys):
+    name = f"name=fine_{uuid4().hex}"  # what was verified is known to later sessions of tests
+    fine = (write("fine.yaml", BASE), "--set", "simulation.step=0.0025", "--set", name)
+    hint = "may not have converged"
+    assert hint in podusv(*fine, "--out", "x").err
+    verified = commanded(monkeypatch, capsys)("verify", *fine)
+    assert verified.code == 0, verified.out
+    assert hint not in podusv(*fine, "--out", "y").err
+    assert hint not in podusv("y", "--out", "z").err
+    assert hint in podusv(*fine, "--out", "w", "--set", "start.y=-1.9").err
 
 
 # --- controllers without a controller

@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import h5py
@@ -464,3 +465,20 @@ def test_python_knows_them() -> None:
 def test_every_name_that_plugins_are_promised_is_there():
     for name in (*plugin.__all__, *plugin.FIGURES):
         assert getattr(plugin, name) is not None
+
+
+def test_a_module_beside_a_plug_in_is_noticed_and_one_that_is_installed_is_not(podusv, monkeypatch):
+    """The run folder keeps no module that a plug-in imports, so that nobody else can run it."""
+    monkeypatch.syspath_prepend(Path.cwd())
+    write("pushing_helper.py", "GAIN = 0.5\n")
+    other = LAW.replace("import numpy as np\n", "import numpy as np\nimport pushing_helper\n", 1)
+    said = {}
+    for name, text in {"alone": LAW, "beside": other}.items():
+        write(f"{name}.py", text)
+        write(f"{name}.yaml", SCENARIO.replace("laws/my_law.py", f"{name}.py"))
+        said[name] = podusv("validate", f"{name}.yaml").out
+    monkeypatch.delitem(sys.modules, "pushing_helper")
+    assert "unkept-module" not in said["alone"]
+    assert "beside.py imports pushing_helper, whose file a run folder does not keep" in (
+        " ".join(said["beside"].split())
+    )

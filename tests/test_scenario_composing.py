@@ -35,6 +35,15 @@ def test_a_child_changes_single_keys_of_its_base():
     assert got.text == Path("sub/child.yaml").read_text()
 
 
+def test_a_description_tells_of_its_own_file_alone():
+    """What a base says of its sea may be false of a child's."""
+    write("base.yaml", SOUND + "description: In calm water.\nname: base\n")
+    write("child.yaml", "extends: base.yaml\nstart: {y: 5}\n")
+    write("told.yaml", "extends: child.yaml\ndescription: In wind.\n")
+    said = {name: load(f"{name}.yaml").scenario.description for name in ("base", "child", "told")}
+    assert said == {"base": "In calm water.", "child": "", "told": "In wind."}
+
+
 def test_several_levels_and_lists_are_replaced_whole():
     law = "controller: {kind: dsc, network: {nodes: [5, 5, 5], low: [-2, -2, -2]}}\n"
     write("a.yaml", SOUND.replace("controller: {kind: pid}\n", law))
@@ -237,7 +246,7 @@ def test_of_several_bases_the_later_goes_over_the_earlier():
     write("second.yaml", "description: second\nstart: {x: 7.0}\n")
     write("a.yaml", "extends: [first.yaml, second.yaml]\nstart: {y: 8.0}\n")
     scenario = load("a.yaml").scenario
-    assert (scenario.name, scenario.description) == ("first", "second")
+    assert (scenario.name, scenario.description) == ("first", "")
     assert (scenario.start.x, scenario.start.y) == (7.0, 8.0)
 
 

@@ -111,7 +111,7 @@ def compare(
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
-    if done.result.entries and not quiet:
+    if done.result.entries and not (quiet or done.verified):
         echo(_advice(items, assign or (), plugin or ()), err=True)
     if not (figure or quiet or as_json):
         echo_how_to_draw(done.folder, done.places())

@@ -11,6 +11,7 @@ import typer
 
 from podusv_cli.cli.options import AsJson, Assignments, Config, Plugins, Trust
 from podusv_cli.cli.terminal import Warnings, echo, echo_entry, echo_json, echo_table
+from podusv_cli.verification import TOLERANCE
 
 if TYPE_CHECKING:
     from podusv_cli.verification.ranking import Ranking
@@ -25,7 +26,7 @@ def verify(
     assign: Assignments = None,
     tolerance: Annotated[
         float, typer.Option(min=0.0, help="Relative error up to which a number is converged.")
-    ] = 0.01,
+    ] = TOLERANCE,
     out: Annotated[
         Path | None,
         typer.Option(help="File to write the JSON object to as well; replaces an earlier one."),

@@ -30,6 +30,7 @@ from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
+from podusv_cli.verification import TOLERANCE
 from podusv_cli.verification import verify as verification
 from podusv_cli.workflows import compare as comparing
 from podusv_cli.workflows import doubt as doubting
@@ -226,7 +227,7 @@ def simulate_many(
 
 
 def verify(
-    source: Source, changes: Changes | None = None, *, tolerance: float = 0.01
+    source: Source, changes: Changes | None = None, *, tolerance: float = TOLERANCE
 ) -> pd.DataFrame:
     """Whether the numbers of a scenario have converged, as `podusv verify` finds out.
 

@@ -67,14 +67,14 @@ def _over(base: Node, top: Node, faults: list[Fault]) -> Node:
 def _layers(text: str, source: str, faults: list[Fault], placed: bool) -> list[Node]:
     """The tree of the scenario's text, then those of all that it extends, nearest first.
 
-    The key `extends` is removed; the first tree is faulty if an extended file cannot be read. Of
-    several bases the later one overrides the earlier.
+    The key `extends` is removed, and of extended files `description`; the first tree is faulty if
+    an extended file cannot be read. Of several bases the later one overrides the earlier.
     """
     node = _mapping(text, source, faults, placed)
     if not node:
         return []
     bases = list(_bases(node, source, faults))
-    own = replace(_without_extends(node), faulty=node.faulty or not all(bases))
+    own = replace(_without(node, "extends"), faulty=node.faulty or not all(bases))
     return [own, *filter(None, bases)]
 
 
@@ -87,14 +87,14 @@ def _bases(node: Node, source: str, faults: list[Fault]) -> Iterator[Node | None
         name, sources = waiting.pop()
         base = _read_base(name, sources, faults)
         tree = _mapping(base[1], base[0], faults, above=sources) if base else None
-        yield tree and _without_extends(tree)
+        yield tree and _without(tree, "extends", "description")  # which tells of that file alone
         if base and tree:
             waiting += [(further, (*sources, base[0])) for further in extended_files(tree)]
 
 
-def _without_extends(node: Node) -> Node:
-    """The tree without `extends`."""
-    return replace(node, content={k: e for k, e in node.mapping.items() if k != "extends"})
+def _without(node: Node, *keys: str) -> Node:
+    """The tree without these keys at its top."""
+    return replace(node, content={k: e for k, e in node.mapping.items() if k not in keys})
 
 
 def extended_files(node: Node) -> tuple[Node, ...]:

@@ -36,6 +36,7 @@ from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened, writer_of
+from podusv_cli.workflows.verify import is_verified
 
 if TYPE_CHECKING:
     from podusv_cli.doubt.outputs import Doubted
@@ -53,6 +54,7 @@ class Compared:
     status: Status  # "interrupted" where a run or the figures were, else "finished"
     missing: tuple[Failure, ...] = ()  # in the comparison and its runs
     doubted: Doubted | None = None  # what the verdicts hang on, where that was asked for
+    verified: bool = False  # whether `podusv verify` has found all of its numbers converged
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
@@ -162,7 +164,8 @@ def compare_gathered(
         origin = writer.add_origin(result.plugins)
         _add_report(writer, result, given.name, origin, extras, progress, request)
         folder = writer.finish(missing=lost)
-        return Compared(folder, result, writer.status, tuple(extras.missing), doubted)
+        verified = all(is_verified(m.resolved) for m in given.members if not m.track)
+        return Compared(folder, result, writer.status, tuple(extras.missing), doubted, verified)
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:

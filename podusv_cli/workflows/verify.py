@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 
+import podusv_cli
 from podusv_cli.core.errors import StorageError, UsageError
+from podusv_cli.engine.machine import code_folder, object_cache
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import load
+from podusv_cli.scenario.load import load, resolved_yaml
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage import files, json_files
+from podusv_cli.verification import TOLERANCE
 from podusv_cli.verification import verify as verification
 from podusv_cli.verification.verify import Verification
 
@@ -36,7 +40,30 @@ def verify(
     if out:
         files.check_places([out])
         _spare(out, force)
-    return verification.verify(scenario, tolerance, progress)
+    done = verification.verify(scenario, tolerance, progress)
+    if not done.unconverged and tolerance <= TOLERANCE:
+        _remember(map(resolved_yaml, scenario.singles().values()))
+    return done
+
+
+def _remember(runs: Iterable[str]) -> None:
+    """Keep, beside compiled code, that the numbers of these resolved scenarios have converged."""
+    for resolved in runs:
+        if mark := _mark(resolved):
+            with suppress(OSError):  # a hint is shown once more, no more
+                code_folder.write(mark, b"")
+
+
+def is_verified(resolved: str) -> bool:
+    """Whether `verify` has found that the numbers of a resolved scenario have converged."""
+    mark = _mark(resolved)
+    return bool(mark and mark.exists())
+
+
+def _mark(resolved: str) -> Path | None:
+    folder = code_folder.code_folder(object_cache.translators())
+    digest = sha256(f"{podusv_cli.__version__}\n{resolved}".encode()).hexdigest()[:16]
+    return folder / f"{digest}.verified" if folder else None
 
 
 def keep(done: Verification, out: Path, *, force: bool = False) -> None:
