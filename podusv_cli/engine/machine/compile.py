@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from podusv_cli.core.errors import LawError
+from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.engine.machine import finish, object_cache, shipped, signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
 from podusv_cli.process.interrupts import interrupts_deferred
@@ -23,8 +23,7 @@ from podusv_cli.process.workers import available_workers, run_all
 ALONE_BY, LANES_BY = "compile_numba", "wide.object_code"
 SYMBOLS = {ALONE_BY: finish.SYMBOL, LANES_BY: "podusv_lanes"}
 NO_NUMBA = (
-    "its machine code does not come with podusv, and numba, which makes it, is not installed; "
-    "pip install numba"
+    "its machine code does not come with podusv, and numba, which makes it, cannot be imported"
 )
 SHARE = 40_000  # size of what a process of its own compiles at least: about 3 s
 RULES = (
@@ -32,6 +31,10 @@ RULES = (
     "tau[0] = ...), calls math.sin and the like and other kernels, and allocates, prints and "
     "raises nothing"
 )
+
+
+class NoTranslator(TypeError):
+    """Nothing is wrong with a kernel, but nothing here can compile it."""
 
 
 class Piece(NamedTuple):
@@ -80,13 +83,11 @@ class Piece(NamedTuple):
             return cast(object_cache.Code, made)
 
     def translator(self) -> Any:
-        """The module that makes its code. Raises TypeError without numba."""
+        """The module that makes its code. Raises NoTranslator where numba cannot be imported."""
         try:
             return import_module(f"podusv_cli.engine.machine.{self.compiler}")
-        except ModuleNotFoundError as error:
-            if error.name != "numba":
-                raise
-            raise TypeError(NO_NUMBA) from error
+        except ImportError as error:
+            raise NoTranslator(f"{NO_NUMBA} ({in_a_line(error)}); pip install numba") from error
 
 
 @cache  # it reads all byte code of a piece
@@ -160,7 +161,8 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
         return compiled(adapter(part, inner, names))
     except TypeError as error:
         place = f"{Path(inner.__code__.co_filename).name}, line {inner.__code__.co_firstlineno}"
-        reason = unsupported(inner) or f"{error}; {RULES}"
+        is_faulty = not isinstance(error, NoTranslator)
+        reason = (is_faulty and unsupported(inner)) or f"{error}{f'; {RULES}' if is_faulty else ''}"
         raise LawError(
             f"kernel {inner.__qualname__} ({place}) cannot become machine code: {reason}"
         ) from error

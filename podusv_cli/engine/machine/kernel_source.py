@@ -22,18 +22,24 @@ def has_source(function: Any) -> bool:
 
 def source(function: Any) -> ast.FunctionDef:
     """A kernel as it was written. Raises OtherSource where the file is another one by now."""
+    check_source(function)
     code = function.__code__
-    try:
-        nodes, codes = _functions(_text(function), code.co_filename)
-    except SyntaxError as error:
-        raise OtherSource(f"{code.co_filename} is no Python any more") from error
-    place = code.co_name, code.co_firstlineno
-    found = codes.get(place)
-    if found is None or _content(found) != _content(code):
-        raise OtherSource(f"{code.co_filename} was edited since {code.co_name} was loaded")
+    nodes, place = _nodes(_text(function)), (code.co_name, code.co_firstlineno)
     if place not in nodes:
         raise OtherSource(f"{code.co_filename}, line {place[1]}: a lambda; write it with def")
     return nodes[place]
+
+
+def check_source(function: Any) -> None:
+    """Raises OtherSource where the file of a kernel has another one by now than what runs."""
+    code = function.__code__
+    try:
+        codes = _codes(_text(function), code.co_filename)
+    except SyntaxError as error:
+        raise OtherSource(f"{code.co_filename} is no Python any more") from error
+    found = codes.get((code.co_name, code.co_firstlineno))
+    if found is None or _content(found) != _content(code):
+        raise OtherSource(f"{code.co_filename} was edited since {code.co_name} was loaded")
 
 
 def _content(code: CodeType) -> tuple[Any, ...]:
@@ -49,18 +55,22 @@ def _text(function: Any) -> str:
 
 
 @cache
-def _functions(text: str, filename: str) -> tuple[dict[Any, ast.FunctionDef], dict[Any, CodeType]]:
-    """Every function of a file by name and first line, as source and as byte code."""
-    tree = ast.parse(text)
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    nodes = {
+def _nodes(text: str) -> dict[Any, ast.FunctionDef]:
+    """Every function of a file by name and first line, as source."""
+    functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
+    return {
         (node.name, min([node.lineno, *(d.lineno for d in node.decorator_list)])): node
         for node in functions
     }
+
+
+@cache
+def _codes(text: str, filename: str) -> dict[Any, CodeType]:
+    """The same as byte code."""
     codes: dict[Any, CodeType] = {}
     waiting = [compile(text, filename, "exec")]
     while waiting:
         code = waiting.pop()
         codes[code.co_name, code.co_firstlineno] = code
         waiting += [part for part in code.co_consts if isinstance(part, CodeType)]
-    return nodes, codes
+    return codes

@@ -23,7 +23,7 @@ from typing import Any
 import llvmlite.binding as llvm
 
 from podusv_cli.core.plugins import TEXT
-from podusv_cli.engine.machine import object_cache
+from podusv_cli.engine.machine import kernel_source, object_cache
 
 FILE = Path(__file__).with_name("kernels.xz")
 # The files of podusv that make bitcode, from the package's folder.
@@ -40,10 +40,10 @@ def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
 
 @cache
 def digest(function: Any, prototype: Any, compiler: str) -> str:
-    """What a kernel is kept under; empty where a source is not there."""
+    """What a kernel is kept under; empty where its file is gone, or edited since it was loaded."""
     try:
         words = [compiler, _typed(prototype), *object_cache.ingredients(function, {}, written)]
-    except OSError:
+    except (OSError, kernel_source.OtherSource):
         return ""
     return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
 
@@ -75,6 +75,7 @@ def written(function: Any) -> tuple[str, ...]:
     code = function.__code__
     if (text := function.__globals__.get(TEXT)) is not None:
         return code.co_name, str(code.co_firstlineno), text
+    kernel_source.check_source(function)  # the digest is of the text, and the byte code runs
     lines = linecache.getlines(code.co_filename)[code.co_firstlineno - 1 :]
     if not lines:
         raise OSError(f"{code.co_filename} has no line {code.co_firstlineno}")
