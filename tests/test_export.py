@@ -191,7 +191,7 @@ def test_the_description_of_the_fmu_names_every_variable_once():
     law = ExportedLaw.of(scenario("momentum_vector", **PODS))
     about = {
         **c.template_values(law), "guid": "g", "outputs": [13, 14], "stop": "30.0",
-        "variables": variables(law, np.arange(15.0)), "loads": True,
+        "units": ["N"], "variables": variables(law, np.arange(15.0)), "loads": True,
     }  # fmt: skip
     tree = ET.fromstring(c.rendered("modelDescription.xml", about))
     found = [variable.get("name") for variable in tree.iter("ScalarVariable")]

@@ -104,7 +104,7 @@ def test_only_what_was_offered_may_move(live: Live, moved: dict[str, Any]) -> No
     assert "not among the values that this page moves" in refused["text"]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def address() -> Iterator[tuple[str, str]]:
     """Host and path of a page that is served, which Ctrl-C ends with exit code 130."""
     command = [sys.executable, "-m", "podusv_cli", "live", OWN, "--no-open", "--set", *SHORT]
@@ -112,9 +112,12 @@ def address() -> Iterator[tuple[str, str]]:
         assert process.stdout
         found = re.search(r"http://([^/]+)(/\S+)", process.stdout.readline())
         assert found
-        yield found[1], found[2]
-        process.send_signal(signal.SIGINT)
-        assert process.wait(30) == 130
+        try:
+            yield found[1], found[2]
+            process.send_signal(signal.SIGINT)
+            assert process.wait(30) == 130
+        finally:
+            process.kill()
 
 
 QUESTION = json.dumps({"moved": {}, "signals": [], "rest": False, "controls": False})

@@ -14,6 +14,7 @@ import pytest
 from tune_samples import planned, searched, toy, tuned
 
 from podusv_cli.scenario.load import load
+from podusv_cli.scenario.plugins import of_files
 from podusv_cli.studies.counting.runs import UnitResult
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.remarks import remarks
@@ -121,7 +122,7 @@ def test_a_law_without_gains_is_kept_and_reported(done):
 
 
 def test_the_found_scenario_extends_the_searched_one(done):
-    scenario = load(done.folder / "tuned.yaml").scenario
+    scenario = load(done.folder / "tuned.yaml", plugged=of_files(trusted=True)).scenario
     assert scenario.name == "toy-tuned"
     assert scenario.tune is None
     assert scenario.sweep
@@ -146,7 +147,7 @@ def test_the_found_gains_give_the_numbers_of_the_validation(done):
     from podusv_cli.studies.making.unit import Unit, make
     from podusv_cli.studies.tuning.plan import VALIDATE
 
-    scenario = load(done.folder / "tuned.yaml").scenario
+    scenario = load(done.folder / "tuned.yaml", plugged=of_files(trusted=True)).scenario
     gains = {key: getattr(scenario.controllers["toy"], key) for key in ("gain", "other")}
     made = done.results.plan.variant({"toy": ("toy", gains)}, VALIDATE, 12)
     again = make(made, Unit("toy", 0, 3, 1)).metrics["effort_u"][0]

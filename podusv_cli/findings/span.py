@@ -12,7 +12,7 @@ from podusv_cli.scenario.model import Scenario
 def counted_rows(scenario: Scenario, log: Recording) -> Mask:
     """The rows up to the end of a path that has one, else all; see `metrics.spans`."""
     rows = np.arange(len(log["time"]))
-    last = log.row_at(scenario.closed_loop().passed_by(1.0))
+    last = log.row_at(scenario.passed_by(1.0))
     return rows >= 0 if last is None else rows <= last
 
 
@@ -22,6 +22,6 @@ def steady_rows(scenario: Scenario, log: Recording) -> Mask:
     A log that does not come so far on its path has the last part of the time.
     """
     share = 1.0 - scenario.metrics.steady_fraction
-    first = log.row_at(scenario.closed_loop().passed_by(share))
+    first = log.row_at(scenario.passed_by(share))
     late = log["time"] >= (scenario.steady_from() if first is None else log["time"][first])
     return late & counted_rows(scenario, log)

@@ -29,13 +29,12 @@ def about_of(scenario: Scenario) -> RunAbout:
 
 def _told_by(scenario: Scenario) -> RunAbout:
     law, approach = scenario.controller, scenario.controller.approach()
-    loop = scenario.closed_loop()
     return RunAbout(
         **_of_parts(scenario),
         values=scenario.model_dump(mode="json", exclude={*BESIDE_RUNS}),
         metrics={n: m.about for n, m in scenario.known_metrics().items() if n not in METRICS},
-        path_end=loop.passed_by(1.0),
-        path_steady=loop.passed_by(1.0 - scenario.metrics.steady_fraction),
+        path_end=scenario.passed_by(1.0),
+        path_steady=scenario.passed_by(1.0 - scenario.metrics.steady_fraction),
         trial=not law.aims(), standoff=approach.standoff if approach else 0.0,
         polar=isinstance(law, PolarBackstepping), optimum_of=law.optimum_of(),
         duration=scenario.simulation.duration, step=scenario.simulation.step,

@@ -26,7 +26,7 @@ from podusv_cli.core.plugins import Plugins, from_file, installed
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
-from podusv_cli.engine.loop.closed_loop import ClosedLoop
+from podusv_cli.engine.loop.closed_loop import ClosedLoop, passed_by
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.metrics.metric import Metric
@@ -293,6 +293,10 @@ class Scenario(Component):
     def steady_from(self) -> float:
         """When the part of the run begins that counts as settled [s]."""
         return self.time_grid().last_part(self.metrics.steady_fraction)
+
+    def passed_by(self, share: float) -> dict[str, float]:
+        """Where this share of the path lies behind the vessel: numbers of the path's `places`."""
+        return passed_by(self.path, self.controller, share)
 
     def at_target(self, numbers: Mapping[str, float]) -> bool:
         """Whether a run with these metrics ends at its target, see `core.about.at_target`."""

@@ -237,9 +237,9 @@ class Live:
             inner[str(steps[end - 1])] = plain(node.mapping[str(steps[end - 1])])
         base = self.source if self.source.startswith("podusv:") else os.path.relpath(self.source)
         text = yaml_text({"extends": base, **changed})
+        own = {name: getattr(loaded.scenario, name) for name in ("name", "description")}
         new = load_text(text, str(file), plugged=of_files(self.trust)).scenario
-        new = new.model_copy(update={"name": loaded.scenario.name})
-        if new != loaded.scenario:
+        if new.model_copy(update=own) != loaded.scenario:
             raise StorageError(f"{file}: what differs does not load to what is shown")
         try:
             with open(file, "x", encoding="utf-8") as out:  # never over another

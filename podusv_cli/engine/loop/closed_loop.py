@@ -34,6 +34,14 @@ def nothing() -> None:
     """Stands for a part that a loop does not have: a kernel takes those arguments that it names."""
 
 
+def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
+    """Where this share of a path lies behind the vessel, as the path says it.
+
+    Empty where the path has no end, or nobody follows it.
+    """
+    return path.passed_by(share) if path.follows and law.aims() else {}
+
+
 @dataclass(frozen=True)
 class Probe:
     """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant of a run.
@@ -96,12 +104,8 @@ class ClosedLoop:
         return self.controller.aims() and not self.path.follows
 
     def passed_by(self, share: float) -> dict[str, float]:
-        """Where this share of a path lies behind the vessel, as the path says it.
-
-        None where the path has no end, or nobody follows it.
-        """
-        followed = self.path.follows and self.controller.aims()
-        return self.path.passed_by(share) if followed else {}
+        """Where this share of the path lies behind the vessel, see `passed_by`."""
+        return passed_by(self.path, self.controller, share)
 
     def lyapunov(self) -> Any:
         """The law where (46) is its Lyapunov function; None where it sees another target."""
