@@ -22,7 +22,7 @@ A vessel of 1.3 m starts 12 m away from a target that it is to follow. Wind, wav
 it, and its propellers give no more than 8 N and 2.5 N m. This file has all of it, and three laws:
 """
 MEANWHILE = """\
-Simulating. The first time, podusv translates the laws into machine code, which takes half a minute.
+Simulating, which takes some seconds, and a few more where numba has to compile a kernel.
 Watch pid_winds_up on the page: while the limit holds the vessel back, the law's integral grows."""
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
@@ -36,7 +36,7 @@ def demo(
 ) -> None:
     """Compare three laws in a chase, and open the page with animation, claims and figures.
 
-    Half a minute the first time. Without a display the page is named.
+    Some seconds. Without a display the page is named.
     """
     from podusv_cli.scenario.shipped import file_of
 
