@@ -158,6 +158,8 @@ TABLE: dict[str, list[Row]] = {
     ('np.all(np.diff(log["time"]) > 0.0)', 'np.all(np.diff(log["time"]) >= 0.0)',
      "test_a_log_that_lacks_what_every_run_has"),
     ("while label.casefold() in used:", "while label in used:", "test_names_are_told_apart"),
+    ("if not done.unconverged and tolerance <= TOLERANCE:", "if tolerance <= TOLERANCE:",
+     "test_numbers_that_verify_has_found_converged_are_not_doubted_again"),
 ],
 "comparison": [
     ("((i >> 1) + places[i] / 256)", "((i >> 1) + places[i] / 128)",
@@ -266,6 +268,8 @@ TABLE: dict[str, list[Row]] = {
     ("at.what == what and at.time < case.scenario.simulation.duration", "at.what == what",
      "test_what_comes_after_the_run_is_not_told"),
     ("LONG = 0.02 ", "LONG = 0.2 ", "test_saturation_is_long_from_a_fiftieth_of_the_run"),
+    ("return file.is_relative_to(folder) and", "return file.parent.parent == folder and",
+     "test_a_module_beside_a_plug_in_is_noticed"),
 ],
 "figures": [
     ("starts + bins.argmin(1), starts + bins.argmax(1)", "starts + bins.argmin(1)",
@@ -348,6 +352,10 @@ TABLE: dict[str, list[Row]] = {
      "test_a_fault_is_one_sentence_at_its_place"),
     ("    if NOT_FINITE.fullmatch(text):\n", "    if False:\n",
      "test_a_fault_is_one_sentence_at_its_place"),
+    ('_without(tree, "extends", "description")', '_without(tree, "extends")',
+     "test_a_description_tells_of_its_own_file_alone"),
+    ("range(HALVINGS // LEVELS)", "range(HALVINGS // LEVELS - 2)",
+     "test_shares_are_those_of_one_bisection_after_another"),
 ],
 "export": [
     ('for i, variable in enumerate(shown, 1) if variable.causality == "output"',
@@ -468,6 +476,14 @@ TABLE: dict[str, list[Row]] = {
     ("shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), k,",
      "t, tail(held, HELD_X), memory, tail(held, HELD_TARGET), k,",
      SURVIVES + "test_a_sampled_law_is_integrated_at_fourth_order_to_another_solution"),
+    ("    kernel_source.check_source(function)  # the digest", "    # the digest",
+     "test_a_kernel_whose_file_was_edited_since_it_was_loaded_takes_no_bitcode"),
+    (" and tuple(version) <= llvm.llvm_version_info", "",
+     "test_a_damaged_or_foreign_file_gives_no_kernels"),
+    ("if makers == object_cache.translators(MAKERS) and", "if",
+     "test_a_damaged_or_foreign_file_gives_no_kernels"),
+    ("raise NoTranslator(", "raise ValueError(",
+     "test_without_numba_runs_have_the_same_bytes_and_a_law_of_ones_own_is_told"),
 ],
 "doubt": [
     ('"start": {\n        "m": _plus(_length, 5.0, 0.5), "rad": _plus(_radian, math.pi, 0.2),',

@@ -345,6 +345,9 @@ def test_numbers_that_verify_has_found_converged_are_not_doubted_again(podusv, m
     assert hint not in podusv(*fine, "--out", "y").err
     assert hint not in podusv("y", "--out", "z").err
     assert hint in podusv(*fine, "--out", "w", "--set", "start.y=-1.9").err
+    coarse = ("fine.yaml", "--set", f"{name}_coarse")
+    assert commanded(monkeypatch, capsys)("verify", *coarse).code == 3
+    assert hint in podusv(*coarse, "--out", "v").err
 
 
 # --- controllers without a controller
