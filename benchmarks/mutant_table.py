@@ -269,7 +269,7 @@ TABLE: dict[str, list[Row]] = {
      "test_what_comes_after_the_run_is_not_told"),
     ("LONG = 0.02 ", "LONG = 0.2 ", "test_saturation_is_long_from_a_fiftieth_of_the_run"),
     ("return file.is_relative_to(folder) and", "return file.parent.parent == folder and",
-     "test_a_module_beside_a_plug_in_is_noticed"),
+     "test_a_module_beside_a_plug_in_is_noticed_and_one_that_is_installed_is_not"),
 ],
 "figures": [
     ("starts + bins.argmin(1), starts + bins.argmax(1)", "starts + bins.argmin(1)",
