@@ -224,11 +224,13 @@ def test_the_verdicts_on_the_page_are_those_of_the_comparison(name: str) -> None
 
 @pytest.mark.papers
 def test_the_numbers_on_the_page_are_those_of_the_comparisons() -> None:
-    course, load, beside = (compared(name).table for name in ("course", "load", "beside"))
+    course, beside = (compared(name).table for name in ("course", "beside"))
+    paper = compared("load")["paper"]
+    late = paper["e_ct"][paper["time"] >= 400.0]  # on the last leg, which goes on
     told = {claim: found for claim, _, _, found in ROWS}
     assert f"{course.loc['e_ct_rms', 'without_sway']:.3f} m rms" in told["F6b"]
     assert f"{compared('cybership2').table.loc['e_ct_rms', 'one_length']:.2f} m rms" in told["F7w"]
-    assert f"{load.loc['e_ct_steady', 'paper']:.3f} m for ever" in told["F9"]
+    assert f"{np.mean(np.abs(late)):.3f} m for ever" in told["F9"]
     assert f"{beside.loc['e_ct_rms', 'paper']:.2f} m rms" in told["F10"]
     for law in ("alos", "velocity_vector"):
         assert f"`{law}` {beside.loc['e_ct_rms', law]:.2f} m" in told["F10"]
