@@ -190,6 +190,8 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_curves_of_different_logs_meet_at_the_same_times"),
 ],
 "study": [
+    ("            logger.removeFilter(critical)\n", "            pass\n",
+     "test_dask_says_to_its_users_afterwards_what_it_said_before"),
     ("    for key, fault in of_numbers(made, scenario):\n", "    for key, fault in ():\n",
      "test_a_draw_is_refused_where_loading_the_scenario_with_it_is"),
     ("if sound is None or any(", "if sound is None and any(",
@@ -662,7 +664,7 @@ TABLE: dict[str, list[Row]] = {
      "test_the_derivatives_are_those_of_the_plant"),
 ],
 "process": [
-    ("    except (ValueError, RecursionError):\n        return None", "    except ValueError:\n        return None",
+    ("    except (ValueError, RecursionError):", "    except ValueError:",
      "test_every_question_is_answered_and_the_page_goes_on"),
     ("        if not isinstance(asked, dict):\n", "        if asked is None:\n",
      "test_every_question_is_answered_and_the_page_goes_on"),
