@@ -562,6 +562,10 @@ TABLE: dict[str, list[Row]] = {
      "test_energy_and_travel_are_those_of_the_log"),
 ],
 "path_ends": [
+    ("    if len(place) > 2 or not", "    if not",
+     "test_a_path_that_does_not_say_where_it_ends_is_one_sentence"),
+    ('has_end = "over_at" in _asked_span(layout)', "has_end = bool(plan.loop.passed_by(1.0))",
+     "test_a_path_that_does_not_say_where_it_ends_is_one_sentence"),
     ("    if seen[OVER] == 0.0:\n", "    if True:\n",
      "test_no_metric_depends_on_how_long_the_run_goes_on"),
     ("steady = WITHIN if seen[LATE] > 0.0 or t >= k.steady_from else BEFORE",
