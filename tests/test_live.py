@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Mapping
-from http.client import HTTPConnection
+from contextlib import suppress
+from http.client import HTTPConnection, HTTPResponse
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +19,7 @@ import h5py
 import numpy as np
 import pytest
 
+from podusv_cli.process import local_page
 from podusv_cli.workflows.live import Live
 
 OWN = "podusv:own_vessel.yaml"
@@ -159,3 +163,85 @@ def test_the_page_names_no_other_place(address: tuple[str, str]) -> None:
     assert "default-src 'none'" in policy
     assert "frame-ancestors 'none'" in policy
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
+
+
+@pytest.fixture
+def served(capfd: pytest.CaptureFixture[str]) -> Iterator[tuple[str, str]]:
+    """Host and path of a page that answers what it was asked; nothing is said in the terminal."""
+    told, begun = list[str](), threading.Event()
+
+    def answer(name: str, asked: Mapping[str, Any]) -> Mapping[str, Any]:
+        if name == "end":
+            raise KeyboardInterrupt  # as Ctrl-C does
+        return {"name": name, "asked": asked, "value": {"set": {1}}.get(name, 0.5)}
+
+    def started(address: str) -> None:
+        told.append(address)
+        begun.set()
+
+    def serve() -> None:
+        with suppress(KeyboardInterrupt):
+            local_page.serve(lambda base: base, answer, started)
+
+    page = threading.Thread(target=serve)
+    page.start()
+    assert begun.wait(10)
+    host, base = told[0].removeprefix("http://").split("/", 1)
+    yield host, f"/{base}"
+    with suppress(OSError):  # it ends before it answers
+        answered(host, "POST", f"/{base}end", None, b"{}", patience=0.1)
+    page.join(10)
+    assert not page.is_alive()
+    assert capfd.readouterr() == ("", "")
+
+
+QUESTIONS = {  # method, path behind the token, length that is said, body, code
+    "good": ("POST", "x", None, b"{}", 200),
+    "no page": ("GET", "x", None, b"", 404),
+    "a path of other letters": ("GET", "\xff\xfe", None, b"", 404),
+    "a length of letters": ("POST", "x", "x", b"{}", 400),
+    "a length below 0": ("POST", "x", "-1", b"{}", 400),
+    "no length": ("POST", "x", "", b"", 400),
+    "too long": ("POST", "x", "65537", b"{}", 413),
+    "far too long": ("POST", "x", "9" * 17, b"{}", 413),
+    "deeply nested": ("POST", "x", None, b"[" * 60_000, 400),
+    "deep mappings": ("POST", "x", None, b'{"a":' * 13_000, 400),
+    "a list": ("POST", "x", None, b"[]", 400),
+    "a number": ("POST", "x", None, b"1", 400),
+    "no text": ("POST", "x", None, b"\xff", 400),
+    "no number in the answer": ("POST", "x", None, b'{"a": NaN}', 500),
+    "no value in the answer": ("POST", "set", None, b"{}", 500),
+}  # fmt: skip
+
+
+def answered(
+    host: str, method: str, path: str, said: str | None, body: bytes, patience: float = 2.0
+) -> tuple[int, str]:
+    """Code and text of the answer to a question as it stands, in this time [s]."""
+    length = str(len(body)) if said is None else said
+    lines = [f"{method} {path} HTTP/1.1", f"Host: {host}", "Content-Type: application/json"]
+    lines += [f"Content-Length: {length}"] if length else []
+    name, _, port = host.partition(":")
+    with socket.create_connection((name, int(port)), timeout=patience) as connection:
+        connection.sendall("\r\n".join([*lines, "", ""]).encode("latin-1") + body)
+        answer = HTTPResponse(connection, method=method)
+        answer.begin()
+        return answer.status, answer.read().decode()
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+@pytest.mark.parametrize("is_known", [True, False])
+def test_every_question_is_answered_and_the_page_goes_on(
+    served: tuple[str, str], question: str, is_known: bool
+) -> None:
+    host, base = served
+    method, path, said, body, code = QUESTIONS[question]
+    found, text = answered(host, method, f"{base if is_known else '/'}{path}", said, body)
+    assert found == (code if is_known else 404)
+    assert text
+    assert "<" not in text
+    assert answered(host, "POST", f"{base}x", None, b"{}")[0] == 200
+
+
+def test_a_path_of_other_letters_is_no_token(served: tuple[str, str]) -> None:
+    assert answered(served[0], "GET", "/\xff\xfe" + "\xe9" * 40, None, b"")[0] == 404

@@ -260,3 +260,50 @@ def test_what_was_gathered_before_the_last_part_of_the_way_is_void(scenario: Pat
     assert 0.4 * 75.0 + 5.0 < opens < run.metrics.path_time
     for name, number in looped(run, 0.6).items():
         assert run.metrics[name] == pytest.approx(number, rel=1e-9), name
+
+
+def plugged(folder: Path, passed_by: str) -> dict[str, Any]:
+    """Changes that take the legs of podusv with another method `passed_by`."""
+    file = folder / "mine.py"
+    file.write_text(
+        "from typing import Literal\n"
+        "from podusv_cli.components.paths.legs import Legs\n"
+        "class Mine(Legs):\n"
+        "    'Legs that say otherwise where they end.'\n"
+        "    kind: Literal['mine'] = 'mine'\n"
+        f"    def passed_by(self, share):\n        {passed_by}\n"
+    )
+    return {"plugins": [str(file)], "path.kind": "mine"}
+
+
+FAULTS = {
+    "raise RuntimeError('no way')": "asked where it ends: RuntimeError: no way",
+    "return {'leg': 1.0, 'along_leg': 0.0, 'e_ct': 3.0}": (
+        "asked where it ends: passed_by(0.8) returns leg, along_leg, e_ct; at most two are allowed"
+    ),
+    "return {'leg': 1.0, 'along': 0.0}": (
+        "passed_by(0.8) returns leg, along; at most two are allowed, of its places (leg, e_ct, "
+    ),
+    "return [3.0]": "asked where it ends: AttributeError",
+}
+
+
+@pytest.mark.parametrize("passed_by", FAULTS)
+def test_a_path_that_does_not_say_where_it_ends_is_one_sentence(
+    scenario: Path, tmp_path: Path, passed_by: str
+) -> None:
+    with pytest.raises(podusv.PodusvError) as caught:
+        podusv.simulate(scenario, plugged(tmp_path, passed_by))
+    assert FAULTS[passed_by] in str(caught.value)
+    assert "asked where it ends" in str(caught.value)
+    assert "evaluated once before the run" not in str(caught.value)
+
+
+def test_a_path_of_a_plug_in_ends_where_it_says(scenario: Path, tmp_path: Path) -> None:
+    changes = plugged(tmp_path, "return super().passed_by(share)")
+    one, other = (
+        numbers(podusv.simulate(scenario, changes | change).metrics)
+        for change in ({}, {"path.kind": "legs"})
+    )
+    assert 30.0 < one["path_time"] < 80.0
+    assert one == other

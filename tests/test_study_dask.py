@@ -1,6 +1,7 @@
 """Studies on real Dask clusters: the bytes of a study that one process made."""
 
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -12,7 +13,7 @@ import pytest
 from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.making.cluster import connected
+from podusv_cli.studies.making.cluster import TALKERS, _client, connected
 from podusv_cli.studies.making.dispatch import dispatch
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.remote import StudyText
@@ -117,3 +118,34 @@ def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
         connected("tcp://127.0.0.1:9", StudyText(TEXT), ""),
     ):
         pass
+
+
+def test_dask_says_to_its_users_afterwards_what_it_said_before(distributed, monkeypatch, caplog):
+    """Of two clusters at a time, too, the first of which ends first."""
+    monkeypatch.setattr("podusv_cli.studies.making.cluster.PATIENCE", 30.0)
+    loggers = [logging.getLogger(name) for name in TALKERS]
+    levels = [logger.level for logger in loggers]
+
+    def said():
+        caplog.clear()
+        for logger in loggers:
+            logger.propagate, before = True, logger.propagate
+            logger.error("lost")
+            logger.propagate = before
+        return len(caplog.records)
+
+    assert said() == 2
+    with distributed.LocalCluster(
+        1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as local:
+        first, second = ExitStack(), ExitStack()
+        for cluster in (first, second):
+            cluster.enter_context(_client(local.scheduler_address))
+        for cluster in (first, second):
+            assert said() == 0
+            cluster.close()
+    assert said() == 2
+    with pytest.raises(StorageError), _client("nowhere:x"):
+        pass
+    assert said() == 2
+    assert [logger.level for logger in loggers] == levels

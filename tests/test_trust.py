@@ -6,11 +6,15 @@ base beside or outside the folder, of a scenario below the manifest, behind a li
 
 import os
 import shutil
+import subprocess
+import sys
+import venv
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from command_samples import one_line
+from command_samples import ROOT, one_line
+from installed_sample import install
 
 import podusv as python
 from podusv_cli.core.errors import ScenarioError
@@ -253,3 +257,80 @@ def test_an_unpacked_archive_is_such_a_folder(podusv):
     assert podusv("unpack", "g.zip").code == 0
     assert podusv("validate", "gift/scenario.yaml").code == 2
     assert not Path("MARK").exists()
+
+
+def as_if_installed():
+    """A folder of somebody's that looks like an installed package to a Python that begins there."""
+    text = WHOLE.replace("kind: pid", "kind: evil")
+    gift({
+        "scenario.yaml": text, "evil-1.0.dist-info/METADATA": "Name: evil\nVersion: 1.0\n",
+        "evil-1.0.dist-info/entry_points.txt": "[podusv.controllers]\nevil = evil:Evil\n",
+    })  # fmt: skip
+    shutil.copy("gift/evil.py", "gift/yaml.py")
+    shutil.copy("gift/evil.py", "gift/signal.py")
+
+
+def begun(*words, cwd, python=sys.executable, path=ROOT):
+    """What a Python says that begins in a folder, where it looks for packages, too."""
+    return subprocess.run(
+        [python, *words], cwd=cwd, env=os.environ | {"PYTHONPATH": str(path)},
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("module", ["podusv_cli", "podusv"])
+@pytest.mark.parametrize("command", ["validate scenario.yaml", "list laws"])
+def test_no_module_of_somebody_s_folder_runs_where_podusv_begins_in_it(module, command):
+    as_if_installed()
+    said = begun("-m", module, *command.split(), cwd="gift")
+    assert not Path("MARK").exists()
+    if command == "list laws":
+        assert said.returncode == 0
+        assert "evil" not in said.stdout
+    else:
+        assert said.returncode == 2
+        assert "evil" in one_line(said.stderr)
+
+
+@pytest.mark.parametrize("place", ["gift", "gift/evil-1.0.dist-info"])
+def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place):
+    as_if_installed()
+    for name in ("yaml.py", "signal.py"):  # which Python itself would take
+        Path("gift", name).unlink()
+    code = (
+        "import sys; sys.path.insert(0, '..')\n"
+        "from podusv_cli.core.plugins import installed; print([p.name for p in installed()])\n"
+        "import podusv; podusv.load('scenario.yaml')"
+    )
+    Path("gift/evil-1.0.dist-info/scenario.yaml").write_text(Path("gift/scenario.yaml").read_text())
+    said = begun("-c", code, cwd=place)
+    assert not Path("MARK").exists()
+    assert said.stdout.strip() == "[]"
+    assert "ScenarioError" in said.stderr
+
+
+NAMES = "from podusv_cli.core.plugins import installed; print([p.name for p in installed()])"
+
+
+def test_a_package_in_one_s_own_folder_is_still_found():
+    Path("lab").mkdir()
+    install(Path("lab"))
+    assert begun("-c", NAMES, cwd="lab").stdout == "['my-lab']\n"
+
+
+@pytest.mark.parametrize("is_editable", [False, True])
+def test_a_package_of_an_environment_is_found_wherever_that_lies(is_editable):
+    """Beside the marks of a run, too; of an editable one the code lies elsewhere, by a .pth."""
+    Path("project").mkdir()
+    Path("project/manifest.json").write_text("{}")
+    venv.create("project/.venv", symlinks=True)
+    (packages,) = Path("project/.venv/lib").glob("python*/site-packages")
+    install(packages)
+    if is_editable:
+        Path("project/src").mkdir()
+        (packages / "my_lab").rename("project/src/my_lab")
+        (packages / "my_lab.pth").write_text(os.path.abspath("project/src"))
+    libraries = os.pathsep.join([str(ROOT), *filter(None, sys.path)])
+    said = begun("-c", NAMES, cwd="project", python=os.path.abspath("project/.venv/bin/python"),
+                 path=libraries)  # fmt: skip
+    assert said.stdout == "['my-lab']\n", said.stderr

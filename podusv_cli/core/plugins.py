@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import re
+import site
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import EntryPoint, distributions
+from importlib.metadata import Distribution, EntryPoint, distributions
 from importlib.util import find_spec
 from pathlib import Path
 from threading import RLock
@@ -22,6 +23,7 @@ from typing import Any
 
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.foreign import in_folder
 
 ROOMS = (
     "controllers", "paths", "disturbances", "actuators", "measurements", "estimators", "vessels",
@@ -145,7 +147,8 @@ def _fault(error: BaseException, path: str) -> str:
 def installed() -> Plugins:
     """What installed packages offer by entry points of the groups `podusv.controllers` and so on.
 
-    Their modules are imported when something is looked for in their room.
+    Their modules are imported when something is looked for in their room. A package that lies in
+    the folder of a run, study or search offers nothing: nobody installed it.
     """
     by_package: dict[str, Plugin] = {}
     for package in distributions():
@@ -154,10 +157,21 @@ def installed() -> Plugins:
             for point in package.entry_points
             if point.group in GROUPS
         )
-        if points and package.name not in by_package:  # another one is hidden by the first
+        # the first one hides another
+        if points and package.name not in by_package and _is_from_installer(package):
             digest = _package_digest(points)
             by_package[package.name] = Plugin(package.name, digest, package.version, offers=points)
     return tuple(by_package[name] for name in sorted(by_package))
+
+
+def _is_from_installer(package: Distribution) -> bool:
+    """Whether this package lies where installers of this Python put it, or in one's own folder.
+
+    Python looks for packages in the current folder too: `python -m` and notebooks do.
+    """
+    place = str(package.locate_file(""))
+    sites = {Path(p).resolve() for p in (*site.getsitepackages(), site.getusersitepackages())}
+    return Path(place).resolve() in sites or not in_folder(place)
 
 
 def package_files(package: Plugin) -> dict[str, Path]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.metrics.metric import Measured
 
@@ -59,12 +60,17 @@ def by_path(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vecto
 
 
 def _mark(layout: Measured, share: float) -> dict[str, float]:
-    """A place of the path as constants of a kernel; none where the path has no end."""
+    """A place of the path as constants of a kernel; none where the path has no end.
+
+    Raises LawError for what the path does not say in one or two of its places.
+    """
     names = [signal.name for signal in layout.loop.path.places]
-    marks = [
-        (float(layout.plan.place + names.index(name)), number)
-        for name, number in layout.loop.passed_by(share).items()
-    ]
+    place = layout.loop.passed_by(share)
+    if len(place) > 2 or not place.keys() <= {*names}:
+        given, known = ", ".join(place), ", ".join(names) or "none"
+        what = f"passed_by({share:g}) returns {given}; at most two are allowed, of its places"
+        raise LawError(f"{what} ({known})")
+    marks = [(float(layout.plan.place + names.index(name)), x) for name, x in place.items()]
     first, then = (*marks, *[(0.0, -math.inf)] * 2)[:2]
     return dict(zip(MARK, (*first, *then), strict=True)) if marks else {}
 

@@ -195,7 +195,7 @@ def metrics_probe(
     sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
-    has_end = bool(plan.loop.passed_by(1.0))
+    has_end = "over_at" in _asked_span(layout)
     ahead = spans.AHEAD if has_end else 0
     metrics = Metrics(
         _within_span(parts, has_end), ahead + sum(size for _, size in parts), differing,
@@ -212,10 +212,12 @@ def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
 
 def _asked_span(layout: Measured) -> dict[str, float]:
     """The constants that tell which instants count."""
+    what = f"{describe(layout.loop.path)}, asked where it ends"
     try:
         return spans.constants(layout)
+    except LawError as error:
+        raise LawError(f"{what}: {error}") from error
     except Exception as error:  # a plug-in's path may raise anything
-        what = f"{describe(layout.loop.path)}, asked where it ends"
         raise LawError(f"{what}: {in_a_line(error)}") from error
 
 

@@ -6,6 +6,7 @@ Simulations want the main thread, where Ctrl-C reaches them; threads of the serv
 from __future__ import annotations
 
 import json
+import re
 import secrets
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -13,9 +14,12 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any
 
+from podusv_cli.core.errors import in_a_line
+
 HOST = "127.0.0.1"
 GLANCE = 0.2  # s between two looks at signals
 MOST = 65536  # bytes of a question
+TEXT = "text/plain; charset=utf-8"
 HEADERS = {
     "Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY",
     "X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin",
@@ -24,7 +28,8 @@ HEADERS = {
     "frame-ancestors 'none'",
 }  # fmt: skip
 Answer = Callable[[str, Mapping[str, Any]], Mapping[str, Any]]  # of the question's name, and it
-_Job = tuple[str, Mapping[str, Any], "SimpleQueue[bytes]"]
+_Told = tuple[int, bytes, str]  # code, content, type
+_Job = tuple[str, Mapping[str, Any], "SimpleQueue[_Told]"]
 
 
 class _Server(ThreadingHTTPServer):
@@ -44,42 +49,60 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """The page."""
-        if self._known() and self.path == self.server.base:
-            self._send(self.server.page, "text/html; charset=utf-8")
+        if not self._is_known():
+            return
+        if self.path != self.server.base:
+            self._refuse(404, "there is one page here, at the address that podusv prints")
+            return
+        self._send(200, self.server.page, "text/html; charset=utf-8")
 
     def do_POST(self) -> None:
         """An answer of the main thread."""
-        size = int(self.headers.get("Content-Length") or 0)
-        if not (self._known() and size <= MOST):
+        if not self._is_known() or (size := self._size()) is None:
             return
         kind, origin = self.headers.get("Content-Type"), self.headers.get("Origin")
         if kind != "application/json" or (origin and origin[7:] not in self.server.hosts):
-            self.send_error(403)
+            self._refuse(403, "only the page itself may ask, in JSON")
             return
-        answer: SimpleQueue[bytes] = SimpleQueue()
-        try:
-            asked = json.loads(self.rfile.read(size))
-        except ValueError:
-            self.send_error(400)
+        asked = _parsed(self.rfile.read(size))
+        if not isinstance(asked, dict):
+            self._refuse(400, "a question must be a JSON object")
             return
+        answer: SimpleQueue[_Told] = SimpleQueue()
         self.server.jobs.put((self.path.removeprefix(self.server.base), asked, answer))
-        self._send(answer.get(), "application/json")
+        self._send(*answer.get())
 
-    def _known(self) -> bool:
+    def _is_known(self) -> bool:
         """Whether it is asked under its own name, which a page elsewhere cannot do, and token."""
+        base = self.server.base.encode()
+        token = self.path.encode()[: len(base)]
         known = self.headers.get("Host") in self.server.hosts
-        if not (
-            known and secrets.compare_digest(self.path[: len(self.server.base)], self.server.base)
-        ):
-            self.close_connection = True
-            self.send_error(404)
-            return False
-        return True
+        if known and secrets.compare_digest(token, base):
+            return True
+        self._refuse(404, "nothing is here; take the address that podusv prints")
+        return False
 
-    def _send(self, content: bytes, kind: str) -> None:
-        self.send_response(200)
+    def _size(self) -> int | None:
+        """The bytes of a question; None, and it is refused, where that is no number or too many."""
+        text = self.headers.get("Content-Length", "")
+        if not re.fullmatch("[0-9]{1,18}", text):
+            self._refuse(400, "Content-Length must be the bytes of a question")
+        elif int(text) > MOST:
+            self._refuse(413, f"a question has at most {MOST} bytes, not {text}")
+        else:
+            return int(text)
+        return None
+
+    def _refuse(self, code: int, sentence: str) -> None:
+        self.close_connection = True  # what is left of the question is not read
+        self._send(code, sentence.encode(), TEXT)
+
+    def _send(self, code: int, content: bytes, kind: str) -> None:
+        self.send_response(code)
         for name, text in {**HEADERS, "Content-Type": kind, "Content-Length": len(content)}.items():
             self.send_header(name, str(text))
+        if self.close_connection:
+            self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(content)
 
@@ -102,5 +125,21 @@ def serve(
                 name, asked, waiting = server.jobs.get(timeout=GLANCE)
             except Empty:  # a signal that comes as the wait begins would else wait for a question
                 continue
-            made = json.dumps(answer(name, asked), separators=(",", ":"), allow_nan=False)
-            waiting.put(made.encode())
+            waiting.put(_told(answer(name, asked)))
+
+
+def _parsed(question: bytes) -> Any:
+    """What a question says; None where it is no JSON, or nested too deeply to be read."""
+    try:
+        return json.loads(question)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _told(answer: Mapping[str, Any]) -> _Told:
+    """An answer as JSON; a sentence where it has a number that JSON has not, or no such value."""
+    try:
+        text = json.dumps(answer, separators=(",", ":"), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        return 500, f"the answer cannot be written as JSON: {in_a_line(error)}".encode(), TEXT
+    return 200, text.encode(), "application/json"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -11,6 +10,7 @@ from pathlib import Path as File
 
 from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.errors import LawError, ScenarioError
+from podusv_cli.core.foreign import in_folder
 from podusv_cli.core.phrases import did_you_mean, found, quoted
 from podusv_cli.core.plugins import Plugin, Plugins, from_file, installed
 from podusv_cli.scenario.keys import keys_of
@@ -22,7 +22,6 @@ from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
 KEY = "plugins"
 FOLDER = "plugins"  # of a run, where its plug-in files are
-FINISHED = ("manifest.json", "study.json", "tune.json")  # folders of podusv have one of these
 
 
 def with_given(root: Node, files: Sequence[str | Plugin]) -> Node:
@@ -116,15 +115,8 @@ def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plu
 
 def _is_foreign(mark: Mark) -> bool:
     """Whether a place, or a scenario by whose `extends` it is read, may be somebody else's."""
-    return any(map(_in_folder, (mark.source, *mark.above)))
-
-
-def _in_folder(source: str) -> bool:
-    """Whether a file is anywhere in the folder of a run, study or search, or a link leads there."""
-    if is_shipped(source):
-        return False
-    above = {*File(os.path.abspath(source)).parents, *File(os.path.realpath(source)).parents}
-    return any(os.path.lexists(folder / name) for folder in above for name in FINISHED)
+    sources = (mark.source, *mark.above)
+    return any(in_folder(source) for source in sources if not is_shipped(source))
 
 
 def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:

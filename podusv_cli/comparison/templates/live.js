@@ -3,10 +3,13 @@
   const tracks = chaseOn(one("stage")), curves = curvesOn(one("plot"));
   let latest = "", moved = new Map(), rows = new Map(), signals = [], last = null, ghost = null, busy = false, wanted = null, pause = 0;
   const add = (parent, tag, properties = {}) => parent.appendChild(Object.assign(document.createElement(tag), properties));
-  const ask = async (name, question) => (await fetch(BASE + name, {
-    method: "POST", headers: { "Content-Type": "application/json" },
-    body: JSON.stringify({ moved: Object.fromEntries(moved), ...question }),
-  })).json();
+  const ask = async (name, question) => {
+    const answer = await fetch(BASE + name, {
+      method: "POST", headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ moved: Object.fromEntries(moved), ...question }),
+    });
+    return answer.ok ? answer.json() : { refused: [{ key: "", text: await answer.text() }] };
+  };
 
   // One question at a time; what moves meanwhile is asked next, and only the newest.
   const want = (question = {}) => {

@@ -80,8 +80,8 @@ class Path(Component):
     def passed_by(self, share: float) -> dict[str, float]:
         """Where this share of the way lies behind the vessel, from 0 to 1: numbers of its `places`.
 
-        It does where they are reached, the first that differs decides. Share 1 is the end of the
-        path. None for a path that has no end.
+        It does where they are reached, the first that differs decides; at most two, or metrics
+        raise LawError. Share 1 is the end of the path. None for a path that has no end.
         """
         return {}
 

@@ -71,20 +71,44 @@ def connected(address: str, study: StudyText, identity: str) -> Iterator[Cluster
         yield cluster
 
 
-def _client(address: str) -> Any:
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
     try:
         from distributed import Client
     except ImportError:
         raise UsageError("--scheduler needs Dask: pip install 'podusv[cluster]'") from None
-    for name in TALKERS:
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    with _silent_talkers():
+        try:
+            client = Client(address, timeout=PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise StorageError(
+                f"--scheduler {address}: no scheduler answers ({' '.join(str(error).split())}); "
+                "start one with `dask scheduler`, and give the address that it prints"
+            ) from error
+        with client:
+            yield client
+
+
+@contextmanager
+def _silent_talkers() -> Iterator[None]:
+    """Dask logs nothing but what is critical; afterwards what it did before.
+
+    A filter of its own, as a level that is put back would be that of another thread's cluster.
+    """
+    loggers, critical = [*map(logging.getLogger, TALKERS)], _Critical()
+    for logger in loggers:
+        logger.addFilter(critical)
     try:
-        return Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
-        raise StorageError(
-            f"--scheduler {address}: no scheduler answers ({' '.join(str(error).split())}); "
-            "start one with `dask scheduler`, and give the address that it prints"
-        ) from error
+        yield
+    finally:
+        for logger in loggers:
+            logger.removeFilter(critical)
+
+
+class _Critical(logging.Filter):
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether it is so bad that it is said."""
+        return record.levelno >= logging.CRITICAL
 
 
 class Cluster:
