@@ -349,15 +349,16 @@ def listed(columns: Iterable[str]) -> str:
     return ", ".join(names[:LISTED]) + more
 
 
-def delivered(values: Vector) -> Marks:
-    """Which values of a column are new ones, true or false.
+def delivered(*columns: Vector) -> Marks:
+    """Which rows of a column have a new value, or of several that come together, as x and y do.
 
     A logger that is faster than a sensor repeats its last value: where values change at regular
-    distances of several rows, only those that change count. A value that is no number never counts.
+    distances of several rows, only those that change count. What is no number never counts.
     """
-    known = np.isfinite(values)
+    values = np.column_stack(columns)
+    known = np.isfinite(values).all(axis=1)
     at = np.flatnonzero(known)
-    changes = np.flatnonzero(np.diff(values[at]) != 0.0) + 1
+    changes = np.flatnonzero((np.diff(values[at], axis=0) != 0.0).any(axis=1)) + 1
     gaps = np.diff(changes)
     if len(gaps) < 5:
         return known
