@@ -147,7 +147,10 @@ def test_two_columns_that_may_be_one_quantity_are_named(tmp_path):
 
 
 def test_every_unit_of_the_table_is_read_in_a_log(tmp_path):
-    of_logs = {"rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "deg": 1.0, "rad/s": 0.5 / math.pi}
+    of_logs = {
+        "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "deg": 1.0, "rad/s": 0.5 / math.pi,
+        "1e-2 deg": math.pi / 18000.0,
+    }  # fmt: skip
     read_ones = 0
     for unit, others in UNITS.items():
         for name in others.keys() - {unit}:
