@@ -36,7 +36,7 @@ OPTIONAL = {signal.name for signal in STATE[3:]}  # that may be in a log without
 # What logs have beside the units that people write: propellers in rad/s, angles as integers.
 OF_LOGS = {
     "1/s": {"rad/s": 0.5 / math.pi}, "rad": {"1e-2 deg": math.pi / 18000.0},
-    "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7},
+    "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "1e-6 deg": 1e-6},
 }  # fmt: skip
 # Of each of podusv's units, what one of those that logs have is in it.
 UNITS: dict[str, dict[str, float]] = {
