@@ -187,6 +187,8 @@ def test_what_is_wrong_with_the_log_is_a_sentence(items, head, says):
     ("times", "says"),
     [
         ([1.78e9 + 0.1 * i for i in range(79)], "to 1780000008 s.*count the log's time from where"),
+        ([1.78e12 + 1e2 * i for i in range(79)], r'in ms since 1970: .*"COLUMN \[ms\]".*count the'),
+        ([1.78e15 + 1e5 * i for i in range(79)], r'in us since 1970: .*"COLUMN \[us\]"'),
         ([100.0 * i for i in range(79)], r'if its times are in ms, write time: "COLUMN \[ms\]"'),
         ([1e5 * i for i in range(79)], r'if its times are in us, write time: "COLUMN \[us\]"'),
         ([0.8 * i for i in range(9)], "to 6.4 s.*with 9 common positions, where 10 are needed"),

@@ -378,3 +378,38 @@ def test_a_clock_without_numbers_is_listed_without_a_warning_of_numpy(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time,x\n12:00:00,1\n12:00:01,2\n12:00:02,3\n")
     assert [own.name for own in listing(path).columns] == ["time", "x"]
+
+
+# Lines above the names
+
+
+@pytest.mark.parametrize("above", ["sep=;\n", "SEP=;\r\n", '"sep=;"\n', "  # by me\n// and you\n"])
+def test_what_stands_above_the_names_is_skipped(tmp_path, above):
+    read = contents(tmp_path, f"{above}t;x\n0;1.5\n1;2.5\n")
+    assert {name: values.tolist() for name, values in read.columns.items()} == {
+        "t": [0.0, 1.0], "x": [1.5, 2.5],
+    }  # fmt: skip
+    read = contents(tmp_path, "sep=,\nt,x;y\n0,1.5\n1,2.5\n")
+    assert [*read.columns] == ["t", "x;y"]
+
+
+def test_bars_separate_cells(tmp_path):
+    assert contents(tmp_path, "t | x\n0 | 1.5\n1 | 2.5\n").columns["x"].tolist() == [1.5, 2.5]
+
+
+@pytest.mark.parametrize(
+    ("above", "says"),
+    [
+        ("% by my logger", r"line 2 has .* line 1 was taken for the names, so if it is a title"),
+        ("Boat log 2024-05-01", r"\(Boat, log, 2024-05-01\).*line 1 was taken for the names"),
+        ("Log,2024,May", r"line 1 was taken for .*\(Log, 2024, May\), but line 2 looks like them"),
+    ],
+)
+def test_a_title_that_is_taken_for_names_is_named(tmp_path, above, says):
+    with pytest.raises(LogFault, match=says):
+        contents(tmp_path, f"{above}\nt,x,y\n0,1.5,3\n1,2.5,4\n2,2.5,4\n")
+
+
+def test_a_line_of_units_below_the_names_is_no_line_of_names(tmp_path):
+    read = contents(tmp_path, "t,x\ns,m\n0,1.5\n1,2.5\n")
+    assert read.doubts["x"] == "has 1 cell that is no number, the first 'm' in line 2"

@@ -47,7 +47,8 @@ ENDINGS = {
     "timeus": "us",
 }  # fmt: skip
 BEYOND = {
-    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "n_#": ((100.0, "rpm"),), "delta_#": ((3.2, "deg"),),
+    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "n_#": ((100.0, "rpm"),),
+    "delta_#": ((3.2, "deg"),),
 }  # fmt: skip
 
 
