@@ -187,6 +187,8 @@ def test_what_is_wrong_with_the_log_is_a_sentence(items, head, says):
     ("times", "says"),
     [
         ([1.78e9 + 0.1 * i for i in range(79)], "to 1780000008 s.*count the log's time from where"),
+        ([1.78e12 + 1e2 * i for i in range(79)], r'in ms since 1970: .*"COLUMN \[ms\]".*count the'),
+        ([1.78e15 + 1e5 * i for i in range(79)], r'in us since 1970: .*"COLUMN \[us\]"'),
         ([100.0 * i for i in range(79)], r'if its times are in ms, write time: "COLUMN \[ms\]"'),
         ([1e5 * i for i in range(79)], r'if its times are in us, write time: "COLUMN \[us\]"'),
         ([0.8 * i for i in range(9)], "to 6.4 s.*with 9 common positions, where 10 are needed"),
@@ -342,3 +344,57 @@ def test_a_log_that_begins_before_the_run_is_moved_by_the_first_common_instant()
     log("LOG.csv", "time,x,y,psi", [*before, *np.column_stack([t, x + 7.0, y - 2.0, psi])])
     done = compared("run", "LOG.csv", align="start")
     assert numbers(done, "run")[1] == pytest.approx(0.0, abs=1e-9)
+
+
+# Headings that begin late or end early, and positions of a coarse receiver
+
+
+def turning(duration=39.9, rate=5.0):
+    """Times, x, y, psi of a boat at 1 m/s that turns to both sides."""
+    times = np.arange(0.0, duration, 1.0 / rate)
+    psi = 0.4 + 1.5 * np.sin(0.3 * times)
+    return times, np.cumsum(np.cos(psi)) / rate, np.cumsum(np.sin(psi)) / rate, psi
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.0, 17.0), (11.0, 40.0), (9.1, 21.3)])
+def test_a_heading_is_not_held_where_it_has_no_values(begin, end):
+    times, x, y, psi = turning()
+    known = (times >= begin) & (times <= end)
+    log("LOG.csv", "time,x,y,psi", np.column_stack([times, x, y, np.where(known, psi, np.nan)]))
+    own = track(Path("LOG.csv"), ())
+    assert np.isfinite(own.signals["psi"]).tolist() == known.tolist()
+    assert np.isfinite(own.signals["x"]).all()
+    (line,) = [remark.text for remark in own.remarks]
+    assert line.startswith(f"psi has values from {times[known][0]:.10g} to {times[known][-1]:.10g}")
+    write("longer.yaml", "extends: task.yaml\nsimulation: {duration: 39.9, step: 0.02}\n")
+    done = compared("longer.yaml", "LOG.csv")
+    run = p.open_run(Path("both/momentum"))
+    off = psi - np.interp(times, run["time"], run["psi"])
+    off = [math.remainder(angle, 2.0 * math.pi) for angle in off[known]]
+    expected = math.sqrt(sum(angle**2 for angle in off) / len(off))
+    found = numbers(done, "momentum")
+    assert found[2:] == pytest.approx([expected, len(times)], rel=1e-6)
+
+
+def test_fewer_than_ten_headings_are_not_scored():
+    times, x, y, psi = turning()
+    log("LOG.csv", "time,x,y,psi", np.column_stack(
+        [times, x, y, np.where(times < 1.7, psi, np.nan)]
+    ))  # fmt: skip
+    made_run()
+    own = track(Path("LOG.csv"), ())
+    assert own.departures(open_run(Path("run")).recording).keys() == {*METRICS} - {METRICS[2]}
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_boat_that_goes_along_an_axis_moves_in_the_other_one(turned):
+    """To 1 cm, what hardly changes is no sensor that repeats itself; nor at ten rows a value."""
+    times = np.arange(0.0, 60.0, 0.1)
+    along, aside = np.round(0.93 * times, 2), np.round(0.004 * times, 2)
+    x, y = (along, aside) if turned else (aside, along)
+    psi = 0.0 * times + (0.0 if turned else 0.5 * math.pi)
+    log("LOG.csv", "time,x,y,psi", np.column_stack([times, x, y, psi]))
+    assert track(Path("LOG.csv"), ()).times == pytest.approx(times)
+    held = np.arange(len(times)) // 10 * 10
+    log("LOG.csv", "time,x,y,psi", np.column_stack([times, x[held], y[held], psi]))
+    assert track(Path("LOG.csv"), ()).times == pytest.approx(times[::10])

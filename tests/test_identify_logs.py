@@ -459,3 +459,61 @@ def test_a_log_for_judging_is_not_moved_by_what_all_of_it_says(tmp_path, sailed)
     (log,) = logs_of(path, LogFile(file="a.csv", role="judge"), scenario())
     assert log.record.rows == pytest.approx(log_of(early, Ideal(), 0.05).record.rows)
     assert "A log for judging stays as it is" in log.warnings[0]
+
+
+# Headings that no course agrees with
+
+WRONG_HEADINGS = {
+    "random": lambda psi: np.random.default_rng(1).uniform(-3.0, 3.0, len(psi)),
+    "a tenth": lambda psi: psi / 10.0,
+    "in turns": lambda psi: psi / (2.0 * math.pi),
+    "another column": lambda psi: np.sin(np.arange(len(psi)) / 17.0),
+}
+OTHER_UNITS = {
+    "hundredths of a degree": (
+        lambda psi: np.round(100.0 * DEG * psi) % 36000.0, r'psi: "COLUMN \[1e-2 deg\]"'
+    ),
+    "hundredths of a degree as degrees": (
+        lambda psi: np.round(100.0 * DEG * psi) % 36000.0 / DEG, r'psi: "COLUMN \[1e-2 deg\]"'
+    ),
+    "radians as degrees": (lambda psi: psi / DEG, r'write psi: "COLUMN \[rad\]"'),
+}  # fmt: skip
+
+
+def pose_alone(log):
+    return replace(log, columns={name: log.columns[name] for name in ("x", "y", "psi")})
+
+
+@pytest.mark.parametrize("wrong", WRONG_HEADINGS)
+def test_a_heading_that_no_course_agrees_with_is_doubted(weaving, wrong):
+    log = pose_alone(weaving)
+    assert checked(log) == []
+    psi = WRONG_HEADINGS[wrong](log.columns["psi"])
+    lines = checked(replace(log, columns={**log.columns, "psi": psi}))
+    said = [re.search(r"course and heading agree to (0\.\d\d) of 1; look at", x) for x in lines]
+    assert float(next(filter(None, said))[1]) < 0.9
+
+
+@pytest.mark.parametrize("unit", OTHER_UNITS)
+def test_a_heading_in_another_unit_is_an_error_that_names_it(weaving, unit):
+    change, sentence = OTHER_UNITS[unit]
+    log = pose_alone(weaving)
+    psi = change(log.columns["psi"])
+    with pytest.raises(LogFault, match=sentence):
+        checked(replace(log, columns={**log.columns, "psi": psi}))
+
+
+@pytest.mark.parametrize("rate", [1, 5, 10])
+@pytest.mark.parametrize("noise", [0.02, 1.0])
+@pytest.mark.parametrize("current", [0.0, 0.3 - 0.2j, 1.2j])
+@pytest.mark.parametrize("through", [1.0, 0.3, -0.5, 0.5j, 0.4 + 0.3j])
+def test_a_boat_that_drifts_or_goes_sideways_or_slowly_has_a_sound_heading(
+    rate, noise, current, through
+):
+    """By algebra; `through` is the velocity through the water, ahead and to starboard."""
+    times = np.arange(0.0, 140.0, 1.0 / rate)
+    psi = 0.1 * times
+    noises = noise * np.random.default_rng(4).standard_normal((2, len(times)))
+    place = through * np.exp(1j * psi) / 0.1j + current * times + noises[0] + 1j * noises[1]
+    lines = checked(Table("drift.csv", times, {"x": place.real, "y": place.imag, "psi": psi}))
+    assert not [line for line in lines if "course and heading" in line]

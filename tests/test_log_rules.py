@@ -147,7 +147,10 @@ def test_two_columns_that_may_be_one_quantity_are_named(tmp_path):
 
 
 def test_every_unit_of_the_table_is_read_in_a_log(tmp_path):
-    of_logs = {"rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "deg": 1.0, "rad/s": 0.5 / math.pi}
+    of_logs = {
+        "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "deg": 1.0, "rad/s": 0.5 / math.pi,
+        "1e-2 deg": math.pi / 18000.0, "1e-6 deg": 1e-6,
+    }  # fmt: skip
     read_ones = 0
     for unit, others in UNITS.items():
         for name in others.keys() - {unit}:
@@ -164,7 +167,8 @@ def test_every_unit_of_the_table_is_read_in_a_log(tmp_path):
     [
         (4330.0, 1042.0, "latitude 4330 is beyond 90 deg; is it in NMEA's degrees and minutes"),
         (-90.5, 10.0, "latitude -90.5 is beyond 90 deg; write degrees from -90 to 90"),
-        (43.0, 180.5, "longitude 180.5 is beyond 180 deg"),
+        (43.0, 360.5, "longitude 360.5 is beyond 180 deg"),
+        (43.0, -180.5, "longitude -180.5 is beyond 180 deg"),
         (590000000, 100000000, r"latitude 590000000 .*write lat: \"COLUMN \[1e-7 deg\]\" under"),
         (30.0, 10342.5, "longitude 10342.5 is beyond 180 deg; is it in NMEA's"),
     ],
@@ -312,3 +316,100 @@ def test_the_command_says_what_is_doubtful_about_a_log(podusv, tmp_path):
     said = podusv("identify", "--columns", "log.csv")
     assert said.code == 0
     assert "warning: log.csv: 'x' has 1 cell that is no number, the first 'oops'" in said.err
+
+
+# Longitudes from 0 to 360 deg, and what is proposed for places
+
+
+@pytest.mark.parametrize("share", [0.0, 0.03, 0.5, 0.97, 1.0])
+def test_longitudes_from_0_to_360_are_less_a_turn_beyond_180(tmp_path, share):
+    """On both sides of Greenwich: so much of the log is west of it."""
+    signed = (np.arange(200.0) - round(200 * share) + 0.5) * 1e-5
+    columns = {"time": range(200), "lat": [48.0] * 200, "psi": [0.0] * 200}
+    path = written(tmp_path / "log.csv", {**columns, "lon": signed % 360.0})
+    wanted = table(written(tmp_path / "own.csv", {**columns, "lon": signed}), (), Named())
+    read = table(path, (), Named())
+    assert read.columns["y"] == pytest.approx(wanted.columns["y"], abs=1e-5)
+    assert not read.warnings
+    path = written(tmp_path / "log.csv", {**columns, "lon": (signed - 122.0) % 360.0})
+    assert not table(path, (), Named()).warnings
+
+
+def test_a_single_longitude_beyond_180_elsewhere_is_left_out(tmp_path):
+    lon = [16.0 + 1e-5 * i for i in range(60)]
+    lon[20] = 211.0
+    path = written(tmp_path / "log.csv", {"time": range(60), "lat": [48.0] * 60, "lon": lon})
+    read = table(path, (), Named())
+    assert np.isnan(read.columns["y"]).sum() == 1
+    assert "lon is out of range once: longitude 211 is beyond 180 deg" in read.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon", "proposed", "says"),
+    [
+        (435000000.0, 164000000.0, "[1e-7 deg]", ""),
+        (43500000.0, 16400000.0, "", "write 1e-6 deg instead"),
+        (4330.0015, 1624.0015, "", "is it in NMEA's degrees and minutes"),
+        (43.5, 16.4, "plain", ""),
+        (5000000.0, 1790000000.0, "[1e-7 deg]", ""),
+    ],
+)
+def test_units_of_places_are_proposed_where_they_are_sure(tmp_path, lat, lon, proposed, says):
+    path = written(tmp_path / "log.csv", {
+        "time": range(30), "lat": [lat + (i if lat > 1e4 else 1e-4 * i) for i in range(30)],
+        "lon": [lon + (i if lon > 1e4 else 1e-4 * i) for i in range(30)], "psi": [0.1] * 30,
+    })  # fmt: skip
+    found = listing(path)
+    lines = [line.strip() for line in found.mapping()]
+    unit = {"plain": "", "": None}.get(proposed, f" {proposed}")
+    assert (f'lat: "lat{unit}"' in lines) == (unit is not None)
+    assert (unit is None) == any("'lat' is not taken for lat: " in x for x in found.warnings)
+    assert says in " ".join(found.warnings)
+
+
+def test_a_word_for_no_value_says_nothing_of_a_unit(tmp_path):
+    psi = [-9999.0 if i % 9 == 4 else 0.1 * i for i in range(60)]
+    path = written(tmp_path / "log.csv", {"time": range(60), "x": range(60), "psi": psi})
+    assert '  psi: "psi"' in listing(path).mapping()
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_clock_without_numbers_is_listed_without_a_warning_of_numpy(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,x\n12:00:00,1\n12:00:01,2\n12:00:02,3\n")
+    assert [own.name for own in listing(path).columns] == ["time", "x"]
+
+
+# Lines above the names
+
+
+@pytest.mark.parametrize("above", ["sep=;\n", "SEP=;\r\n", '"sep=;"\n', "  # by me\n// and you\n"])
+def test_what_stands_above_the_names_is_skipped(tmp_path, above):
+    read = contents(tmp_path, f"{above}t;x\n0;1.5\n1;2.5\n")
+    assert {name: values.tolist() for name, values in read.columns.items()} == {
+        "t": [0.0, 1.0], "x": [1.5, 2.5],
+    }  # fmt: skip
+    read = contents(tmp_path, "sep=,\nt,x;y\n0,1.5\n1,2.5\n")
+    assert [*read.columns] == ["t", "x;y"]
+
+
+def test_bars_separate_cells(tmp_path):
+    assert contents(tmp_path, "t | x\n0 | 1.5\n1 | 2.5\n").columns["x"].tolist() == [1.5, 2.5]
+
+
+@pytest.mark.parametrize(
+    ("above", "says"),
+    [
+        ("% by my logger", r"line 2 has .* line 1 was taken for the names, so if it is a title"),
+        ("Boat log 2024-05-01", r"\(Boat, log, 2024-05-01\).*line 1 was taken for the names"),
+        ("Log,2024,May", r"line 1 was taken for .*\(Log, 2024, May\), but line 2 looks like them"),
+    ],
+)
+def test_a_title_that_is_taken_for_names_is_named(tmp_path, above, says):
+    with pytest.raises(LogFault, match=says):
+        contents(tmp_path, f"{above}\nt,x,y\n0,1.5,3\n1,2.5,4\n2,2.5,4\n")
+
+
+def test_a_line_of_units_below_the_names_is_no_line_of_names(tmp_path):
+    read = contents(tmp_path, "t,x\ns,m\n0,1.5\n1,2.5\n")
+    assert read.doubts["x"] == "has 1 cell that is no number, the first 'm' in line 2"

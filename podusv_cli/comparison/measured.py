@@ -15,7 +15,12 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE
-from podusv_cli.metrics.measured import OF_LOG, log_instants
+from podusv_cli.metrics.measured import (
+    log_distance_max,
+    log_distance_rms,
+    log_heading_rms,
+    log_instants,
+)
 from podusv_cli.storage.run_folder import FinishedRun, InMemory
 
 POSE = tuple(signal.name for signal in STATE[:3])
@@ -82,7 +87,10 @@ class Track:
         return InMemory(self.file, "finished", {}, {}, "", kept=log)
 
     def departures(self, run: Recording) -> dict[str, float]:
-        """How far a run is from it where times agree, by metric; over FEWEST instants at least."""
+        """How far a run is from it where times agree, by metric; over FEWEST instants at least.
+
+        Headings count where the track has one.
+        """
         times = run["time"]
         rows = self.common(times[0], times[-1]) if len(times) else np.zeros(len(self.times), bool)
         count = int(np.count_nonzero(rows))
@@ -93,8 +101,15 @@ class Track:
             for name in POSE
         )
         distances, turned = np.hypot(x, y), np.remainder(psi + math.pi, 2.0 * math.pi) - math.pi
-        numbers = (np.sqrt(np.mean(distances**2)), distances.max(), np.sqrt(np.mean(turned**2)))
-        return {m.name: float(x) for m, x in zip(OF_LOG, (*numbers, count), strict=True)}
+        turned = turned[np.isfinite(turned)]
+        numbers = {
+            log_distance_rms.name: math.sqrt(np.mean(distances**2)),
+            log_distance_max.name: float(distances.max()),
+            log_instants.name: float(count),
+        }
+        if len(turned) >= FEWEST:
+            numbers[log_heading_rms.name] = math.sqrt(np.mean(turned**2))
+        return numbers
 
     def beside_speeds(self, label: str, run: Recording) -> list[Finding]:
         """A remark where it is much faster or slower than a run, as in other units."""

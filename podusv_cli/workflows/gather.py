@@ -24,6 +24,7 @@ from podusv_cli.workflows.members import from_folder as members_of
 from podusv_cli.workflows.run import Request, opened
 
 START = "start"  # of a run, to which a log may be moved
+DATED = (9.4e8, 4.2e9)  # s since 1970, of the years 2000 to 2100
 FINER = {unit: float(factor) for unit, factor in units.UNITS["s"].items() if factor < 1}
 
 
@@ -86,12 +87,19 @@ def _check_common(log: Track, duration: float) -> None:
         return
     span = last - first
     finer = [unit for unit, f in FINER.items() if last * f <= duration < span and span * f > 1.0]
+    dated = [unit for unit, f in FINER.items() if DATED[0] <= first * f <= DATED[1]]
+    from_begin = "count the log's time from where the run begins"
     hint = (
         f'if its times are in {finer[0]}, write time: "COLUMN [{finer[0]}]" under '
         f'identify.columns, or "time [{finer[0]}]" as the name of the column'
         if finer
-        else "count the log's time from where the run begins"
+        else from_begin
     )
+    if dated:
+        hint = (
+            f'its times seem to be in {dated[0]} since 1970: write time: "COLUMN [{dated[0]}]" '
+            f"under identify.columns, and {from_begin}"
+        )
     raise UsageError(
         f"{log.file}: its times go from {first:.10g} to {last:.10g} s, and the run from 0 to "
         f"{duration:g} s, with {count} common positions, where {FEWEST} are needed; {hint}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,10 +11,13 @@ import numpy as np
 
 from podusv_cli.comparison.measured import POSE, Track
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.named_files import YAML
 
+PSI = STATE[2]
+SELDOM = 0.05  # of the positions, that may lack a heading
 NO_COMMON_PLACE = (
     "the log and the runs have no common place: its x and y count from its first fix, those of the "
     "runs from where `start` is; `--align start` moves the log to where the first run is at the "
@@ -36,7 +39,8 @@ def track(
 ) -> Track:
     """The measured track of a log; the first of these sections says what its columns are called.
 
-    A row stands where a position is new; all else is straight between its own values. `top_speed`
+    A row stands where a position is new; all else is straight between its own values, and NaN
+    before the first and after the last of them. `top_speed`
     [m/s] is that of the fastest boat beside it. Raises UsageError where the log has no pose, or
     has mistakes that its motion shows.
     """
@@ -51,18 +55,38 @@ def track(
             "with units in brackets where these are not s, m, rad, or write identify.columns in a "
             "scenario beside it, which says what they are called"
         )
-    rows = delivered(log.columns["x"]) & np.isfinite(log.columns["y"])
+    rows = delivered(log.columns["x"], log.columns["y"])
     if np.count_nonzero(rows) < 2:
         raise UsageError(f"{path}: has fewer than two positions, which is no track")
     lines = [*log.warnings, *checked(log, top_speed=top_speed)]
     if log.from_fix and not at_start:
         lines.append(NO_COMMON_PLACE)
-    signals = {}
-    for name, values in log.columns.items():
-        known = np.isfinite(values)
-        whole = np.unwrap(values[known]) if name == "psi" else values[known]
-        if known.any() and name in {signal.name for signal in STATE}:
-            signals[name] = np.interp(log.times[rows], log.times[known], whole)
+    signals = {
+        signal.name: _at(log.times[rows], log.times, log.columns[signal.name], turns=signal == PSI)
+        for signal in STATE
+        if np.isfinite(log.columns.get(signal.name, np.nan)).any()
+    }
+    lines += _without_heading(log.times[rows], signals[PSI.name])
     own = Track(path, log.times[rows], signals, at_start=at_start)
     prefix = f"{log.name}: "
     return replace(own, remarks=tuple(own.remark(line.removeprefix(prefix)) for line in lines))
+
+
+def _at(at: Vector, times: Vector, values: Vector, *, turns: bool) -> Vector:
+    """A quantity at other times; NaN before its first value and after its last one."""
+    known = np.isfinite(values)
+    whole = np.unwrap(values[known]) if turns else values[known]
+    return np.interp(at, times[known], whole, left=np.nan, right=np.nan)
+
+
+def _without_heading(times: Vector, psi: Vector) -> Iterator[str]:
+    """Of a log whose heading begins later or ends earlier than its positions."""
+    known = np.isfinite(psi)
+    if np.mean(~known) > SELDOM:
+        where = "at no position"
+        if known.any():
+            where = f"from {times[known][0]:.10g} to {times[known][-1]:.10g} s alone"
+        yield (
+            f"psi has values {where}, while its positions go from {times[0]:.10g} to "
+            f"{times[-1]:.10g} s; headings are compared where psi has values"
+        )

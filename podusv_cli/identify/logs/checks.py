@@ -58,7 +58,11 @@ ABEAM = 0.2  # of an agreement, within which a mean angle means something
 NEAR = math.log(1.1)  # of a ratio, that counts as the ratio of two units
 ODD = math.log(1.4)  # of a ratio, that no unit explains and no sensor has
 ASIDE = 60.0  # deg, a mean angle between course and heading
+CENTI = 100.0  # a degree, where headings are integers
+HALF = 0.5  # of a motion, less than which a heading explains where it is wrong
+LOUD = 4.0  # times the noise of velocities, from which on what is left is motion
 TURN_AND_MORE = 7.0  # rad, with which no heading in radians begins
+TINY = 1e-30  # beside a sum of squares
 STEADY = 0.05  # of a speed, and in rad of a heading: standard deviations without a manoeuvre
 BEYOND = 1.3  # of what an actuator can do
 
@@ -199,6 +203,18 @@ def _constant(motion: Motion) -> Iterator[str]:
             yield f"{name} is {known[0]:g} throughout"
 
 
+# Full turns in the log's own numbers: what to write of psi, and which mistake that is.
+TURNS = {
+    RADIANS: ("COLUMN", ""),
+    DEGREES: ("COLUMN [deg]", "psi is in degrees"),
+    CENTI * DEGREES: ("COLUMN [1e-2 deg]", "psi is in hundredths of a degree"),
+    math.radians(RADIANS): ("COLUMN [rad]", "psi is in radians and not in degrees"),
+    math.radians(CENTI * DEGREES): (
+        "COLUMN [1e-2 deg]", "psi is in hundredths of a degree and not in degrees"
+    ),
+}  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Reading:
     """A way to read headings: how much a full turn is, and whether it is counted to port.
@@ -213,14 +229,14 @@ class Reading:
     @property
     def words(self) -> str:
         """As a condition."""
-        degrees = "psi is in degrees" if self.turn == DEGREES else ""
+        _, unit = TURNS[self.turn]
         counted = "psi or the position is counted the other way round" if self.sign < 0.0 else ""
-        return " and ".join(filter(None, (degrees, counted)))
+        return " and ".join(filter(None, (unit, counted)))
 
     @property
     def remedy(self) -> str:
         """What to write."""
-        column = "COLUMN [deg]" if self.turn == DEGREES else "COLUMN"
+        column, _ = TURNS[self.turn]
         if self.sign > 0.0:
             return f'write psi: "{column}" under identify.columns'
         if abs(cmath.phase(self.mean)) < math.pi / 4.0:
@@ -266,7 +282,7 @@ def _courses(motion: Motion) -> Iterator[str]:
         apart = course - sign * motion.heading(turn)[moving]
         return Reading(turn, sign, complex(np.nanmean(np.exp(1j * apart))))
 
-    own, *others = [read(turn, sign) for turn in (RADIANS, DEGREES) for sign in (1.0, -1.0)]
+    own, *others = [read(turn, sign) for turn in TURNS for sign in (1.0, -1.0)]
     best, lack = max(others, key=lambda reading: abs(reading.mean)), 1.0 - abs(own.mean)
     # A reading that takes all headings for the same one agrees as well as the courses alike are.
     least = min(lack, 1.0 - abs(complex(np.nanmean(np.exp(1j * course)))))
@@ -283,6 +299,33 @@ def _courses(motion: Motion) -> Iterator[str]:
             f"the boat moves {aside:.0f} deg off its heading on average; check that x is "
             "north, y east, and psi counted from north towards east"
         )
+    straight = abs(complex(np.nanmean(np.exp(1j * course)))) >= ALIKE
+    if not straight and lack > 1.0 - ALIKE and _unexplained(motion):
+        yield (
+            f"course and heading agree to {abs(own.mean):.2f} of 1; look at the unit and the "
+            "column of psi, unless the boat moves in all directions without turning"
+        )
+
+
+def _unexplained(motion: Motion) -> bool:
+    """Whether headings leave most of how a boat moves open, at any leeway and in any current.
+
+    By least squares velocities are those of a steady speed through the water at a steady angle to
+    the heading, or of the log's own u and v, and a current. The noise of positions is no motion.
+    """
+    velocity, heading = motion.velocity, np.exp(1j * motion.heading())
+    if {"u", "v"} <= motion.table.columns.keys():
+        heading = heading * (motion.mean("u") + 1j * motion.mean("v"))
+    rows = motion.moving & np.isfinite(heading)
+    if np.sum(rows) < FEWEST_BINS:
+        return False
+    moved, ahead = (values[rows] - np.mean(values[rows]) for values in (velocity, heading))
+    speed = complex(np.vdot(ahead, moved) / max(float(np.vdot(ahead, ahead).real), TINY))
+    speed *= min(1.0, BEYOND * motion.fastest / abs(speed)) if speed else 1.0
+    left = float(np.mean(np.abs(moved - speed * ahead) ** 2))
+    bends = np.abs(velocity[4:] - 2.0 * velocity[2:-2] + velocity[:-4]) ** 2
+    noise = float(np.nanmedian(bends)) / (6.0 * math.log(2.0))  # a rate spans two bins
+    return left > max(HALF * float(np.mean(np.abs(moved) ** 2)), LOUD * noise)
 
 
 def _jumps(motion: Motion) -> Iterator[str]:

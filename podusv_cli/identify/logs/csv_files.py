@@ -21,9 +21,13 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.logs.contents import Contents, LogFault
 
-SEPARATORS = ",;\t"
+SEPARATORS = ",;\t|"
+NAMED_SEPARATOR = re.compile(r'"?sep=([,;\t| ])"?', re.IGNORECASE)  # a first line of Excel's
+COMMENTS = ("#", "//")
 SELDOM = 0.05  # of the rows, that may be broken
 UNNAMED = "column "  # and its number: the name of a column without one
+AS_COMMENT = "delete it, or write # before it"
+LONG = 60  # characters of a line that a message shows
 SHOWN = 20  # characters of a cell that a message shows
 BOMS = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16", b"\xef\xbb\xbf": "utf-8-sig"}
 EXPONENT = r"(?:[eE][-+]?\d+)?"
@@ -47,7 +51,7 @@ class Line(NamedTuple):
 def read_csv(path: Path) -> Contents:
     """The columns of a CSV file, whose first line names them; NaN for what is no number.
 
-    Separated by commas, semicolons, tabs or blanks; decimal points or commas. Dates, as
+    Separated by commas, semicolons, tabs, bars or blanks; decimal points or commas. Dates, as
     2026-05-04T10:00:00Z, become seconds since 1970. Raises LogFault.
     """
     try:
@@ -56,7 +60,8 @@ def read_csv(path: Path) -> Contents:
         raise LogFault(f"{path}: cannot be read: {error.strerror}") from error
     head, *body = list(_lines(text)) or [Line(1, ())]
     names = _names(path, head)
-    rows, warnings = _whole_rows(path, names, body)
+    rows, warnings = _whole_rows(path, names, body, head.number)
+    _check_title(path, head, rows)
     if not text.endswith(("\n", "\r")) and rows and rows[-1] is body[-1]:
         warnings.append(
             f"its last line ({rows.pop().number}) has no line end and may be cut; it is left out"
@@ -82,10 +87,16 @@ def decoded(content: bytes) -> str:
 
 
 def _lines(text: str) -> Iterator[Line]:
-    """The lines but empty ones and comments; the first tells what separates cells."""
+    """The lines but empty ones and comments; the first tells what separates cells.
+
+    It is not among them where it is no more than `sep=;`, as Excel writes it.
+    """
     separator = None
     for number, line in enumerate(io.StringIO(text, newline=None), 1):
-        if not line.strip() or line.startswith("#"):
+        if not line.strip() or line.lstrip().startswith(COMMENTS):
+            continue
+        if separator is None and (named := NAMED_SEPARATOR.fullmatch(line.rstrip("\n"))):
+            separator = named[1]
             continue
         if separator is None:
             separator = max(SEPARATORS, key=line.count)
@@ -129,15 +140,30 @@ def _names(path: Path, head: Line) -> list[str]:
     return [name or f"{UNNAMED}{i}" for i, name in enumerate(names, 1)]
 
 
+def _check_title(path: Path, head: Line, rows: Sequence[Line]) -> None:
+    """Raises LogFault where numbers stand in the line of names, and names in the next one."""
+    if rows and any(map(_is_number, head.cells)) and not any(map(_may_be_value, rows[0].cells)):
+        raise LogFault(
+            f"{path}: line {head.number} was taken for the names of columns "
+            f"({', '.join(head.cells)[:LONG]}), but line {rows[0].number} looks like them; if "
+            f"line {head.number} is a title, {AS_COMMENT}"
+        )
+
+
+def _may_be_value(cell: str) -> bool:
+    return _is_number(cell) or cell.lower() in MISSING or bool(DATE.match(cell))
+
+
 def _is_number(cell: str) -> bool:
     return bool(NUMBER.fullmatch(cell.replace(",", ".")))
 
 
 def _whole_rows(
-    path: Path, names: Sequence[str], body: Sequence[Line]
+    path: Path, names: Sequence[str], body: Sequence[Line], head: int
 ) -> tuple[list[Line], list[str]]:
     """The lines with a cell a name, and a sentence on the others. Raises LogFault.
 
+    `head` is the number of the line with the names.
     Cells beyond the names are allowed where they are empty; the last line may be cut.
     """
     count = len(names)
@@ -159,7 +185,8 @@ def _whole_rows(
         )
         raise LogFault(
             f"{path}: {len(broken)} of {len(body)} lines do not have one cell for each name "
-            f"({names_listed}): {what}; {hint}"
+            f"({names_listed}): {what}; {hint}; line {head} was taken for the names, so if it is a "
+            f"title or a comment, {AS_COMMENT}"
         )
     lines = "1 line is" if len(broken) == 1 else f"{len(broken)} lines are"
     return rows, [f"{lines} left out for the number of cells: {what}"]

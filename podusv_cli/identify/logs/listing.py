@@ -13,11 +13,12 @@ import numpy as np
 import yaml
 
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
-from podusv_cli.identify.logs.contents import Columns
+from podusv_cli.identify.logs.contents import Columns, LogFault
 from podusv_cli.identify.logs.formats import contents_of
+from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.messages import TIME
+from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
 from podusv_cli.identify.logs.reading import UNITS, clock_of, delivered, listed, parted
 
 SIDES = "left|right|port|starboard|stbd"
@@ -46,8 +47,8 @@ ENDINGS = {
     "timeus": "us",
 }  # fmt: skip
 BEYOND = {
-    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "lat": ((90.5, "1e-7 deg"),),
-    "lon": ((361.0, "1e-7 deg"),), "n_#": ((100.0, "rpm"),), "delta_#": ((3.2, "deg"),),
+    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "n_#": ((100.0, "rpm"),),
+    "delta_#": ((3.2, "deg"),),
 }  # fmt: skip
 
 
@@ -113,12 +114,33 @@ def listing(path: Path) -> Listing:
     contents = contents_of(path)
     columns = contents.columns
     guesses = dict(_guesses(columns))
-    doubts = (f"{name!r} {doubt}" for name, doubt in contents.doubts.items() if name in guesses)
+    doubts = [f"{name!r} {doubt}" for name, doubt in contents.doubts.items() if name in guesses]
+    for column, reason in _no_places(columns, guesses):
+        doubts.append(f"{column!r} is not taken for {guesses.pop(column)}: {reason}")
     return Listing(
         [_listed(name, columns, guesses) for name in columns],
         any(name.endswith("orientation.yaw") for name in guesses),
         tuple(f"{path.name}: {line}." for line in (*contents.warnings, *doubts)),
     )
+
+
+def _places(guesses: dict[str, str]) -> dict[str, str]:
+    """The columns of latitude and longitude, by quantity."""
+    return {guess: column for column, guess in guesses.items() if guess in PLACES}
+
+
+def _no_places(columns: Columns, guesses: dict[str, str]) -> list[tuple[str, str]]:
+    """Columns that are called so and have no places on earth in degrees, and why."""
+    found = []
+    for signal in (LAT, LON):
+        column = _places(guesses).get(signal.name)
+        if column is None or _unit(column, columns, guesses):
+            continue
+        try:
+            on_earth(signal, without_none(columns[column])[0])
+        except LogFault as fault:
+            found.append((column, str(fault)))
+    return found
 
 
 def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
@@ -127,7 +149,7 @@ def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
     ends = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     seconds = _duration(name, columns, guesses)
     rate = float(np.sum(delivered(values))) / seconds if seconds > 0.0 else np.nan
-    unit = _unit(name, quantity, values) if quantity else ""
+    unit = _unit(name, columns, guesses) if quantity else ""
     missing = 1.0 - len(known) / max(len(values), 1)
     return Listed(name, rate, *ends, missing, _numbered(quantity, name, guesses), unit)
 
@@ -164,17 +186,23 @@ def _plain(column: str) -> str:
     return name.removesuffix(f"_{ending}") if ending else name
 
 
-def _unit(name: str, quantity: str, values: Vector) -> str:
+def _unit(name: str, columns: Columns, guesses: dict[str, str]) -> str:
     """Of a column: in brackets, at the end of its name, or by its range."""
-    own, unit = parted(name)
+    quantity, (own, unit) = guesses[name], parted(name)
+    values, _ = without_none(columns[name])
     if unit:
         return unit
     ending = next((e for e in ENDINGS if re.search(rf"(^|[._]){e}$", own.lower())), None)
     if ending is not None:
         return ENDINGS[ending]
     if quantity == TIME:
-        step = float(np.nanmedian(np.diff(values))) if len(values) > 1 else 0.0
+        steps = np.diff(values[np.isfinite(values)])
+        step = float(np.median(steps)) if len(steps) else 0.0
         return next((u for u, f in {"": 1.0, **FINER}.items() if step * f < SLOWEST), "")
+    places = _places(guesses)
+    if quantity in PLACES and places.keys() == PLACES.keys():
+        lat, lon = (without_none(columns[places[place]])[0] for place in PLACES)
+        return "1e-7 deg" if integers_of(lat, lon) else ""
     most = float(np.nanmax(np.abs(values), initial=0.0))
     return next((unit for least, unit in BEYOND.get(quantity, ()) if most > least), "")
 
@@ -185,5 +213,5 @@ def _duration(name: str, columns: Columns, guesses: dict[str, str]) -> float:
     clock = own or next((column for column, guess in guesses.items() if guess == TIME), None)
     if clock is None or not np.isfinite(columns[clock]).any():
         return np.nan
-    unit = "" if own else _unit(clock, TIME, columns[clock])
+    unit = "" if own else _unit(clock, columns, guesses)
     return float(np.nanmax(columns[clock]) - np.nanmin(columns[clock])) * UNITS["s"].get(unit, 1.0)

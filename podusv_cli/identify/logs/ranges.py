@@ -14,7 +14,10 @@ Marks = npt.NDArray[np.bool_]
 PLACES = {LAT.name: ("latitude", 90.0), LON.name: ("longitude", 180.0)}  # and most [deg]
 SELDOM = 0.05  # of the values, that may be out of range
 MINUTES = 100.0  # a degree, where degrees and minutes are written as one number
-SCALE = 1e7  # a degree, where positions are integers
+FINE, COARSE = 1e-7, 1e-6  # deg, the units of positions that are integers
+FEWEST = 1e3  # times the largest degrees, below which integers are in none of these
+TURN = 360.0  # deg
+NEARBY = 1.0  # deg, within which a log's track stays
 APART = 0.2  # of the range of all other values, that one for "none" lies beyond them
 # What sensors and buses write where they have no value: the largest numbers of 16 and 32 bits with
 # usual scales, the heading 511 of AIS, and nines.
@@ -58,6 +61,8 @@ def on_earth(signal: Signal, values: Vector) -> tuple[Vector, str]:
     Raises LogFault, with a sentence that does not name the file, where it is no single damage.
     """
     word, most = PLACES[signal.name]
+    if signal == LON:
+        values = _west(values, most)
     beyond = np.abs(values) > most  # false for NaN
     if not beyond.any():
         return values, ""
@@ -70,6 +75,30 @@ def on_earth(signal: Signal, values: Vector) -> tuple[Vector, str]:
     raise LogFault(f"{what}; {_reason(signal.name, values[np.isfinite(values)], most)}")
 
 
+def _west(longitudes: Vector, most: float) -> Vector:
+    """Longitudes less a turn where they are counted from 0 to 360 deg.
+
+    A few beyond 180 deg are so where they are near the others, as on both sides of Greenwich.
+    """
+    west = (longitudes > most) & (longitudes <= TURN)
+    others = longitudes[np.isfinite(longitudes) & ~west]
+    if west.sum() <= SELDOM * np.isfinite(longitudes).sum() and len(others):
+        west &= np.abs(longitudes - TURN - np.median(others)) < NEARBY
+    return np.where(west, longitudes - TURN, longitudes)
+
+
+def integers_of(lat: Vector, lon: Vector) -> bool:
+    """Whether places are in 1e-7 deg for sure: integers that are beyond the earth in 1e-6 deg."""
+    sizes = [np.abs(values[np.isfinite(values)]) for values in (lat, lon)]
+    if not all(len(size) and np.all(size == np.round(size)) for size in sizes):
+        return False
+    limits = [most for _, most in PLACES.values()]
+    largest = [float(size.max()) for size in sizes]
+    return any(a > most / COARSE for a, most in zip(largest, limits, strict=True)) and all(
+        a <= most / FINE for a, most in zip(largest, limits, strict=True)
+    )
+
+
 def _reason(name: str, values: Vector, most: float) -> str:
     """What such numbers probably are, and what to write."""
     size = np.abs(values)
@@ -78,10 +107,12 @@ def _reason(name: str, values: Vector, most: float) -> str:
             "is it in NMEA's degrees and minutes, ddmm.mmmm? Convert it to degrees: "
             "dd + mm.mmmm / 60"
         )
-    if size.max() <= most * SCALE and np.all(values == np.round(values)):
-        unit = "1e-7 deg"
+    if most * FEWEST < size.max() <= most / FINE and np.all(values == np.round(values)):
+        unit, most_fine = "1e-7 deg", size.max() * FINE
+        instead = f"; for {size.max() * COARSE:.6g} deg write 1e-6 deg instead"
         return (
-            f'if it is in {unit}, write {name}: "COLUMN [{unit}]" under identify.columns, or '
-            f'"{name} [{unit}]" as the name of the column'
+            f'if it is in {unit} ({most_fine:.6g} deg), write {name}: "COLUMN [{unit}]" under '
+            f'identify.columns, or "{name} [{unit}]" as the name of the column'
+            f"{instead if size.max() <= most / COARSE else ''}"
         )
     return f"write degrees from {-most:g} to {most:g}"

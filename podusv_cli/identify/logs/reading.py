@@ -33,11 +33,11 @@ LISTED = 30  # columns that a message names
 BOOT = 20  # rows at least, between two steps back of a clock and in each, which then began anew
 SENSED = {signal.name for signal in (*STATE, LAT, LON)}
 OPTIONAL = {signal.name for signal in STATE[3:]}  # that may be in a log without any number
-# What logs have beside the units that people write: propellers in rad/s, positions as integers.
+# What logs have beside the units that people write: propellers in rad/s, angles as integers.
 OF_LOGS = {
-    "1/s": {"rad/s": 0.5 / math.pi},
-    "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7},
-}
+    "1/s": {"rad/s": 0.5 / math.pi}, "rad": {"1e-2 deg": math.pi / 18000.0},
+    "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "1e-6 deg": 1e-6},
+}  # fmt: skip
 # Of each of podusv's units, what one of those that logs have is in it.
 UNITS: dict[str, dict[str, float]] = {
     unit: {name: float(factor) for name, factor in allowed(unit).items()} | OF_LOGS.get(unit, {})
@@ -349,15 +349,16 @@ def listed(columns: Iterable[str]) -> str:
     return ", ".join(names[:LISTED]) + more
 
 
-def delivered(values: Vector) -> Marks:
-    """Which values of a column are new ones, true or false.
+def delivered(*columns: Vector) -> Marks:
+    """Which rows of a column have a new value, or of several that come together, as x and y do.
 
     A logger that is faster than a sensor repeats its last value: where values change at regular
-    distances of several rows, only those that change count. A value that is no number never counts.
+    distances of several rows, only those that change count. What is no number never counts.
     """
-    known = np.isfinite(values)
+    values = np.column_stack(columns)
+    known = np.asarray(np.isfinite(values).all(axis=1), bool)
     at = np.flatnonzero(known)
-    changes = np.flatnonzero(np.diff(values[at]) != 0.0) + 1
+    changes = np.flatnonzero((np.diff(values[at], axis=0) != 0.0).any(axis=1)) + 1
     gaps = np.diff(changes)
     if len(gaps) < 5:
         return known
