@@ -245,3 +245,8 @@ def test_every_question_is_answered_and_the_page_goes_on(
 
 def test_a_path_of_other_letters_is_no_token(served: tuple[str, str]) -> None:
     assert answered(served[0], "GET", "/\xff\xfe" + "\xe9" * 40, None, b"")[0] == 404
+
+
+def test_a_question_that_lacks_something_is_answered_in_a_sentence(live: Live) -> None:
+    (refused,) = live.answer("frame", {"moved": {}})["refused"]
+    assert refused["text"] == "the question lacks signals, rest, controls"

@@ -41,7 +41,7 @@ def test_a_comma_at_the_end_of_each_row_is_no_column(tmp_path):
 def test_a_surplus_cell_with_something_in_it_is_refused(tmp_path):
     with pytest.raises(LogFault, match=r"2 of 2 lines .* line 2 has 3 cells, and there are 2 n"):
         contents(tmp_path, "t,x\n0,1.5,7\n1,2.5,7\n")
-    with pytest.raises(LogFault, match="decimal commas need another separator, such as ;"):
+    with pytest.raises(LogFault, match="decimal commas need a semicolon between cells"):
         contents(tmp_path, "t,x\n0,5,1,5\n1,5,2,5\n")
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -208,8 +209,8 @@ def test_units_are_those_of_scenarios(podusv):
         ((*BOAT, "--length", "-3"), "--length -3: must be above 0 [m]"),
         ((*BOAT, "--mass", "18 tons"), "--mass 18 tons: is no number in kg; tons does not fit "
          "(units here: kg, g, t, lb)"),
-        ((*BOAT, "--mass", "18t"), "18000 kg would make hulls of 4.9 m by 2.4 m 3.06 m deep, "
-         "deeper than they are wide; check length, beam and mass"),
+        ((*BOAT, "--mass", "18t"), "under 18000 kg hulls of 4.9 m by 2.4 m would lie 3.06 m "
+         "deep, deeper than they are wide; check length, beam and mass"),
         ((*BOAT, "--hulls", "2", "--hull-beam", "1.5"), "two hulls of 1.5 m (--hull-beam 1.5) do "
          "not fit into a beam of 2.4 m; check --length 4.9 and --beam 2.4, or give a smaller "
          "--hull-beam or --hulls 1"),
@@ -323,3 +324,14 @@ def test_hulls_too_narrow_name_the_option_that_says_how_wide_they_are(podusv):
     assert podusv("start", "small", *given, "--hulls", "2", "--hull-beam", "0.2").code == 0
     said = podusv("start", "one", *given[:5], "4500", *given[6:])
     assert "--hull-beam" not in said.err
+
+
+def test_a_hull_that_would_lie_too_deep_is_told_a_beam_that_will_do(podusv):
+    narrow = ("--length", "1.6", "--beam", "0.9", "--mass", "45", "--thrusters", "2x50N@0.35")
+    said = podusv("start", "cat", *narrow, "--hulls", "2")
+    found = re.search(r"give --hull-beam (\S+) or more", " ".join(said.err.split()))
+    assert found
+    beam = float(found[1])
+    assert podusv("start", "cat", *narrow, "--hulls", "2", "--hull-beam", f"{beam}").code == 0
+    less = podusv("start", "less", *narrow, "--hulls", "2", "--hull-beam", f"{beam - 0.01}")
+    assert less.code == 2

@@ -138,7 +138,12 @@ def window(frame: Table) -> str:
     if not over:
         return ""
     times = next(iter(over.values())) if len(ends) == 1 else ", ".join(map(" ".join, over.items()))
-    others = ", ".join(label for label in ends if label not in over)
+    numbers = dict(zip(frame.columns, zip(*frame.rows.values(), strict=True), strict=True))
+    others = ", ".join(  # without a log, which has no number of its own
+        label
+        for label, own in numbers.items()
+        if label not in over and not all(map(math.isnan, own))
+    )
     return f"numbers up to the end of the path: {times}" + (
         f"; of the whole run: {others}" if others else ""
     )

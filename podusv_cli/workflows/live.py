@@ -76,6 +76,9 @@ class Live:
 
     def answer(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
         """What the page asks for; what podusv refuses as `refused`, sentences by key."""
+        wanted = ("moved", "name") if name == "save" else ("moved", "signals", "rest", "controls")
+        if lacking := [key for key in wanted if key not in asked]:
+            return {"refused": [{"key": "", "text": f"the question lacks {', '.join(lacking)}"}]}
         try:
             moved = self.allowed(asked["moved"])
             if name == "save":

@@ -51,9 +51,10 @@ def track(
     log = table(path, STATE, named)
     if lacking := [name for name in POSE if name not in log.columns]:
         raise UsageError(
-            f"{path}: nothing is known of {', '.join(lacking)}; call its columns time, x, y, psi, "
-            "with units in brackets where these are not s, m, rad, or write identify.columns in a "
-            "scenario beside it, which says what they are called"
+            f"{path}: nothing is known of {', '.join(lacking)}; call its columns time, x, y (or "
+            "lat, lon) and psi, with units in brackets where these are not s, m, rad, as "
+            f"`podusv identify --columns {path}` proposes, or write that under identify.columns in "
+            "a scenario beside it"
         )
     rows = delivered(log.columns["x"], log.columns["y"])
     if np.count_nonzero(rows) < 2:

@@ -39,7 +39,6 @@ THRUSTERS = re.compile(r"(\d)\s*x\s*([^@]+)@\s*(.+)")
 EXAMPLE = "2x180N@1.0: two of 180 N each, 1.0 m beside the centre line"
 # From models that fit in a hand to the largest ships; far beyond, the formulas overflow.
 SIZES = {"m": (1e-3, 1e3), "kg": (1e-3, 1e9), "N": (1e-4, 1e8), "m/s": (1e-3, 100.0)}
-NO_HULL_BEAM = ", or give --hull-beam: without it, each hull is a tenth of the length wide"
 # What is drawn in a study: a factor on each of these keys, by the name in `SCATTER`.
 FACTORS = {
     "I_z": ("I_z",), "X_udot": ("X_udot",), "Y_vdot": ("Y_vdot",), "N_rdot": ("N_rdot",),
@@ -145,11 +144,20 @@ def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
         )
     if hull.draught > hull.narrow:
         raise UsageError(
-            f"{hull.mass:g} kg would make hulls of {hull.length:g} m by {hull.narrow:.3g} m "
+            f"under {hull.mass:g} kg hulls of {hull.length:g} m by {hull.narrow:.3g} m would lie "
             f"{hull.draught:.3g} m deep, deeper than they are wide; check length, beam and mass"
-            + (NO_HULL_BEAM if boat.hulls > 1 and not boat.hull_beam else "")
+            + (_wider(hull) if boat.hulls > 1 and not boat.hull_beam else "")
         )
     return hull, thrusters
+
+
+def _wider(hull: Hull) -> str:
+    """How wide hulls have to be that lie no deeper than that: the depth times the width stays."""
+    least = math.ceil(100.0 * math.sqrt(hull.draught * hull.narrow)) / 100.0
+    return (
+        f", or give --hull-beam {least:g} or more: without it, each hull is a tenth of the length "
+        "wide"
+    )
 
 
 def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:

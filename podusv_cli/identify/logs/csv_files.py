@@ -179,7 +179,7 @@ def _whole_rows(
     if len(broken) > max(1.0, SELDOM * len(body)):
         names_listed = ", ".join(names[:6]) + (", ..." if count > 6 else "")
         hint = (
-            "decimal commas need another separator, such as ;"
+            "decimal commas need a semicolon between cells"
             if len(first.cells) >= 2 * count - 1
             else "write one value under each name"
         )
