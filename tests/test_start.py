@@ -320,7 +320,9 @@ def test_hulls_too_narrow_name_the_option_that_says_how_wide_they_are(podusv):
     given = ("--length", "1.6", "--beam", "0.7", "--mass", "45", "--thrusters", "2x50N@0.2")
     said = podusv("start", "small", *given, "--hulls", "2")
     assert said.code == 2
-    assert "or give --hull-beam: without it, each hull is a tenth of" in one_line(said.err)
+    assert "or give --hull-beam 0.17 or more: without it, each hull is a tenth of" in one_line(
+        said.err
+    )
     assert podusv("start", "small", *given, "--hulls", "2", "--hull-beam", "0.2").code == 0
     said = podusv("start", "one", *given[:5], "4500", *given[6:])
     assert "--hull-beam" not in said.err
