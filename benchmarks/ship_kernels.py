@@ -23,7 +23,7 @@ from podusv_cli.engine.machine.wide.scalar_ir import NotForLanes
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.step import rk4
 from podusv_cli.export.law import ExportedLaw
-from podusv_cli.identify import march
+from podusv_cli.identify.fit import march
 from podusv_cli.interface.scenarios import loaded
 from podusv_cli.process.workers import available_workers, run_all
 from podusv_cli.scenario.load import Loaded, load

@@ -11,12 +11,12 @@ from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.estimate import (
+from podusv_cli.identify.fit.estimate import (
     estimated,
     prior_kept,
 )
+from podusv_cli.identify.fit.problem import Problem
 from podusv_cli.identify.logs.reading import Table
-from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load

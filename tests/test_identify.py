@@ -31,14 +31,13 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Answer
-from podusv_cli.identify.estimate import (
+from podusv_cli.identify.fit.estimate import (
     OPEN,
     SILENT,
     Estimate,
     directions,
 )
-from podusv_cli.identify.logs.reading import Table, delivered
-from podusv_cli.identify.march import (
+from podusv_cli.identify.fit.march import (
     APART,
     COMMANDS,
     DELIVERED,
@@ -48,9 +47,10 @@ from podusv_cli.identify.march import (
     Record,
     side_by_side,
 )
+from podusv_cli.identify.fit.problem import Problem, hull_numbers
+from podusv_cli.identify.logs.reading import Table, delivered
 from podusv_cli.identify.outputs import drawn
 from podusv_cli.identify.phrases import early_words, summary, thrust_words, worse_words
-from podusv_cli.identify.problem import Problem, hull_numbers
 from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
@@ -519,9 +519,8 @@ def test_the_mass_matrix_stays_symmetric_where_it_was(boat):
         up = given.vessel(np.ones(1))
         assert up.m32 == pytest.approx(math.exp(given.sd[0]) * hull.m32)
         assert up.m23 == pytest.approx(up.m32 if hull is HULL else hull.m23)
-        constants = dict(
-            zip(NAMES, given.constants(np.ones(len(given.numbers)), (0.0, 0.0)), strict=True)
-        )
+        values = given.at(np.ones(len(given.numbers)))
+        constants = dict(zip(NAMES, given.constants(values, (0.0, 0.0)), strict=True))
         assert (constants["m23"], constants["m32"]) == pytest.approx((up.m23, up.m32))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from podusv_cli.identify.estimate import (
+from podusv_cli.identify.fit.estimate import (
     Scored,
     Search,
     covariance,

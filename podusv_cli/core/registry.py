@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator
-from functools import reduce
+from functools import cache, reduce
 from importlib import import_module
 from operator import or_
 from pathlib import Path
@@ -123,11 +123,20 @@ def _members(package: str, plugins: Plugins) -> Iterator[Any]:
 
 def _placed(package: str, plugins: Plugins) -> Iterator[tuple[str, Any]]:
     """Everything in the modules of a package and in the plug-ins, and which of them it is in."""
-    for module in iter_modules(import_module(package).__path__, f"{package}."):
-        members = vars(_imported(module.name)).items()
-        yield from ((module.name, thing) for name, thing in members if not name.startswith("__"))
+    yield from scan_package(package)
     for plugin in plugins:
         yield from ((str(plugin), thing) for thing in plugin.members(package.rpartition(".")[2]))
+
+
+@cache
+def scan_package(package: str) -> tuple[tuple[str, Any], ...]:
+    """What podusv's own modules of a package define, each with its module; looked up once."""
+    return tuple(
+        (module.name, thing)
+        for module in iter_modules(import_module(package).__path__, f"{package}.")
+        for name, thing in vars(_imported(module.name)).items()
+        if not name.startswith("__")
+    )
 
 
 def _imported(module: str) -> Any:

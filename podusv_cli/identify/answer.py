@@ -17,9 +17,9 @@ from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.estimate import Directions, Estimate
+from podusv_cli.identify.fit.estimate import Directions, Estimate
+from podusv_cli.identify.fit.problem import Problem, channels
 from podusv_cli.identify.judge import FreeRun, Score
-from podusv_cli.identify.problem import Problem, channels
 from podusv_cli.identify.records import Log
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
@@ -159,16 +159,14 @@ class Answer:
     def parameters(self) -> list[Parameter]:
         """The numbers that were looked for, the hull's first."""
         sd = np.sqrt(np.diag(self.estimate.covariance))
-        found = []
-        for number, y, width in zip(self.problem.numbers, self.estimate.y, sd, strict=True):
-            (_, *before), (value, *after) = (
-                [number.at(e) for e in (y0, y0 - SIDE * w, y0 + SIDE * w)]
-                for y0, w in ((0.0, 1.0), (float(y), float(width)))
-            )
-            (low, high), (lowest, highest) = sorted(before), sorted(after)
-            ends = low, high, value, lowest, highest
-            found.append(Parameter(number.name, number.prior, *ends, float(width)))
-        return found
+        at, y, width = self.problem.at, self.estimate.y, np.full(len(sd), SIDE)
+        before = np.sort([at(-width), at(width)], axis=0)
+        after = np.sort([at(y - SIDE * sd), at(y + SIDE * sd)], axis=0)
+        columns = np.array([*before, at(y), *after, sd]).T.tolist()
+        return [
+            Parameter(number.name, number.prior, *ends)
+            for number, ends in zip(self.problem.numbers, columns, strict=True)
+        ]
 
     @cached_property
     def draws(self) -> list[Vessel]:

@@ -10,10 +10,10 @@ import numpy as np
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.identify.estimate import Search, directions, estimated
+from podusv_cli.identify.fit.estimate import Search, directions, estimated
+from podusv_cli.identify.fit.march import DELIVERED, VALUES
+from podusv_cli.identify.fit.problem import Problem
 from podusv_cli.identify.logs.reading import Whole
-from podusv_cli.identify.march import DELIVERED, VALUES
-from podusv_cli.identify.problem import Problem
 from podusv_cli.identify.records import Log
 
 WARM = 20.0  # s, in which the filter finds velocities and load before the first free run

@@ -14,9 +14,9 @@ from podusv_cli.core.component import unit_of
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Answer, Force
-from podusv_cli.identify.estimate import OPEN, SILENT
+from podusv_cli.identify.fit.estimate import OPEN, SILENT
+from podusv_cli.identify.fit.march import CURRENT, DELAY, THRUST
 from podusv_cli.identify.judge import WHO, Score
-from podusv_cli.identify.march import CURRENT, DELAY, THRUST
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from podusv_cli.identify.answer import AXES, Answer
-from podusv_cli.identify.estimate import OPEN
+from podusv_cli.identify.fit.estimate import OPEN
+from podusv_cli.identify.fit.march import DELAY, THRUST
 from podusv_cli.identify.judge import WHO
-from podusv_cli.identify.march import DELAY, THRUST
 
 # The manoeuvre that determines the numbers of an axis.
 MANOEUVRES = {

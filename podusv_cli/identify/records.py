@@ -10,9 +10,9 @@ from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
+from podusv_cli.identify.fit.march import APART, COMMANDS, DELIVERED, HOLDS, SHIFTS, VALUES, Record
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import SLACK, Marks, Table, Whole, delivered
-from podusv_cli.identify.march import APART, COMMANDS, DELIVERED, HOLDS, SHIFTS, VALUES, Record
 
 BEGIN = 3.0  # s, from which the velocities at the start are guessed
 FEWEST = 20  # values of the position, or a log says nothing

@@ -98,12 +98,22 @@ def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep)
         *ENDING,
         *(name for single in laws.values() for name in gathered_metrics(single)),
     }
+    wrong_names = {name: _wrong_name(name, q, taken) for name, q in sweep.vary.items()}
+    wrong_keys = {
+        name: [text for key in q.targets(name) for text in _key(key, q, laws)]
+        for name, q in sweep.vary.items()
+    }
+    sound = {
+        name: q for name, q in sweep.vary.items() if not (wrong_names[name] or wrong_keys[name])
+    }
+    together = _are_taken_together(sound, laws, own)
     for name, quantity in sweep.vary.items():
-        if wrong := _wrong_name(name, quantity, taken):
-            yield ("sweep", "vary", name), wrong
+        if wrong_names[name]:
+            yield ("sweep", "vary", name), wrong_names[name]
             continue
-        texts = [text for key in quantity.targets(name) for text in _key(key, quantity, laws)]
-        texts = texts or list(_tried(name, quantity, laws, own))
+        texts = wrong_keys[name]
+        if name in sound and not together:
+            texts = list(_wrong_values(name, quantity, laws, own))
         told = [*dict.fromkeys(texts)][: 1 if quantity.rows else None]  # they have many keys
         yield from ((("sweep", "vary", name), text) for text in told)
 
@@ -193,40 +203,68 @@ def _real(quantity: Quantity) -> str:
     return next((way for way in quantity.distribution.given if way in REAL), "")
 
 
-def _tried(
+def _are_taken_together(
+    quantities: Mapping[str, Quantity], laws: Mapping[str, Scenario], own: Mapping[str, Any]
+) -> bool:
+    """Whether every law takes all quantities at once, each at every value that is tried of it.
+
+    A loop is built for each round, not for each quantity. A round that fails says nothing of which
+    quantity is to blame: then each has to be tried alone.
+    """
+    values_of = {name: _values_to_try(quantity) for name, quantity in quantities.items()}
+    rounds = max(map(len, values_of.values()), default=0)
+    draws = [{name: v[i % len(v)] for name, v in values_of.items()} for i in range(rounds)]
+    try:
+        return all(
+            _structure(drawn(single, quantities, draw)) == own[law]
+            for law, single in laws.items()
+            for draw in draws
+        )
+    except ValueRefused:
+        return False
+
+
+def _values_to_try(quantity: Quantity) -> list[Any]:
+    """Some of the values that a quantity has: all, where there are few."""
+    if quantity.rows:
+        return list(range(len(quantity.lines.rows)))
+    if quantity.seed:
+        return [1]
+    choice = (quantity.distribution.choice or ())[:MOST_TRIED]
+    return list(choice) or quantity.distribution.at(TRIED).tolist()
+
+
+def _wrong_values(
     name: str, quantity: Quantity, laws: Mapping[str, Scenario], own: Mapping[str, Any]
 ) -> Iterator[str]:
-    """What is wrong with some of the values that a quantity has: all, where there are few.
+    """What is wrong with the values that are tried of a quantity.
 
     `own` is what the runs of a law have in common.
     """
-    rows = range(len(quantity.lines.rows)) if quantity.rows else ()
-    discrete = rows or (quantity.distribution.choice or ())[:MOST_TRIED]
-    drawn_values = [
-        *discrete,
-        *([] if discrete or quantity.seed else quantity.distribution.at(TRIED).tolist()),
-        *([1] if quantity.seed else []),
-    ]
+    rows = len(quantity.lines.rows) if quantity.rows else 0
+    tried = _values_to_try(quantity)
+    all_count = rows or quantity.distribution.choice
     for law, single in laws.items():
-        refusals = [_refused(name, quantity, single, value) for value in drawn_values]
-        if all(refusals) or (discrete and any(refusals)):
+        answers = [_scenario_or_refusal(name, quantity, single, value) for value in tried]
+        refusals = [answer if isinstance(answer, str) else "" for answer in answers]
+        if all(refusals) or (all_count and any(refusals)):
             place, refused = next((i, text) for i, text in enumerate(refusals) if text)
-            row = f"row {place + 1} of {len(rows)}: " if rows else ""
+            row = f"row {place + 1} of {rows}: " if rows else ""
             yield row + refused.removeprefix(f"sweep.vary.{name}: ")
         yield from (
             "changes how the loop is put together or sampled; list its values under grid"
-            for value, refused in zip(drawn_values, refusals, strict=True)
-            if not refused
-            and _structure(drawn(single, {name: quantity}, {name: value})) != own[law]
+            for answer in answers
+            if not isinstance(answer, str) and _structure(answer) != own[law]
         )
 
 
-def _refused(name: str, quantity: Quantity, scenario: Scenario, value: Any) -> str:
+def _scenario_or_refusal(
+    name: str, quantity: Quantity, scenario: Scenario, value: Any
+) -> Scenario | str:
     try:
-        drawn(scenario, {name: quantity}, {name: value})
+        return drawn(scenario, {name: quantity}, {name: value})
     except ValueRefused as error:
         return str(error)
-    return ""
 
 
 def _structure(scenario: Scenario) -> Any:

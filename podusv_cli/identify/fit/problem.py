@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
 from podusv_cli.components.estimators.ekf import MOVING, ExtendedKalmanFilter, N
 from podusv_cli.components.facts import Facts
-from podusv_cli.components.vessels.vessel import COEFFICIENTS, INERTIA, Vessel
-from podusv_cli.core.errors import UsageError
+from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import LANES, Vector
-from podusv_cli.identify.estimate import Search
-from podusv_cli.identify.logs.reading import Whole
-from podusv_cli.identify.march import (
+from podusv_cli.identify.fit.estimate import Search
+from podusv_cli.identify.fit.march import (
     CURRENT,
     DELAY,
     DELIVERED,
@@ -30,16 +28,22 @@ from podusv_cli.identify.march import (
     Followed,
     side_by_side,
 )
+from podusv_cli.identify.fit.numbers import (
+    ADDED,
+    FORCES,
+    Number,
+    hull_numbers,
+    symmetric,
+    values_at,
+)
+from podusv_cli.identify.logs.reading import Whole
 from podusv_cli.identify.records import Log
 from podusv_cli.process.workers import available_workers
-from podusv_cli.scenario.identify import DAMPING, GROUPS, Identify
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
 
-# Where an entry of the mass matrix is, and what of it stands beside the added mass.
-ADDED = {"m11": "X_udot", "m22": "Y_vdot", "m23": "Y_rdot", "m32": "N_vdot", "m33": "N_rdot"}
-# Numbers that a force is proportional to; those of the damping.
-FORCES = ("m", "I_z", *(n for n in COEFFICIENTS if n[:2] in DAMPING.values()))
-DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
+Entry = TypeVar("Entry")
+CURRENTS = slice(NAMES.index(CURRENT[0]), NAMES.index(CURRENT[0]) + len(CURRENT))
 WALKS = ("q_u", "q_v", "q_r", "q_b", "q_b_psi")
 UNSURE = 1.5  # of the logarithm of a noise, before the logs are read
 LOUD = 2.0  # of these deviations, of accelerations and loads, where a second search begins
@@ -54,88 +58,6 @@ TURNED = 0.05  # rad, of the heading at the start
 FINEST = 1e-4  # of what a sensor measured, its least error
 FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
 BLOCK = 30.0  # s of a log, whose innovations count together
-
-
-@dataclass(frozen=True)
-class Number:
-    """One number that is looked for: its logarithm is normal about that of `prior`, with `sd`.
-
-    Without a `ratio` it is normal itself. It is never more than `least` standard deviations below.
-    """
-
-    name: str
-    prior: float
-    sd: float
-    ratio: bool = True
-    least: float = -math.inf
-
-    def at(self, e: float) -> float:
-        """The number so many standard deviations from its prior."""
-        step = self.sd * max(e, self.least)
-        return self.prior * math.exp(step) if self.ratio else self.prior + step
-
-
-def hull_numbers(vessel: Vessel, wanted: Identify) -> list[Number]:
-    """The vessel's numbers that are looked for. A number that is 0 stays 0.
-
-    Raises UsageError for names that it has not, and where logs can give ratios alone.
-    """
-    names: dict[str, None] = {}
-    constants = vessel.constants()
-    for name in wanted.free:
-        names |= dict.fromkeys(_members(name, constants))
-    every = {n for group in GROUPS for n in _members(group, constants)}
-    if THRUST in names and every <= names.keys():
-        raise UsageError(
-            "identify.free: thrust, inertia and damping times one factor give the same motion, so "
-            "that with all of them free logs tell ratios alone; leave thrust out, or hold what is "
-            "known otherwise, as m11 of a boat that was weighed: "
-            f"free: [m22, m33, {', '.join(GROUPS[1:])}, thrust]"
-        )
-    unknown = [name for name in wanted.priors if name not in names]
-    if unknown:
-        raise UsageError(
-            f"identify.priors: {unknown[0]} is not looked for; looked for: {', '.join(names)}"
-        )
-    return [
-        Number(n, constants.get(n, 1.0), _log_sd(wanted.priors.get(n, wanted.prior))) for n in names
-    ]
-
-
-def _members(name: str, constants: Mapping[str, float]) -> list[str]:
-    """The numbers of a group, or the number of this name."""
-    group = {"inertia": ("m11", "m22", "m33")} | {
-        f"damping.{axis}": tuple(n for n in DAMPINGS if n.startswith(first))
-        for axis, first in DAMPING.items()
-    }
-    if name in group:
-        return [n for n in group[name] if constants[n] != 0.0]
-    alone = {*INERTIA, THRUST, *(n for members in group.values() for n in members)}
-    if name not in alone:
-        near = difflib.get_close_matches(name, [*GROUPS, *alone], 1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise UsageError(
-            f"identify.free: {name!r} is no group ({', '.join(GROUPS)}) and no number of the "
-            f"vessel ({', '.join(sorted(alone))}){hint}"
-        )
-    if name == "m32" and symmetric(constants):
-        return ["m23"]
-    if constants.get(name, 1.0) == 0.0:
-        raise UsageError(
-            f"identify.free: {name} of the vessel is 0, and what is known of it is relative to "
-            "that, so it would stay 0; give vessel a first guess of it"
-        )
-    return [name]
-
-
-def symmetric(constants: Mapping[str, float]) -> bool:
-    """Whether the mass matrix is so, as that of a hull at rest in the water: m32 goes with m23."""
-    return constants["m23"] == constants["m32"]
-
-
-def _log_sd(relative: float) -> float:
-    """The standard deviation of the logarithm, of a log-normal number with this relative one."""
-    return math.sqrt(math.log1p(relative * relative))
 
 
 def sensor_noise(log: Log) -> Vector:
@@ -228,37 +150,58 @@ class Problem:
         return dict(zip(FIRST, sizes, strict=True))
 
     @cached_property
-    def _base(self) -> dict[str, float]:
-        return {
-            **self.scenario.vessel.constants(),
-            **self.filter.constants(),
-            THRUST: 1.0,
-            DELAY: 0.0,
-        }
+    def _fixed_constants(self) -> Vector:
+        """The filter's constants before anything is looked for, in the order of `NAMES`."""
+        still = {THRUST: 1.0, DELAY: 0.0, **dict.fromkeys(CURRENT, 0.0)}
+        known = self.scenario.vessel.constants() | self.filter.constants() | still
+        return np.array([known[name] for name in NAMES])
+
+    def at(self, y: Vector) -> Vector:
+        """The numbers at a point."""
+        return values_at(self.numbers, y)
 
     def values(self, y: Vector) -> dict[str, float]:
         """The numbers at a point, by name."""
-        values = {n.name: n.at(e) for n, e in zip(self.numbers, y.tolist(), strict=True)}
-        return self._with_m32(values)
+        values = self.at(y).tolist()
+        return {name: values[place] for name, place in self._places.items()}
 
-    def _with_m32(self, values: dict[str, float]) -> dict[str, float]:
-        tied = "m23" in values and symmetric(self.scenario.vessel.constants())
-        return values | {"m32": values["m23"]} if tied else values
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        """Where the coordinate of each number is in a point; m32 may go with m23."""
+        return self._with_m32({number.name: i for i, number in enumerate(self.numbers)})
 
-    def constants(self, y: Vector, current: Sequence[float]) -> Vector:
-        """The filter's constants at a point, in water that flows north and east so fast [m/s]."""
-        constants = self._base | self.values(y) | dict(zip(CURRENT, current, strict=True))
-        return np.array([constants[name] for name in NAMES])
+    def _with_m32(self, by_name: dict[str, Entry]) -> dict[str, Entry]:
+        tied = "m23" in by_name and symmetric(self.scenario.vessel.constants())
+        return by_name | {"m32": by_name["m23"]} if tied else by_name
+
+    @cached_property
+    def _free_constants(self) -> tuple[Whole, Whole]:
+        """Which of the filter's constants are looked for, and where in a point each of them is."""
+        free = [(i, self._places[name]) for i, name in enumerate(NAMES) if name in self._places]
+        at, place = np.array(free, dtype=np.int64).T
+        return at, place
+
+    def constants(self, values: Vector, current: Sequence[float]) -> Vector:
+        """The filter's constants, with `values` from `at`, in water that flows so fast [m/s]."""
+        at, place = self._free_constants
+        constants = self._fixed_constants.copy()
+        constants[at] = values[place]
+        constants[CURRENTS] = current
+        return constants
+
+    def _currents(self, log: Log, values: Vector) -> list[float]:
+        """The current of a log [m/s] with `values` from `at`, north and east."""
+        names = [f"{axis}, {log.name}" for axis in CURRENT]
+        return [float(values[self._places[n]]) if n in self._places else 0.0 for n in names]
 
     def currents(self, log: Log, y: Vector) -> list[float]:
-        """The current of a log at a point [m/s]."""
-        values = self.values(y)
-        return [values.get(f"{axis}, {log.name}", 0.0) for axis in CURRENT]
+        """The current of a log at a point [m/s], north and east."""
+        return self._currents(log, self.at(y))
 
     def vessel(self, y: Vector) -> Vessel:
         """The hull at a point. Raises ValidationError where no hull can be like that."""
         own = self.scenario.vessel
-        new = self._with_m32({n.name: n.at(e) for n, e in zip(self.hull, y.tolist(), strict=False)})
+        new = self._with_m32(self._hull_values(y))
         new.pop(THRUST, None)
         beside = {n: getattr(own, n) + getattr(own, ADDED[n]) for n in ADDED}
         added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}
@@ -266,8 +209,11 @@ class Problem:
 
     def thrust(self, y: Vector) -> float:
         """What part of the loads that the actuator's numbers give acts on the hull at a point."""
-        own = zip(self.hull, y.tolist(), strict=False)
-        return next((n.at(e) for n, e in own if n.name == THRUST), 1.0)
+        return self._hull_values(y).get(THRUST, 1.0)
+
+    def _hull_values(self, y: Vector) -> dict[str, float]:
+        values = values_at(self.hull, y[: len(self.hull)]).tolist()
+        return {number.name: value for number, value in zip(self.hull, values, strict=True)}
 
     def scaled(self, y: Vector, thrust: float) -> Vessel:
         """The hull that moves under this thrust as the one at a point does under its own.
@@ -281,17 +227,19 @@ class Problem:
     def _follow(self) -> Follow:
         return side_by_side(self.scenario.actuator)
 
-    def start(self, log: Log, current: Sequence[float], y: Vector | None = None) -> Vector:
-        """The filter's state at the beginning of a log, in the water's frame; that of a point."""
+    def start(self, log: Log, current: Sequence[float], values: Vector | None = None) -> Vector:
+        """The filter's state at the beginning of a log, in the water's frame.
+
+        With `values` from `at` velocity and loads there are known; without, unsure.
+        """
         state, (c, s) = log.state.copy(), (math.cos(log.state[2]), math.sin(log.state[2]))
         state[3] -= c * current[0] + s * current[1]
         state[4] -= c * current[1] - s * current[0]
         pose = max(self.filter.sigma_p, 1e-9) * 3.0
         speeds = np.array(AT_START) * [self.facts.s, self.facts.s, self.facts.s / self.facts.lam]
         loads, first = [*self._first.values()][2:], np.zeros(len(FIRST))
-        if y is not None:
-            values = self.values(y)
-            first = np.array([values[f"{name}, {log.name}"] for name in FIRST])
+        if values is not None:
+            first = values[[self._places[f"{name}, {log.name}"] for name in FIRST]]
             speeds[:2], loads = 0.0, [0.0] * 3
         state[3:5] += first[:2]
         unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
@@ -301,10 +249,11 @@ class Problem:
         self, log: Log, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
     ) -> Followed:
         """The filter along a log, for every point, in the current of the point or another."""
-        flows = currents or [self.currents(log, y) for y in points]
-        known = [None] * len(points) if currents else points
-        starts = [self.start(log, flow, y) for flow, y in zip(flows, known, strict=True)]
-        runs = self._runs(log, [*map(self.constants, points, flows)], starts, tracked=True)
+        values = [self.at(y) for y in points]
+        flows = currents or [self._currents(log, each) for each in values]
+        known = [None] * len(points) if currents else values
+        starts = [self.start(log, flow, each) for flow, each in zip(flows, known, strict=True)]
+        runs = self._runs(log, [*map(self.constants, values, flows)], starts, tracked=True)
         whole = Followed(*(np.concatenate(arrays, axis=-1) for arrays in zip(*runs, strict=True)))
         since = log.times - log.times[0]
         whole.track[:, :2] += since[:, None, None] * np.array(flows).T
@@ -325,11 +274,12 @@ class Problem:
         """
         ends = np.cumsum([0, *(log.record.delivered for log in self.logs)]).tolist()
         nu, s = (np.empty((ends[-1], len(points))) for _ in range(2))
+        values = [self.at(y) for y in points]
 
         def fill(log: Log, begin: int, end: int) -> None:
-            flows = [self.currents(log, y) for y in points]
-            both = zip(points, flows, strict=True)
-            rows = [np.append(self.constants(y, f), self.start(log, f, y)) for y, f in both]
+            flows = [self._currents(log, each) for each in values]
+            both = zip(values, flows, strict=True)
+            rows = [np.append(self.constants(v, f), self.start(log, f, v)) for v, f in both]
             # What another log begins with changes nothing here.
             each, of = np.unique(rows, axis=0, return_inverse=True)
             constants, starts = list(each[:, : len(NAMES)]), list(each[:, len(NAMES) :])
