@@ -50,7 +50,7 @@ def keep(
     tasks = [_task(folder, plan, run, request) for run in missing]
     with interrupts_enabled():
         for law, cell in dict.fromkeys((run.law, run.cell) for run in missing):
-            warm_up(Case.of(plan.single(law, cell)))
+            warm_up(Case(plan.single(law, cell), plan.run_plan(law, cell)))
     outcomes = run_all([partial(execute, task) for task in tasks], workers=request.workers)
     for run, outcome in zip(missing, outcomes, strict=True):
         if outcome.failure:

@@ -12,6 +12,7 @@ from typing import Any
 from podusv_cli.core.about import Keep
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
+from podusv_cli.engine.running.simulate import ready
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
@@ -89,7 +90,8 @@ def run(config: Config, request: Request, tell: Tell) -> Swept:
     made, folder, texts = _planned(config, request)
     check_fits(made, folder, request.shard[1])
     for law in made.laws:  # before there is a folder that a mended law would not fit
-        made.single(law, 0).ready(compiling(request, law))
+        compiled = made.scenario.simulation.compiled
+        ready(made.run_plan(law, 0), compiled, compiling(request, law))
     store = Store(folder, record.about(made))
     with sole_writer(store.folder):
         if request.force:

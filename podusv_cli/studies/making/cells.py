@@ -12,7 +12,7 @@ from typing import Any
 from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.phrases import as_yaml
-from podusv_cli.scenario.load import Check, Loaded
+from podusv_cli.scenario.load import CLASHES, Check, Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, placed, plain, route
 
@@ -56,7 +56,12 @@ def _made(loaded: Loaded, check: Check | None, faults: dict[Hashable, None]) -> 
         values = tuple(zip(grid, map(plain, nodes), strict=True))
         checks = [_within(check, _label(values))] if check else []
         try:
-            yield Cell(index, values, loaded.changed(top, checks))
+            scenario = (
+                loaded.changed(top, checks)
+                if grid
+                else loaded.checked([], (CLASHES, *checks)).scenario
+            )
+            yield Cell(index, values, scenario)
         except ScenarioError as error:
             faults |= dict.fromkeys(error.faults)
 

@@ -14,6 +14,7 @@ import numpy as np
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.about import BESIDE_RUNS, Keep
 from podusv_cli.core.errors import UsageError
+from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine.object_cache import ingredients
 from podusv_cli.engine.step import rk4 as closed_loop
 from podusv_cli.scenario.load import Loaded, values
@@ -70,7 +71,7 @@ class StudyPlan:
     @cached_property
     def metrics(self) -> tuple[str, ...]:
         """The names of the metrics that a law of the study has during a run, in their order."""
-        probes = [self.single(law, cell.index).probe() for law in self.laws for cell in self.cells]
+        probes = [self.run_plan(law, cell.index).probe for law in self.laws for cell in self.cells]
         blank = [probe.summary(np.full(probe.size, np.nan)) for probe in probes]
         names = {name for numbers in blank for name in numbers}
         return tuple(name for name in self.scenario.known_metrics() if name in names)
@@ -78,6 +79,16 @@ class StudyPlan:
     def single(self, law: str, cell: int) -> Scenario:
         """The scenario of one law in one cell."""
         return self.cells[cell].scenario.singles()[law]
+
+    def run_plan(self, law: str, cell: int) -> Plan:
+        """The loop of a law in a cell before any draw, on its grid; put together once."""
+        if (law, cell) not in self._run_plans:
+            self._run_plans[law, cell] = self.single(law, cell).plan()
+        return self._run_plans[law, cell]
+
+    @cached_property
+    def _run_plans(self) -> dict[LawInCell, Plan]:
+        return {}
 
     @cached_property
     def identity(self) -> dict[str, Any]:
@@ -96,7 +107,7 @@ class StudyPlan:
                     if key.partition(".")[0] not in COSMETIC
                 }  # fmt: skip
                 facts |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
-                facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(single)
+                facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(self.run_plan(law, cell.index))
         return facts
 
     def varied(self, variant: Variant) -> StudyPlan:
@@ -123,9 +134,9 @@ def plan(loaded: Loaded) -> StudyPlan:
     return StudyPlan(loaded.scenario, cells(loaded, sweep_faults))
 
 
-def kernels(scenario: Scenario) -> str:
+def kernels(planned: Plan) -> str:
     """A digest of the source of all kernels of a law's loop, the same on every processor."""
-    parts = [kernel for _, kernel, _ in scenario.plan().functions]
+    parts = [kernel for _, kernel, _ in planned.functions]
     sha = hashlib.sha256()
     for kernel in (closed_loop.advance, *parts):
         for text in ingredients(kernel, {}):

@@ -31,8 +31,7 @@ def prepare(
     `runs` is how many runs of it there will be, by default those of the plan. `compiling` is called
     with the fraction that is compiled, if there is anything to compile.
     """
-    scenario = plan.single(law, cell)
-    planned = scenario.plan()
+    planned = plan.run_plan(law, cell)
     ready(planned, compiled=True, compiling=compiling)
     runs = runs or plan.sweep.draws * len(plan.cells)
     return lanes.prepare(planned, runs * planned.grid.steps, compiling)
