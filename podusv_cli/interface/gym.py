@@ -14,6 +14,7 @@ from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.batch import BatchRun
 from podusv_cli.engine.running.lanes import LaneSorter, why_alone
+from podusv_cli.engine.running.simulate import marcher, ready
 from podusv_cli.engine.running.stepped import SteppedBatch
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.gym_task import (
@@ -29,7 +30,7 @@ from podusv_cli.interface.gym_task import (
     whole,
 )
 from podusv_cli.interface.scenarios import Changes, Source
-from podusv_cli.interface.session import DEMAND, Session, marcher_of
+from podusv_cli.interface.session import DEMAND, Session
 
 try:
     import gymnasium
@@ -96,8 +97,9 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         self._task = task = Task(source, changes, terms)
         EzPickle.__init__(self, task.whole, **terms._asdict())
         self.action_space, self.observation_space = demands(task), observations(task)
-        self._task.scenario.ready()
-        self._march = marcher_of(self._task.scenario)
+        plan, compiled = task.scenario.plan(), task.scenario.simulation.compiled
+        ready(plan, compiled)
+        self._march = marcher(plan, compiled)
         self._session: Session | None = None
         self._now: Moment
         self._gathered = 0.0
@@ -117,7 +119,7 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         seed = None if seed is None else self._task.seed(seed)
         super().reset(seed=seed)
         scenario = self._task.drawn(seed, self.np_random)
-        self._session = session = Session(scenario, self._task.period, self._march)
+        self._session = session = Session(scenario, self._task.period, scenario.plan(), self._march)
         self._now, self._gathered = self._task.moment_of(session, np.zeros(OUTPUTS)), 0.0
         return self._task.observation(self._now), {"time": 0.0}
 

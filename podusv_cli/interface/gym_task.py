@@ -15,8 +15,9 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.closed_loop import STATE
+from podusv_cli.engine.running.simulate import marcher
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
-from podusv_cli.interface.session import Session, marcher_of, waiting
+from podusv_cli.interface.session import Session, waiting
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.making.check import gathered_metrics, sweep_faults
@@ -94,7 +95,8 @@ class Task:
         """
         plain = self.scenario.simulation.model_copy(update={"compiled": False})
         scenario = self.scenario.model_copy(update={"simulation": plain})
-        session = Session(scenario, self.period, marcher_of(scenario))
+        plan = scenario.plan()
+        session = Session(scenario, self.period, plan, marcher(plan, compiled=False))
         first = self.moment_of(session, np.zeros(OUTPUTS))
         after = session.step(np.zeros(OUTPUTS))
         if self.own is None:

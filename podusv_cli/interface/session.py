@@ -6,20 +6,23 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.simulate import Marcher, marcher
+from podusv_cli.engine.running.simulate import Marcher, marcher, ready
 from podusv_cli.engine.running.stepped import Mark, SteppedRun
 from podusv_cli.interface.border import explained
 from podusv_cli.interface.functions import open_run, request
 from podusv_cli.interface.results import Run
 from podusv_cli.interface.scenarios import Changes, Source, loaded
+from podusv_cli.scenario.address import ValueRefused, with_values
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.workflows import run as running
 
@@ -74,13 +77,9 @@ def open_session(
     <podusv run schedule: finished at 20 s, straight_on>
     """
     scenario, period = waiting(loaded(source, changes).scenario, period)
-    scenario.ready()
-    return Session(scenario, period, marcher_of(scenario))
-
-
-def marcher_of(scenario: Scenario) -> Marcher:
-    """What makes the march of a scenario, and of others that differ in numbers."""
-    return marcher(scenario.plan(), scenario.simulation.compiled)
+    plan, compiled = scenario.plan(), scenario.simulation.compiled
+    ready(plan, compiled)
+    return Session(scenario, period, plan, marcher(plan, compiled))
 
 
 def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
@@ -94,7 +93,12 @@ def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
         raise UsageError(
             "for how long does a demand hold? give period=0.1 [s], or the scenario a control.period"
         )
-    return scheduled(single, period), period
+    ends = f"0.0, 0, 0\n{2.0 * single.simulation.duration!r}, 0, 0"
+    held = single.model_copy(update={"controller": Schedule(between="hold", rows=ends)})
+    try:
+        return with_values(held, {("control", "period"): period}), period
+    except ValueRefused as error:
+        raise UsageError(f"period: {error}") from error
 
 
 class Session:
@@ -104,10 +108,10 @@ class Session:
     `close` writes.
     """
 
-    def __init__(self, scenario: Scenario, period: float, march: Marcher) -> None:
-        """The run is at its begin; the scenario is ready, and `march` that of one like it."""
+    def __init__(self, scenario: Scenario, period: float, plan: Plan, march: Marcher) -> None:
+        """The run is at its begin; `plan` is the scenario's, and `march` that of one like it."""
         self.scenario, self.period = scenario, period
-        grid = scenario.time_grid()
+        grid = plan.grid
         self._status: Status = "running"
         self._every, self._demands = grid.hold_every, list[tuple[float, float]]()
         if grid.steps > MOST * self._every:
@@ -117,8 +121,7 @@ class Session:
                 f"than {MOST:,} demands of {period:g} s; ask for at most {longest:g} s, or for a "
                 "longer period"
             )
-        self._metrics = scenario.probe(grid)
-        plan = Plan.with_probe(scenario.closed_loop(), grid, self._metrics)
+        self._metrics = scenario.metrics_of(plan)
         self._march = SteppedRun(plan, march, compiled=scenario.simulation.compiled)
         self._demand = self._march.vectors.law_table[DEMAND]
 
@@ -216,28 +219,22 @@ class Session:
         """
         if not self._demands:
             raise UsageError("session: nothing has been simulated yet; give it a demand with step")
-        given = loaded(scheduled(self.scenario, self.period, self._demands))
+        given = scheduled(self.scenario, self.period, self._demands)
         return open_run(running.run_loaded(given, request(out, force, figures)).folder)
 
 
-def scheduled(
-    scenario: Scenario, period: float, demands: Sequence[tuple[float, float]] = ()
-) -> Scenario:
-    """The scenario with a law that holds each of these demands for a period, and then ends.
-
-    Without demands it is as long as it was, with a demand that the session changes.
-    """
-    changes: dict[str, Any] = {"control.period": period}
+def scheduled(scenario: Scenario, period: float, demands: Sequence[tuple[float, float]]) -> Loaded:
+    """The scenario with a law that holds each of these demands for a period, and then ends."""
     run, every = scenario.simulation, scenario.time_grid().hold_every
-    if demands:
-        steps = min(len(demands) * every, scenario.time_grid().steps)
-        changes["simulation.duration"] = min(len(demands) * every * run.step, run.duration)
-        changes["log.every"] = min(scenario.log.every, steps)
+    steps = min(len(demands) * every, scenario.time_grid().steps)
     # The last demand has rows at the end and after it, so that the end is no end of the schedule.
-    held = [*demands, demands[-1], demands[-1]] if demands else [(0.0, 0.0)]
+    held = [*demands, demands[-1], demands[-1]]
     times = [k * every * run.step for k in range(len(held))]
     rows = [f"{t!r}, {tau_u!r}, {tau_r!r}" for t, (tau_u, tau_r) in zip(times, held, strict=True)]
-    if not demands:
-        rows.append(f"{2.0 * run.duration!r}, 0, 0")
-    changes["controller"] = {"kind": "schedule", "between": "hold", "rows": "\n".join(rows)}
-    return loaded(scenario, changes, silent=True).scenario  # another law is the purpose
+    changes = {
+        "control.period": period,
+        "simulation.duration": min(len(demands) * every * run.step, run.duration),
+        "log.every": min(scenario.log.every, steps),
+        "controller": {"kind": "schedule", "between": "hold", "rows": "\n".join(rows)},
+    }
+    return loaded(scenario, changes, silent=True)  # another law is the purpose
