@@ -16,8 +16,8 @@ from podusv_cli.identify.fit.estimate import (
     prior_kept,
 )
 from podusv_cli.identify.fit.problem import Problem
+from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.reading import Table
-from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 

@@ -268,9 +268,9 @@ def test_the_scenario_itself_is_judged_as_a_comparison_judges_it(podusv):
 INTERRUPTED = """
 import os, signal
 from podusv_cli.cli import main
-from podusv_cli.workflows import doubt
+from podusv_cli.doubt import search
 
-found, calls = doubt.explored, []
+found, calls = search.explored, []
 
 def third(*given):
     calls.append(given)
@@ -278,7 +278,7 @@ def third(*given):
         os.killpg(os.getpgid(0), signal.SIGINT)
     return found(*given)
 
-doubt.explored = third
+search.explored = third
 main()
 """
 

@@ -48,10 +48,10 @@ from podusv_cli.identify.fit.march import (
     side_by_side,
 )
 from podusv_cli.identify.fit.problem import Problem, hull_numbers
+from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.reading import Table, delivered
 from podusv_cli.identify.outputs import drawn
 from podusv_cli.identify.phrases import early_words, summary, thrust_words, worse_words
-from podusv_cli.identify.records import log_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.identify import answered

@@ -14,12 +14,12 @@ from log_files import read, write_bag, write_dataflash, write_ulog, written
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.signal import Signal
 from podusv_cli.identify.fit.march import DELIVERED, HOLDS, VALUES
+from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import columns_of
 from podusv_cli.identify.logs.frames import LAT, LON, local_plane, radii
 from podusv_cli.identify.logs.listing import listing
 from podusv_cli.identify.logs.reading import Named, table
-from podusv_cli.identify.records import log_of
 
 
 def test_a_ros_bag_gives_its_topics_by_their_stamps(tmp_path):

@@ -37,8 +37,8 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.identify.answer import AXES, SIDE, Answer
 from podusv_cli.identify.fit.estimate import OPEN, directions, estimated, prior_kept
 from podusv_cli.identify.fit.problem import Problem
+from podusv_cli.identify.fit.records import Log
 from podusv_cli.identify.intake import logs_of
-from podusv_cli.identify.records import Log
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.model import Scenario
 

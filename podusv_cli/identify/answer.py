@@ -19,8 +19,8 @@ from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.estimate import Directions, Estimate
 from podusv_cli.identify.fit.problem import Problem, channels
+from podusv_cli.identify.fit.records import Log
 from podusv_cli.identify.judge import FreeRun, Score
-from podusv_cli.identify.records import Log
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
 SLOWEST = 0.05  # of the largest speed along the logs: slower is no motion to speak of

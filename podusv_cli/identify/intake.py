@@ -13,12 +13,12 @@ import numpy as np
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
+from podusv_cli.identify.fit.records import FEWEST, POSE, Log, complete, log_of
 from podusv_cli.identify.logs.checks import checked
 from podusv_cli.identify.logs.commands import acted
 from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.reading import CLOCK, Named, Table, tables
 from podusv_cli.identify.offsets import Clocks
-from podusv_cli.identify.records import FEWEST, POSE, Log, complete, log_of
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
 

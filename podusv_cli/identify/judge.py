@@ -13,8 +13,8 @@ from podusv_cli.core.kinematics import wrap
 from podusv_cli.identify.fit.estimate import Search, directions, estimated
 from podusv_cli.identify.fit.march import DELIVERED, VALUES
 from podusv_cli.identify.fit.problem import Problem
+from podusv_cli.identify.fit.records import Log
 from podusv_cli.identify.logs.reading import Whole
-from podusv_cli.identify.records import Log
 
 WARM = 20.0  # s, in which the filter finds velocities and load before the first free run
 EVERY = 30.0  # s, from one start to the next; more in logs that would have more than MOST starts

@@ -16,9 +16,9 @@ import numpy as np
 from podusv_cli.identify.fit import estimate
 from podusv_cli.identify.fit.march import DELAY
 from podusv_cli.identify.fit.problem import WALKS, Problem
+from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import Table
-from podusv_cli.identify.records import log_of
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.model import Scenario
 

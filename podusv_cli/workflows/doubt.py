@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 from podusv_cli.comparison import claims
 from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
@@ -15,20 +13,17 @@ from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.doubt import outputs
-from podusv_cli.doubt.alone import TriedChoice, explored
-from podusv_cli.doubt.answer import DoubtReport, Tried, answers, labels_of
+from podusv_cli.doubt.answer import DoubtReport, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
-from podusv_cli.doubt.choices import HULL, Choice, Singles, choices, with_loads
-from podusv_cli.doubt.compared import ClaimNumber, compared
+from podusv_cli.doubt.choices import HULL, Singles, choices, with_loads
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
-from podusv_cli.doubt.together import Draws, drawn
+from podusv_cli.doubt.search import search
 from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.findings.finding import Case, unknown_codes
 from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
-from podusv_cli.process.workers import Job, run_shares
 from podusv_cli.scenario.address import with_values
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.limits import limits
@@ -41,7 +36,6 @@ from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
 from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of
 
 Progress = Callable[[str, float], None]
-BATCH = 10  # draws that a process makes before it tells
 
 
 def doubt(config: Path, request: Request, progress: Progress | None = None) -> outputs.Doubted:
@@ -115,9 +109,10 @@ def doubted(
     with interrupts_enabled():
         entries = {label: _entry(label, case, subject.parsed) for label, case in cases.items()}
     judge, asked = judging(subject, entries), scenario.doubt or Doubt()
-    tried = search(subject, judge, asked, request.workers, progress)
-    whole = len(choices(subject.singles, asked)), asked.draws
-    interrupted = (len(tried.alone), len(tried.worlds)) != whole
+    moving = choices(subject.singles, asked)
+    parsed = {claim.name: claim.claim for claim in subject.parsed}
+    tried = search(parsed, moving, judge, asked, request.workers, progress)
+    interrupted = (len(tried.alone), len(tried.worlds)) != (len(moving), asked.draws)
     verdicts = [
         RunsVerdict(
             claim.name,
@@ -129,53 +124,6 @@ def doubted(
     ]
     events = {claim.name: nearest_event(claim, entries) for claim in subject.parsed}
     return DoubtReport(scenario, answers(verdicts, tried, events), tried), interrupted
-
-
-def search(
-    subject: Subject, judge: Judge, doubt: Doubt, workers: int = 0,
-    progress: Progress | None = None,
-) -> Tried:  # fmt: skip
-    """Try every choice alone, and draw all at once; shorter after an interrupt."""
-    base, moving = judge({}), choices(subject.singles, doubt)
-    numbers = {
-        parsed.name: compared(parsed.claim.expect, parsed.claim.tolerance)
-        for parsed in subject.parsed
-    }
-    draws = drawn(moving, doubt.seed, doubt.draws)
-    tell = progress or (lambda what, fraction: None)
-    alone = _made(
-        [partial(_explored, choice, judge, base, numbers) for choice in moving],
-        partial(tell, "one at a time"), workers,
-    )  # fmt: skip
-    parts = [range(i, min(i + BATCH, doubt.draws)) for i in range(0, doubt.draws, BATCH)]
-    worlds = _made(
-        [partial(_judged, draws, part, judge) for part in parts],
-        partial(tell, "all at once"), workers,
-    )  # fmt: skip
-    return Tried(base, alone, draws, [world for part in worlds for world in part])
-
-
-def _made(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) -> list[Any]:
-    """The results of jobs up to the first that has none."""
-    outcomes = run_shares(jobs, progress, workers)
-    for outcome in outcomes:
-        if outcome.failure and not outcome.interrupted:
-            raise PodusvError(outcome.failure)
-    ended = next((i for i, outcome in enumerate(outcomes) if outcome.result is None), len(outcomes))
-    return [outcome.result for outcome in outcomes[:ended]]
-
-
-def _explored(
-    choice: Choice, judge: Judge, base: Judged, numbers: Mapping[str, Sequence[ClaimNumber]],
-    tell: Callable[[float], None],
-) -> TriedChoice:  # fmt: skip
-    with interrupts_enabled():
-        return explored(choice, judge, base, numbers)
-
-
-def _judged(draws: Draws, part: range, judge: Judge, tell: Callable[[float], None]) -> list[Judged]:
-    with interrupts_enabled():
-        return [judge(draws.world(i)) for i in part]
 
 
 def judging(subject: Subject, entries: Mapping[str, Entry]) -> Judge:

@@ -12,11 +12,11 @@ from podusv_cli.identify import outputs
 from podusv_cli.identify.answer import Answer
 from podusv_cli.identify.fit import estimate
 from podusv_cli.identify.fit.problem import Problem
+from podusv_cli.identify.fit.records import Log
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.phrases import early_words, far_words, thrust_words, worse_words
-from podusv_cli.identify.records import Log
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import Loaded, resolved_yaml

@@ -36,8 +36,8 @@ from podusv_cli.identify.fit.numbers import (
     symmetric,
     values_at,
 )
+from podusv_cli.identify.fit.records import Log
 from podusv_cli.identify.logs.reading import Whole
-from podusv_cli.identify.records import Log
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario

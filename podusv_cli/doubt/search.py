@@ -1,0 +1,76 @@
+"""The walk: every choice alone, then all at once, with a judge that is handed in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from podusv_cli.core.about import Claim
+from podusv_cli.core.errors import PodusvError
+from podusv_cli.doubt.alone import TriedChoice, explored
+from podusv_cli.doubt.answer import Tried
+from podusv_cli.doubt.choices import Choice
+from podusv_cli.doubt.compared import ClaimNumber, compared
+from podusv_cli.doubt.judged import Judge, Judged
+from podusv_cli.doubt.together import Draws, drawn
+from podusv_cli.process.interrupts import interrupts_enabled
+from podusv_cli.process.workers import Job, run_shares
+from podusv_cli.scenario.doubt import Doubt
+
+BATCH = 10  # draws that a process makes before it tells
+
+
+def search(
+    claims: Mapping[str, Claim], moving: Sequence[Choice], judge: Judge, doubt: Doubt,
+    workers: int = 0, progress: Callable[[str, float], None] | None = None,
+) -> Tried:  # fmt: skip
+    """Try every choice alone, and draw all at once; shorter after an interrupt.
+
+    `judge` says what the claims answer in a world. `workers` is the number of processes, 0 for as
+    many as there are cores. `progress` is called with what is tried and its fraction that is done.
+    """
+    base = judge({})
+    numbers = {name: compared(claim.expect, claim.tolerance) for name, claim in claims.items()}
+    draws = drawn(moving, doubt.seed, doubt.draws)
+    tell = progress or (lambda what, fraction: None)
+    alone = _results_of(
+        [partial(_explore_choice, choice, judge, base, numbers) for choice in moving],
+        partial(tell, "one at a time"),
+        workers,
+    )
+    parts = [range(i, min(i + BATCH, doubt.draws)) for i in range(0, doubt.draws, BATCH)]
+    worlds = _results_of(
+        [partial(_judge_draws, draws, part, judge) for part in parts],
+        partial(tell, "all at once"),
+        workers,
+    )
+    return Tried(base, alone, draws, [world for part in worlds for world in part])
+
+
+def _results_of(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) -> list[Any]:
+    """The results of jobs up to the first that has none. Raises PodusvError for a failed one."""
+    outcomes = run_shares(jobs, progress, workers)
+    for outcome in outcomes:
+        if outcome.failure and not outcome.interrupted:
+            raise PodusvError(outcome.failure)
+    ended = next((i for i, outcome in enumerate(outcomes) if outcome.result is None), len(outcomes))
+    return [outcome.result for outcome in outcomes[:ended]]
+
+
+def _explore_choice(
+    choice: Choice,
+    judge: Judge,
+    base: Judged,
+    numbers: Mapping[str, Sequence[ClaimNumber]],
+    tell: Callable[[float], None],
+) -> TriedChoice:
+    with interrupts_enabled():
+        return explored(choice, judge, base, numbers)
+
+
+def _judge_draws(
+    draws: Draws, part: range, judge: Judge, tell: Callable[[float], None]
+) -> list[Judged]:
+    with interrupts_enabled():
+        return [judge(draws.world(i)) for i in part]
