@@ -98,13 +98,23 @@ class Loaded:
 
     def checked(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
         """This. Raises ScenarioError with the faults and with all that the checks find."""
-        for key, text in chain(self.contradictions, *(look(self) for look in checks)):
+        for key, text in chain(self.contradictions, *map(self._faults_by, checks)):
             steps = route(key) if isinstance(key, str) else key
             mark = follow(self.filled, steps)[-1].mark
             faults.append(Fault(mark, key if isinstance(key, str) else dotted(key), text))
         if faults:
             raise ScenarioError(_ordered(faults, self.root.mark.source))
         return self
+
+    def _faults_by(self, check: Check) -> Sequence[tuple[str | Route, str]]:
+        """What a check finds; one that is asked for again, as of a study's only cell, has told."""
+        if check not in self._found:
+            self._found[check] = check(self)
+        return self._found[check]
+
+    @cached_property
+    def _found(self) -> dict[Check, Sequence[tuple[str | Route, str]]]:
+        return {}
 
     def told(self, warn: Callable[[str], object]) -> Loaded:
         """This, after a warning of all that was dropped."""

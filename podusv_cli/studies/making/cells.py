@@ -72,8 +72,9 @@ def _label(values: tuple[tuple[str, Any], ...]) -> str:
 
 def _within(check: Check, label: str) -> Check:
     """The check, naming the cell in what it says."""
-    cell = f" (in the cell {label})" if label else ""
-    return lambda loaded: [(key, f"{text}{cell}") for key, text in check(loaded)]
+    if not label:
+        return check
+    return lambda loaded: [(key, f"{text} (in the cell {label})") for key, text in check(loaded)]
 
 
 def _grid(loaded: Loaded) -> dict[str, tuple[Node, ...]]:
