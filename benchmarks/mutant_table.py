@@ -86,6 +86,9 @@ TABLE: dict[str, list[Row]] = {
      "test_mistakes_that_a_motion_shows_are_refused_as_identify_does"),
 ],
 "cli": [
+    ("    from podusv_cli.core.json_text import encode\n",
+     "    from podusv_cli.core.json_text import encode\n    from podusv_cli.storage import files\n",
+     "test_every_thin_arrow_between_rooms_is_meant"),
     ("    if done.diverges:\n", "    if False:\n",
      "test_a_run_that_diverges_and_had_not_has_a_code_of_its_own"),
     ('page}")\n    raise typer.Exit(SOME_FAILED if', 'page}")\n    raise typer.Exit(0 if',

@@ -9,6 +9,7 @@ from command_samples import one_line
 from comparison_samples import about, scenario
 from plugin_samples import LAW, SCENARIO, put
 
+from podusv_cli.core import json_text
 from podusv_cli.core.about import RunAbout
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
@@ -24,7 +25,7 @@ def test_what_is_written_is_read(name, tmp_path):
     for single in load(f"configs/{name}.yaml").scenario.singles().values():
         told = about_of(single)
         place = tmp_path / f"{single.controller.label}.json"
-        place.write_bytes(json_files.encode(told.model_dump(exclude_defaults=True)))
+        place.write_bytes(json_text.encode(told.model_dump(exclude_defaults=True)))
         assert json_files.read_as(place, RunAbout) == told
 
 

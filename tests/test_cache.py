@@ -25,8 +25,9 @@ from podusv_cli.core.kernel import Vector, kernel, specialise
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.engine.loop.closed_loop import nothing
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.machine import code_folder, compile, object_cache
+from podusv_cli.engine.machine import compile, object_cache
 from podusv_cli.engine.step.grid import TimeGrid
+from podusv_cli.process import code_folder
 
 FORCE = 0.0
 

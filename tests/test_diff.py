@@ -22,10 +22,11 @@ from storage_samples import recording
 from podusv_cli.cli.diff import deviation_in_words
 from podusv_cli.comparison.log_difference import Deviation, compare, differing
 from podusv_cli.comparison.run_difference import scenario_changes, version_changes
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
-from podusv_cli.storage import json_files, manifest
+from podusv_cli.storage import manifest
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
@@ -241,7 +242,7 @@ def test_metrics_count_but_for_what_a_clock_measured(name, code, run, tmp_path, 
     def change(content: bytes) -> bytes:
         told = json.loads(content)
         told["metrics"][name] = 12.5
-        return json_files.encode(told)
+        return json_text.encode(told)
 
     said = podusv("diff", run, copied(run, tmp_path / "copy", metrics_json=change))
     assert said.code == code

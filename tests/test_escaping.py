@@ -18,10 +18,10 @@ from test_comparison_page import page
 
 from podusv_cli.cli import progress, terminal
 from podusv_cli.comparison import claims, report, table
-from podusv_cli.core import escaping
+from podusv_cli.core import escaping, json_text
 from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.pages.page import environment
-from podusv_cli.storage import csv_files, json_files
+from podusv_cli.storage import csv_files
 
 TURNED, COLOUR = "\u202e", "\x1b[31m"  # letters from right to left from here on; red from here on
 EVIL = f"=cmd|'/C x'!A0{COLOUR}{TURNED}\x9b1m\n# <script>[a](b)`*_\u200b"
@@ -84,7 +84,7 @@ def test_html_is_text():
 
 def test_json_says_the_same_without_the_letters():
     content = {"a": "".join(NASTY) + "\U000e0041\u8239", "b": [1, "\ud800"]}
-    text = json_files.encode(content).decode()
+    text = json_text.encode(content).decode()
     assert not nasty(text)
     assert "\u8239" in text
     assert json.loads(text) == content

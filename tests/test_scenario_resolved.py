@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scenario_samples import SOUND, loaded, write
 
+from podusv_cli.core import json_text
 from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import SizingError
@@ -22,7 +23,7 @@ from podusv_cli.scenario.sections import LABEL
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.scenario.yaml_text import MAX_NODES, read
-from podusv_cli.storage import json_files, manifest
+from podusv_cli.storage import manifest
 
 LARGEST = 1e6  # inertia of more than this overflows where two are multiplied
 TEXT = st.text(st.characters(exclude_categories=("Cs", "Cc"), include_characters="\t\n"))
@@ -250,7 +251,7 @@ def test_the_manifest_of_many_runs_is_read_back(tmp_path):
              "missing.json")  # fmt: skip
     files = {f"a_rather_long_name_of_law_{i:04}/{n}": entry for i in range(3000) for n in names}
     whole = manifest.Manifest(podusv_format=manifest.FORMAT, status="finished", files=files)
-    (tmp_path / "manifest.json").write_bytes(json_files.encode(whole.model_dump()))
+    (tmp_path / "manifest.json").write_bytes(json_text.encode(whole.model_dump()))
     assert len(manifest.read(tmp_path).files) == len(files)
 
 

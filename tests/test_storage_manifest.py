@@ -20,6 +20,7 @@ import pytest
 import scipy
 
 import podusv_cli
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import json_files, manifest, provenance
 from podusv_cli.storage.files import LARGEST_FILE
@@ -169,7 +170,7 @@ def test_json_keeps_the_order_and_has_null_for_what_is_no_number(tmp_path):
         "z": 1.5, "a": math.nan, "m": [math.inf, -math.inf, (1, True)], "ψ": None,
         "numpy": {"f": np.float64(0.1), "n": np.float32("nan"), "i": np.int64(3), "v": np.ones(2)},
     }  # fmt: skip
-    text = json_files.encode(content)
+    text = json_text.encode(content)
     assert text.decode().splitlines()[:3] == ["{", '  "z": 1.5,', '  "a": null,']
     assert text.endswith(b"}\n")
     path = tmp_path / "a.json"
@@ -183,13 +184,13 @@ def test_json_keeps_the_order_and_has_null_for_what_is_no_number(tmp_path):
 
 def test_json_of_arguments_that_are_no_text(tmp_path):
     path = tmp_path / "a.json"
-    path.write_bytes(json_files.encode({"argv": [os.fsdecode(b"caf\xe9.yaml")]}))
+    path.write_bytes(json_text.encode({"argv": [os.fsdecode(b"caf\xe9.yaml")]}))
     assert os.fsencode(json_files.read(path)["argv"][0]) == b"caf\xe9.yaml"
 
 
 def test_what_json_does_not_know_is_a_bug():
     with pytest.raises(TypeError):
-        json_files.encode({"path": Path("a")})
+        json_text.encode({"path": Path("a")})
 
 
 # --- where a result comes from
@@ -214,7 +215,7 @@ def test_versions_platform_command_and_times():
     assert origin["started"] == "2026-03-01T10:00:00.250+00:00"
     assert origin["finished"] == "2026-03-01T10:00:03.000+00:00"
     assert origin["duration_s"] == 2.75
-    assert json_files.encode(origin)
+    assert json_text.encode(origin)
 
 
 def test_a_package_that_is_not_installed_has_no_version(monkeypatch):

@@ -36,7 +36,7 @@ def cached(
     def complete(context: typer.Context, incomplete: str) -> Offered:
         if context.params.get("plugin"):
             return _beginning(incomplete, known(_plugins(context) or ()))
-        from podusv_cli.engine.machine.code_folder import write
+        from podusv_cli.process.code_folder import write
 
         folder, state = _folder(), _state()
         place = folder and folder / f"{known.__name__}.json"
@@ -59,7 +59,7 @@ def _folder() -> Path | None:
     """Where words are kept; None where nothing can be."""
     import logging
 
-    from podusv_cli.engine.machine.code_folder import code_folder
+    from podusv_cli.process.code_folder import code_folder
 
     before = logging.root.manager.disable
     logging.disable()  # a shell has no place for a message

@@ -82,8 +82,6 @@ def optimum(
 
 
 def _report(done: Optimum) -> None:
-    from podusv_cli.optimum.collocation import TOLERANCE
-
     name = done.minimised
     unit = done.run.rows[name].unit
     rows = [
@@ -91,7 +89,7 @@ def _report(done: Optimum) -> None:
         for s in done.stages
     ]
     echo_table(["from a run of", "step", f"{name} [{unit}]", "iterations", "time"], rows)
-    echo(f"a local optimum, to IPOPT's tolerance of {TOLERANCE:g}; a search from the run of")
+    echo(f"a local optimum, to IPOPT's tolerance of {done.tolerance:g}; a search from the run of")
     echo("another law in `controllers` may lead to a lower one")
     if name in done.run.metrics and done.departures:
         away = done.departures

@@ -42,7 +42,7 @@ def echo_path(path: Path) -> None:
 
 def echo_json(content: Mapping[str, Any]) -> None:
     """One JSON object."""
-    from podusv_cli.storage.json_files import encode
+    from podusv_cli.core.json_text import encode
 
     typer.echo(encode(content), nl=False)
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.comparison.entries import Entry
+from podusv_cli.core import json_text
 from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.plugins import Plugins
@@ -17,7 +18,6 @@ from podusv_cli.figures.shown import dressed
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
-from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import RunWriter
 
 TABLE = "comparison.csv"
@@ -88,11 +88,11 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
             chosen=result.chosen or headlines,
             ratios=result.ratios,
         ).encode(),
-        TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
+        TIMING: lambda: json_text.encode({**_claims(timed), "metrics": times}),
     }
     if result.verdicts:
         forms["claims.md"] = lambda: claims.with_timed(judged, timed, TIMING).encode()
-        forms["claims.json"] = lambda: json_files.encode(_claims(judged))
+        forms["claims.json"] = lambda: json_text.encode(_claims(judged))
     return forms
 
 

@@ -17,7 +17,7 @@ from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.words import in_words as rows_in_words
-from podusv_cli.storage import csv_files, json_files
+from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 
 HEAD = ("claim", "verdict", "in draws", "turns at", "hangs on")
@@ -69,9 +69,7 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
     writer.add("scenario.yaml", text.encode())
     for name, text in report.scenario.plugin_files().items():
         writer.add(name, text.encode())
-    writer.add(
-        "doubt.json", json_files.encode({"claims": [as_json(answer) for answer in report.answers]})
-    )
+    writer.add_json("doubt.json", {"claims": [as_json(answer) for answer in report.answers]})
     for name, rows in {
         "doubt.csv": table(report.answers), "turns.csv": _turns(report),
         "draws.csv": _draws(report),

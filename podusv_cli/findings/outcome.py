@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from podusv_cli.components.estimators.base import mean_squared_innovation
 from podusv_cli.core.finding import Sentences, rows_where, times_of, warn_after_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.findings.sea import SENSORS
 from podusv_cli.findings.span import counted_rows, steady_rows
-from podusv_cli.metrics.consistency import mean_square
 from podusv_cli.scenario.model import Scenario
 
 PLACES = {
@@ -127,7 +127,7 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     )
     for sensor, places in SENSORS.items():
         square, count = squares[places].sum(), counts[places].sum()
-        nis = mean_square(squares[places], counts[places])
+        nis = mean_squared_innovation(squares[places], counts[places])
         told = (
             f"innovations of the {sensor} are {np.sqrt(nis):.2g} times what it believes (NIS "
             f"{nis:.3g} of {count:.0f} values)"

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from podusv_cli.components.estimators.base import mean_squared_innovation
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
@@ -88,15 +89,9 @@ def _constants(layout: Measured) -> dict[str, float]:
     }  # fmt: skip
 
 
-def mean_square(squares: Vector, counts: Vector) -> float:
-    """NIS: the mean squared innovation over its variance, from sums and numbers; NaN without."""
-    count = float(counts.sum())
-    return float(squares.sum()) / count if count else math.nan
-
-
 def _nis(seen: Vector, step: float) -> float:
     gained = seen[NOW:SIZE] - seen[BEFORE:NOW]
-    return mean_square(gained[:SIX], gained[SIX:])
+    return mean_squared_innovation(gained[:SIX], gained[SIX:])
 
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)

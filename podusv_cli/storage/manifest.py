@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.storage import files as atomic
@@ -46,7 +47,7 @@ def write(folder: Path, status: Status) -> Manifest:
     manifest = Manifest(
         podusv_format=FORMAT, status=status, files={name: _entry(folder / name) for name in names}
     )
-    atomic.write_bytes(folder / NAME, json_files.encode(manifest.model_dump()))
+    atomic.write_bytes(folder / NAME, json_text.encode(manifest.model_dump()))
     return manifest
 
 

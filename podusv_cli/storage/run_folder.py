@@ -15,6 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from podusv_cli.core import json_text
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.plugins import Plugin
@@ -95,7 +96,7 @@ class RunWriter:
 
     def add_json(self, name: str, content: Mapping[str, Any]) -> None:
         """Write a new JSON file, null for numbers that are not finite."""
-        self.add(name, json_files.encode(content))
+        self.add(name, json_text.encode(content))
 
     def add_origin(self, plugins: Iterable[Plugin] = (), **more: Any) -> dict[str, Any]:
         """Write provenance.json; what is in it, for a page."""

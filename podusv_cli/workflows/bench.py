@@ -11,21 +11,17 @@ from typing import Any
 import pandas as pd
 
 from podusv_cli.optimum.collocation import casadi
-from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
-from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.studies.bench import optima, page, standing
+from podusv_cli.studies.bench import optima, standing
+from podusv_cli.studies.bench.bench_folder import draw_figures, write_files
 from podusv_cli.studies.bench.cases import BenchCase, Selection, cases
 from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.runs import BenchRun, crashed, play
 
 Progress = Callable[[str, float], None]
-RUNS, BOARD, REPORT, ORIGIN = "runs.csv", "leaderboard.md", "report.html", "provenance.json"
-OPTIMA = "optima.csv"
-DIGITS = "%.6g"
 
 
 @dataclass(frozen=True)
@@ -88,11 +84,11 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
         solved = list(_solved(every, runs, request, progress, extras)) if request.optimum else []
         made = standing.with_optima(made, solved) if solved else made
         with interrupts_deferred():
-            figures = _drawn(runs, made, extras) if request.figures else []
+            figures = draw_figures(runs, made, extras) if request.figures else []
             plugins = dict.fromkeys(
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
-            _write(writer, made, figures, writer.add_origin(plugins), solved)
+            write_files(writer, made, figures, writer.add_origin(plugins), solved)
             return Benched(writer.finish(), made, tuple(map(str, extras.missing)))
 
 
@@ -151,27 +147,3 @@ def _play(case: BenchCase, tell: Callable[[float], None]) -> list[BenchRun]:
     runs = play(case)
     tell(1.0)
     return runs
-
-
-def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -> list[Picture]:
-    from podusv_cli.figures.sketch import rendered
-    from podusv_cli.studies.bench.figures import sketches  # matplotlib is slow to import
-
-    return rendered(sketches(runs, made), extras)[1]
-
-
-def _write(
-    writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture], origin: dict[str, Any],
-    solved: Sequence[Least],
-) -> None:  # fmt: skip
-    writer.add(RUNS, _csv(made))
-    writer.add(BOARD, page.as_markdown(made).encode())
-    writer.add(REPORT, page.page(made, figures, origin, solved).encode())
-    if solved:
-        writer.add(OPTIMA, _csv(optima.table(solved)))
-    for figure in figures:
-        writer.add(f"figures/{figure.name}.png", figure.file)
-
-
-def _csv(rows: pd.DataFrame) -> bytes:
-    return csv_files.text(rows, DIGITS).encode()

@@ -15,7 +15,6 @@ from podusv_cli.comparison import claims, outputs, table
 from podusv_cli.comparison.curves import ClaimedRun
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Entry, EntryWithoutLog, metrics_of
-from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding, merged
@@ -32,6 +31,7 @@ from podusv_cli.scenario.limits import Size, estimate, needed
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder, open_run
+from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member

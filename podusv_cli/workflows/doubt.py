@@ -9,7 +9,6 @@ from pathlib import Path
 from podusv_cli.comparison import claims
 from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
 from podusv_cli.comparison.entries import Entry, metrics_of
-from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
 from podusv_cli.doubt import outputs
@@ -31,6 +30,7 @@ from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_tree import find, placed
 from podusv_cli.storage.run_folder import InMemory, default_folder
+from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.doubt_study import doubt_study
 from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
 from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of

@@ -275,11 +275,3 @@ def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> li
         for a in first
         if any(a.name in own for own in numbers.values())
     ]  # fmt: skip
-
-
-def page(title: str, base: str) -> str:
-    """The page, which asks under a path."""
-    from podusv_cli.pages.page import environment
-
-    template = environment("podusv_cli.comparison").get_template("live.html.j2")
-    return template.render(title=title, base=base)

@@ -49,6 +49,11 @@ class Optimum:
         """Where the run lies."""
         return self.run.folder
 
+    @property
+    def tolerance(self) -> float:
+        """Up to which the solver found each optimum."""
+        return collocation.TOLERANCE
+
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of it."""
         stages = [
@@ -60,7 +65,7 @@ class Optimum:
         ]  # fmt: skip
         return {
             **self.run.as_json(), "minimised": self.minimised, "grids": stages,
-            "tolerance": collocation.TOLERANCE, "departures": self.departures,
+            "tolerance": self.tolerance, "departures": self.departures,
         }  # fmt: skip
 
 

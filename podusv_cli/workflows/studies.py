@@ -10,13 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import unknown
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import files, json_files
+from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making import before, record
 from podusv_cli.studies.making.plan import KERNELS, StudyPlan, differing, disagreements, plan
@@ -88,7 +89,7 @@ def planned(study: Path, *, trusted: bool) -> StudyPlan:
     """
     check_study(study)
     made = plan(kept_scenario(study, plugged=plugins.of_folder(trusted)))
-    noted, ours = record.begun(study).identity, json_files.plain(made.identity)
+    noted, ours = record.begun(study).identity, json_text.plain(made.identity)
     if keys := [key for key in differing(noted, ours) if not key.endswith(KERNELS)]:
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "

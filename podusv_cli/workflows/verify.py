@@ -8,9 +8,11 @@ from hashlib import sha256
 from pathlib import Path
 
 import podusv_cli
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.engine.machine import code_folder, object_cache
+from podusv_cli.engine.machine import object_cache
 from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.process import code_folder
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load, resolved_yaml
 from podusv_cli.scenario.plugins import of_files
@@ -70,7 +72,7 @@ def keep(done: Verification, out: Path, *, force: bool = False) -> None:
     """Write a verification as JSON to the file `out`. Raises StorageError, as `verify`."""
     _spare(out, force)
     files.make_folder(out.parent)
-    files.write_bytes(out, json_files.encode(done.as_json()))
+    files.write_bytes(out, json_text.encode(done.as_json()))
 
 
 def _spare(out: Path, force: bool) -> None:

@@ -16,7 +16,8 @@ import pytest
 from command_samples import BASE, ROOT, write
 
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.engine.machine import code_folder, compile, object_cache
+from podusv_cli.engine.machine import compile, object_cache
+from podusv_cli.process import code_folder
 from podusv_cli.process.temporary_names import temporary_name
 
 FRESH = code_folder.code_folder

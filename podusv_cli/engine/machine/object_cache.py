@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import llvmlite.binding as llvm
 import numpy as np
 
-from podusv_cli.engine.machine import code_folder
+from podusv_cli.process import code_folder
 
 # The files of podusv that turn kernels into machine code, from the package's folder.
 TRANSLATORS = ("core/kernel.py", "engine/machine/**/*.py")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.core import json_text
 from podusv_cli.core.about import MetricAbout, QuantityAbout, StudyAbout, StudyIdentity
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.phrases import as_yaml
@@ -53,7 +54,7 @@ def of_scenario(
             name: QuantityAbout(keys=q.targets(name), drawn=in_words(q), is_seed=q.is_label)
             for name, q in sweep.vary.items()
         },
-        metrics=metrics, measured=measured, identity=json_files.plain(identity), history=(),
+        metrics=metrics, measured=measured, identity=json_text.plain(identity), history=(),
     )  # fmt: skip
 
 
@@ -80,7 +81,7 @@ def begun(folder: Path) -> StudyIdentity:
 def write(folder: Path, study: StudyAbout) -> None:
     """Write study.json. Raises StorageError."""
     content = {"format": FORMAT, **study.model_dump(exclude_defaults=True)}
-    files.write_bytes(folder / STUDY, json_files.encode(content))
+    files.write_bytes(folder / STUDY, json_text.encode(content))
 
 
 def plugin_files(folder: Path, study: StudyAbout) -> dict[str, str]:

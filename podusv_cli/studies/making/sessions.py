@@ -19,6 +19,7 @@ from pydantic import (
     PositiveInt,
 )
 
+from podusv_cli.core import json_text
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.storage import files, json_files, manifest, provenance
 from podusv_cli.storage.writer import PATIENCE, PROVENANCE, sole_writer
@@ -115,4 +116,4 @@ class SessionLog:
     def _write(self, noted: list[dict[str, Any]]) -> None:
         noted[self._place : self._place + 1] = [self._origin]
         content = {"format": 1, "sittings": noted}
-        files.write_bytes(self._folder / NAME, json_files.encode(content))
+        files.write_bytes(self._folder / NAME, json_text.encode(content))

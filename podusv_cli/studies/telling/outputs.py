@@ -10,11 +10,11 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import markdown
+from podusv_cli.core.json_text import encode
 from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.pages.page import Picture, sentence
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import csv_files, files
-from podusv_cli.storage.json_files import encode
 from podusv_cli.storage.run_folder import MISSING
 from podusv_cli.studies.counting.runs import AXES, ENDING, STATUSES
 from podusv_cli.studies.counting.runs_file import Table

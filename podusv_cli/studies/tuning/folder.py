@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveInt
 
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import UsageError
 from podusv_cli.scenario.load import yaml_text
 from podusv_cli.scenario.plugins import FOLDER
@@ -90,7 +91,7 @@ def write(
 
     `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
     """
-    content = json_files.encode(_content(plan, _asked(noted), started))
+    content = json_text.encode(_content(plan, _asked(noted), started))
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
     # without tune.json, a folder that is not empty is no search.
     if noted:
@@ -104,7 +105,7 @@ def write(
 
 def _identity(plan: TunePlan) -> dict[str, Any]:
     identity = {"format of tune.json": FORMAT, "optuna": sampler.version(), **plan.identity}
-    return json_files.plain(identity)
+    return json_text.plain(identity)
 
 
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
+from podusv_cli.core import json_text
 from podusv_cli.storage import files, json_files
 
 FOLDER = "trials"
@@ -45,7 +46,7 @@ class Trial:
 def write(folder: Path, name: str, trials: Sequence[Trial]) -> None:
     """Write the trials of a search. Raises StorageError."""
     content = {"format": FORMAT, "trials": [asdict(trial) for trial in trials]}
-    files.write_bytes(folder / FOLDER / f"{name}.json", json_files.encode(content))
+    files.write_bytes(folder / FOLDER / f"{name}.json", json_text.encode(content))
 
 
 class Stored(BaseModel):
