@@ -8,8 +8,9 @@ from conftest import PACKAGE
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case, preflight
+from podusv_cli.findings.finding import preflight
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.workflows import execute

@@ -25,8 +25,9 @@ from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.metrics.metric import Accumulator, Metric, gathered
 from podusv_cli.metrics.table import METRICS, metrics_probe
 from podusv_cli.scenario.address import ValueRefused, has, with_values
-from podusv_cli.scenario.load import load_text, resolved_yaml, values
+from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
 
 SECTIONS = {"paths": "path", "disturbances": "disturbance", "actuators": "actuator"}

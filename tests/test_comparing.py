@@ -11,8 +11,8 @@ import pytest
 from old_results import draw_quickly
 
 from podusv_cli.core.errors import ScenarioError
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
 

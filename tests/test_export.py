@@ -45,7 +45,7 @@ from podusv_cli.export import fmu as units
 from podusv_cli.export.check import check
 from podusv_cli.export.fmu import variables
 from podusv_cli.export.law import ExportedLaw
-from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 

@@ -9,9 +9,10 @@ from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import simulate
-from podusv_cli.findings.finding import Case, postflight, preflight
+from podusv_cli.findings.finding import postflight, preflight
 from podusv_cli.findings.sizing import gains_for_another_hull
 from podusv_cli.findings.units import other_unit
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.studies.making.plan import plan

@@ -10,12 +10,12 @@ from findings_samples import codes, finding, late, log, scene
 
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.findings.finding import Case
 from podusv_cli.findings.proof import conditions
-from podusv_cli.findings.reference import drift, reference
 from podusv_cli.findings.task import sliding_distance
 from podusv_cli.findings.values import damping_sign
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load
+from podusv_cli.scenario.reference import drift, reference
 
 LONG = "simulation.duration=300"
 SWITCH = 15.0

@@ -14,8 +14,9 @@ from scenario_samples import write
 import podusv
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.doubt.check import doubt_faults
-from podusv_cli.scenario.load import Loaded, load, load_stored, resolved_yaml, tree_yaml
+from podusv_cli.scenario.load import Loaded, load, load_stored, tree_yaml
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.studies.making.check import singles, sweep_faults
 from podusv_cli.studies.making.draws import drawn, draws

@@ -134,7 +134,7 @@ from pathlib import Path
 from podusv_cli.cli.exit_codes import report_error
 from podusv_cli.scenario.load import load_text
 from podusv_cli.core.errors import StorageError
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 from podusv_cli.workflows.execute import Task, execute, warm_up
 text, limit, held, kind = sys.argv[1], *map(int, sys.argv[2:4]), sys.argv[4]
 scenario = load_text(text, "a.yaml").scenario

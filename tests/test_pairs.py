@@ -25,11 +25,12 @@ from podusv_cli.core.kernel import LANES
 from podusv_cli.export import link
 from podusv_cli.export.check import check
 from podusv_cli.export.law import ExportedLaw
-from podusv_cli.findings.finding import Case
 from podusv_cli.interface.results import Run
 from podusv_cli.scenario.address import ValueRefused, has, with_values
-from podusv_cli.scenario.load import load_text, resolved_yaml, values
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
 from podusv_cli.studies.making.check import gathered_metrics
 from podusv_cli.workflows import export as exporting

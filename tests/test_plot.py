@@ -16,7 +16,7 @@ from podusv_cli.core.recording import Recording
 from podusv_cli.figures import animation
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.style import Look, house_style
-from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import run_folder
 from podusv_cli.workflows import plot as plotting
 from podusv_cli.workflows.run import Request

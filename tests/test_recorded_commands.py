@@ -11,7 +11,8 @@ import podusv
 from podusv_cli.components.actuators.recorded import Recorded
 from podusv_cli.core.errors import UsageError
 from podusv_cli.export.law import ExportedLaw
-from podusv_cli.scenario.load import load, load_stored, resolved_yaml
+from podusv_cli.scenario.load import load, load_stored
+from podusv_cli.scenario.resolved import resolved_yaml
 
 HULL = {
     "m": 41.3, "I_z": 7.9, "X_udot": -3.7, "Y_vdot": -29.1, "N_rdot": -4.3, "X_u": -6.1,

@@ -20,7 +20,6 @@ MEANT = {
     "doubt -> process": "figures that cannot be drawn are missing, and said so",
     "doubt -> storage": "its folder appears whole, with tables that no spreadsheet executes",
     "export -> scenario": "a law is exported as a scenario has it",
-    "findings -> engine": "the first signals of a law are computed as the loop computes them",
     "interface -> doubt": "the same checks and the same table as those of the command",
     "interface -> metrics": "a notebook shows metrics with their units",
     "interface -> process": "what cannot be computed of a run in memory is one of its warnings",

@@ -11,8 +11,9 @@ from old_results import draw_quickly
 from storage_samples import files
 from test_reproduction import untimed
 
-from podusv_cli.scenario.load import load, load_stored, resolved_yaml
+from podusv_cli.scenario.load import load, load_stored
 from podusv_cli.scenario.presets import preset_names, with_presets
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.workflows import compare, execute
 
 SECTIONS = {room: room.removesuffix("s") for room in ROOMS}

@@ -8,7 +8,8 @@ from conftest import kinds
 from scenario_samples import SOUND, VESSEL_NAMES, findings, loaded, told, write
 
 import podusv
-from podusv_cli.scenario.load import load, load_text, resolved_yaml, tree_yaml
+from podusv_cli.scenario.load import load, load_text, tree_yaml
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sweep import Keep
 
 *OTHERS, LAST = kinds("controllers")

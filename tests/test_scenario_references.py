@@ -12,9 +12,10 @@ from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.scenario import presets
-from podusv_cli.scenario.load import load, load_stored, load_text, resolved_yaml, tree_yaml
+from podusv_cli.scenario.load import load, load_stored, load_text, tree_yaml
 from podusv_cli.scenario.named_files import MAX_POINTS
 from podusv_cli.scenario.presets import preset_file, preset_names
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import plain
 
 

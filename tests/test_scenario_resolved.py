@@ -17,8 +17,9 @@ from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.keys import limits, members, sections
 from podusv_cli.scenario.limits import LEAST_COMPRESSED, Size, needed
-from podusv_cli.scenario.load import HEADING, load, load_stored, load_text, resolved_yaml, values
+from podusv_cli.scenario.load import load, load_stored, load_text, values
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import HEADING, resolved_yaml
 from podusv_cli.scenario.sections import LABEL
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.tune import Tune

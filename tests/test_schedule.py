@@ -14,7 +14,8 @@ from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.core.kernel import bundle, call
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.timed_rows import LARGEST
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.resolved import resolved_yaml
 
 
 @pytest.fixture(autouse=True)

@@ -25,7 +25,8 @@ from podusv_cli.export.law import ExportedLaw
 from podusv_cli.findings.sizing import other_numbers
 from podusv_cli.scenario.address import content
 from podusv_cli.scenario.explain import explain
-from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
+from podusv_cli.scenario.load import Loaded, load_text
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
 from podusv_cli.studies.making.check import sweep_faults
 from podusv_cli.studies.making.draws import drawn, draws

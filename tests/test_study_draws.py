@@ -24,8 +24,9 @@ from podusv_cli.core.component import Component
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.random_words import in_unit_interval
 from podusv_cli.scenario.address import ValueRefused, described, with_values
-from podusv_cli.scenario.load import load_text, resolved_yaml, values
+from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import route
 from podusv_cli.studies.making.draws import drawing, drawn, draws, seeds, table, uniforms, words

@@ -13,7 +13,8 @@ from small_study import TEXT
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.scenario.address import ValueRefused
 from podusv_cli.scenario.explain import explain
-from podusv_cli.scenario.load import Loaded, load_text, resolved_yaml
+from podusv_cli.scenario.load import Loaded, load_text
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
 from podusv_cli.studies.making.cells import MOST, cells

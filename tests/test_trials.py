@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
-from podusv_cli.findings.finding import Case
 from podusv_cli.findings.outcome import trial_unfinished
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.shipped import file_of
 from podusv_cli.workflows.execute import Stopwatch, simulated, summary

@@ -12,7 +12,8 @@ from tune_samples import faults, planned, toy
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.load import load_text, resolved_yaml
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.tune import Range
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, RANGE
 from podusv_cli.studies.making.draws import SWEEP, table, words

@@ -10,7 +10,8 @@ from scenario_samples import SOUND, loaded, told, write
 
 import podusv
 from podusv_cli.core import units
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.schema import json_schema
 from podusv_cli.studies.making.cells import cells
 

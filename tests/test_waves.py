@@ -17,7 +17,8 @@ from podusv_cli.components.disturbances.wave_kernels import short_crested
 from podusv_cli.components.disturbances.waves import Waves
 from podusv_cli.components.disturbances.wind import Wind
 from podusv_cli.core.kernel import bundle
-from podusv_cli.scenario.load import load_text, resolved_yaml
+from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.resolved import resolved_yaml
 
 SHORT = NONLINEAR.model_copy(update={"length": 1e-3, "beam": 1e-3})
 MOTION = tuple(signal.name for signal in WAVE_MOTION)

@@ -22,16 +22,16 @@ from podusv_cli.components.controllers.network import activation
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import rates_replay
-from podusv_cli.findings import finding
 from podusv_cli.findings.stability import loops, sampled_growth
 from podusv_cli.process.workers import run_all
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.loop_margins import loop_margins
 from podusv_cli.workflows.execute import Stopwatch, simulated
 
-Case, Value = TypeVar("Case"), TypeVar("Value")
+Item, Value = TypeVar("Item"), TypeVar("Value")
 PAPER = Path(__file__).parents[2] / "configs/mu_2017"
 READINGS = {
     "F": "figures_compare.yaml",
@@ -73,7 +73,7 @@ def laws(config: str, *overrides: str) -> dict[str, Scenario]:
 
 def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     """Metrics and log of a run."""
-    case = finding.Case.of(scenario)
+    case = Case.of(scenario)
     recording = simulated(case, Stopwatch())
     seen = recording.seen
     assert seen is not None  # the probe saw it
@@ -87,11 +87,11 @@ def errors(scenario: Scenario) -> dict[str, float]:
     return {name: metrics[name] if finished else np.nan for name in ("iae_e", "e_steady")}
 
 
-def parallel(work: Callable[[Case], Value], runs: Sequence[Case]) -> list[Value]:
+def parallel(work: Callable[[Item], Value], runs: Sequence[Item]) -> list[Value]:
     """What the work gives for each run, in as many processes as there are cores."""
 
-    def job(case: Case, progress: object) -> Value:
-        return work(case)
+    def job(item: Item, progress: object) -> Value:
+        return work(item)
 
     outcomes = run_all([partial(job, run) for run in runs], lambda *_: None)
     if failures := [outcome.failure for outcome in outcomes if outcome.failure]:

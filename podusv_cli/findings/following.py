@@ -12,10 +12,10 @@ from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import Sentences, warn_after_run, warn_before_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import median, reference
 from podusv_cli.findings.sizing import other_numbers
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.reference import median, reference
 
 ROOM = 2.0  # acceptance radii; a shorter leg is left before it is followed
 AMPLE = 1.2  # of length over speed: a duration that leaves time to speed up and to turn

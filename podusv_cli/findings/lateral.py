@@ -12,8 +12,8 @@ from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_steering import VelocitySteering
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.finding import Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import STANDING, sway_share
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.reference import STANDING, sway_share
 from podusv_cli.theory.lateral import (
     growth,
     momentum_vector_gains,

@@ -11,7 +11,6 @@ from podusv_cli.components.actuators.base import SATURATION
 from podusv_cli.components.controllers.velocity_loop import Cause, Loop
 from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
 from podusv_cli.findings.stability import (
     bursts,
     delay_margin,
@@ -21,6 +20,7 @@ from podusv_cli.findings.stability import (
     rk4_growth,
     sampled_growth,
 )
+from podusv_cli.scenario.case import Case
 from podusv_cli.theory.loop_margins import loop_margins
 
 UNSTABLE = 1.0 + 1e-6

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from podusv_cli.core.finding import Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 
 @warn_before_run(

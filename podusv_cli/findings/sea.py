@@ -7,7 +7,7 @@ import math
 from podusv_cli.core.finding import At, Sentences, warn_before_run
 from podusv_cli.core.signal import STATE
 from podusv_cli.core.steps import misfit
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 GRAVITY = 9.81
 BREAKS = 1.0 / 7.0  # height over length at which waves break

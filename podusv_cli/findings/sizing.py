@@ -9,8 +9,8 @@ from podusv_cli.components.facts import Facts
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import At, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import median
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.reference import median
 
 # Of the rule's number, what a number of the scenario's own may be at least and at most.
 USUAL = {"U": (0.5, 2.0), "N_m": (0.3, 3.0), "k_psi": (0.2, 100.0)}

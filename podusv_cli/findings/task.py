@@ -12,8 +12,8 @@ from podusv_cli.components.controllers.base import Approach
 from podusv_cli.components.vessels.plant import sway_force
 from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
 from podusv_cli.core.kernel import bundle
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import FASTEST, STANDING, drift, median
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.reference import FASTEST, STANDING, drift, median
 
 OPPOSITE = 1e-6  # rad
 RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.finding import At, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 WATER = 1000.0  # kg/m3
 SLENDER = (0.4, 30.0)  # length over beam

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.finding import At, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 DAMPING = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # a positive linear one is refused by the model
 ADDED_MASS = {"X_udot": "m11", "Y_vdot": "m22", "N_rdot": "m33"}  # and the inertia it belongs to

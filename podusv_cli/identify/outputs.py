@@ -20,7 +20,7 @@ from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.load import yaml_text
+from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.sweep import POSTERIOR
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter

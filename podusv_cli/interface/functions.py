@@ -20,7 +20,7 @@ from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.outputs import table
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
-from podusv_cli.findings.finding import Case, postflight
+from podusv_cli.findings.finding import find_before_run, postflight
 from podusv_cli.interface.border import ParameterError, interrupt_with
 from podusv_cli.interface.hulls import IdentifiedHull
 from podusv_cli.interface.parameters import check_words, columns, in_si, scenarios
@@ -72,10 +72,10 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     """
     given = loaded(source, changes)
     scenario, extras = _single(given), Extras()
-    case = Case(scenario, given.plan(scenario))
+    case = given.case(scenario)
     recording = simulated(case, Stopwatch())
     whole, _ = monitored(case, recording)
-    findings = [*case.findings(), *postflight(case.scenario, whole)]
+    findings = [*find_before_run(case), *postflight(case.scenario, whole)]
     numbers = summary(case, recording, extras)
     warned = tuple(map(str, (*findings, *extras.missing)))
     return Run(

@@ -17,8 +17,9 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario import model, plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Check, Loaded, Plugged, load_text, yaml_text
+from podusv_cli.scenario.load import Check, Loaded, Plugged, load_text
 from podusv_cli.scenario.load import load as load_file
+from podusv_cli.scenario.resolved import yaml_text
 
 Changes = Mapping[str, Any]
 Source = str | os.PathLike[str] | Mapping[str, Any] | model.Scenario

@@ -1,24 +1,21 @@
-"""Loading scenario files, and writing resolved.yaml."""
+"""Loading scenario files."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
 from operator import attrgetter
 from typing import Any
 
-import yaml
-
-from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario import plugins
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.kinds import kept
@@ -27,7 +24,8 @@ from podusv_cli.scenario.messages import check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.named_files import with_contents, without_files
 from podusv_cli.scenario.presets import complete, stands_in
-from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve
+from podusv_cli.scenario.resolved import plain_data, yaml_text
+from podusv_cli.scenario.yaml_text import MAX_NODES, read_text
 from podusv_cli.scenario.yaml_tree import (
     Fault,
     Mark,
@@ -44,7 +42,6 @@ from podusv_cli.scenario.yaml_tree import (
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
-HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
 # From a tree to the tree with its plug-ins in order, and these; see `plugins.loaded`.
@@ -71,7 +68,7 @@ class Loaded:
     def origins(self) -> dict[str, str]:
         """Of every dotted key: "configs/a.yaml:12:5", "--set a.b=v", "default", `BY_RULE`, ..."""
         origins = {}
-        for at, _ in _leaves(_data(self.scenario), ()):
+        for at, _ in _leaves(plain_data(self.scenario), ()):
             node = find(self.filled, at)
             origins[dotted(at)] = str(node.mark) if node else "default"
         return origins | {dotted(steps): BY_RULE for steps in self.scenario.keys_by_rule()}
@@ -90,6 +87,16 @@ class Loaded:
         """That of one run; its law may be a `controller` that is none of several `controllers`."""
         alike = (plan for plan in self.plans.values() if plan.loop.controller == single.controller)
         return next(alike, None) or single.plan()
+
+    @cached_property
+    def cases(self) -> dict[str, Case]:
+        """The case of each law's run, by label; none where values contradict."""
+        singles = self.scenario.singles()
+        return {label: Case(singles[label], plan) for label, plan in self.plans.items()}
+
+    def case(self, single: Scenario) -> Case:
+        """That of one run, with the plan that `plan` has for it."""
+        return Case(single, self.plan(single))
 
     @cached_property
     def clashes(self) -> list[tuple[str, str]]:
@@ -245,13 +252,7 @@ def _ordered(faults: list[Fault], first: str) -> list[Fault]:
 
 def values(scenario: Scenario) -> dict[str, Any]:
     """Every value of a scenario by its dotted key, in the order of the fields."""
-    return {dotted(route): content for route, content in _leaves(_data(scenario), ())}
-
-
-def _data(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data; studies only where there are some, since runs have none."""
-    data = scenario.model_dump()
-    return {k: v for k, v in data.items() if k not in BESIDE_RUNS or v is not None}
+    return {dotted(route): content for route, content in _leaves(plain_data(scenario), ())}
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
@@ -262,11 +263,6 @@ def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
             yield (*above, name), content
 
 
-def resolved_yaml(scenario: Scenario) -> str:
-    """The scenario as a file with every value in it; loading it gives an equal scenario."""
-    return HEADING + yaml_text(_data(scenario))
-
-
 def tree_yaml(loaded: Loaded) -> str:
     """The scenario as one file that can be changed like the given one.
 
@@ -275,51 +271,3 @@ def tree_yaml(loaded: Loaded) -> str:
     """
     root = with_contents(loaded.root, keys_of(type(loaded.scenario)), [])
     return yaml_text({"name": loaded.scenario.name} | plain(root))
-
-
-def yaml_text(data: Mapping[str, Any]) -> str:
-    """Plain data as YAML that podusv reads back to the same values."""
-    with suppress(UnicodeEncodeError):  # libyaml has no lone surrogates
-        return _dumped(data, _Fast)
-    return _dumped(data, _Dumper)
-
-
-def _dumped(data: Mapping[str, Any], dumper: Any) -> str:
-    text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
-    return str(text)
-
-
-class _Dumper(yaml.SafeDumper):
-    """Blocks for mappings, brackets for lists of scalars, quotes around all text but words."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-class _Fast(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """The same text by libyaml, which PyYAML can lack."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    is_word = text.replace("_", "").isalnum() and isinstance(resolve(text), str) and text.isascii()
-    style = None if is_word else '"'
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
-
-
-def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
-    flat = not any(isinstance(part, tuple) for part in items)
-    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flat)
-
-
-def _kind_first(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.MappingNode:
-    ordered = sorted(data.items(), key=lambda entry: entry[0] != "kind")
-    return dumper.represent_mapping("tag:yaml.org,2002:map", ordered, flow_style=False)
-
-
-for _dumper in (_Dumper, _Fast):
-    _dumper.add_representer(str, _text)
-    _dumper.add_representer(tuple, _list)
-    _dumper.add_representer(dict, _kind_first)

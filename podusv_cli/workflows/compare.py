@@ -21,12 +21,13 @@ from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.finding import Case, finding_kinds
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED, metrics_with
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import Size, estimate, needed
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance

@@ -19,15 +19,17 @@ from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.search import search
 from podusv_cli.engine.running.simulate import to_end
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.address import with_values
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import find, placed
 from podusv_cli.storage.run_folder import InMemory, default_folder
 from podusv_cli.workflows.claimed_margins import with_margins

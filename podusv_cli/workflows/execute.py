@@ -20,13 +20,14 @@ from podusv_cli.core.finding import Finding
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import ready, run
-from podusv_cli.findings.finding import Case, postflight
+from podusv_cli.findings.finding import find_before_run, postflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import csv_files, files
@@ -207,7 +208,7 @@ def examined(case: Case) -> list[Finding]:
     """
     check_figures(case.scenario)
     check_law(case.plan)
-    return case.findings()
+    return find_before_run(case)
 
 
 def simulated(

@@ -13,7 +13,7 @@ from podusv_cli.comparison.measured import FEWEST, Track
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core import units
 from podusv_cli.core.errors import UsageError
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
@@ -133,13 +133,12 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
-    cases = [Case(single, loaded.plans[label]) for label, single in singles.items()]
     members = [
         Member(
             label, case.about, case.resolved_yaml, case.scenario.plugged,
             case=case, text=loaded.text, noticed=examined(case),
         )
-        for label, case in zip(labels, cases, strict=True)
+        for label, case in zip(labels, loaded.cases.values(), strict=True)
     ]  # fmt: skip
     claims = parse_claims(loaded)
     return Members(scenario.name, members, list(singles), claims, scenario.identify)

@@ -19,8 +19,9 @@ from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.phrases import early_words, far_words, thrust_words, worse_words
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.identify import Identify, LogFile
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of

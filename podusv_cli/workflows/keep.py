@@ -6,12 +6,12 @@ import os
 from functools import partial
 from pathlib import Path
 
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
-from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
 from podusv_cli.studies.making.draws import drawn, draws

@@ -21,15 +21,17 @@ from podusv_cli.engine.running.simulate import run
 from podusv_cli.figures.chase import chase
 from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.traces import FIRST, traces
-from podusv_cli.findings.finding import Case, postflight, unknown_codes
+from podusv_cli.findings.finding import find_before_run, postflight, unknown_codes
 from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.address import ValueRefused, with_values
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.controls import Control, controls
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, load_text, yaml_text
+from podusv_cli.scenario.load import Loaded, load, load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
+from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted, plain, route
 from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
 
@@ -124,7 +126,7 @@ class Live:
             self._bases.clear()
             self._puts.clear()
             loaded = self.loaded(moved)
-            cases = {n: Case(s, loaded.plan(s)) for n, s in self.singles(loaded.scenario).items()}
+            cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
         else:
             cases = self._moving(moved)
         scenario = next(iter(cases.values())).scenario
@@ -135,7 +137,7 @@ class Live:
         for label, case in cases.items():
             if rest:
                 recording, _ = monitored(case, simulated(case, Stopwatch()))
-                for found in (*case.findings(), *postflight(case.scenario, recording)):
+                for found in (*find_before_run(case), *postflight(case.scenario, recording)):
                     findings.setdefault(str(found), []).append(label)
             else:
                 recording = vars(case).get("run") or run(
@@ -170,7 +172,7 @@ class Live:
         known = json.dumps(words)
         if known not in self._bases:
             loaded = self.loaded(words)
-            cases = {n: Case(s, loaded.plan(s)) for n, s in self.singles(loaded.scenario).items()}
+            cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
             self._bases = {known: (cases, "nominal" in loaded.root.mapping)}
         cases, told = self._bases[known]
         return {label: self._put(label, case, moved, words, told) for label, case in cases.items()}
@@ -197,7 +199,7 @@ class Live:
             text = str(error) if error.steps else said
             raise ScenarioError([Fault(Mark(self.source), key, text)]) from error
         made, path, approach = (
-            Case(scenario, scenario.plan()),
+            Case.of(scenario),
             scenario.path,
             scenario.controller.approach(),
         )

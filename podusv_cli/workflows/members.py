@@ -20,8 +20,8 @@ from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case
 from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.plugins import continue_with, on_hand, used_of
 from podusv_cli.storage import manifest

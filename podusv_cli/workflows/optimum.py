@@ -20,8 +20,9 @@ from podusv_cli.optimum.collocation import Stage
 from podusv_cli.optimum.feedback import schedule
 from podusv_cli.optimum.problem import Minimised, Motion, Problem, problem
 from podusv_cli.scenario.limits import estimate, limits
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
 from podusv_cli.workflows.execute import Finished, Task, check_figures, execute

@@ -13,10 +13,10 @@ from typing import Any
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import limits, needed
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario

@@ -11,7 +11,7 @@ from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.address import content
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Check, Loaded, load
@@ -81,7 +81,7 @@ def run_loaded(
     with watch.part("load"):
         scenario = single(loaded, request.controller)
         check_asked(request, [scenario.plugged])
-        case = Case(scenario, loaded.plan(scenario))
+        case = loaded.case(scenario)
         target = request.out or default_folder(RESULTS, scenario.name, case.resolved_yaml)
     with watch.part("preflight"):
         noticed = examined(case)

@@ -15,8 +15,8 @@ from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import unknown
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making import before, record

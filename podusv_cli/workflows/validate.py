@@ -11,7 +11,7 @@ from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.engine.running.lanes import why_alone
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.findings.proof import argument, conditions
 from podusv_cli.scenario.limits import largest, limits
 from podusv_cli.scenario.load import Loaded, values
@@ -63,11 +63,8 @@ def validate(config: Path, request: Request) -> Valid:
     parse_claims(loaded)
     scenario = loaded.scenario
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
-    cases = {
-        label: Case(single, loaded.plans[label]) for label, single in scenario.singles().items()
-    }
-    findings = merged({label: examined(case) for label, case in cases.items()})
-    for case in cases.values():
+    findings = merged({label: examined(case) for label, case in loaded.cases.items()})
+    for case in loaded.cases.values():
         warm_up(case)
     return Valid(loaded, findings, study)
 

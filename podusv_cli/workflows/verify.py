@@ -14,8 +14,9 @@ from podusv_cli.engine.machine import object_cache
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.process import code_folder
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import load
 from podusv_cli.scenario.plugins import of_files
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import files, json_files
 from podusv_cli.verification import TOLERANCE
 from podusv_cli.verification import verify as verification

@@ -13,8 +13,8 @@ from counting import counted
 from scenario_samples import loaded
 from storage_samples import deadline
 
-from podusv_cli.findings.finding import Case
 from podusv_cli.scenario import limits
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, execute

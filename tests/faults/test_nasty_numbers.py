@@ -20,9 +20,10 @@ from command_samples import ROOT
 from counts import count
 
 from podusv_cli import cli
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.workers import available_workers
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.workflows.execute import warm_up
 

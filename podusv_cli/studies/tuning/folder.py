@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, PositiveInt
 
 from podusv_cli.core import json_text
 from podusv_cli.core.errors import UsageError
-from podusv_cli.scenario.load import yaml_text
 from podusv_cli.scenario.plugins import FOLDER
+from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.storage import files, json_files, manifest
