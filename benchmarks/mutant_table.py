@@ -580,7 +580,7 @@ TABLE: dict[str, list[Row]] = {
      "test_every_metric_is_that_of_a_loop_over_the_log_up_to_the_last_waypoint"),
     ("recording.up_to(case.plan.loop.passed_by(1.0))", "recording",
      "test_a_metric_of_the_log_is_given_the_rows_up_to_the_end"),
-    ("track.departures(entry.counted)", "track.departures(entry.recording)",
+    ("track.departures(run.counted)", "track.departures(run.recording)",
      "test_a_log_beside_a_run_counts_to_the_end_of_its_path"),
     ("+ abs(row[tau + 1] * s[4]) ", "", "test_energy_counts_the_work_of_the_force_to_the_side"),
     ("off = clipped(sight + angle_i + wrap(course - track)",

@@ -67,7 +67,7 @@ def test_a_track_beside_a_run_is_as_far_away_as_it_was_put():
     rms = math.sqrt((1.7**2 + (len(t) - 1) * 0.5**2) / len(t))
     assert numbers(done, "run") == pytest.approx([rms, 1.7, 0.31, len(t)], rel=1e-9)
     assert all(math.isnan(x) for x in numbers(done, "LOG"))
-    measured = done.result.entries[-1]
+    measured = done.result.runs[-1]
     assert measured.label == "LOG"
     assert measured.recording["z_e"] == pytest.approx(
         np.hypot(run["x_d"][3:61:4] - x - 0.6 * aside, run["y_d"][3:61:4] - y + 0.8 * aside)
@@ -305,7 +305,7 @@ def test_a_log_on_earth_is_moved_to_the_run_when_asked(podusv: Command, sailed_o
     done = compared("run", "LOG.csv", align="start")
     assert warnings_of(done) == []
     assert numbers(done, "run")[1] < 1e-4
-    measured = done.result.entries[-1].recording
+    measured = done.result.runs[-1].recording
     assert measured["x"][0] == pytest.approx(sailed_on_earth["x"][8], abs=1e-12)
     podusv("compare", "run", "LOG.csv", "--align", "start", "--out", "both", "--force")
     with Path("both/comparison.csv").open() as file:

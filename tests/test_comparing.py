@@ -70,7 +70,7 @@ def test_run_takes_the_one_controller_and_says_what_it_left(config, tmp_path):
 def test_planted_claims_get_their_verdicts_with_numbers(done):
     verdicts = json.loads((done.folder / "claims.json").read_text())["claims"]
     assert [v["verdict"] for v in verdicts] == ["reproduced", "not reproduced"]
-    iae = {e.label: e.metric("iae") for e in done.result.entries}
+    iae = {e.label: e.metric("iae") for e in done.result.runs}
     assert verdicts[0]["numbers"] == pytest.approx(
         {"fast.iae": iae["fast"], "slow.iae": iae["slow"]}
     )
@@ -78,7 +78,7 @@ def test_planted_claims_get_their_verdicts_with_numbers(done):
 
 def test_the_table_is_the_same_in_every_form(done):
     frame = pd.read_csv(done.folder / "comparison.csv", index_col=0)
-    iae_e = {entry.label: entry.metric("iae_e") for entry in done.result.entries}
+    iae_e = {entry.label: entry.metric("iae_e") for entry in done.result.runs}
     assert frame.loc["iae_e", ["fast", "slow", "pid"]].to_dict() == pytest.approx(iae_e)
     assert frame.loc["iae_e", "slow/fast"] == pytest.approx(iae_e["slow"] / iae_e["fast"])
     best = min(iae_e, key=iae_e.get)
@@ -122,7 +122,7 @@ def test_costs_are_measured_side_by_side(done, config, monkeypatch):
         return [{"law_ns": float(place)} for place, _ in enumerate(runs)]
 
     monkeypatch.setattr(compare, "law_costs", costs)
-    first, *rest = done.result.entries
+    first, *rest = done.result.runs
     singles = load(config).scenario.singles()
     made = {one.label: Case.of(singles[one.label]) for one in rest}
     entries = compare._with_costs([first, *rest], made, Extras())

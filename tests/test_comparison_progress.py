@@ -1,15 +1,16 @@
 """Costs, names and progress of a comparison."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
-from comparison_samples import Folder, about
+from comparison_samples import past_run
 from known_signals import ABOUT
 
 from podusv_cli.cli import progress
 from podusv_cli.cli.progress import progress_bars
 from podusv_cli.comparison import outputs
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.recording import Recording
 from podusv_cli.metrics import cost
 from podusv_cli.process.extras import Extras
@@ -35,10 +36,8 @@ def test_drawing_is_progress_too():
     seen = []
     t = np.linspace(0, 1, 5)
     signals = dict.fromkeys(("time", "x", "y", "x_d", "y_d", "psi", "u", "v", "r"), t)
-    run = Folder({})
-    run.recording = Recording("finished", "pid", signals, about=ABOUT)
-    entry = Entry("a", run, about())
-    result = outputs.Result({}, [entry], {}, {}, pd.DataFrame(), [], {}, {})
+    run = replace(past_run({}), log=Recording("finished", "pid", signals, about=ABOUT))
+    result = outputs.Result({}, [run], {}, {}, pd.DataFrame(), [], {}, {})
 
     def tell(name, fraction):
         seen.append((name, fraction))

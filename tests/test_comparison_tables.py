@@ -7,14 +7,14 @@ import subprocess
 
 import pytest
 from command_samples import ROOT
-from comparison_samples import FRAME, Folder, about, scenario, verdicts
+from comparison_samples import FRAME, about, past_run, scenario, verdicts
 from matplotlib.figure import Figure
 from matplotlib.mathtext import MathTextParser
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.differences import as_text, differences
-from podusv_cli.comparison.entries import CHECKS, Entry, EntryWithoutLog
 from podusv_cli.core.about import BESIDE_RUNS
+from podusv_cli.core.past_run import CHECKS, PastRun
 from podusv_cli.figures.style import STYLES
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.metrics.windows import NAMED, named
@@ -306,45 +306,49 @@ def test_where_kinds_differ_only_the_kind_and_what_both_have_is_shown():
     assert third["disturbance.scale"] == {"a": "1", "b": "-", "c": "2"}
 
 
-# --- entries
+# --- runs
 
 
-def test_an_entry_answers_for_its_run():
-    entry = Entry("a", Folder({"iae": 3.0, "rmse": None, "law_ns": 7.0}), about(), {"law_ns": 9})
-    assert (entry.metric("iae"), entry.metric("law_ns")) == (3.0, 9.0)
-    assert math.isnan(entry.metric("rmse"))
-    assert math.isnan(entry.metric("ise"))
-    assert entry.signal("x_e").tolist() == [0, 1, 2, 3]
-    assert len(entry.signal("y_e")) == len(entry.signal("W_norm_u")) == len(entry.signal("v")) == 0
-    assert (entry.until, entry.ending) == (4.0, "")
-    assert entry.check("finished") is True
+def test_a_run_answers_for_itself():
+    run = past_run({"iae": 3.0, "rmse": math.nan, "law_ns": 7.0}, cost={"law_ns": 9.0})
+    assert (run.metric("iae"), run.metric("law_ns")) == (3.0, 9.0)
+    assert math.isnan(run.metric("rmse"))
+    assert math.isnan(run.metric("ise"))
+    assert list(run.compared_metrics()) == ["iae", "rmse", "law_ns"]
+    assert run.signal("x_e").tolist() == [0, 1, 2, 3]
+    assert [run.has(name) for name in ("x_e", "y_e", "W_norm_u", "v")] == [True, *[False] * 3]
+    with pytest.raises(KeyError):
+        run.signal("v")
+    assert (run.until, run.ending) == (4.0, "")
+    assert run.check("finished") is True
 
 
-def test_an_entry_is_off_its_target_beyond_the_settling_radius_but_in_a_trial():
-    near, far = (Folder({"e_steady": error}) for error in (0.9, 1.1))
-    assert [Entry("a", run, about()).off_target for run in (near, far)] == [False, True]
-    assert not Entry("a", far, about("metrics.settling_radius=2")).off_target
-    assert not Entry("a", far, about("controller={kind: zigzag}")).off_target
-    assert not Entry("a", Folder({"e_steady": 1.1}, "diverged"), about()).off_target
+def test_a_run_is_off_its_target_beyond_the_settling_radius_but_in_a_trial():
+    near, far = {"e_steady": 0.9}, {"e_steady": 1.1}
+    assert [past_run(metrics).off_target for metrics in (near, far)] == [False, True]
+    assert not past_run(far, told=about("metrics.settling_radius=2")).off_target
+    assert not past_run(far, told=about("controller={kind: zigzag}")).off_target
+    assert not past_run(far, "diverged").off_target
 
 
-def test_an_entry_that_diverged_has_no_metrics_and_ends_early():
-    run = Folder({"iae": 3.0}, "diverged", "diverged at t = 3.5 s: u is not finite; last ...")
-    entry = Entry("a", run, about(), {"law_ns": 9.0})
-    assert math.isnan(entry.metric("iae"))
-    assert math.isnan(entry.metric("law_ns"))
-    assert (entry.until, entry.ending) == (3.0, "diverged at t = 3.5 s")
-    assert entry.check("finished") is False
-    assert entry.check("underactuated") is True
+def test_a_run_that_diverged_has_no_metrics_and_ends_early():
+    message = "diverged at t = 3.5 s: u is not finite; last ..."
+    run = past_run({"iae": 3.0}, "diverged", message, cost={"law_ns": 9.0})
+    assert math.isnan(run.metric("iae"))
+    assert math.isnan(run.metric("law_ns"))
+    assert (run.until, run.ending) == (3.0, "diverged at t = 3.5 s")
+    assert run.check("finished") is False
+    assert run.check("underactuated") is True
 
 
-def test_an_absent_run_has_nothing_but_its_scenario():
-    absent = EntryWithoutLog(about(), "Traceback\n  File\nZeroDivisionError: oops\n")
-    assert absent.ending == "has no log: ZeroDivisionError: oops"
-    assert math.isnan(absent.metric("iae"))
-    assert (len(absent.signal("x")), absent.until) == (0, 0.0)
-    assert absent.check("finished") is None
-    assert absent.check("underactuated") is True
+def test_a_lost_run_has_nothing_but_its_scenario():
+    lost = PastRun.lost("a", about(), "Traceback\n  File\nZeroDivisionError: oops\n")
+    assert lost.ending == "has no log: ZeroDivisionError: oops"
+    assert math.isnan(lost.metric("iae"))
+    assert (lost.compared_metrics(), lost.has("x"), lost.until) == ({}, False, 0.0)
+    assert not lost.off_target
+    assert lost.check("finished") is None
+    assert lost.check("underactuated") is True
 
 
 def test_whether_an_interrupted_run_would_have_finished_cannot_be_told():

@@ -37,6 +37,9 @@ class Planted:
         known = {"time": t, "z_e": self.scale * (10.0 - t), "x_d": 0.5 * t, "tau_u": 0 * t + 2.0}
         return known.get(name, np.empty(0))
 
+    def has(self, name: str) -> bool:
+        return len(self.signal(name)) > 0
+
     def check(self, name: str) -> bool | None:
         return None if self is RUNS["cut"] else not self.ending
 

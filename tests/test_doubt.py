@@ -13,8 +13,8 @@ from command_samples import PATIENCE, under_way
 from html_tree import tree
 
 import podusv
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.comparison.parsing import parse_claims
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.doubt.alone import SHARP
@@ -26,7 +26,6 @@ from podusv_cli.doubt.judged import Judged
 from podusv_cli.doubt.together import counted, drawn
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
-from podusv_cli.storage.run_folder import InMemory
 from podusv_cli.workflows import doubt as doubting
 from podusv_cli.workflows.run import Request
 
@@ -406,10 +405,8 @@ def logged(leg):
     t = np.linspace(0.0, 10.0, 101)
     signals = {"time": t, "leg": np.array([leg(instant) for instant in t]), "u": t}
     about = {"leg": Signal("leg", "1", "legs done"), "u": Signal("u", "m/s", "speed")}
-    run = InMemory(
-        Path(), "finished", {}, {}, "", kept=Recording("finished", "pid", signals, about=about)
-    )
-    return {"a": Entry("a", run, about_of(scenario(WRITTEN)))}
+    log = Recording("finished", "pid", signals, about=about)
+    return {"a": PastRun("a", about_of(scenario(WRITTEN)), log)}
 
 
 def test_the_event_nearest_to_a_window_is_named():

@@ -81,7 +81,7 @@ def test_a_comparison_plans_the_loop_of_each_law_once(tmp_path, counting):
     counts = counting()
     config = ROOT / "fossen_2003/cybership2.yaml"
     done = compare([config], run.Request(out=tmp_path / "all", figures=False, overrides=SHORT))
-    assert len(done.result.entries) == 4
+    assert len(done.result.runs) == 4
     assert counts == dict.fromkeys((name for _, name in MADE), 4)
 
 

@@ -7,15 +7,14 @@ import json
 import math
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from podusv_cli.comparison.claims import judge
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.comparison.parsing import parse_claims
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.engine.running import simulate as simulation
 from podusv_cli.metrics.operations import operations
 from podusv_cli.scenario.about import about_of
@@ -88,8 +87,7 @@ def rerun(scenario):
     plan = scenario.plan()
     recording = simulation.run(plan)
     numbers = plan.probe.summary(recording.seen) | operations(plan, recording)
-    run = SimpleNamespace(recording=recording, metrics=numbers)
-    return Entry("", run, about_of(scenario))
+    return PastRun("", about_of(scenario), recording, numbers)
 
 
 def signs(letter, sets, laws=("adaptive_neural", "full_backstepping", "pid")):

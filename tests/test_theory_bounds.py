@@ -16,10 +16,10 @@ from podusv_cli.components.controllers.dsc import DynamicSurface
 from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.network import Network
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
+from podusv_cli.core.derived_signals import derived_with
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.shown import dressed
-from podusv_cli.figures.signals import DERIVED
 from podusv_cli.figures.stability import FAR, POINTS
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log
@@ -33,6 +33,8 @@ SEEN = Observed(
     b=Pair(0.9, 0.7), W=Pair(0.7, 0.4), alpha_dot=Pair(0.2, 0.03), drift=Pair(0.3, 0.05),
     epsilon=Pair(0.1, 0.2), rest=Pair(2.6, 0.6),
 )  # fmt: skip
+
+DERIVED = derived_with(())
 
 
 def bound(observed: Observed | None = SEEN, **gains: Any) -> UltimateBound:

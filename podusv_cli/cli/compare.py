@@ -111,7 +111,7 @@ def compare(
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
-    if done.result.entries and not (quiet or done.verified):
+    if done.result.runs and not (quiet or done.verified):
         echo(_advice(items, assign or (), plugin or ()), err=True)
     if not (figure or quiet or as_json):
         echo_how_to_draw(done.folder, done.places())
@@ -128,7 +128,7 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
-    count = len(result.entries)
+    count = len(result.runs)
     echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
 
 

@@ -16,7 +16,7 @@ NEAR = 1e-9  # s; times closer than this are the same
 
 
 class ClaimedRun(Protocol):
-    """A run, as far as claims can be about it."""
+    """What claims ask of a run: of one that is over, or, before there are runs, of an example."""
 
     @property
     def until(self) -> float:
@@ -33,8 +33,11 @@ class ClaimedRun(Protocol):
     def metric(self, name: str) -> float:
         """A metric; NaN where the run has none of this name."""
 
+    def has(self, name: str) -> bool:
+        """Whether the run has a signal of this name, logged or derivable."""
+
     def signal(self, name: str) -> Vector:
-        """A logged signal; empty where the run has none of this name."""
+        """A signal that it has."""
 
     def check(self, name: str) -> bool | None:
         """Whether a named property of the run holds; None where that is unknown."""
@@ -75,7 +78,7 @@ def metric(label: str, run: ClaimedRun, about: MetricAbout) -> float:
 
 def signal(label: str, run: ClaimedRun, name: str) -> Curve:
     """A signal of a run. Raises CannotTell."""
-    values = run.signal(name)
+    values = run.signal(name) if run.has(name) else np.empty(0)
     if not len(values):
         raise CannotTell(f"{label}.{name}: {label} {run.ending or 'does not log it'}")
     return Curve(run.signal("time")[: len(values)], values, {label: run})

@@ -21,9 +21,10 @@ import numpy as np
 
 from podusv_cli.comparison import curves
 from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, ClaimedRun, Curve, Quantity
-from podusv_cli.comparison.entries import CHECKS
 from podusv_cli.core.about import MetricAbout
+from podusv_cli.core.derived_signals import derived_with
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.past_run import CHECKS
 from podusv_cli.core.signal import Signal
 from podusv_cli.expressions.margins import SIGNS, around, below
 from podusv_cli.expressions.reading import (
@@ -35,13 +36,14 @@ from podusv_cli.expressions.reading import (
     syntax_tree,
 )
 from podusv_cli.expressions.walk import Condition, Walk
-from podusv_cli.figures.signals import DERIVED
 from podusv_cli.metrics.table import METRICS
 
 EXAMPLE = "a.iae < b.iae"
 STRICT = (ast.Lt, ast.Gt)  # too close to tell where the difference is within the tolerance
 # norms of the weights, which have one value for every node of a network
-NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
+NORMS = {
+    derived.needs[0]: name for name, derived in derived_with(()).items() if len(derived.needs) == 1
+}
 
 
 def parse(
@@ -72,6 +74,9 @@ class _Example:
         return 1.0
 
     def check(self, name: str) -> bool:
+        return True
+
+    def has(self, name: str) -> bool:
         return True
 
     def signal(self, name: str) -> Vector:

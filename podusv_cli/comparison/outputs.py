@@ -8,10 +8,10 @@ from functools import partial
 from typing import Any
 
 from podusv_cli.comparison import claims, report, table
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.core import json_text
 from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures import chase, traces
 from podusv_cli.figures.shown import dressed
@@ -34,12 +34,12 @@ RESERVED = (
 class Result:
     """What a comparison found.
 
-    All but `entries`, the runs that have a log, are by label. An ending says why a run did not
+    All but `runs`, those that have a log, are by label. An ending says why a run did not
     finish, "" if it did. Warnings and timings are those of the runs made for this comparison.
     """
 
     abouts: Mapping[str, RunAbout]
-    entries: Sequence[Entry]
+    runs: Sequence[PastRun]
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
     table: table.Table
@@ -57,7 +57,7 @@ class Result:
     @property
     def unsettled(self) -> list[str]:
         """The runs that do not end at their target, which no table ranks."""
-        return [entry.label for entry in self.entries if entry.off_target]
+        return [run.label for run in self.runs if run.off_target]
 
 
 def write(writer: RunWriter, result: Result, extras: Extras) -> None:
@@ -120,9 +120,7 @@ def drawn(
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
-    shown = dressed(
-        [(e.label, e.recording, e.about, e.plugins) for e in result.entries], result.peaks
-    )
+    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.runs], result.peaks)
     sheets = chosen(names, shown, extras)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT, PHONE)))
     return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
@@ -150,13 +148,13 @@ def as_report(
             for name, sheet in figures_of([result.plugins]).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.entries])
+    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.runs])
     story = report.Story(
         title=title, abouts=result.abouts, meanings=result.meanings,
         endings=result.endings, missing=[str(part) for part in missing],
         differences=result.differences,
         noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
-        theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
+        theories={run.label: run.theory for run in result.runs if run.theory},
         figures=pictures, provenance=provenance, chase=chase.chase(shown),
         traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled,
         doubts=result.doubts,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from podusv_cli.core import derived_signals as derived
 from podusv_cli.core import escaping, quantities
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.escaping import visible
@@ -16,7 +17,6 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
-from podusv_cli.figures import signals as derived
 from podusv_cli.figures.looks import nth_style
 
 MARKS = 24  # on the curves of a panel together
@@ -120,7 +120,7 @@ def about(runs: Sequence[Shown], name: str) -> Signal:
     """What a signal is, by the first of the runs that have it, else as podusv derives it."""
     having = [run for run in runs if run.has(name)]
     if not having:
-        return derived.DERIVED[name].signal
+        return derived.derived_with(())[name].signal
     return derived.about(having[0].recording, name, having[0].plugins)
 
 

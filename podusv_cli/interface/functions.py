@@ -321,13 +321,12 @@ def _opened(member: Member) -> Run:
 def _compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
     """The runs of a comparison that have a log, by label."""
     result = done.result
-    folders = {e.label: done.folder / e.label for e in result.entries if e.label in result.timings}
     return {
-        e.label: Run(
-            e.label, e.about, e.recording, e.metrics(), tuple(map(str, result.warnings[e.label])),
-            folders.get(e.label, e.run.folder), scenarios.get(e.label),
+        run.label: Run(
+            run.label, run.about, run.recording, run.compared_metrics(),
+            tuple(map(str, result.warnings[run.label])), done.place(run), scenarios.get(run.label),
         )
-        for e in result.entries
+        for run in result.runs
     }  # fmt: skip
 
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from podusv_cli.core import derived_signals as derived
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins, installed
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures import signals as derived
 from podusv_cli.interface.border import explained
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.load import load_stored

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,7 +19,8 @@ from typing import Any, Self
 from podusv_cli.core import json_text
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import StorageError
-from podusv_cli.core.plugins import Plugin
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.process.extras import Extras
@@ -203,6 +205,24 @@ def check_free_space(final: Path, needed: float, remedy: str) -> None:
 
 
 @dataclass(frozen=True)
+class LogFile:
+    """A log.h5 that is read when it is first asked for, once for all who share it."""
+
+    path: Path
+
+    @cached_property
+    def recording(self) -> Recording:
+        """Its content. Raises StorageError."""
+        from podusv_cli.storage import log_reader  # h5py is slow to import
+
+        return log_reader.read_log(self.path)
+
+    def __getstate__(self) -> dict[str, Path]:
+        """Its place alone: another process reads the file itself, instead of taking its numbers."""
+        return {"path": self.path}
+
+
+@dataclass(frozen=True)
 class FinishedRun:
     """A run as its finished folder has it. `metrics` has None where a number was not finite.
 
@@ -223,23 +243,22 @@ class FinishedRun:
         return (self.folder / LOG).exists()
 
     @cached_property
+    def log(self) -> LogFile:
+        """Its log, read on first use."""
+        return LogFile(self.folder / LOG)
+
+    @property
     def recording(self) -> Recording:
-        """The content of log.h5, read on first use. Raises StorageError."""
-        from podusv_cli.storage import log_reader  # h5py is slow to import
+        """The content of log.h5. Raises StorageError."""
+        return self.log.recording
 
-        return log_reader.read_log(self.folder / LOG)
-
-
-@dataclass(frozen=True)
-class InMemory(FinishedRun):
-    """A run that lies in no folder."""
-
-    kept: Recording = field(kw_only=True)
-
-    @cached_property
-    def recording(self) -> Recording:
-        """What was recorded."""
-        return self.kept
+    def as_run(self, label: str, about: RunAbout, plugins: Plugins = ()) -> PastRun:
+        """The run in it under a label; `about` may be made of the scenario, see `about`."""
+        numbers = {n: math.nan if x is None else float(x) for n, x in self.metrics.items()}
+        return PastRun(
+            label, about, self.log, numbers, plugins=plugins, folder=self.folder,
+            theory=self.theory,
+        )  # fmt: skip
 
 
 def open_run(folder: Path, *, optional: str = "") -> FinishedRun:

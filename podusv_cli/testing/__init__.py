@@ -32,6 +32,7 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.components.paths.base import Path as AnyPath
 from podusv_cli.components.paths.line import Line
+from podusv_cli.core import derived_signals as derived
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle, call
@@ -43,7 +44,6 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.figures import signals as derived
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import dressed
 from podusv_cli.figures.style import house_style, image

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from podusv_cli.comparison.claims import ParsedClaim
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.errors import LawError, NotConvergedError
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
@@ -17,25 +17,26 @@ from podusv_cli.theory.loop_margins import loop_margins
 
 
 def with_margins(
-    entries: Sequence[Entry], made: Mapping[str, Scenario], claims: Sequence[ParsedClaim],
+    runs: Sequence[PastRun], made: Mapping[str, Scenario], claims: Sequence[ParsedClaim],
     extras: Extras,
-) -> list[Entry]:  # fmt: skip
-    """The entries; those `made` now each with those margins of its loop that claims name.
+) -> list[PastRun]:  # fmt: skip
+    """The runs; those `made` now each with those margins of its loop that claims name.
 
     A finished run, and one whose loop has no margins, has none; `extras` says why.
     """
     named = {pair for claim in claims for pair in _named(claim)}
     wanted = {
-        e.label: {n for label, n in named if label == e.label and n in OF_LOOP} for e in entries
+        run.label: {n for label, n in named if label == run.label and n in OF_LOOP} for run in runs
     }
-    for run in (entry.run for entry in entries if wanted[entry.label] and entry.label not in made):
-        why = f"it is finished: podusv margins {run.folder}/resolved.yaml"
-        extras.missing.append(Failure(f"margins of {run.folder.name}", why))
+    for run in runs:
+        if wanted[run.label] and run.label not in made and run.folder:
+            why = f"it is finished: podusv margins {run.folder}/resolved.yaml"
+            extras.missing.append(Failure(f"margins of {run.folder.name}", why))
     return [
-        _measured(e, made[e.label], wanted[e.label], extras)
-        if wanted[e.label] and e.label in made
-        else e
-        for e in entries
+        _measured(run, made[run.label], wanted[run.label], extras)
+        if wanted[run.label] and run.label in made
+        else run
+        for run in runs
     ]
 
 
@@ -48,10 +49,10 @@ def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
                     yield label, name
 
 
-def _measured(entry: Entry, scenario: Scenario, wanted: set[str], extras: Extras) -> Entry:
-    what = f"margins of {entry.label}"
+def _measured(run: PastRun, scenario: Scenario, wanted: set[str], extras: Extras) -> PastRun:
+    what = f"margins of {run.label}"
     if extras.interrupted:
-        return entry
+        return run
     try:
         with interrupts_enabled():
             margins = loop_margins(
@@ -62,5 +63,5 @@ def _measured(entry: Entry, scenario: Scenario, wanted: set[str], extras: Extras
     except (LawError, NotConvergedError) as error:
         extras.missing.append(Failure(what, str(error)))
     else:
-        return replace(entry, cost={**entry.cost, **{name: margins[name] for name in wanted}})
-    return entry
+        return replace(run, cost={**run.cost, **{name: margins[name] for name in wanted}})
+    return run

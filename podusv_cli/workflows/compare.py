@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from podusv_cli.comparison import claims, outputs, table
-from podusv_cli.comparison.curves import ClaimedRun
 from podusv_cli.comparison.differences import differences
-from podusv_cli.comparison.entries import Entry, EntryWithoutLog, metrics_of
+from podusv_cli.comparison.known_metrics import metrics_of
 from podusv_cli.comparison.optimum import related
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Status
@@ -31,7 +31,7 @@ from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import Size, estimate, needed
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder, open_run
+from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
@@ -64,7 +64,7 @@ class Compared:
             "format": 1,
             "status": self.status,
             "folder": str(self.folder),
-            "runs": [self._run_as_json(entry) for entry in result.entries],
+            "runs": [self._run_as_json(run) for run in result.runs],
             "comparison": table.numbers(result.table),
             "failed": {label: text for label, text in result.endings.items() if text},
             "differences": result.differences,
@@ -75,28 +75,29 @@ class Compared:
 
     def places(self) -> list[Path]:
         """The fewest folders that have all of its runs."""
-        runs = (entry for entry in self.result.entries if not entry.run.folder.is_file())
-        places = [self._place(entry) for entry in runs]  # without what was measured
+        runs = (run for run in self.result.runs if not self.place(run).is_file())
+        places = [self.place(run) for run in runs]  # without what was measured
         return [self.folder] if {place.parent for place in places} == {self.folder} else places
 
-    def _place(self, entry: Entry) -> Path:
-        here = entry.label in self.result.timings
-        return self.folder / entry.label if here else entry.run.folder
+    def place(self, run: PastRun) -> Path:
+        """Where one of its runs lies: within, or where it was made; the file of a log."""
+        assert run.folder is not None  # all were opened
+        return self.folder / run.label if run.label in self.result.timings else run.folder
 
     def warnings(self) -> list[Finding]:
         """The findings about the runs made for this comparison, before and after them."""
         return merged(self.result.warnings)
 
-    def _run_as_json(self, entry: Entry) -> dict[str, Any]:
+    def _run_as_json(self, run: PastRun) -> dict[str, Any]:
         """As `podusv run --json`, without what is missing; timing only of runs made now."""
         return {
             "format": 1,
-            "status": entry.recording.status,
-            "run": str(self._place(entry)),
-            "controller": entry.recording.controller,
-            "metrics": dict(entry.run.metrics),
-            "timing": dict(self.result.timings.get(entry.label, {})),
-            "warnings": [f.as_json() for f in self.result.warnings[entry.label]],
+            "status": run.recording.status,
+            "run": str(self.place(run)),
+            "controller": run.recording.controller,
+            "metrics": dict(run.metrics),
+            "timing": dict(self.result.timings.get(run.label, {})),
+            "warnings": [f.as_json() for f in self.result.warnings[run.label]],
         }
 
 
@@ -150,7 +151,7 @@ def compare_gathered(
         extras.interrupted = any(outcome.interrupted for outcome in outcomes.values())
         result = collect(given.members, outcomes, given.claims, extras)
         result = replace(result, chosen=request.metrics, ratios=request.ratios)
-        if extras.interrupted and not result.entries:
+        if extras.interrupted and not result.runs:
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
         doubted = None
         if loaded and not extras.interrupted:
@@ -241,43 +242,38 @@ def collect(
     What the runs lack is missing in the comparison, too.
     """
     finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
-    runs = {m.label: m.run for m in members if m.run}
-    runs |= {label: open_run(done.folder) for label, done in finished.items()}
-    members = _placed(members, runs)
-    runs |= _measured(members, runs)
+    folders = {m.label: m.run for m in members if m.run}
+    folders |= {label: open_run(done.folder) for label, done in finished.items()}
+    opened_runs = [
+        folders[m.label].as_run(m.label, m.about, m.plugins) for m in members if m.label in folders
+    ]
+    members = _placed(members, opened_runs)
+    runs = [*opened_runs, *_measured(members, opened_runs)]
+    messages = {run.label: run.recording.message for run in runs}
     endings = {
-        m.label: outcomes.get(m.label, Outcome()).failure
-        or (runs[m.label].recording.message if m.label in runs else "")
+        m.label: outcomes.get(m.label, Outcome()).failure or messages.get(m.label, "")
         for m in members
     }
     for label, done in finished.items():
         extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
-    entries = [
-        Entry(m.label, runs[m.label], m.about, plugins=m.plugins)
-        for m in members
-        if m.label in runs
-    ]
     made = {m.label: m.case for m in members if m.case and m.label in finished}
-    entries = related(_with_costs(entries, made, extras), extras)
-    entries = _with_departures(entries, members)
+    runs = related(_with_costs(runs, made, extras), extras)
+    runs = _with_departures(runs, members)
     scenarios = {label: case.scenario for label, case in made.items()}
-    entries = with_margins(entries, scenarios, parsed, extras)
-    sources: dict[str, ClaimedRun] = {
-        m.label: EntryWithoutLog(m.about, endings[m.label]) for m in members
-    }
-    sources |= {entry.label: entry for entry in entries}
-    numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
-    numbers |= {entry.label: entry.metrics() for entry in entries}
+    runs = with_margins(runs, scenarios, parsed, extras)
+    every = {m.label: PastRun.lost(m.label, m.about, endings[m.label]) for m in members}
+    every |= {run.label: run for run in runs}
+    numbers = {label: run.compared_metrics() for label, run in every.items()}
     abouts = {m.label: m.about for m in members}
-    known = metrics_of(entries)
+    known = metrics_of(runs)
     plugins = tuple(dict.fromkeys(plugin for m in members for plugin in m.plugins))
     return outputs.Result(
         abouts=abouts,
-        entries=entries,
+        runs=runs,
         endings=endings,
         differences=differences({label: about.values for label, about in abouts.items()}),
         table=table.table(numbers, known),
-        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources, known))
+        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, every, known))
         or [],
         timings={label: done.timing for label, done in finished.items()},
         metrics=known,
@@ -288,9 +284,9 @@ def collect(
     )
 
 
-def _placed(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> list[Member]:
+def _placed(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
     """The members; what was measured where it is to stand, with what the runs show of it."""
-    logs = {label: run.recording for label, run in runs.items() if len(run.recording["time"])}
+    logs = {run.label: run.recording for run in runs if len(run.recording["time"])}
     placed = []
     for member in members:
         if member.track and logs:
@@ -302,46 +298,46 @@ def _placed(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> list[
     return placed
 
 
-def _measured(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> dict[str, FinishedRun]:
+def _measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[PastRun]:
     """What was measured as a run, with the target of the first of the others that has a log."""
-    logs = (run.recording for run in runs.values())
+    logs = (run.recording for run in runs)
     first = next((log for log in logs if len(log["time"])), None)
-    return {m.label: m.track.beside(first) for m in members if m.track and first}
+    return [m.track.beside(first, m.label, m.about) for m in members if m.track and first]
 
 
-def _with_departures(entries: Sequence[Entry], members: Sequence[Member]) -> list[Entry]:
-    """The entries; runs with how far they are from the measured track, where there is one."""
+def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list[PastRun]:
+    """The runs; the simulated ones with how far they are from the measured track, if any."""
     measured = {m.label: m.track for m in members if m.track}
     return [
-        replace(entry, cost={**entry.cost, **track.departures(entry.counted)})
-        if entry.label not in measured
-        else entry
+        replace(run, cost={**run.cost, **track.departures(run.counted)})
+        if run.label not in measured
+        else run
         for track in measured.values()
-        for entry in entries
-    ] or [*entries]
+        for run in runs
+    ] or [*runs]
 
 
 def _meanings(plugins: Plugins) -> dict[str, str]:
     return {code: kind.meaning for code, kind in finding_kinds(plugins).items()}
 
 
-def _with_costs(entries: Sequence[Entry], made: Mapping[str, Case], extras: Extras) -> list[Entry]:
-    """The entries; those `made` now with the laws' cost measured here and now, side by side.
+def _with_costs(runs: Sequence[PastRun], made: Mapping[str, Case], extras: Extras) -> list[PastRun]:
+    """The runs; those `made` now with the laws' cost measured here and now, side by side.
 
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
     is never compared; and a finished run is looked at without its law.
     """
     timed = [
-        e
-        for e in entries
-        if e.label in made
-        and made[e.label].scenario.simulation.compiled
-        and len(e.recording["time"])
+        run
+        for run in runs
+        if run.label in made
+        and made[run.label].scenario.simulation.compiled
+        and len(run.recording["time"])
     ]
-    loops = [(made[entry.label].plan, entry.recording) for entry in timed]
+    loops = [(made[run.label].plan, run.recording) for run in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
-    by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
-    return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
+    by_label = {run.label: cost for run, cost in zip(timed, costs, strict=True)}
+    return [replace(run, cost=by_label.get(run.label, UNMEASURED)) for run in runs]
 
 
 def _add_report(

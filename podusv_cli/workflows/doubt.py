@@ -8,9 +8,10 @@ from pathlib import Path
 
 from podusv_cli.comparison import claims
 from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
-from podusv_cli.comparison.entries import Entry, metrics_of
+from podusv_cli.comparison.known_metrics import metrics_of
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.answer import DoubtReport, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
@@ -31,7 +32,7 @@ from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import find, placed
-from podusv_cli.storage.run_folder import InMemory, default_folder
+from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.doubt_study import doubt_study
 from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
@@ -109,8 +110,8 @@ def doubted(
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
-        entries = {label: _entry(label, case, subject.parsed) for label, case in cases.items()}
-    judge, asked = judging(subject, entries), scenario.doubt or Doubt()
+        runs = {label: _simulated(label, case, subject.parsed) for label, case in cases.items()}
+    judge, asked = judging(subject, runs), scenario.doubt or Doubt()
     moving = choices(subject.singles, asked)
     parsed = {claim.name: claim.claim for claim in subject.parsed}
     tried = search(parsed, moving, judge, asked, request.workers, progress)
@@ -124,23 +125,24 @@ def doubted(
         )
         for claim in subject.parsed
     ]
-    events = {claim.name: nearest_event(claim, entries) for claim in subject.parsed}
+    events = {claim.name: nearest_event(claim, runs) for claim in subject.parsed}
     return DoubtReport(scenario, answers(verdicts, tried, events), tried), interrupted
 
 
-def judging(subject: Subject, entries: Mapping[str, Entry]) -> Judge:
-    """What judges the claims in a world; `entries` are the runs that a world does not move."""
+def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
+    """What judges the claims in a world; `runs` are those that a world does not move."""
 
     def judge(world: World) -> Judged:
         labels = dict.fromkeys(label for label, _ in world)
         try:
             moved = {label: _changed(subject, label, world) for label in labels}
             made = {
-                label: _entry(label, Case.of(new), subject.parsed) for label, new in moved.items()
+                label: _simulated(label, Case.of(new), subject.parsed)
+                for label, new in moved.items()
             }
         except PodusvError as error:
             return Judged({}, {}, str(error))
-        every, scenarios = {**entries, **made}, {**subject.singles, **moved}
+        every, scenarios = {**runs, **made}, {**subject.singles, **moved}
         measured = with_margins([*every.values()], scenarios, subject.parsed, Extras())
         metrics = metrics_of(measured)
         verdicts = claims.judge(subject.parsed, {e.label: e for e in measured}, metrics)
@@ -156,12 +158,11 @@ def _changed(subject: Subject, label: str, world: World) -> Scenario:
     return with_values(single, new)
 
 
-def _entry(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> Entry:
+def _simulated(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> PastRun:
     """A run in memory, with what a comparison adds to it that these claims name."""
     recording = to_end(case.plan, compiled=case.scenario.simulation.compiled)
     whole, _ = monitored(case, recording)
-    numbers: dict[str, float | None] = {**summary(case, recording, Extras())}
+    numbers = summary(case, recording, Extras())
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)
-    run = InMemory(Path(), recording.status, numbers, {}, "", kept=whole)
-    return Entry(label, run, case.about, plugins=case.scenario.plugged)
+    return PastRun(label, case.about, whole, numbers, plugins=case.scenario.plugged)

@@ -22,9 +22,6 @@ def derived_with(plugins: Plugins) -> dict[str, Derived]:
     }
 
 
-DERIVED = derived_with(())
-
-
 def has(log: Recording, name: str, plugins: Plugins = ()) -> bool:
     """Whether the log has the signal, or those that it is computed from."""
     known = derived_with(plugins)
