@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import typer.main
 import podusv
 from podusv_cli.cli import app
 from podusv_cli.cli.exit_codes import MEANINGS
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.signal import Signal
 from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.shown import dressed
@@ -68,7 +70,7 @@ def pictures() -> Iterable[tuple[str, bytes]]:
     for shown in SHOWN:
         scenario = podusv.load(shown, {"simulation.duration": SECONDS})
         runs = [
-            (name, *of_run(single))
+            past_run_of(name, single)
             for name, single in scenario.singles().items()
             if name in ("adaptive_neural", "pid")
         ]
@@ -77,10 +79,9 @@ def pictures() -> Iterable[tuple[str, bytes]]:
     return drawn.items()
 
 
-def of_run(scenario: Any) -> tuple[Any, Any, Any]:
-    """What a figure needs of the run of a scenario, but its label."""
-    run = podusv.simulate(scenario)
-    return run.recording, run.about, scenario.plugged
+def past_run_of(label: str, scenario: Any) -> PastRun:
+    """The run of a scenario under a label."""
+    return replace(podusv.simulate(scenario).past, label=label)
 
 
 def gallery_pictures() -> Iterable[tuple[str, bytes]]:
@@ -88,7 +89,7 @@ def gallery_pictures() -> Iterable[tuple[str, bytes]]:
     for shown, laws in GALLERY.items():
         singles = podusv.load(shown).singles()
         runs = [
-            (label, *of_run(single))
+            past_run_of(label, single)
             for label, single in singles.items()
             if label in (laws or singles)
         ]

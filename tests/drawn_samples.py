@@ -7,6 +7,7 @@ import numpy as np
 from known_signals import ABOUT
 from matplotlib.patches import Polygon
 
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
 from podusv_cli.figures.shown import dressed
@@ -81,7 +82,7 @@ def shown(*runs):
 
 def looked_at(label, log, plan):
     """A recording with its scenario as figures take them."""
-    return label, log, about_of(plan), ()
+    return PastRun(label, about_of(plan), log)
 
 
 def drawn(name, runs, columns=2):

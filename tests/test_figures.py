@@ -26,6 +26,7 @@ from scenario_samples import SOUND
 from podusv_cli.comparison.claims import peaks
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core import escaping
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures.animation import stage
 from podusv_cli.figures.curves import thinned
@@ -136,7 +137,7 @@ def test_markers_stand_on_the_curve_at_their_times(two):
         for run, curve in zip(two, axes.lines, strict=True):
             assert curve.get_marker() == run.marker
             at = curve.get_xdata()[curve.get_markevery()]
-            assert at == pytest.approx(run.places * 100.0, abs=0.1)
+            assert at == pytest.approx(run.look.places * 100.0, abs=0.1)
     (alone,) = shown(("a", recording()))
     assert line(panels(drawn("velocities", [alone]))["$u$ [m/s]"], "a").get_marker() == "None"
 
@@ -341,7 +342,9 @@ def followed():
 
 
 def labelled(parts):
-    return dressed([(label, *part, ()) for label, part in zip(ODD, parts, strict=True)])
+    return dressed(
+        [PastRun(label, about, log) for label, (log, about) in zip(ODD, parts, strict=True)]
+    )
 
 
 @pytest.mark.slow

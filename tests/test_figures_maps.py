@@ -59,7 +59,7 @@ def test_silhouettes_stand_where_the_vessels_are_and_point_where_they_head(two):
     scale = enlargement(two)
     found = hulls(whole)
     assert len(found) == 2 * 8
-    times = [np.ceil(1000.0 * at) / 10.0 for run in two for at in run.places]  # those logged
+    times = [np.ceil(1000.0 * at) / 10.0 for run in two for at in run.look.places]  # those logged
     assert len(set(times)) == 16  # staggered, so that none hides another
     for (bow, stern, color), t, run in zip(found, times, np.repeat(two, 8), strict=True):
         ahead, behind = expected_hull(run.recording, t, scale)

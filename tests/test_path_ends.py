@@ -243,7 +243,7 @@ def test_tables_and_pages_say_up_to_when_they_count_and_the_rest_is_grey(
     for shown in (chase, curves):
         assert [run["counts"] for run in shown["runs"]] == [time, 47.0]
     run = done["one"]
-    shown = dressed([("one", run.recording, run.about, ())])
+    shown = dressed([run.past])
     axes = next(
         axes for axes in FIGURES["path"].family(shown, 2).axes if "e_{ct}" in axes.get_ylabel()
     )

@@ -120,7 +120,7 @@ def drawn(
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
-    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.runs], result.peaks)
+    shown = dressed(result.runs, result.peaks)
     sheets = chosen(names, shown, extras)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT, PHONE)))
     return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
@@ -148,7 +148,7 @@ def as_report(
             for name, sheet in figures_of([result.plugins]).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.runs])
+    shown = dressed(result.runs)
     story = report.Story(
         title=title, abouts=result.abouts, meanings=result.meanings,
         endings=result.endings, missing=[str(part) for part in missing],

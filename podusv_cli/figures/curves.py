@@ -140,7 +140,7 @@ def mark(line: Line2D, run: Shown, t: Vector | None = None) -> None:
     """
     instants = np.asarray(line.get_xdata() if t is None else t)
     if len(instants) and run.marker:
-        at = instants[0] + run.places * (instants[-1] - instants[0])
+        at = instants[0] + run.look.places * (instants[-1] - instants[0])
         rows = np.minimum(np.searchsorted(instants, at), len(instants) - 1)
         line.set(marker=run.marker, markevery=rows.tolist(), **MARK)
         line.recache(always=True)  # else matplotlib counts from the first point within the axes

@@ -48,7 +48,7 @@ def chosen(names: Sequence[str], runs: Sequence[Shown], extras: Extras) -> list[
 
     One that is named and that no run has signals for is missing among the `extras`.
     """
-    known = figures_of(run.plugins for run in runs)
+    known = figures_of(shown.run.plugins for shown in runs)
     fitting = {name: sheet for name, sheet in known.items() if sheet.fits(runs)}
     for name in (name for name in names if name not in (ALL, *fitting)):
         wanted = ", ".join(known[name].signals)

@@ -175,7 +175,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)), runs)
     scale = enlargement(runs)
     for run in runs:
-        for t in run.start + run.places * (run.end - run.start):
+        for t in run.start + run.look.places * (run.end - run.start):
             axes.add_patch(Polygon(hull_of(run, float(t), scale), **_outline(run)))
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -20,13 +19,11 @@ from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.outputs import table
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
-from podusv_cli.findings.finding import find_before_run, postflight
 from podusv_cli.interface.border import ParameterError, interrupt_with
 from podusv_cli.interface.hulls import IdentifiedHull
 from podusv_cli.interface.parameters import check_words, columns, in_si, scenarios
 from podusv_cli.interface.results import Comparison, Run
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
-from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -36,7 +33,6 @@ from podusv_cli.workflows import compare as comparing
 from podusv_cli.workflows import doubt as doubting
 from podusv_cli.workflows import identify as identifying
 from podusv_cli.workflows import run as running
-from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
 from podusv_cli.workflows.gather import (
     Members,
     from_folder,
@@ -44,6 +40,7 @@ from podusv_cli.workflows.gather import (
     gathered,
     measured,
 )
+from podusv_cli.workflows.in_memory import run_in_memory
 from podusv_cli.workflows.measured import is_log
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
@@ -71,17 +68,8 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     (71.0, (3001,))
     """
     given = loaded(source, changes)
-    scenario, extras = _single(given), Extras()
-    case = given.case(scenario)
-    recording = simulated(case, Stopwatch())
-    whole, _ = monitored(case, recording)
-    findings = [*find_before_run(case), *postflight(case.scenario, whole)]
-    numbers = summary(case, recording, extras)
-    warned = tuple(map(str, (*findings, *extras.missing)))
-    return Run(
-        whole.controller, case.about, whole, numbers, warned,
-        given=case.scenario,
-    )  # fmt: skip
+    case = given.case(_single(given))
+    return Run(run_in_memory(case), case.scenario)
 
 
 def run(
@@ -101,7 +89,8 @@ def run(
     given = loaded(source, changes)
     single = _single(given)
     done = running.run_loaded(given, request(out, force, figures))
-    return replace(open_run(done.folder), given=single)
+    made = open_run(done.folder).past
+    return Run(replace(made, plugins=single.plugged), single)
 
 
 def open_run(folder: str | os.PathLike[str]) -> Run:
@@ -312,10 +301,9 @@ def request(out: Any, force: bool, figures: bool) -> running.Request:
 def _opened(member: Member) -> Run:
     run = member.run
     assert run is not None  # the members of a folder are finished
-    numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
     warned = tuple(map(str, json_files.read_as(run.folder / "metrics.json", _Noticed).warnings))
-    law, log = run.recording.controller, run.recording
-    return Run(law, member.about, log, numbers, warned, run.folder)
+    past = run.as_run(run.recording.controller, member.about, member.plugins)
+    return Run(replace(past, warnings=warned))
 
 
 def _compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
@@ -323,11 +311,16 @@ def _compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> di
     result = done.result
     return {
         run.label: Run(
-            run.label, run.about, run.recording, run.compared_metrics(),
-            tuple(map(str, result.warnings[run.label])), done.place(run), scenarios.get(run.label),
+            replace(
+                run,
+                metrics=run.compared_metrics(),
+                warnings=tuple(map(str, result.warnings[run.label])),
+                folder=done.place(run),
+            ),
+            scenarios.get(run.label),
         )
         for run in result.runs
-    }  # fmt: skip
+    }
 
 
 def _several(sources: Any) -> list[Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from html import escape
 from os import PathLike
@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from podusv_cli.core import derived_signals as derived
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown
-from podusv_cli.core.plugins import Plugins, installed
 from podusv_cli.core.recording import Recording
 from podusv_cli.interface.border import explained
 from podusv_cli.metrics.table import metrics_with
@@ -68,13 +67,38 @@ class Run:
     was only simulated. `run["z_e"]` is a signal as a numpy array.
     """
 
-    label: str
-    about: RunAbout
-    recording: Recording
-    numbers: Mapping[str, float]
-    warnings: tuple[str, ...] = ()
-    folder: Path | None = None
+    past: PastRun
     given: Scenario | None = None  # of which it was made here
+
+    @property
+    def label(self) -> str:
+        """What it is called: by its law, or as a comparison calls it."""
+        return self.past.label
+
+    @property
+    def about(self) -> RunAbout:
+        """What it says about itself, as about.json has it."""
+        return self.past.about
+
+    @property
+    def recording(self) -> Recording:
+        """What was recorded, as podusv's own functions take it."""
+        return self.past.recording
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """Every metric by name, as plain numbers."""
+        return self.past.metrics
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The findings before and after the run, as sentences."""
+        return self.past.warnings
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it lies."""
+        return self.past.folder
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -88,16 +112,6 @@ class Run:
         assert self.folder is not None  # what is in memory has its scenario
         path = self.folder / RESOLVED
         return load_stored(read_text(path), str(path)).scenario
-
-    @property
-    def _plugins(self) -> Plugins:
-        """Those that have figures, metrics and signals for it."""
-        return self.given.plugged if self.given is not None else installed()
-
-    @property
-    def _looked_at(self) -> tuple[Recording, RunAbout, Plugins]:
-        """What figures show of it."""
-        return self.recording, self.about, self._plugins
 
     @property
     def status(self) -> str:
@@ -136,10 +150,9 @@ class Run:
 
     def __getitem__(self, signal: str) -> Vector:
         """A signal that the log has or that follows from it; KeyError with those that there are."""
-        log = self.recording
-        if not derived.has(log, signal, self._plugins):
-            raise KeyError(unknown(f"signal {signal!r}", signal, log.signals))
-        return derived.signal(log, signal, self._plugins)
+        if not self.past.has(signal):
+            raise KeyError(unknown(f"signal {signal!r}", signal, self.recording.signals))
+        return self.past.signal(signal)
 
     @explained
     def plot(self, *names: str, columns: int = 2) -> Figure:
@@ -164,7 +177,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """The trajectory beside the metrics, what was warned of above."""
-        known = {**metrics_with(self._plugins), **self.about.metrics}
+        known = {**metrics_with(self.past.plugins), **self.about.metrics}
         rows = {n: f"{x:.5g} {known[n].unit}" for n, x in self.numbers.items() if n in known}
         table = pd.Series(rows, name=self.label, dtype=str).to_frame().to_html(border=0)
         lines = [repr(self), self.message, *self.warnings]
@@ -240,7 +253,7 @@ def animation(runs: Mapping[str, Run]) -> Animation:
     from podusv_cli.figures.chase import page
     from podusv_cli.figures.shown import dressed
 
-    shown = dressed([(label, *run._looked_at) for label, run in runs.items()])
+    shown = dressed([replace(run.past, label=label) for label, run in runs.items()])
     if not shown:
         raise UsageError(f"there is nothing to show: {', '.join(map(repr, runs.values()))}")
     return Animation(page(shown))
@@ -251,7 +264,7 @@ def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> F
     from podusv_cli.figures.shown import dressed
     from podusv_cli.figures.style import house_style, image
 
-    shown = dressed([(label, *run._looked_at) for label, run in runs.items()])
+    shown = dressed([replace(run.past, label=label) for label, run in runs.items()])
     family = _family(runs, names or ("trajectory",), shown)
     with house_style():
         drawn = family(shown, columns)
@@ -265,7 +278,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
     from podusv_cli.figures.drawing import figures_of
     from podusv_cli.figures.panels import signals_over_time
 
-    figures = figures_of(run._plugins for run in runs.values())
+    figures = figures_of(run.past.plugins for run in runs.values())
     if len(names) == 1 and names[0] in figures:
         sheet = figures[names[0]]
         if not shown or not sheet.fits(shown):

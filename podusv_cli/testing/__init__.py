@@ -36,6 +36,7 @@ from podusv_cli.core import derived_signals as derived
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle, call
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
@@ -205,7 +206,7 @@ def picture(sheet: Sheet, count: int, columns: int) -> bytes:
     waves = {name: np.sin(run["time"]) for name in sheet.signals if name not in known}
     about = {name: Signal(name, "1", "a wave") for name in waves}
     run = replace(run, signals={**run.signals, **waves}, about={**run.about, **about})
-    shown = dressed([(f"run {n}", run, about_of(scenario), ()) for n in range(count)])
+    shown = dressed([PastRun(f"run {n}", about_of(scenario), run) for n in range(count)])
     with house_style():
         return image(sheet.family(shown, columns), "png")
 

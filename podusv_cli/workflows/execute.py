@@ -17,6 +17,7 @@ from podusv_cli import __version__
 from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import ready, run
@@ -308,6 +309,6 @@ def _drawn(
     from podusv_cli.figures.drawing import chosen, draw_in_parallel  # matplotlib is slow to import
     from podusv_cli.figures.shown import dressed
 
-    plugins = task.scenario.plugged
-    shown = dressed([(task.label or recording.controller, recording, about, plugins)])
+    label = task.label or recording.controller
+    shown = dressed([PastRun(label, about, recording, plugins=task.scenario.plugged)])
     return draw_in_parallel(shown, chosen(task.names, shown, extras), ("png",), extras)

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from podusv_cli.core.errors import PodusvError, ScenarioError, StorageError, UsageError, in_a_line
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown
 from podusv_cli.engine.running.simulate import run
 from podusv_cli.figures.chase import chase
@@ -147,13 +148,13 @@ class Live:
             if recording.status == "interrupted":
                 raise KeyboardInterrupt  # which a march takes for its own end
             numbers[label] = summary(case, recording, Extras())
-            runs.append((label, recording, case.about, scenario.plugged))
+            runs.append(PastRun(label, case.about, recording, plugins=scenario.plugged))
         shown = dressed(runs)
         told: dict[str, Any] = {
             "chase": chase(shown, FRAMES),
             "curves": traces(shown, [n for n in signals or FIRST if any(r.has(n) for r in shown)]),
             "numbers": _table(scenario, numbers),
-            "endings": {label: log.message for label, log, *_ in runs if log.message},
+            "endings": {r.label: r.recording.message for r in runs if r.recording.message},
             "command": self.command(moved),
         }
         if rest:

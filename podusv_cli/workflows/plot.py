@@ -17,6 +17,7 @@ import numpy as np
 from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures import panels
@@ -89,11 +90,11 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     members = _named(members, choice.labels)
     known = figures_of(member.plugins for member in members)
     check_names(request.names, request.formats, known)
-    whole = [(m.label, m.run.recording, m.about, m.plugins) for m in members if m.run]
-    empty = _empty(members, dressed(whole))
-    shown = dressed([(label, _during(log, choice), about, own) for label, log, about, own in whole])
+    whole = [m.run.as_run(m.label, m.about, m.plugins) for m in members if m.run]
+    empty = _empty(whole, dressed(whole))
+    shown = dressed([replace(run, log=_during(run.recording, choice)) for run in whole])
     if not shown:
-        ends = ", ".join(f"{label} ends at {log['time'][-1]:g} s" for label, log, *_ in whole)
+        ends = ", ".join(f"{run.label} ends at {run.recording['time'][-1]:g} s" for run in whole)
         raise UsageError(
             f"no run has two instants from {choice.since:g} to {choice.until:g} s ({ends})"
         )
@@ -162,13 +163,13 @@ def _short(member: Member) -> str:
     return member.about.name if STAMP.fullmatch(name) else name
 
 
-def _empty(members: Sequence[Member], shown: Sequence[Shown]) -> dict[str, str]:
+def _empty(runs: Sequence[PastRun], shown: Sequence[Shown]) -> dict[str, str]:
     """Runs of which nothing can be drawn, and how they ended; UsageError where those are all."""
     drawable = {run.label for run in shown}
     endings = {
-        member.label: member.run.recording.message or "has a single row"
-        for member in members
-        if member.run and visible(member.label) not in drawable
+        run.label: run.recording.message or "has a single row"
+        for run in runs
+        if visible(run.label) not in drawable
     }
     if not shown:
         endings_in_words = "; ".join(f"{label}: {ending}" for label, ending in endings.items())
