@@ -329,7 +329,7 @@ def runs(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs")
     folders = [made(place / x, f"path.x={x}", text=SCENARIO + BRIEF) for x in ("1", "2")]
     (one,), (other,) = map(from_folder, folders)
-    return labelled([(part.run.recording, part.about) for part in (one, other)])
+    return labelled([(part.folder.recording, part.about) for part in (one, other)])
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import shutil
 from collections.abc import Callable
@@ -13,10 +14,12 @@ import numpy as np
 import pytest
 from comparison_samples import past_run
 
+from podusv_cli.core.errors import StorageError
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.process.workers import run_all
 from podusv_cli.storage import log_reader
 from podusv_cli.storage.run_folder import open_run
+from podusv_cli.workflows.members import from_folder
 from podusv_cli.workflows.run import Request, run
 
 TEXT = """
@@ -96,11 +99,27 @@ def test_a_run_in_memory_crosses_with_its_numbers() -> None:
 
 
 def test_a_log_that_is_gone_is_told_when_it_is_asked_for(folder: Path, tmp_path: Path) -> None:
-    from podusv_cli.core.errors import StorageError
-
     shutil.copytree(folder, tmp_path / "copy")
     run = opened(tmp_path / "copy")
     (tmp_path / "copy/log.h5").unlink()
     assert run.metrics["iae"] > 0.0
     with pytest.raises(StorageError, match=r"copy/log\.h5"):
         _ = run.recording
+
+
+def test_a_folder_of_before_about_json_opens_with_what_its_scenario_says(
+    folder: Path, tmp_path: Path
+) -> None:
+    old = tmp_path / "old"
+    shutil.copytree(folder, old)
+    (old / "about.json").unlink()
+    manifest = json.loads((old / "manifest.json").read_text())
+    del manifest["files"]["about.json"]
+    (old / "manifest.json").write_text(json.dumps(manifest))
+    assert open_run(old).about is None
+    (member,) = from_folder(old)
+    assert member.folder is not None
+    run, new = member.folder.as_run("old", member.about), opened(folder)
+    assert run.about == new.about
+    assert run.compared_metrics() == pytest.approx(new.compared_metrics(), rel=0, nan_ok=True)
+    assert (run.until, run.check("underactuated")) == (20.0, new.check("underactuated"))

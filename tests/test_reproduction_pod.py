@@ -87,7 +87,7 @@ def test_what_the_findings_hang_on_comes_out(name, keys, adaptive_neural, pid):
         ROOT / f"configs/pod/{name}.yaml", re.findall("`(.*?)`", keys)
     ).scenario.singles()
     for law, told in (("adaptive_neural", adaptive_neural), ("pid", pid)):
-        iae = rerun(singles[law]).run.metrics["iae"]
+        iae = rerun(singles[law]).metrics["iae"]
         assert iae == pytest.approx(int(told), abs=0.6, rel=1e-3)
 
 
@@ -106,14 +106,14 @@ def test_the_lines_that_say_so_are_there():
 )
 def test_what_else_costs_at_the_propeller_comes_out(name, keys, told):
     law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["adaptive_neural"]
-    assert told.format(round(rerun(law).run.metrics["energy_pod"])) in FOUND
+    assert told.format(round(rerun(law).metrics["energy_pod"])) in FOUND
 
 
 @pytest.mark.papers
 def test_unequal_thrust_holds_twice_the_disturbance_as_told():
     keys = ("disturbance.scale=2",)
     law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["adaptive_neural"]
-    got = rerun(law).run.metrics
+    got = rerun(law).metrics
     assert f"limit for {100 * got['at_angle_limit']:.0f} % of the time" in FOUND
     assert f"(z_e {got['z_e_steady']:.3f} m, no more propeller energy" in FOUND
     assert got["energy_pod"] < float(committed("kept").loc["energy_pod", "adaptive_neural"])

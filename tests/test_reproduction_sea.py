@@ -256,7 +256,7 @@ def test_the_committed_comparison_is_what_comes_out(name, tmp_path, monkeypatch)
 def test_one_committed_run_is_what_comes_out():
     """The one that a rounding error does not drive apart: no noise, no limit in the loop."""
     law = load(ROOT / "configs/sea/delay.yaml").scenario.singles()["velocity_vector"]
-    found = rerun(law).run.metrics
+    found = rerun(law).metrics
     committed = SINGLE["delay"].velocity_vector.astype(float)
     common = [name for name in committed.index if name in found]
     assert {"iae", "tv_tau_u", "saturated_fraction"} <= set(common)

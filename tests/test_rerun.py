@@ -169,7 +169,7 @@ def test_runs_made_again_are_compared_in_the_order_of_the_scenario(compared, tmp
     podusv("rerun", compared, "--out", again)
     podusv("rerun", again, "--out", twice)
     for folder in (compared, again, twice):
-        assert [run.folder.name for run in runs_of(folder)] == ["soft", "hard"]
+        assert [run.path.name for run in runs_of(folder)] == ["soft", "hard"]
     provenance = again / "provenance.json"
     provenance.write_text(json.dumps({**json.loads(provenance.read_text()), "runs": 3}))
     manifest.write(again, "finished")

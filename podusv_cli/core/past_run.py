@@ -57,9 +57,8 @@ class PastRun:
     @classmethod
     def lost(cls, label: str, about: RunAbout, failure: str) -> PastRun:
         """A run of which there is no log; `failure` is its error message, in several lines."""
-        return cls(
-            label, about, Recording("interrupted", "", {"time": np.empty(0)}), failure=failure
-        )
+        nothing = Recording("interrupted", "", {"time": np.empty(0)})
+        return cls(label, about, nothing, failure=failure)
 
     @property
     def recording(self) -> Recording:

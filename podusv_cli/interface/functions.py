@@ -299,10 +299,10 @@ def request(out: Any, force: bool, figures: bool) -> running.Request:
 
 
 def _opened(member: Member) -> Run:
-    run = member.run
-    assert run is not None  # the members of a folder are finished
-    warned = tuple(map(str, json_files.read_as(run.folder / "metrics.json", _Noticed).warnings))
-    past = run.as_run(run.recording.controller, member.about, member.plugins)
+    there = member.folder
+    assert there is not None  # the members of a folder are finished
+    warned = tuple(map(str, json_files.read_as(there.path / "metrics.json", _Noticed).warnings))
+    past = there.as_run(there.recording.controller, member.about, member.plugins)
     return Run(replace(past, warnings=warned))
 
 

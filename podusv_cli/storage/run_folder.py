@@ -223,13 +223,13 @@ class LogFile:
 
 
 @dataclass(frozen=True)
-class FinishedRun:
-    """A run as its finished folder has it. `metrics` has None where a number was not finite.
+class RunFolder:
+    """The files of a finished run folder. `metrics` has None where a number was not finite.
 
     `about` is None where an older podusv wrote the folder.
     """
 
-    folder: Path
+    path: Path
     status: Status
     metrics: dict[str, float | None]
     provenance: dict[str, Any]
@@ -240,12 +240,12 @@ class FinishedRun:
     @property
     def has_log(self) -> bool:
         """Whether its log is there; a folder may be packed without."""
-        return (self.folder / LOG).exists()
+        return (self.path / LOG).exists()
 
     @cached_property
     def log(self) -> LogFile:
         """Its log, read on first use."""
-        return LogFile(self.folder / LOG)
+        return LogFile(self.path / LOG)
 
     @property
     def recording(self) -> Recording:
@@ -256,12 +256,12 @@ class FinishedRun:
         """The run in it under a label; `about` may be made of the scenario, see `about`."""
         numbers = {n: math.nan if x is None else float(x) for n, x in self.metrics.items()}
         return PastRun(
-            label, about, self.log, numbers, plugins=plugins, folder=self.folder,
+            label, about, self.log, numbers, plugins=plugins, folder=self.path,
             theory=self.theory,
         )  # fmt: skip
 
 
-def open_run(folder: Path, *, optional: str = "") -> FinishedRun:
+def open_run(folder: Path, *, optional: str = "") -> RunFolder:
     """Open a run folder whose files are unchanged since it was finished.
 
     Raises StorageError naming the first fault. The file `optional` may be missing.
@@ -270,8 +270,8 @@ def open_run(folder: Path, *, optional: str = "") -> FinishedRun:
     missing = [name for name in NEEDED if name not in contents.files]
     if missing:
         raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")
-    return FinishedRun(
-        folder=folder,
+    return RunFolder(
+        path=folder,
         status=contents.status,
         metrics=_metrics(folder / "metrics.json"),
         provenance=json_files.read(folder / PROVENANCE),

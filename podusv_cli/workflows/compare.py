@@ -172,7 +172,7 @@ def compare_gathered(
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
     """UsageError for a metric that no run has."""
-    logged = (name for member in members if member.run for name in member.run.metrics)
+    logged = (name for member in members if member.folder for name in member.folder.metrics)
     plugged = (name for member in members for name in metrics_with(member.plugins))
     own = (name for member in members for name in member.about.metrics)
     known = dict.fromkeys((*plugged, *own, *logged))
@@ -242,7 +242,7 @@ def collect(
     What the runs lack is missing in the comparison, too.
     """
     finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
-    folders = {m.label: m.run for m in members if m.run}
+    folders = {m.label: m.folder for m in members if m.folder}
     folders |= {label: open_run(done.folder) for label, done in finished.items()}
     opened_runs = [
         folders[m.label].as_run(m.label, m.about, m.plugins) for m in members if m.label in folders

@@ -35,7 +35,7 @@ from podusv_cli.storage.run_folder import (
     RESOLVED,
     STUDY,
     THEORY,
-    FinishedRun,
+    RunFolder,
     open_run,
 )
 
@@ -63,7 +63,7 @@ class _Repetition(BaseModel):
 
 @dataclass(frozen=True)
 class Member:
-    """One run of several: finished, or the `case` of one that is still to be made.
+    """One run of several: the `folder` of one that is over, or the `case` of one to be made.
 
     A `track` is no run: it was measured. `plugins` have figures, metrics and signals for it.
     """
@@ -72,7 +72,7 @@ class Member:
     about: RunAbout
     resolved: str  # the text of resolved.yaml
     plugins: Plugins = ()
-    run: FinishedRun | None = None
+    folder: RunFolder | None = None
     case: Case | None = None
     text: str = ""  # the scenario's file
     noticed: Sequence[Finding] = ()  # before the run
@@ -87,13 +87,13 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:
     plugins = on_hand(files)
     return [
         Member(
-            run.folder.name, run.about or _told_before(run, files), run.resolved_yaml, plugins, run
+            run.path.name, run.about or _told_before(run, files), run.resolved_yaml, plugins, run
         )
         for run in runs_of(path)
     ]  # fmt: skip
 
 
-def runs_of(path: Path, *, optional: str = "") -> list[FinishedRun]:
+def runs_of(path: Path, *, optional: str = "") -> list[RunFolder]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
     Their logs and theory.json were checked. Raises UsageError for a folder without finished runs,
@@ -144,24 +144,24 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _checked(path: Path, optional: str) -> FinishedRun:
+def _checked(path: Path, optional: str) -> RunFolder:
     run = open_run(path, optional=optional)
     if run.has_log and (wrong := _fault(run.recording)):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
-    stability.check(run.theory, run.folder / THEORY)
+    stability.check(run.theory, run.path / THEORY)
     return run
 
 
-def _told_before(run: FinishedRun, files: Sequence[str]) -> RunAbout:
+def _told_before(run: RunFolder, files: Sequence[str]) -> RunAbout:
     """What a run says about itself of which an older podusv wrote no about.json."""
-    source = str(run.folder / RESOLVED)
+    source = str(run.path / RESOLVED)
     try:
         given = load_stored(run.resolved_yaml, source, plugged=partial(used_of, files))
     except ScenarioError as error:
         raise UsageError(
-            f"{run.folder}: an older podusv wrote it without {ABOUT}, and its scenario cannot be "
+            f"{run.path}: an older podusv wrote it without {ABOUT}, and its scenario cannot be "
             f"read: {str(error).splitlines()[0]}; name the files of its plug-ins with --plugin, or "
-            f"make the run anew: {continue_with('rerun', run.folder)} --out NEW"
+            f"make the run anew: {continue_with('rerun', run.path)} --out NEW"
         ) from error
     return about_of(given.scenario)
 

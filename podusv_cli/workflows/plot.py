@@ -90,7 +90,7 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     members = _named(members, choice.labels)
     known = figures_of(member.plugins for member in members)
     check_names(request.names, request.formats, known)
-    whole = [m.run.as_run(m.label, m.about, m.plugins) for m in members if m.run]
+    whole = [m.folder.as_run(m.label, m.about, m.plugins) for m in members if m.folder]
     empty = _empty(whole, dressed(whole))
     shown = dressed([replace(run, log=_during(run.recording, choice)) for run in whole])
     if not shown:
@@ -155,7 +155,7 @@ def _labelled(members: Iterable[Member]) -> list[Member]:
 
 
 def _folder(member: Member) -> Path:
-    return member.run.folder if member.run else Path(member.label)
+    return member.folder.path if member.folder else Path(member.label)
 
 
 def _short(member: Member) -> str:

@@ -22,7 +22,7 @@ from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_folder
 from podusv_cli.storage import manifest, run_folder
-from podusv_cli.storage.run_folder import LOG, FinishedRun
+from podusv_cli.storage.run_folder import LOG, RunFolder
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
@@ -30,7 +30,7 @@ from podusv_cli.workflows.members import Member, runs_of
 from podusv_cli.workflows.run import Request
 
 Progress = Callable[[str, float], None]
-Pairs = Sequence[tuple[FinishedRun, Scenario]]
+Pairs = Sequence[tuple[RunFolder, Scenario]]
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,13 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     runs = [(run, _scenario(run, request)) for run in runs_of(path, optional=LOG)]
     for run, _ in runs:
         if run.status == "interrupted":
-            raise UsageError(f"{run.folder} was interrupted; there is no whole run to repeat")
+            raise UsageError(f"{run.path} was interrupted; there is no whole run to repeat")
     return (_one if len(runs) == 1 else _several)(runs, request, progress)
 
 
-def _scenario(run: FinishedRun, request: Request) -> Scenario:
+def _scenario(run: RunFolder, request: Request) -> Scenario:
     return load_stored(
-        run.resolved_yaml, str(run.folder / run_folder.RESOLVED),
+        run.resolved_yaml, str(run.path / run_folder.RESOLVED),
         checks=(limits(request.allow_large, read_back=True),),
         plugged=of_folder(request.trust),
     ).scenario  # fmt: skip
@@ -115,7 +115,7 @@ def _scenario(run: FinishedRun, request: Request) -> Scenario:
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     ((original, scenario),) = runs
-    label = original.folder.name or str(original.folder)
+    label = original.path.name or str(original.path)
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
         target, text = request.out or place / "again", original.resolved_yaml
@@ -126,7 +126,7 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     again = [
         Member(
-            run.folder.name, about_of(scenario), run.resolved_yaml,
+            run.path.name, about_of(scenario), run.resolved_yaml,
             case=Case.of(scenario), text=run.resolved_yaml,
         )
         for run, scenario in runs
@@ -166,9 +166,9 @@ def _passing(request: Request) -> Iterator[Path]:
         staging.discard()
 
 
-def _repeated(original: FinishedRun, done: Finished) -> Repeated:
+def _repeated(original: RunFolder, done: Finished) -> Repeated:
     """A run that was made once more, held against the original."""
     differing = difference(original, run_folder.open_run(done.folder))
     return Repeated(
-        original.folder, original.status, done.status, differing, done.missing, done.message
+        original.path, original.status, done.status, differing, done.missing, done.message
     )

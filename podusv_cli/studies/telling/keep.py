@@ -17,7 +17,7 @@ import numpy as np
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.storage.run_folder import LOGS, FinishedRun, open_run
+from podusv_cli.storage.run_folder import LOGS, RunFolder, open_run
 from podusv_cli.studies.counting.runs_file import Table
 from podusv_cli.studies.telling.results import Results
 
@@ -47,7 +47,7 @@ class Kept:
     """
 
     wanted: KeptRun
-    run: FinishedRun | None
+    run: RunFolder | None
     difference: str = ""
 
 
@@ -119,7 +119,7 @@ def _opened(path: Path, kept_run: KeptRun, results: Results, extras: Extras) -> 
     return Kept(kept_run, run, difference(run, kept_run, results.runs))
 
 
-def difference(run: FinishedRun, one: KeptRun, runs: Table) -> str:
+def difference(run: RunFolder, one: KeptRun, runs: Table) -> str:
     """The first metric in which a run differs from the table, with both values; "" if none does."""
     for name in runs.metrics:
         ours, theirs = run.metrics.get(name), float(runs.metric(one.law, name)[one.cell, one.draw])
