@@ -144,6 +144,8 @@ TABLE: dict[str, list[Row]] = {
     ("{escape(line)}", "{line}", "test_a_run_that_diverges_is_a_run_and_its_warnings_are_there"),
 ],
 "workflows": [
+    ("members = _placed(members, opened_runs)", "members = _placed(members, opened_runs[::-1])",
+     "test_a_log_is_moved_to_the_first_argument_finished_or_not"),
     ('checks=(unknown_codes, limits(insist=""), sweep_faults)',
      'checks=()',
      'test_what_validate_would_refuse_is_not_written'),

@@ -315,6 +315,20 @@ def test_a_log_on_earth_is_moved_to_the_run_when_asked(podusv: Command, sailed_o
     assert made.table.loc["log_distance_max", "run"] < 1e-4
 
 
+def test_a_log_is_moved_to_the_first_argument_finished_or_not():
+    """Two tasks that begin 5 m apart: the first one named has the log, whichever is a run."""
+    made_run()  # of the task, into the folder `run`
+    write("aside.yaml", "extends: task.yaml\nname: aside\nstart: {x: 3.0, y: -4.0}\n")
+    log("LOG.csv", "time,x,y,psi", ROWS)
+    begins = {}
+    for items in (("aside.yaml", "run"), ("run", "aside.yaml")):
+        done = compared(*items, "LOG.csv", align="start")
+        first, *_, measured = (one.recording for one in done.result.runs)
+        begins[items[0]] = [measured[name][0] for name in ("x", "y")]
+        assert begins[items[0]] == [first[name][0] for name in ("x", "y")]
+    assert math.dist(*begins.values()) == pytest.approx(5.0, abs=1e-9)
+
+
 def test_a_log_in_metres_stays_where_it_is_unless_asked():
     run = made_run()
     columns = np.column_stack([run[name][4:60:5] for name in ("time", "x", "y", "psi")])

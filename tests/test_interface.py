@@ -369,6 +369,7 @@ def test_the_documentation_names_all_that_there_is():
             "numbers",
             "about",
             "given",
+            "past",
         }
 
 
