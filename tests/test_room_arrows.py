@@ -17,7 +17,6 @@ MEANT = {
     "cli -> theory": "the table of margins shows the margins of theory as they are",
     "comparison -> process": "what of a comparison cannot be made is missing, and said so",
     "doubt -> expressions": "claims in a world have the verdicts and numbers of all claims",
-    "doubt -> process": "figures that cannot be drawn are missing, and said so",
     "doubt -> storage": "its folder appears whole, with tables that no spreadsheet executes",
     "export -> scenario": "a law is exported as a scenario has it",
     "interface -> doubt": "the same checks and the same table as those of the command",
