@@ -91,6 +91,15 @@ def test_a_run_crosses_to_a_worker_and_back(
     assert (back.label, back.about, dict(back.metrics)) == (run.label, run.about, dict(run.metrics))
 
 
+def test_a_run_is_found_from_another_folder(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder.parent)
+    crossing = pickle.dumps(opened(Path(folder.name)))
+    monkeypatch.chdir(tmp_path)
+    assert pickle.loads(crossing).until == 20.0
+
+
 def test_a_run_in_memory_crosses_with_its_numbers() -> None:
     run = past_run({"iae": 3.0}, "diverged", "diverged at t = 3 s: why")
     back = pickle.loads(pickle.dumps(run))

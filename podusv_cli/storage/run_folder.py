@@ -219,7 +219,7 @@ class LogFile:
 
     def __getstate__(self) -> dict[str, Path]:
         """Its place alone: another process reads the file itself, instead of taking its numbers."""
-        return {"path": self.path}
+        return {"path": self.path.absolute()}
 
 
 @dataclass(frozen=True)
