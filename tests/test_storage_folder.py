@@ -177,7 +177,7 @@ def test_files_and_links_are_not_replaced(final, force):
 
 def test_a_finished_run_opens_with_all_that_plots_and_comparisons_need(final):
     run = open_run(run_to(final))
-    assert run.folder == final
+    assert run.path == final
     assert run.status == "finished"
     assert run.metrics == {"iae": 1.5, "ise": None}
     assert run.provenance == {"podusv": "1.2.3"}
