@@ -86,6 +86,8 @@ TABLE: dict[str, list[Row]] = {
      "test_mistakes_that_a_motion_shows_are_refused_as_identify_does"),
 ],
 "cli": [
+    ('str(finished[label] / "resolved.yaml"), []', '"SCENARIO", []',
+     "test_after_finished_runs_the_last_line_names_the_first_that_is_not_verified"),
     ("    if done.diverges:\n", "    if False:\n",
      "test_a_run_that_diverges_and_had_not_has_a_code_of_its_own"),
     ('page}")\n    raise typer.Exit(SOME_FAILED if', 'page}")\n    raise typer.Exit(0 if',
@@ -141,6 +143,8 @@ TABLE: dict[str, list[Row]] = {
     ("{escape(line)}", "{line}", "test_a_run_that_diverges_is_a_run_and_its_warnings_are_there"),
 ],
 "workflows": [
+    ("for m in runs if not is_verified(m.resolved))", "for m in runs)",
+     "test_after_finished_runs_the_last_line_names_the_first_that_is_not_verified"),
     ('checks=(unknown_codes, limits(insist=""), sweep_faults)',
      'checks=()',
      'test_what_validate_would_refuse_is_not_written'),
@@ -162,6 +166,9 @@ TABLE: dict[str, list[Row]] = {
      "test_numbers_that_verify_has_found_converged_are_not_doubted_again"),
 ],
 "comparison": [
+    ("if name not in unranked and is_ranked else math.nan", "if name not in unranked else math.nan",
+     "test_a_run_by_itself_is_not_ranked"),
+    ("RANKED if len(frame.columns) > 1 else ''", "RANKED", "test_a_run_by_itself_is_not_ranked"),
     ("((i >> 1) + places[i] / 256)", "((i >> 1) + places[i] / 128)",
      "test_the_page_puts_a_spike_at_its_time"),
     ("cut = [whole, point + power]", "cut = [whole, power + point]",
@@ -190,6 +197,10 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_curves_of_different_logs_meet_at_the_same_times"),
 ],
 "study": [
+    ("sweep.claims or sweep.success != Sweep().success", "sweep.claims",
+     "test_a_study_of_the_file_that_start_writes_warns_of_nothing"),
+    ("sweep.claims or sweep.success != Sweep().success", "sweep.success != Sweep().success",
+     "test_claims_that_a_study_does_not_judge_are_named"),
     ("            logger.removeFilter(critical)\n", "            pass\n",
      "test_dask_says_to_its_users_afterwards_what_it_said_before"),
     ("    for key, fault in of_numbers(made, scenario):\n", "    for key, fault in ():\n",
@@ -274,6 +285,12 @@ TABLE: dict[str, list[Row]] = {
      "test_a_module_beside_a_plug_in_is_noticed_and_one_that_is_installed_is_not"),
 ],
 "figures": [
+    ("counts[begin : begin + came] = False", "pass",
+     "test_what_a_corner_leaves_is_no_distance_that_a_run_comes_to"),
+    ("(own * own[0] <= 0.0) | (size <= np.median(size))", "size <= np.median(size)",
+     "test_what_a_corner_leaves_is_no_distance_that_a_run_comes_to"),
+    ("(own * own[0] <= 0.0) | (size <= np.median(size))", "own * own[0] <= 0.0",
+     "test_what_a_corner_leaves_is_no_distance_that_a_run_comes_to"),
     ("starts + bins.argmin(1), starts + bins.argmax(1)", "starts + bins.argmin(1)",
      "test_thinning_keeps_the_extremes_of_every_bin_in_order"),
     ("kept = [run for run in runs if run.whole or (span is not None and run.end > span[1])]",
@@ -677,6 +694,10 @@ TABLE: dict[str, list[Row]] = {
      "test_the_derivatives_are_those_of_the_plant"),
 ],
 "process": [
+    ("if not isinstance(sys.exception(), ConnectionError):", "if True:",
+     "test_a_browser_that_leaves_before_its_answer_prints_nothing"),
+    ("if not isinstance(sys.exception(), ConnectionError):", "if False:",
+     "test_what_goes_wrong_but_for_that_is_printed"),
     ("    except (ValueError, RecursionError):", "    except ValueError:",
      "test_every_question_is_answered_and_the_page_goes_on"),
     ("        if not isinstance(asked, dict):\n", "        if asked is None:\n",
