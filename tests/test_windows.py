@@ -93,8 +93,8 @@ def test_a_window_of_awkward_numbers_needs_no_numba_and_is_what_the_log_says(
 
 
 def over(t: Sequence[float], z_e: Sequence[float], start: float, end: float) -> tuple[float, float]:
-    """Rms by trapezoids and the largest of the instants from start to end."""
-    inside = [(a, z) for a, z in zip(t, z_e, strict=True) if start <= a <= end]
+    """Rms by trapezoids, and the largest, of the instants from start to end, which round."""
+    inside = [(a, z) for a, z in zip(t, z_e, strict=True) if start - 1e-9 <= a <= end + 1e-9]
     square = 0.0
     for (a, z), (b, y) in pairwise(inside):
         square += 0.5 * (b - a) * (z * z + y * y)
