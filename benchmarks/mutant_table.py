@@ -424,7 +424,7 @@ TABLE: dict[str, list[Row]] = {
 ],
 "metrics": [
     ("        error[2] = wrap(error[2])\n", "", "test_a_heading_is_as_consistent_a_turn_further"),
-    ("t >= FROM - NEAR and t <= TO + NEAR", "t >= FROM and t <= TO",
+    ("t >= own[FROM] - NEAR and t <= own[TO] + NEAR", "t >= own[FROM] and t <= own[TO]",
      "test_a_window_ends_at_the_instant_that_rounds_beyond_it"),
     ("ABSOLUTE, weight * z_e", "ABSOLUTE, 0.5 * weight * z_e",
      "test_a_run_that_diverges_is_a_run_and_its_warnings_are_there"),
@@ -435,7 +435,7 @@ TABLE: dict[str, list[Row]] = {
     ("def _rmse(seen: Vector, step: float) -> float:\n    return math.sqrt(",
      "def _rmse(seen: Vector, step: float) -> float:\n    return (",
      "test_metrics_follow_their_definitions"),
-    ("0.5 * (t - seen[NOW]) * (z_e * z_e + seen[LAST] * seen[LAST])", "(t - seen[NOW]) * z_e * z_e",
+    ("0.5 * (t - before) * (z_e * z_e + z_e_before * z_e_before)", "(t - before) * z_e * z_e",
      "test_an_error_over_a_window_follows_its_definition"),
     ("float(crossed) if crossed < math.inf else math.nan", "float(crossed)",
      "test_settling_that_never_happens_is_no_number"),
