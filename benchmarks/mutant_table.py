@@ -446,7 +446,7 @@ TABLE: dict[str, list[Row]] = {
      "test_a_run_that_never_began_has_no_number_of_a_window"),
     ("seen=self.probe.first(), under_way", "seen=np.zeros(self.probe.size), under_way",
      "test_an_error_over_a_window_follows_its_definition"),
-    ("sizes = [*(size for _, size in parts[:-1]), 0]", "sizes = [size for _, size in parts]",
+    ("    if not others:\n        return inner", "    if not first:\n        return inner",
      "test_any_windows_and_radii_have_the_same_code"),
     ("return {**found, last: name}", "return {last: name, **found}",
      "test_any_windows_and_radii_have_the_same_code"),

@@ -256,6 +256,7 @@ def test_along_legs_the_close_up_shows_where_a_run_is_farthest_from_its_path():
         (lambda t: 2.0 - 0.25 * (t - 50.0) + 0.9 * gap(t, 80.0, 3.0), 100.0),  # it goes through
         (lambda t: 2.0 * np.exp(50.0 - t) - 0.7 * gap(t, 71.0, 3.0), 71.0),  # it overshoots
         (lambda t: 0.3 + 1.7 * np.exp(50.0 - t) + 0.5 * gap(t, 77.0, 3.0), 77.0),  # never there
+        (lambda t: np.where(t < 57.05, 2.0 - 0.47 * (t - 50.0), 0.0), 57.0),  # then exactly there
         (lambda t: 2.0 + 0.01 * (t - 50.0), 100.0),  # it goes away
     ],
 )

@@ -43,7 +43,6 @@ def headlines_first(known: Mapping[str, Metric]) -> list[Metric]:
 
 Failed = Callable[[str, Exception], None]
 Parts = tuple[tuple[Accumulator, int], ...]
-Watches = tuple[tuple[Callable[..., None], int], ...]
 COUNT = 0  # placeholder: how many numbers `first_kernel` gathers
 
 
@@ -74,13 +73,15 @@ def chained(
 
 
 @cache
-def _watch(watches: Watches) -> Callable[..., None]:
-    """One kernel that calls all of these, each with the numbers that follow the last's.
+def _watch(parts: Parts) -> Callable[..., None]:
+    """One kernel that calls those of all parts, each with the numbers that follow the last's.
 
-    How many numbers the last one gathers is no part of the code.
+    How many numbers the last part gathers is no part of the code.
     """
-    (first, count), *others = watches or ((first_kernel, 0),)
-    inner = taking(first, WATCH)
+    if not parts:
+        return first_kernel
+    (first, count), *others = parts
+    inner = taking(first.watch, WATCH)
     if not others:
         return inner  # type: ignore[no-any-return]
     kernels = {"first_kernel": inner, "other_kernels": _watch(tuple(others))}
@@ -88,16 +89,10 @@ def _watch(watches: Watches) -> Callable[..., None]:
 
 
 @cache
-def _within_span(watches: Watches, has_end: bool) -> Callable[..., None]:
+def _within_span(parts: Parts, has_end: bool) -> Callable[..., None]:
     """The kernel of all parts, shown the instants that count."""
     span = spans.by_path if has_end else spans.by_time
-    return specialise(span, "metrics", all_kernels=_watch(watches))  # type: ignore[no-any-return]
-
-
-def _watches(parts: Parts) -> Watches:
-    """The parts' kernels, each with how many numbers lie between its own and the next one's."""
-    sizes = [*(size for _, size in parts[:-1]), 0]
-    return tuple((part.watch, size) for (part, _), size in zip(parts, sizes, strict=False))
+    return specialise(span, "metrics", all_kernels=_watch(parts))  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,7 +215,7 @@ def metrics_probe(
     has_end = "over_at" in _asked_span(layout)
     ahead = spans.AHEAD if has_end else 0
     metrics = Metrics(
-        _within_span(_watches(parts), has_end), ahead + sum(size for _, size in parts), differing,
+        _within_span(parts, has_end), ahead + sum(size for _, size in parts), differing,
         parts=parts, step=plan.grid.step, known=known, layout=layout, ahead=ahead,
     )  # fmt: skip
     metrics.constants_for(plan.loop)
