@@ -14,12 +14,12 @@ from log_files import read, write_bag, write_dataflash, write_ulog, written
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.signal import Signal
 from podusv_cli.identify.fit.march import DELIVERED, HOLDS, VALUES
-from podusv_cli.identify.fit.records import log_of
+from podusv_cli.identify.fit.records import complete, log_of
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import columns_of
 from podusv_cli.identify.logs.frames import LAT, LON, local_plane, radii
 from podusv_cli.identify.logs.listing import listing
-from podusv_cli.identify.logs.reading import Named, table
+from podusv_cli.identify.logs.reading import Named, Table, delivered_each, table
 
 
 def test_a_ros_bag_gives_its_topics_by_their_stamps(tmp_path):
@@ -272,3 +272,26 @@ def test_what_is_guessed_of_a_ros_bag_can_be_pasted(tmp_path):
     section = yaml.safe_load("\n".join(found.mapping()))
     log = read(tmp_path / "bag", section["columns"], section["frame"])
     assert {"x", "y", "psi", "u", "v", "r"} <= log.columns.keys()
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_positions_count_together_where_a_boat_goes_along_an_axis(along):
+    """To 1 cm; across its way a value stays for 2.5 s, as that of a slow sensor would."""
+    times = np.arange(0.0, 40.0, 0.1)
+    columns = dict.fromkeys(("x", "y"), np.round(0.004 * times, 2))
+    columns |= {along: np.round(0.93 * times, 2), "psi": 0.01 * np.sin(times)}
+    columns |= {"tau_u": 0.1 * times, "tau_r": 0.0 * times}
+    log = Table("east.csv", times, columns)
+    complete(log, Ideal())
+    assert log_of(log, Ideal(), 0.1).counts[:3].tolist() == [400, 400, 400]
+
+
+def test_a_position_of_which_half_is_missing_counts_for_the_other_half():
+    x, y = np.arange(30.0), 2.0 * np.arange(30.0)
+    x[3:7], y[20] = np.nan, np.nan
+    new = delivered_each({"x": x, "y": y, "r": np.full(30, np.nan)})
+    assert np.flatnonzero(~new["x"]).tolist() == [3, 4, 5, 6]
+    assert np.flatnonzero(~new["y"]).tolist() == [20]
+    assert not new["r"].any()
+    apart = delivered_each({"x": x[:3], "y": np.full(3, np.nan)})
+    assert apart["x"].all()

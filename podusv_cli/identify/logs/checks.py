@@ -20,7 +20,7 @@ from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.motion import DEGREES, FAST, RADIANS, Motion
-from podusv_cli.identify.logs.reading import SENSED, UNITS, Table, delivered
+from podusv_cli.identify.logs.reading import SENSED, UNITS, Table, delivered_each
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
 NEAREST = 2e-3  # s between positions, below which no receiver is
@@ -79,7 +79,8 @@ def checked(
     try:
         with np.errstate(invalid="ignore", divide="ignore"), catch_warnings():
             simplefilter("ignore", RuntimeWarning)  # of means over nothing, which are NaN
-            for check in (*(OF_FITS if actuator else ()), *OF_ALL):
+            headed = OF_HEADINGS if "psi" in table.columns else ()
+            for check in (*(OF_FITS if actuator else ()), *OF_ALL, *headed):
                 lines += check(motion)
     except LogFault as error:
         raise LogFault("; also, ".join((f"{table.name}: {error}", *lines))) from error
@@ -140,7 +141,7 @@ def _places(motion: Motion) -> Iterator[str]:
         f"x and y move at {motion.fastest:.2g} m/s at most; if they are latitude and longitude in "
         f"degrees, {CALL_THEM}"
     )
-    if np.nanstd(motion.heading()) > STEADY:
+    if "psi" not in motion.table.columns or np.nanstd(motion.heading()) > STEADY:
         raise LogFault(what)
     yield what
 
@@ -330,8 +331,9 @@ def _unexplained(motion: Motion) -> bool:
 
 def _jumps(motion: Motion) -> Iterator[str]:
     """Values that jump: of a receiver that finds itself elsewhere, or in a damaged cell."""
+    new = delivered_each(motion.table.columns)
     for name in [name for name in motion.table.columns if name in SENSED]:
-        rows = np.flatnonzero(delivered(motion.table.columns[name]))
+        rows = np.flatnonzero(new[name])
         values, times = motion.table.columns[name][rows], motion.table.times[rows]
         if len(rows) < FEWEST_BINS:
             continue
@@ -443,9 +445,7 @@ def _idle(motion: Motion) -> Iterator[str]:
 
 
 Check = Callable[[Motion], Iterator[str]]
-# Of every log, and of those that a hull is to be found from.
-OF_ALL: tuple[Check, ...] = (
-    _jumps, _clock, _places, _speeds_apart, _speed_made_good, _empty, _compass, _courses, _yaw_rate,
-    _speeds,
-)  # fmt: skip
+# Of every log, of those with headings, and of those that a hull is to be found from.
+OF_ALL: tuple[Check, ...] = (_jumps, _clock, _places, _speeds_apart, _speed_made_good, _empty)
+OF_HEADINGS: tuple[Check, ...] = (_compass, _courses, _yaw_rate, _speeds)
 OF_FITS: tuple[Check, ...] = (_slow_rows, _out_of_reach, _constant, _idle, _manoeuvres)

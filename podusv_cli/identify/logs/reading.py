@@ -370,3 +370,16 @@ def delivered(*columns: Vector) -> Marks:
     new[at[changes]] = True
     new[at[0]] = True
     return new
+
+
+def delivered_each(columns: Mapping[str, Vector]) -> dict[str, Marks]:
+    """Of every quantity, which rows have a new value. x and y come together: see `delivered`.
+
+    Where one of the two is missing, the other is looked at alone.
+    """
+    new = {name: delivered(values) for name, values in columns.items()}
+    if "x" in new and "y" in new:
+        x, y = np.isfinite(columns["x"]), np.isfinite(columns["y"])
+        together = delivered(columns["x"], columns["y"])
+        new |= {"x": together | (new["x"] & ~y), "y": together | (new["y"] & ~x)}
+    return new
