@@ -295,3 +295,29 @@ def test_a_position_of_which_half_is_missing_counts_for_the_other_half():
     assert not new["r"].any()
     apart = delivered_each({"x": x[:3], "y": np.full(3, np.nan)})
     assert apart["x"].all()
+
+
+def test_columns_of_a_german_logger_are_guessed(tmp_path):
+    text = "Zeit [ms];Breite;Länge;Kurs;Steuerkurs\n"
+    rows = [f"{100 * i};59,{1000 + i};10,{1000 + i};{30 + i};{33 + i}\n" for i in range(30)]
+    (tmp_path / "log.csv").write_text(text + "".join(rows), encoding="utf-8")
+    found = {column.quantity: column.name for column in listing(tmp_path / "log.csv").columns}
+    assert found.pop("") == "Kurs"  # over ground, which is no heading
+    names = {"time": "Zeit [ms]", "lat": "Breite", "lon": "Länge", "psi": "Steuerkurs"}
+    assert found == names
+
+
+@pytest.mark.parametrize("second", ["", ",stamp"])
+def test_clock_times_are_not_proposed_as_time(tmp_path, second):
+    rows = [f"2026-05-04,12:03:{i:02d},59.1,10.1,{i}" for i in range(30)]
+    rows = [f"{row},{i}" if second else row for i, row in enumerate(rows)]
+    head = f"Date,Time,lat,lon,hdg{second}"
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows, ""]))
+    found = listing(tmp_path / "log.csv")
+    clock = [column.name for column in found.columns if column.quantity == "time"]
+    assert clock == (["stamp"] if second else [])
+    assert ("  # time: ?   (not guessed; see podusv docs identify)" in found.mapping()) != bool(
+        clock
+    )
+    (line,) = found.warnings
+    assert "'Time' is not taken for time: it has clock times such as '12:03:00'" in line
