@@ -26,6 +26,7 @@ from podusv_cli.cli.terminal import (
 from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
+    from podusv_cli.comparison.entries import Entry
     from podusv_cli.workflows.compare import Compared
 
 SOME_FAILED = 3
@@ -62,8 +63,8 @@ def compare(
         str,
         typer.Option(
             "--align",
-            metavar="start",
-            help="Move a log to where the first run is at the first common instant.",
+            metavar="start|place",
+            help="Lay a log on the first run: clock and place of its beginning, or place alone.",
         ),
     ] = "",
     doubt: Annotated[
@@ -128,8 +129,17 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
-    count = len(result.entries)
-    echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
+    echo(f"compared {_counted(result.entries)}: {done.folder}")
+
+
+def _counted(entries: Sequence[Entry]) -> str:
+    """How many runs, and how many logs beside them."""
+    from podusv_cli.comparison.measured import NO_LAW
+
+    logs = sum(entry.recording.controller == NO_LAW for entry in entries)
+    runs = len(entries) - logs
+    words = [f"{runs} {'run' if runs == 1 else 'runs'}", *(["1 log"] if logs else [])]
+    return " and ".join(words)
 
 
 def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool = False) -> None:

@@ -178,7 +178,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     scale = enlargement(runs)
     for run in runs:
         for t in run.start + run.places * (run.end - run.start):
-            axes.add_patch(Polygon(hull_of(run, float(t), scale), **_outline(run)))
+            _draw_hull(axes, run, float(t), scale)
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")
     given = {point for run in runs for point in run.about.waypoints}
@@ -196,10 +196,16 @@ def _accepting(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.add_patch(Circle((east, north), radius, **ACCEPTANCE))
 
 
-def _outline(run: Shown) -> dict[str, Any]:
-    """How a hull is drawn: not filled, and in the run's line style, so that none hides another."""
-    style = run.linestyle
-    return {"fill": False, "edgecolor": run.color, "linestyle": style, "linewidth": 0.7}
+def _draw_hull(axes: Axes, run: Shown, t: float, scale: float) -> None:
+    """Draw a run's hull at a time [s], where its heading is known; grey after the end of its path.
+
+    It is not filled, and in the run's line style, so that none hides another.
+    """
+    outline = hull_of(run, t, scale) if run.has("psi") else np.full((1, 2), np.nan)
+    color = run.color if t <= run.counts_to else AFTER["color"]
+    look = {"fill": False, "edgecolor": color, "linestyle": run.linestyle, "linewidth": 0.7}
+    if np.isfinite(outline).all():
+        axes.add_patch(Polygon(outline, **look))
 
 
 def _mark_ends(axes: Axes, runs: Sequence[Shown], east: Span, north: Span) -> None:
@@ -237,7 +243,7 @@ def views(runs: Sequence[Shown]) -> list[View]:
     finished = scaling(runs)
     target = next(target for target in targets(runs) if finished[0] in target.runs)
     kept = [run for run in finished if run in target.runs]
-    last = min(run.end for run in kept)
+    last = min(run.counts_to for run in kept)
     if target.in_sight and not target.is_ahead and all(run.has(DEVIATION) for run in kept):
         return [_deviation(kept, target, last)]
     names = ("y_d", "x_d") if target.is_ahead else ("y", "x")
@@ -247,7 +253,7 @@ def views(runs: Sequence[Shown]) -> list[View]:
 
 def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle: Vector) -> View:
     """The runs at a time, with the tracks before and after it."""
-    last = min(run.end for run in runs)
+    last = min(run.counts_to for run in runs)
     span = t - LAST_PART * last, min(t + LAST_PART * last, last)
     at = np.array([[run.at(t, name) for name in ("y", "x")] for run in runs])
     away = 1.3 * float(np.max(np.hypot(*(at - middle).T)))
@@ -303,7 +309,7 @@ def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
     """Tracks around the time of the view, hulls to scale."""
     _draw_tracks(axes, [view.target], view.tracks, view.span, among)
     for run in view.hulls:
-        axes.add_patch(Polygon(hull_of(run, view.t, 1.0), **_outline(run)))
+        _draw_hull(axes, run, view.t, 1.0)
     if view.target.is_ahead:
         aim = [[view.tracks[0].at(view.t, name)] for name in ("y_d", "x_d")]
         label = f"{view.target.line_style['label']} at this time"

@@ -20,6 +20,7 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.findings.reference import Reference, reference
 from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.load import Loaded, resolved_yaml
 from podusv_cli.scenario.model import BASES, Scenario
 
@@ -79,11 +80,13 @@ def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
 class Case:
     """A scenario with one law, its plan, and what is needed of it several times, computed once.
 
-    The plan is the run's loop on its grid, with the probe of all metrics.
+    The plan is the run's loop on its grid, with the probe of all metrics. `identify` says what a
+    log beside the run calls its quantities.
     """
 
     scenario: Scenario
     plan: Plan
+    identify: Identify | None = None
 
     @classmethod
     def of(cls, scenario: Scenario) -> Case:
@@ -102,7 +105,7 @@ class Case:
     @cached_property
     def about(self) -> RunAbout:
         """What readers of its run need."""
-        return about_of(self.scenario)
+        return about_of(self.scenario, self.identify)
 
     @cached_property
     def resolved_yaml(self) -> str:

@@ -122,14 +122,15 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
 def compare(
     sources: Source | Run | Iterable[Source | Run], changes: Changes | None = None, *,
     out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
-    align: Literal["", "start"] = "",
+    align: Literal["", "start", "place"] = "",
 ) -> Comparison:  # fmt: skip
     """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
 
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
-    mixture; beside them a log of a boat, such as "sea_trial.csv". With `align="start"` the log is
-    moved to where the first run is at the first instant that both have. Raises ScenarioError,
-    UsageError, StorageError.
+    mixture; beside them a log of a boat, such as "sea_trial.csv". With `align="start"` its clock
+    and place are moved so that its first position is the first run's at the first instant; with
+    "place" its place alone, by the first instant that both have. Raises ScenarioError, UsageError,
+    StorageError.
 
     >>> import podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})

@@ -17,11 +17,12 @@ from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.entries import Entry, EntryWithoutLog, metrics_of
 from podusv_cli.comparison.margins import with_margins
 from podusv_cli.comparison.optimum import related
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.core.recording import Status
+from podusv_cli.core.recording import Recording, Status
 from podusv_cli.findings.finding import Case, finding_kinds
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED, metrics_with
@@ -292,15 +293,23 @@ def collect(
 def _placed(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> list[Member]:
     """The members; what was measured where it is to stand, with what the runs show of it."""
     logs = {label: run.recording for label, run in runs.items() if len(run.recording["time"])}
+    done = [_done_after(m.about, logs[m.label]) for m in members if m.label in logs]
     placed = []
     for member in members:
         if member.track and logs:
             label, first = next(iter(logs.items()))
             remarks = member.track.beside_speeds(label, first)
-            track = member.track.placed(first)
-            member = replace(member, track=track, noticed=[*member.noticed, *remarks])
+            track = member.track.placed(label, first)
+            remarks = [*track.remarks, *remarks]
+            about = track.about(member.about, max(done))
+            member = replace(member, track=track, noticed=remarks, about=about)
         placed.append(member)
     return placed
+
+
+def _done_after(about: RunAbout, log: Recording) -> float:
+    """When a run has done its path [s], or ends before; infinite for a path without an end."""
+    return float(log.up_to(about.path_end)["time"][-1]) if about.path_end else math.inf
 
 
 def _measured(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> dict[str, FinishedRun]:

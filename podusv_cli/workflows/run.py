@@ -41,7 +41,7 @@ class Request:
     workers: int = 0  # processes at a time; 0: one a core
     controller: str = ""  # which of `controllers` to run
     metrics: Sequence[str] = ()  # those that are asked for; all where empty
-    align: str = ""  # "start" moves a log to where the first run is at the first common instant
+    align: str = ""  # "start" lays a log's clock and place on the first run, "place" its place
     ratios: bool = False  # whether comparison.tex has ratios to the first run
     doubt: bool = False  # whether a comparison also says what its verdicts hang on
     trust: bool = False  # whether plug-in files of a finished run may be executed
@@ -81,7 +81,7 @@ def run_loaded(
     with watch.part("load"):
         scenario = single(loaded, request.controller)
         check_asked(request, [scenario.plugged])
-        case = Case(scenario, loaded.plan(scenario))
+        case = Case(scenario, loaded.plan(scenario), loaded.scenario.identify)
         target = request.out or default_folder(RESULTS, scenario.name, case.resolved_yaml)
     with watch.part("preflight"):
         noticed = examined(case)
