@@ -16,7 +16,7 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.workflows import compare as comparing
 from podusv_cli.workflows.measured import track
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 TASK = """
 vessel: {preset: cybership2}

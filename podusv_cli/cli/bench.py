@@ -55,12 +55,13 @@ def bench(
         shipped_bench,
     )
     from podusv_cli.workflows import bench as workflow
+    from podusv_cli.workflows.request import Request
 
     chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
     wanted = Selection(folder or shipped_bench(), laws or (), assign or (), chosen, trust)
-    request = workflow.Request(out, force, figures, workers, sys.argv, optimum)
+    request = Request(out=out, force=force, figures=figures, argv=sys.argv, workers=workers)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
-        done = workflow.bench(wanted, request, bars)
+        done = workflow.bench(wanted, request, bars, optimum=optimum)
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     for lack in done.missing:
         echo(lack, err=True)

@@ -70,7 +70,7 @@ def identify(
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.identify.logs.formats import READERS
     from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     ending = Path(config).suffix.lower()
     if ending and ending in READERS:
@@ -80,7 +80,14 @@ def identify(
         )
     warned = Warnings(quiet)
     request = Request(
-        assign or (), out, force, figures, sys.argv, warned, False, plugin or (), trust=trust
+        assign or (),
+        out,
+        force=force,
+        figures=figures,
+        argv=sys.argv,
+        plugins=plugin or (),
+        trust=trust,
+        warn=warned,
     )
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.identify(Path(config), request, bars)

@@ -41,14 +41,23 @@ def tune(
     Optuna (podusv[tune]).
     """
     from podusv_cli.workflows import tune as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.many_runs import Request, silent
+    from podusv_cli.workflows.request import Request, silent
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
-            assign or (), out, workers, sys.argv, plugin or (), figures, scheduler,
-            trust, say=line.say, warn=line.warn, force=force,
+            assign or (),
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            workers=workers,
+            scheduler=scheduler,
+            say=line.say,
+            warn=line.warn,
             begin=silent if quiet or as_json else line.note,
-        )  # fmt: skip
+        )
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:
         echo(f"warning: {refused}", err=True)
