@@ -124,8 +124,8 @@ def compare(
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
-    if done.result.entries and not (quiet or done.verified):
-        echo(_advice(items, assign or (), plugin or ()), err=True)
+    if done.unverified and not quiet:
+        echo(_advice(done, items, assign or (), plugin or ()), err=True)
     if not (figure or quiet or as_json):
         echo_how_to_draw(done.folder, done.places())
     page = done.folder / "report.html"
@@ -161,12 +161,12 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool 
 
 
 def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
-    from podusv_cli.comparison.table import NOTE, cells, head, window
+    from podusv_cli.comparison.table import cells, head, note, window
 
     result = done.result
     rows = cells(result.table, result.metrics, result.unsettled, chosen=metrics)
     echo_table(head(result.table), rows)
-    echo(*filter(None, (NOTE, window(result.table))))
+    echo(*filter(None, (note(result.table), window(result.table))))
 
 
 def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
@@ -189,18 +189,26 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
     lines = grid(["", *labels], across, columns()) or grid(["", *names], down, columns())
     typer.echo("\n".join(map(visible, lines)))
     if lines:
-        note = "* best of those that end at their target; -v: every metric, with ratios"
+        note = "-v: every metric"
+        if len(labels) > 1:
+            note = f"* best of those that end at their target; {note}, with ratios"
         echo(*filter(None, (note, window(result.table))))
     return bool(lines)
 
 
-def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:
-    """How to find out whether the numbers have converged."""
+def _advice(
+    done: Compared, items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]
+) -> str:
+    """How to find out whether the numbers of the first run that is not verified have converged."""
     from podusv_cli.workflows.measured import is_log
 
-    scenarios = (i for i in items if not (Path(i).is_dir() or is_log(Path(i))))
-    scenario = next(scenarios, "SCENARIO")
-    changes = [word for change in assign for word in ("--set", change)]
+    finished = {e.label: e.run.folder for e in done.result.entries}
+    label = done.unverified[0]
+    if label in done.result.timings:
+        scenario = next(i for i in items if not (Path(i).is_dir() or is_log(Path(i))))
+        changes = [word for change in assign for word in ("--set", change)]
+    else:  # it was there before
+        scenario, changes = str(finished[label] / "resolved.yaml"), []
     files = [word for file in plugin for word in ("--plugin", file)]
     command = shlex.join(["podusv", "verify", scenario, *changes, *files])
     return f"the numbers may not have converged; check them: {command}"

@@ -55,7 +55,7 @@ class Compared:
     status: Status  # "interrupted" where a run or the figures were, else "finished"
     missing: tuple[Failure, ...] = ()  # in the comparison and its runs
     doubted: Doubted | None = None  # what the verdicts hang on, where that was asked for
-    verified: bool = False  # whether `podusv verify` has found all of its numbers converged
+    unverified: tuple[str, ...] = ()  # runs whose numbers `podusv verify` has not found converged
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
@@ -165,8 +165,10 @@ def compare_gathered(
         origin = writer.add_origin(result.plugins)
         _add_report(writer, result, given.name, origin, extras, progress, request)
         folder = writer.finish(missing=lost)
-        verified = all(is_verified(m.resolved) for m in given.members if not m.track)
-        return Compared(folder, result, writer.status, tuple(extras.missing), doubted, verified)
+        made = {entry.label for entry in result.entries}
+        runs = [m for m in given.members if m.label in made and not m.track]
+        unverified = tuple(m.label for m in runs if not is_verified(m.resolved))
+        return Compared(folder, result, writer.status, tuple(extras.missing), doubted, unverified)
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
