@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli import options
-from podusv_cli.cli.terminal import echo, echo_result, echo_table
+from podusv_cli.cli.terminal import echo, echo_table, show
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.bench import Benched
@@ -62,9 +62,7 @@ def bench(
     request = Request(out=out, force=force, figures=figures, argv=sys.argv, workers=workers)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.bench(wanted, request, bars, optimum=optimum)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for lack in done.missing:
-        echo(lack, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     raise typer.Exit(SOME_CRASHED if done.crashed else 0)
 
 

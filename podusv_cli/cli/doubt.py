@@ -10,7 +10,7 @@ import typer
 
 from podusv_cli.cli import options
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+from podusv_cli.cli.terminal import Warnings, echo, echo_table, show
 
 if TYPE_CHECKING:
     from podusv_cli.doubt.outputs import Doubted
@@ -54,9 +54,7 @@ def doubt(
             compiling=compiling(bars, wanted=not (quiet or as_json)),
         )
         done = workflow.doubt(Path(config), request, bars)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.status == "interrupted":
         echo("interrupted; the table is about what was tried so far", err=True)
         raise typer.Exit(INTERRUPTED)

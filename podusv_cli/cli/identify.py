@@ -10,7 +10,7 @@ import typer
 
 from podusv_cli.cli import options
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table, show
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -91,9 +91,7 @@ def identify(
     )
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.identify(Path(config), request, bars)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.status == "interrupted":
         echo("interrupted; the numbers are the best so far", err=True)
         raise typer.Exit(INTERRUPTED)

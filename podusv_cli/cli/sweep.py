@@ -12,7 +12,7 @@ import typer
 from podusv_cli.cli import completion, options
 from podusv_cli.cli.exit_codes import with_exit_codes
 from podusv_cli.cli.progress import StudyLine
-from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_path, echo_result, echo_table
+from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_path, echo_table, show
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -128,9 +128,7 @@ def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
 
     Exits with 3 for broken runs, and for kept logs that differ from the table.
     """
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.results and (done.results.broken or done.results.contradicted):
         raise typer.Exit(SOME_FAILED)
 

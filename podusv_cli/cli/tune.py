@@ -10,7 +10,7 @@ import typer
 
 from podusv_cli.cli import options
 from podusv_cli.cli.progress import StudyLine
-from podusv_cli.cli.terminal import echo, echo_result, echo_table
+from podusv_cli.cli.terminal import echo, echo_table, show
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.tune import Tuned
@@ -61,9 +61,7 @@ def tune(
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:
         echo(f"warning: {refused}", err=True)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
 
 
 def _report(done: Tuned) -> None:

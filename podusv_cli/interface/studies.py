@@ -270,7 +270,7 @@ def bench(
     wanted: Selection = Selection(place, [Path(law) for law in laws], assignments(changes), axes)
     request = Request(out=Path(out), force=force, figures=figures, workers=workers)
     done = benching.bench(wanted, request, optimum=optimum)
-    return Bench(done.folder, done.runs, done.board, done.missing)
+    return Bench(done.folder, done.runs, done.board, tuple(map(str, done.missing)))
 
 
 def _config(source: Source, changes: Changes | None) -> tuple[Config, Sequence[str]]:

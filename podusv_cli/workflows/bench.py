@@ -36,7 +36,7 @@ class Benched:
 
     folder: Path
     runs: pd.DataFrame
-    missing: tuple[str, ...] = ()
+    missing: tuple[Failure, ...] = ()
 
     @property
     def board(self) -> pd.DataFrame:
@@ -53,7 +53,7 @@ class Benched:
         board = self.board.astype(object).where(self.board.notna(), None)
         return {
             "format": 1, "folder": str(self.folder), "runs": len(self.runs),
-            "leaderboard": board.reset_index().to_dict("records"), "missing": self.missing,
+            "leaderboard": board.reset_index().to_dict("records"), "missing": [str(failure) for failure in self.missing],
         }  # fmt: skip
 
 
@@ -86,7 +86,7 @@ def bench(
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
             _write(writer, made, figures, writer.add_origin(plugins), solved)
-            return Benched(writer.finish(), made, tuple(map(str, extras.missing)))
+            return Benched(writer.finish(), made, tuple(extras.missing))
 
 
 def _simulated(
