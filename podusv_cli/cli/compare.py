@@ -87,16 +87,29 @@ def compare(
     """
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     warned = Warnings(quiet)
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         request = Request(
-            assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            figure or (), [name.strip() for name in form.split(",")], workers,
-            metrics=metric or (), ratios=ratios, align=align, doubt=doubt, trust=trust,
+            assign or (),
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            allow_large=allow_large,
+            workers=workers,
+            names=figure or (),
+            formats=[name.strip() for name in form.split(",")],
+            metrics=metric or (),
+            align=align,
+            ratios=ratios,
+            doubt=doubt,
+            warn=warned,
             compiling=compiling(progress, wanted=not (quiet or as_json)),
-        )  # fmt: skip
+        )
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)
     together = [*done.result.warnings] if sys.stderr.isatty() and not verbose else []

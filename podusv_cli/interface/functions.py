@@ -47,6 +47,7 @@ from podusv_cli.workflows.gather import (
 from podusv_cli.workflows.measured import is_log
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
+from podusv_cli.workflows.request import Request
 
 
 class _Noticed(BaseModel):
@@ -305,9 +306,9 @@ def _single(given: Loaded) -> Scenario:
     return scenario.alone()
 
 
-def request(out: Any, force: bool, figures: bool) -> running.Request:
+def request(out: Any, force: bool, figures: bool) -> Request:
     """The options of a run that is written."""
-    return running.Request(out=Path(out) if out is not None else None, force=force, figures=figures)
+    return Request(out=Path(out) if out is not None else None, force=force, figures=figures)
 
 
 def _opened(member: Member) -> Run:

@@ -36,7 +36,8 @@ from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
-from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened, writer_of
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS, check_asked, opened, writer_of
 from podusv_cli.workflows.verify import is_verified
 
 if TYPE_CHECKING:

@@ -23,7 +23,8 @@ from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.measured import is_log, track
 from podusv_cli.workflows.members import Member, distinct, numbered
 from podusv_cli.workflows.members import from_folder as members_of
-from podusv_cli.workflows.run import Request, opened
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import opened
 
 DATED = (9.4e8, 4.2e9)  # s since 1970, of the years 2000 to 2100
 BEGIN = 0.0  # s, the first instant of every run
