@@ -7,7 +7,7 @@ from scenario_samples import write
 
 import podusv as p
 from podusv_cli.workflows import compare as comparing
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 TASK = """
 vessel: {preset: cybership2}
