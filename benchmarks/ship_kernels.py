@@ -17,8 +17,9 @@ from typing import Any
 import podusv_cli
 from podusv_cli.core import registry
 from podusv_cli.core.errors import PodusvError
+from podusv_cli.engine.loop.closed_loop import nothing
 from podusv_cli.engine.machine import shipped, signatures
-from podusv_cli.engine.machine.compile import Piece, adapter
+from podusv_cli.engine.machine.compile import Piece, adapter, lane_adapter
 from podusv_cli.engine.machine.wide.scalar_ir import NotForLanes
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.step import rk4
@@ -105,6 +106,8 @@ def pieces() -> dict[str, Piece]:
         Piece(rk4.advance, signatures.ADVANCE),
         Piece(rk4.evaluate_all, signatures.EVALUATE_ALL),
         Piece(rk4.rates_along, signatures.RATES_ALONG),
+        adapter("probe", nothing, ()),  # of runs that nobody sees
+        lane_adapter("probe", nothing, (), frozenset()),
     ]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of values that another kind has not

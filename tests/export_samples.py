@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from conftest import REQUIRED
 import podusv
 from podusv_cli.export import link
 from podusv_cli.workflows import export as workflow
+from podusv_cli.workflows.request import Request
 
 SOURCE, OTTER = "podusv:mu_2017/corrected.yaml", "podusv:pod/vessels/otter.yaml"
 CC = "cc -std=c99 -Wall -Wextra -pedantic -Werror -O2 -ffp-contract=off"
@@ -41,6 +43,21 @@ def exported(
     **options: Any,
 ) -> Path:  # fmt: skip
     """The folder of a small export for this machine; of other changes in place of the `kind`."""
-    options = {"fmu": False, "platforms": [link.this_machine()]} | options
     given = [f"{key}={json.dumps(value)}" for key, value in (changes or {}).items()]
-    return workflow.export(Path(source), workflow.Request(to, given or task(kind, 5), **options))
+    return export_law(Path(source), to, given or task(kind, 5), **{"fmu": False} | options)
+
+
+def export_law(
+    source: Path,
+    to: Path,
+    overrides: Sequence[str] = (),
+    *,
+    c: bool = True,
+    fmu: bool = True,
+    platforms: Sequence[str] | None = None,
+    **options: Any,
+) -> Path:
+    """The folder of an export, for this machine where no platforms are given."""
+    wanted = [link.this_machine()] if platforms is None else platforms
+    products = workflow.Products(c, fmu, wanted)
+    return workflow.export(source, Request(overrides, to, **options), products)

@@ -254,7 +254,7 @@ def test_a_terminal_shows_the_headlines_of_all_laws_beside_each_other(podusv, mo
     on_a_terminal(monkeypatch)
     out = podusv(config, "--out", "x", "--force", "--no-figures").out
     assert max(map(len, out.splitlines())) <= 80
-    table = out.partition("\n* best of those")[0].splitlines()
+    table = re.split(r"\n(?:\* best of those|-v: every metric)", out)[0].splitlines()
     if laws < 5:  # a column each
         assert len(table) <= 9
         assert table[-1].startswith("share of time at the actuator's limits")
@@ -332,7 +332,20 @@ def test_the_last_line_tells_how_to_check_that_numbers_have_converged(podusv):
         "the numbers may not have converged; check them: "
         "podusv verify one.yaml --set 'description=two words'"
     )
-    assert podusv("x", "--out", "y").err.endswith(": podusv verify SCENARIO\n")
+
+
+def test_after_finished_runs_the_last_line_names_the_first_that_is_not_verified(
+    podusv, monkeypatch, capsys
+):
+    own = f"name=kept_{uuid4().hex}"
+    config = write("two.yaml", TWO)
+    fine = ("--set", "simulation.step=0.0025", "--set", own)
+    assert podusv(config, "--out", "x", *fine).code == 0
+    for label in ("stiff", "soft"):
+        file = Path("x") / label / "resolved.yaml"
+        assert podusv("x", "--out", "y", "--force").err.endswith(f": podusv verify {file}\n")
+        assert commanded(monkeypatch, capsys)("verify", str(file)).code == 0
+    assert "may not have converged" not in podusv("x", "--out", "y", "--force").err
 
 
 def test_numbers_that_verify_has_found_converged_are_not_doubted_again(podusv, monkeypatch, capsys):

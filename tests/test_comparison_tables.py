@@ -96,6 +96,17 @@ def test_a_measured_time_is_never_marked_as_the_best():
     assert row(frame, "law_ns") == ["ns", "90", "80 (0.889)"]
 
 
+def test_a_run_by_itself_is_not_ranked():
+    alone = table.table({"a": {"iae": 9.0, "energy": 0.0, "settling_time": 2.5}})
+    assert row(alone, "iae") == ["m s", "9"]
+    assert "*" not in "".join(text for line in table.rows(alone) for text in line.texts)
+    assert r"\textbf" not in table.as_latex(alone)
+    said = table.as_markdown(alone, {"a": ""})
+    assert "smallest" not in said
+    assert "not defined" in said
+    assert "smallest" in table.as_markdown(FRAME, {"a": ""})
+
+
 def test_where_a_law_keeps_a_standoff_to_be_nearer_is_not_better():
     frame = table.table({"a": {"iae": 9.0, "iae_e": 5.0}, "b": {"iae": 8.0, "iae_e": 6.0}})
     assert table.leaders(frame) == {"a": ["iae_e"], "b": []}
@@ -127,7 +138,7 @@ def test_markdown_tells_how_runs_ended():
     words = METRICS["iae"].row
     assert lines[4] == f"| {words} | m s | 4 | 2* (0.5) | 8 (2) | - | `iae` |"
     assert lines[-2:] == ["", "- lost: killed"]
-    assert table.as_markdown(FRAME, {"a": ""}).endswith(table.NOTE + "\n")
+    assert table.as_markdown(FRAME, {"a": ""}).endswith(table.note(FRAME) + "\n")
 
 
 def test_latex_escapes_and_marks():

@@ -25,7 +25,7 @@ from podusv_cli.workflows.examples import examples, texts
 pytestmark = pytest.mark.slow  # builds packages, and an environment compiles anew
 PACKAGES = ("podusv", "podusv_cli")
 ROOMS = ("configs", "docs", "results", "examples")
-NEEDED = ("pyproject.toml", "README.md", "LICENSE", *PACKAGES, *ROOMS)
+NEEDED = ("pyproject.toml", "setup.py", "README.md", "LICENSE", *PACKAGES, *ROOMS)
 BUILD = "import sys; from setuptools import build_meta; build_meta.build_{}(sys.argv[1])"
 
 

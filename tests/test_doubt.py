@@ -27,7 +27,7 @@ from podusv_cli.doubt.together import counted, drawn
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
 from podusv_cli.workflows import doubt as doubting
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 # A hull that nothing pushes: u' = X_u u/(m - X_udot), by Fossen (2021), eq. 6.110, with u alone.
 ADRIFT = """

@@ -23,6 +23,7 @@ from conftest import example, kinds
 from export_samples import (
     HARDWARE,
     SOURCE,
+    export_law,
     exported,
     law,
     needs_cc,
@@ -107,10 +108,7 @@ def test_a_law_that_loads_between_samples_change_is_held_against_itself(tmp_path
     said: list[str] = []
     changes = ["control.period=0.1", "simulation.duration=2", "controller={kind: momentum_vector}",
                pods, "vessel={preset: otter}"]  # fmt: skip
-    request = workflow.Request(
-        tmp_path / "law", changes, fmu=False, platforms=[link.this_machine()], say=said.append
-    )
-    folder = workflow.export(Path(SOURCE), request)
+    folder = export_law(Path(SOURCE), tmp_path / "law", changes, fmu=False, say=said.append)
     assert any("check your code by that, not by log.h5" in text for text in said)
     assert not any("the run" in text and "samples before" in text for text in said)
     assert not json.loads((folder / "law.json").read_text())["of_run"]
@@ -231,8 +229,7 @@ def test_an_fmu_begins_where_the_run_does_and_asks_for_loads_that_it_cannot_know
 def exported_as(to: Path, scenario: Any, **options: Any) -> Path:
     """The folder of a scenario's law for this machine."""
     (to / "scenario.yaml").write_text(resolved_yaml(scenario))
-    options = {"platforms": [link.this_machine()]} | options
-    return workflow.export(to / "scenario.yaml", workflow.Request(to / "law", **options))
+    return export_law(to / "scenario.yaml", to / "law", **options)
 
 
 def table(folder: Path) -> Any:
@@ -255,8 +252,8 @@ def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
 
 def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(monkeypatch):
     monkeypatch.setattr(link, "find_spec", lambda name: name == "ziglang")
-    assert [*workflow._linked(workflow.Request(Path("law")))] == [link.this_machine()]
-    asked = workflow.Request(Path("law"), platforms=["win64", "linux64"])
+    assert [*workflow._linked(workflow.Products())] == [link.this_machine()]
+    asked = workflow.Products(platforms=["win64", "linux64"])
     said: list[str] = []
     monkeypatch.setattr(
         units, "shared_library", lambda files, name, platform: said.append(name) or b""
@@ -304,7 +301,7 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 def test_what_cannot_be_exported_gets_a_sentence(tmp_path, options, says):
     changes = {"overrides": ["control.period=0.1", "simulation.duration=1"]} | options
     with pytest.raises(UsageError, match=says):
-        workflow.export(Path(SOURCE), workflow.Request(tmp_path / "law", **changes))
+        export_law(Path(SOURCE), tmp_path / "law", **changes)
     assert not (tmp_path / "law").exists()
 
 
@@ -313,12 +310,15 @@ def test_an_export_says_which_law_it_takes_where_nobody_chose(tmp_path, monkeypa
     said: list[str] = []
     monkeypatch.setattr(workflow, "to_end", raised := Mock(side_effect=KeyboardInterrupt))
     for chosen in ("", "velocity_vector"):
-        request = workflow.Request(
-            tmp_path / f"law-{chosen}", ["simulation.duration=1"], chosen, c=True, fmu=False,
-            platforms=["linux64"], say=said.append,
-        )  # fmt: skip
         with pytest.raises(KeyboardInterrupt):
-            workflow.export(HARDWARE / "boat.yaml", request)
+            export_law(
+                HARDWARE / "boat.yaml",
+                tmp_path / f"law-{chosen}",
+                ["simulation.duration=1"],
+                fmu=False,
+                controller=chosen,
+                say=said.append,
+            )
     assert raised.call_count == 2
     notes = [line for line in said if line.startswith("exporting")]
     assert notes == [
@@ -337,7 +337,7 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
         check(tmp_path)
     monkeypatch.setattr(workflow, "this_machine", lambda: "")
     with pytest.raises(UsageError, match=r"no export for this machine.*--no-fmu"):
-        workflow.export(Path(SOURCE), workflow.Request(tmp_path / "law"))
+        export_law(Path(SOURCE), tmp_path / "law", platforms=())
     monkeypatch.setattr(link.shutil, "which", lambda name: None)
     monkeypatch.setattr(link, "find_spec", lambda name: None)
     with pytest.raises(UsageError, match=r"no linker for .*podusv\[export\]"):
@@ -346,9 +346,10 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
     monkeypatch.setattr(link.shutil, "which", lambda name: None)
     monkeypatch.setattr(link, "find_spec", lambda name: None)
     said: list[str] = []
-    request = workflow.Request(tmp_path / "law", ["control.period=0.1"], say=said.append)
     with pytest.raises(UsageError, match=r"no linker for .*--no-fmu exports without"):
-        workflow.export(Path(SOURCE), request)
+        export_law(
+            Path(SOURCE), tmp_path / "law", ["control.period=0.1"], platforms=(), say=said.append
+        )
     assert said == []  # before anything is computed
 
 
@@ -433,8 +434,7 @@ def test_code_that_a_folder_brings_along_is_run_with_trust_alone(
     "kind", [pytest.param(law, marks=() if law == "alos" else pytest.mark.slow) for law in LAWS]
 )
 def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
-    request = workflow.Request(tmp_path / "law", task(kind), platforms=[link.this_machine()])
-    folder = workflow.export(Path(SOURCE), request)
+    folder = export_law(Path(SOURCE), tmp_path / "law", task(kind))
     assert validate_fmu(str(folder / "law.fmu")) == []
     found = check(folder)
     assert [checked.what for checked in found] == ["library", "law.fmu"]
@@ -502,8 +502,7 @@ def test_other_processors_have_the_bits_of_the_run(tmp_path, platform, kind):
     runner, stepped = BOARDS[platform]
     if not shutil.which(runner):
         pytest.skip(f"needs {runner}")
-    request = workflow.Request(tmp_path / "law", task(kind), fmu=False, platforms=[platform])
-    folder = workflow.export(Path(SOURCE), request)
+    folder = export_law(Path(SOURCE), tmp_path / "law", task(kind), fmu=False, platforms=[platform])
     samples = np.loadtxt(folder / "check.csv", delimiter=",", skiprows=1)
     assert len(samples) == 3001
     out = stepped(folder, samples[:, 1:16].tobytes())

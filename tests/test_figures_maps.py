@@ -226,11 +226,15 @@ def test_a_map_of_any_shape_has_equal_scales_and_fills_its_panel(wide, columns):
     assert max(east / np.ptp(whole.get_xlim()), north / np.ptp(whole.get_ylim())) > 0.75
 
 
-def on_legs(**e_ct):
+def on_legs(leg=lambda t: 0.0 * t, **e_ct):
     """Runs on legs with these distances from them over time, by their names."""
     legs = scenario(path="{kind: legs, points: [[0, 0], [20, 5], [35, -3]]}")
-    about = {**ABOUT, "e_ct": Signal("e_ct", "m", "cross-track error")}
-    logs = {name: recording(e_ct=law) for name, law in e_ct.items()}
+    about = {
+        **ABOUT,
+        "e_ct": Signal("e_ct", "m", "cross-track error"),
+        "leg": Signal("leg", "1", "legs done"),
+    }
+    logs = {name: recording(e_ct=law, leg=leg) for name, law in e_ct.items()}
     return shown(*((name, replace(log, about=about), legs) for name, log in logs.items()))
 
 
@@ -244,6 +248,25 @@ def test_along_legs_the_close_up_shows_where_a_run_is_farthest_from_its_path():
     assert title(view) == "(b) farthest from the path, t = 60 s"
     assert np.mean(view.get_xlim()) == pytest.approx(off["y"][600])
     assert [line.get_label() for line in distance.lines] == ["near", "off"]
+
+
+@pytest.mark.parametrize(
+    ("after", "instant"),
+    [
+        (lambda t: 2.0 - 0.25 * (t - 50.0) + 0.9 * gap(t, 80.0, 3.0), 100.0),  # it goes through
+        (lambda t: 2.0 * np.exp(50.0 - t) - 0.7 * gap(t, 71.0, 3.0), 71.0),  # it overshoots
+        (lambda t: 0.3 + 1.7 * np.exp(50.0 - t) + 0.5 * gap(t, 77.0, 3.0), 77.0),  # never there
+        (lambda t: np.where(t < 57.05, 2.0 - 0.47 * (t - 50.0), 0.0), 57.0),  # then exactly there
+        (lambda t: 2.0 + 0.01 * (t - 50.0), 100.0),  # it goes away
+    ],
+)
+def test_what_a_corner_leaves_is_no_distance_that_a_run_comes_to(after, instant):
+    """A leg that begins at 50 s with 2 m, the radius of acceptance."""
+    begins = 50.0
+    law = lambda t: np.where(t < begins, 0.1, after(np.maximum(t, begins)))  # noqa: E731
+    runs = on_legs(leg=lambda t: np.where(t < begins, 0.0, 1.0), a=law)
+    _, view, _ = drawn("trajectory", runs).axes
+    assert title(view) == f"(b) farthest from the path, t = {instant:g} s"
 
 
 def test_the_caption_names_what_any_panel_may_show():

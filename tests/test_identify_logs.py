@@ -82,9 +82,9 @@ def test_headings_may_wrap(sailed):
 
 
 def test_a_sensor_that_is_held_between_its_values_counts_once(weaving):
-    held = np.repeat(weaving.columns["x"][::5], 5)
-    log = log_of(replace(weaving, columns={**weaving.columns, "x": held}), Ideal(), 0.05)
-    assert log.counts[:2].tolist() == [120, 600]
+    held = {name: np.repeat(weaving.columns[name][::5], 5) for name in ("x", "y", "r")}
+    log = log_of(replace(weaving, columns={**weaving.columns, **held}), Ideal(), 0.05)
+    assert log.counts.tolist() == [120, 120, 600, 600, 600, 120]
 
 
 def test_a_gap_parts_a_log(sailed):

@@ -14,12 +14,12 @@ from log_files import read, write_bag, write_dataflash, write_ulog, written
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.signal import Signal
 from podusv_cli.identify.fit.march import DELIVERED, HOLDS, VALUES
-from podusv_cli.identify.fit.records import log_of
+from podusv_cli.identify.fit.records import complete, log_of
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import columns_of
 from podusv_cli.identify.logs.frames import LAT, LON, local_plane, radii
 from podusv_cli.identify.logs.listing import listing
-from podusv_cli.identify.logs.reading import Named, table
+from podusv_cli.identify.logs.reading import Named, Table, delivered_each, table
 
 
 def test_a_ros_bag_gives_its_topics_by_their_stamps(tmp_path):
@@ -272,3 +272,52 @@ def test_what_is_guessed_of_a_ros_bag_can_be_pasted(tmp_path):
     section = yaml.safe_load("\n".join(found.mapping()))
     log = read(tmp_path / "bag", section["columns"], section["frame"])
     assert {"x", "y", "psi", "u", "v", "r"} <= log.columns.keys()
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_positions_count_together_where_a_boat_goes_along_an_axis(along):
+    """To 1 cm; across its way a value stays for 2.5 s, as that of a slow sensor would."""
+    times = np.arange(0.0, 40.0, 0.1)
+    columns = dict.fromkeys(("x", "y"), np.round(0.004 * times, 2))
+    columns |= {along: np.round(0.93 * times, 2), "psi": 0.01 * np.sin(times)}
+    columns |= {"tau_u": 0.1 * times, "tau_r": 0.0 * times}
+    log = Table("east.csv", times, columns)
+    complete(log, Ideal())
+    assert log_of(log, Ideal(), 0.1).counts[:3].tolist() == [400, 400, 400]
+
+
+def test_a_position_of_which_half_is_missing_counts_for_the_other_half():
+    x, y = np.arange(30.0), 2.0 * np.arange(30.0)
+    x[3:7], y[20] = np.nan, np.nan
+    new = delivered_each({"x": x, "y": y, "r": np.full(30, np.nan)})
+    assert np.flatnonzero(~new["x"]).tolist() == [3, 4, 5, 6]
+    assert np.flatnonzero(~new["y"]).tolist() == [20]
+    assert not new["r"].any()
+    apart = delivered_each({"x": x[:3], "y": np.full(3, np.nan)})
+    assert apart["x"].all()
+
+
+def test_columns_of_a_german_logger_are_guessed(tmp_path):
+    text = "Zeit [ms];Breite;Länge;Kurs;Steuerkurs\n"
+    rows = [f"{100 * i};59,{1000 + i};10,{1000 + i};{30 + i};{33 + i}\n" for i in range(30)]
+    (tmp_path / "log.csv").write_text(text + "".join(rows), encoding="utf-8")
+    found = {column.quantity: column.name for column in listing(tmp_path / "log.csv").columns}
+    assert found.pop("") == "Kurs"  # over ground, which is no heading
+    names = {"time": "Zeit [ms]", "lat": "Breite", "lon": "Länge", "psi": "Steuerkurs"}
+    assert found == names
+
+
+@pytest.mark.parametrize("second", ["", ",stamp"])
+def test_clock_times_are_not_proposed_as_time(tmp_path, second):
+    rows = [f"2026-05-04,12:03:{i:02d},59.1,10.1,{i}" for i in range(30)]
+    rows = [f"{row},{i}" if second else row for i, row in enumerate(rows)]
+    head = f"Date,Time,lat,lon,hdg{second}"
+    (tmp_path / "log.csv").write_text("\n".join([head, *rows, ""]))
+    found = listing(tmp_path / "log.csv")
+    clock = [column.name for column in found.columns if column.quantity == "time"]
+    assert clock == (["stamp"] if second else [])
+    assert ("  # time: ?   (not guessed; see podusv docs identify)" in found.mapping()) != bool(
+        clock
+    )
+    (line,) = found.warnings
+    assert "'Time' is not taken for time: it has clock times such as '12:03:00'" in line

@@ -6,9 +6,11 @@ import json
 import re
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from http.client import HTTPConnection, HTTPResponse
@@ -241,6 +243,38 @@ def test_every_question_is_answered_and_the_page_goes_on(
     assert text
     assert "<" not in text
     assert answered(host, "POST", f"{base}x", None, b"{}")[0] == 200
+
+
+@pytest.mark.parametrize("resets", [True, False])
+def test_a_browser_that_leaves_before_its_answer_prints_nothing(
+    served: tuple[str, str], capfd: pytest.CaptureFixture[str], resets: bool
+) -> None:
+    """Reset, as a browser that is killed, or closed while answers are on their way."""
+    host, base = served
+    name, _, port = host.partition(":")
+    question = f"POST {base}x HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\n"
+    asked = f"{question}Content-Length: 2\r\n\r\n{{}}".encode()
+    with socket.create_connection((name, int(port)), timeout=2.0) as connection:
+        if resets:
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        connection.sendall(asked * (1 if resets else 500))
+    assert answered(host, "POST", f"{base}x", None, b"{}")[0] == 200
+    time.sleep(0.5)  # the other thread has found out by now
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_goes_wrong_but_for_that_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
+    server = local_page._Server(0, lambda base: base)
+    with server:
+        for error in (BrokenPipeError(), ConnectionResetError(), ZeroDivisionError("seen")):
+            try:
+                raise error
+            except (OSError, ArithmeticError):
+                server.handle_error(None, ("here", 1))
+    said = capfd.readouterr().err
+    assert "ZeroDivisionError: seen" in said
+    assert "BrokenPipe" not in said
+    assert "Reset" not in said
 
 
 def test_a_path_of_other_letters_is_no_token(served: tuple[str, str]) -> None:

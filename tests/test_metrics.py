@@ -503,3 +503,14 @@ def test_runs_with_windows_and_runs_without_share_a_table(podusv):
     assert row[-3] == "-"
     assert float(row[-2].rstrip("*")) > 0
     assert podusv("plot", "old", "--out", "figures", "--only", "errors").code in (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("e_ct_max", "anew at each change of legs, with up to `acceptance`"),
+        ("at_rate_limit", "a pod turns as fast as its drive can"),
+    ],
+)
+def test_what_a_metric_means_can_be_read_without_its_source(name, says, podusv):
+    assert says in " ".join(podusv("explain", name).out.split())

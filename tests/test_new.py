@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import xarray
 import yaml
 from command_samples import ROOT
 from installed_sample import LAB, install
@@ -231,6 +232,36 @@ def test_commands_list_explain_and_draw_it(place):
     assert "nmi], default 3.0 " in explained
     assert "cross-track error" in podusv(place, "explain", "e_y")
     assert "identical" in podusv(place, "rerun", "c/los")
+
+
+def test_its_command_is_one_of_podusvs(place):
+    """In the help, with arguments of its own, and with podusv's exit codes and sentences."""
+    reached = {}
+    for law in ("los", "far"):
+        log = xarray.open_dataset(place / "c" / law / "log.h5", engine="h5netcdf")
+        reached[law] = float(abs(log["y"]).max())
+    law = max(reached, key=reached.get)
+    assert podusv(place, "widest", "c/los", "c/far") == f"c/{law}: {reached[law]:.3f} m\n"
+    assert re.search(r"\n +widest +Say which of finished runs", podusv(place, "--help"))
+    assert "RUN..." in podusv(place, "widest", "--help")
+    assert "c/none" in podusv(place, "widest", "c/none", code=2)
+    assert "No such command 'wides'" in podusv(place, "wides", code=2)
+
+
+@pytest.mark.parametrize("name", ["widest", "run"])
+def test_a_command_that_cannot_be_imported_or_is_podusvs_own(place, name):
+    """The first says so when it is called, and the others still work; the second is not taken."""
+    points = place / "site/my_lab-1.0.dist-info/entry_points.txt"
+    text = points.read_text()
+    points.write_text(text.replace("widest = my_lab.widest", f"{name} = my_lab.nowhere"))
+    try:
+        helped = podusv(place, "--help")
+        said = podusv(place, name, "c/los", code=2)
+    finally:
+        points.write_text(text)
+    assert "Simulate a scenario and write a run folder" in helped
+    own = "c/los" if name == "run" else "widest: my_lab.nowhere:widest cannot be imported: Module"
+    assert own in said
 
 
 @pytest.mark.slow

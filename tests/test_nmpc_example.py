@@ -13,7 +13,7 @@ from podusv_cli.components.paths.line import Line
 from podusv_cli.core.kernel import bundle
 from podusv_cli.optimum.collocation import dynamics
 from podusv_cli.workflows import rerun as repeating
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 ca = pytest.importorskip("casadi", reason="CasADi is not installed: podusv[optimum]")
 nmpc = SimpleNamespace(**runpy.run_path(str(ROOT / "examples/nmpc/nmpc.py")))

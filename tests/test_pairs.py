@@ -37,7 +37,7 @@ from podusv_cli.workflows import export as exporting
 from podusv_cli.workflows import rerun as repeating
 from podusv_cli.workflows import studies
 from podusv_cli.workflows.execute import Stopwatch, simulated
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 Pair = Callable[[Drawn, Path], None]
 PAIRS: dict[str, Pair] = {}
@@ -243,8 +243,8 @@ def exported_law(drawn: Drawn, place: Path) -> None:
         return
     path = place / "scenario.yaml"
     path.write_text(resolved_yaml(scenario))
-    request = exporting.Request(place / "law", platforms=[link.this_machine()])
-    folder = exporting.export(path, request)
+    products = exporting.Products(platforms=[link.this_machine()])
+    folder = exporting.export(path, Request(out=place / "law"), products)
     assert [checked.differs for checked in check(folder)] == [""] * (1 + bool(find_spec("fmpy")))
     unit = Unit(folder / "law.fmu", place / "unit")
     inputs = len(unit.inputs)

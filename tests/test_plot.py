@@ -19,7 +19,7 @@ from podusv_cli.figures.style import Look, house_style
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import run_folder
 from podusv_cli.workflows import plot as plotting
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 LAWLESS = ("W_hat_u", "W_hat_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "rbf_center")
 

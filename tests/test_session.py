@@ -10,7 +10,7 @@ import podusv
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.interface.session import Observation, Session
 from podusv_cli.workflows import rerun as repeating
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 PERIOD = 0.1  # s
 # A hull whose surge is m u' = tau_u - X_u u for motion straight on

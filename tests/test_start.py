@@ -131,6 +131,17 @@ def check(podusv, name):
     assert [*answer["comparison"]["path_done"].values()] == [1.0, 1.0]
 
 
+def test_a_study_of_the_file_that_start_writes_warns_of_nothing(podusv):
+    """Its claims are about single runs, and its study has its own `success`."""
+    podusv("start", "boat", *BOATS["catamaran"])
+    assert load("boat.yaml").scenario.claims
+    short = ("--set", "simulation.duration=2", "--set", "sweep.draws=1")
+    said = podusv("sweep", "run", "boat.yaml", *short, "--no-figures", "--workers", "1")
+    assert said.code == 0
+    assert "warning" not in said.err
+    assert "are about single runs" not in podusv("validate", "boat.yaml", *short).out
+
+
 def test_what_is_estimated_is_marked_and_varied(podusv):
     podusv("start", "boat", *BOATS["catamaran"])
     scenario, text = load("boat.yaml").scenario, Path("boat.yaml").read_text()

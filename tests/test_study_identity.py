@@ -10,9 +10,11 @@ from small_study import TEXT, made, small, written
 
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.process.workers import Outcome
+from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making import plan as plans
 from podusv_cli.studies.making import store as stores
+from podusv_cli.studies.making.check import unjudged
 from podusv_cli.studies.making.dispatch import ENDED, Driver
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.store import RUNS, Store
@@ -48,9 +50,14 @@ def test_claims_that_a_study_does_not_judge_are_named(tmp_path):
     config.write_text(text % "median(li.iae / pid.iae) < 1")
     with pytest.raises(ScenarioError, match=r"'median'; it belongs to sweep\.claims"):
         sweep.run(config, request, lambda tally: None)
-    config.write_text(text % "li.iae < pid.iae")
+    alone = (text % "li.iae < pid.iae").replace("  claims:\n    S1:", "  # S1:")
+    config.write_text(alone)
     sweep.run(config, request, lambda tally: None)
     assert "claims (M) are about single runs" in warnings[0]
+    assert "claims (M) are about" in unjudged(load_text(alone, "small.yaml").scenario)
+    for own in (text % "li.iae < pid.iae", alone.replace("seed: 7", "success: iae < 1")):
+        judging = load_text(own, "small.yaml").scenario
+        assert unjudged(judging) == ""
 
 
 def test_runs_of_other_kernels_are_read(whole, tmp_path, updated, podusv):

@@ -27,7 +27,8 @@ from podusv_cli.theory.bounds import Observed, Pair, UltimateBound, sway_bound, 
 from podusv_cli.theory.ideal_weights import exponents, node_distance
 from podusv_cli.theory.lyapunov import TERMS
 from podusv_cli.theory.monitor import ERRORS, NETWORKS, WINDOWS
-from podusv_cli.workflows.run import Request, run
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import run
 
 SEEN = Observed(
     b=Pair(0.9, 0.7), W=Pair(0.7, 0.4), alpha_dot=Pair(0.2, 0.03), drift=Pair(0.3, 0.05),

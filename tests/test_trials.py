@@ -229,7 +229,8 @@ def test_only_trials_have_the_metrics_of_trials():
     assert "overshoot_1" in zigzag
     assert "overshoot_1" not in turn
     law = load_text("extends: podusv:own_vessel.yaml\nname: x\n", "x.yaml").scenario.alone()
-    assert not {"advance", "overshoot_1"} & set(law.probe().summary(np.ones(200)))
+    probe = law.probe()
+    assert not {"advance", "overshoot_1"} & set(probe.summary(np.ones(probe.size)))
 
 
 def test_behind_pods_the_thrust_turns_by_the_angle_and_pushes_the_stern_aside():

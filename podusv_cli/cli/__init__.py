@@ -20,6 +20,7 @@ from podusv_cli.cli.exit_codes import (
     report_error,
     with_exit_codes,
 )
+from podusv_cli.cli.installed_commands import installed_commands, load_command
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
@@ -49,7 +50,17 @@ OBJECTS_BETWEEN_COLLECTIONS = 500_000
 
 
 class Commands(typer.core.TyperGroup):
-    """The commands, and what those of other names are called here."""
+    """podusv's commands, those of installed packages, and what others are called here."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names of all commands; podusv's own first."""
+        own = super().list_commands(ctx)
+        return [*own, *(name for name in installed_commands() if name not in own)]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of this name; one that podusv has is never that of a package."""
+        own = super().get_command(ctx, cmd_name)
+        return own or (load_command(cmd_name) if cmd_name in installed_commands() else None)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names; an error for an unknown one."""

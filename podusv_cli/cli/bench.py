@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from podusv_cli.cli import options
-from podusv_cli.cli.terminal import echo, echo_result, echo_table
+from podusv_cli.cli.terminal import echo, echo_table, show
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.bench import Benched
@@ -55,15 +55,14 @@ def bench(
         shipped_bench,
     )
     from podusv_cli.workflows import bench as workflow
+    from podusv_cli.workflows.request import Request
 
     chosen = {"tasks": task or (), "vessels": vessel or (), "conditions": condition or ()}
     wanted = Selection(folder or shipped_bench(), laws or (), assign or (), chosen, trust)
-    request = workflow.Request(out, force, figures, workers, sys.argv, optimum)
+    request = Request(out=out, force=force, figures=figures, argv=sys.argv, workers=workers)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
-        done = workflow.bench(wanted, request, bars)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for lack in done.missing:
-        echo(lack, err=True)
+        done = workflow.bench(wanted, request, bars, optimum=optimum)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     raise typer.Exit(SOME_CRASHED if done.crashed else 0)
 
 

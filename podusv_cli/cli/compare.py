@@ -26,6 +26,7 @@ from podusv_cli.cli.terminal import (
 from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
+    from podusv_cli.core.past_run import PastRun
     from podusv_cli.workflows.compare import Compared
 
 SOME_FAILED = 3
@@ -62,8 +63,8 @@ def compare(
         str,
         typer.Option(
             "--align",
-            metavar="start",
-            help="Move a log to where the first run is at the first common instant.",
+            metavar="start|place",
+            help="Lay a log on the first run: clock and place of its beginning, or place alone.",
         ),
     ] = "",
     doubt: Annotated[
@@ -86,16 +87,29 @@ def compare(
     """
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import compare as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     warned = Warnings(quiet)
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         request = Request(
-            assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            figure or (), [name.strip() for name in form.split(",")], workers,
-            metrics=metric or (), ratios=ratios, align=align, doubt=doubt, trust=trust,
+            assign or (),
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            allow_large=allow_large,
+            workers=workers,
+            names=figure or (),
+            formats=[name.strip() for name in form.split(",")],
+            metrics=metric or (),
+            align=align,
+            ratios=ratios,
+            doubt=doubt,
+            warn=warned,
             compiling=compiling(progress, wanted=not (quiet or as_json)),
-        )  # fmt: skip
+        )
         done = workflow.compare([Path(item) for item in items], request, progress)
     echo_result(done, lambda: _report(done, verbose, metric or ()), as_json=as_json, quiet=quiet)
     together = [*done.result.warnings] if sys.stderr.isatty() and not verbose else []
@@ -111,8 +125,8 @@ def compare(
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
-    if done.result.runs and not (quiet or done.verified):
-        echo(_advice(items, assign or (), plugin or ()), err=True)
+    if done.unverified and not quiet:
+        echo(_advice(done, items, assign or (), plugin or ()), err=True)
     if not (figure or quiet or as_json):
         echo_how_to_draw(done.folder, done.places())
     page = done.folder / "report.html"
@@ -128,8 +142,17 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
-    count = len(result.runs)
-    echo(f"compared {count} {'run' if count == 1 else 'runs'}: {done.folder}")
+    echo(f"compared {_counted(result.runs)}: {done.folder}")
+
+
+def _counted(past: Sequence[PastRun]) -> str:
+    """How many runs, and how many logs beside them."""
+    from podusv_cli.comparison.measured import NO_LAW
+
+    logs = sum(run.recording.controller == NO_LAW for run in past)
+    runs = len(past) - logs
+    words = [f"{runs} {'run' if runs == 1 else 'runs'}", *(["1 log"] if logs else [])]
+    return " and ".join(words)
 
 
 def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool = False) -> None:
@@ -148,12 +171,12 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool 
 
 
 def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
-    from podusv_cli.comparison.table import NOTE, cells, head, window
+    from podusv_cli.comparison.table import cells, head, note, window
 
     result = done.result
     rows = cells(result.table, result.metrics, result.unsettled, chosen=metrics)
     echo_table(head(result.table), rows)
-    echo(*filter(None, (NOTE, window(result.table))))
+    echo(*filter(None, (note(result.table), window(result.table))))
 
 
 def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
@@ -176,18 +199,26 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
     lines = grid(["", *labels], across, columns()) or grid(["", *names], down, columns())
     typer.echo("\n".join(map(visible, lines)))
     if lines:
-        note = "* best of those that end at their target; -v: every metric, with ratios"
+        note = "-v: every metric"
+        if len(labels) > 1:
+            note = f"* best of those that end at their target; {note}, with ratios"
         echo(*filter(None, (note, window(result.table))))
     return bool(lines)
 
 
-def _advice(items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]) -> str:
-    """How to find out whether the numbers have converged."""
+def _advice(
+    done: Compared, items: Sequence[str], assign: Sequence[str], plugin: Sequence[str]
+) -> str:
+    """How to find out whether the numbers of the first run that is not verified have converged."""
     from podusv_cli.workflows.measured import is_log
 
-    scenarios = (i for i in items if not (Path(i).is_dir() or is_log(Path(i))))
-    scenario = next(scenarios, "SCENARIO")
-    changes = [word for change in assign for word in ("--set", change)]
+    finished = {run.label: done.place(run) for run in done.result.runs}
+    label = done.unverified[0]
+    if label in done.result.timings:
+        scenario = next(i for i in items if not (Path(i).is_dir() or is_log(Path(i))))
+        changes = [word for change in assign for word in ("--set", change)]
+    else:  # it was there before
+        scenario, changes = str(finished[label] / "resolved.yaml"), []
     files = [word for file in plugin for word in ("--plugin", file)]
     command = shlex.join(["podusv", "verify", scenario, *changes, *files])
     return f"the numbers may not have converged; check them: {command}"

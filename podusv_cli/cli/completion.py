@@ -78,7 +78,7 @@ def _state() -> str:
     from podusv_cli.core.plugins import installed
     from podusv_cli.scenario import shipped
 
-    folders = (Path(podusv_cli.__file__).parent, shipped.folder())  # no link is followed
+    folders = (Path(podusv_cli.__file__).parent, shipped.folder())
     files = (
         path for folder in folders for end in ("py", "yaml") for path in folder.rglob(f"*.{end}")
     )

@@ -47,7 +47,7 @@ def demo(
 
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import compare as workflow  # heavy: after there is something to read
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     with progress_bars(wanted=True) as progress:
         request = Request(out=out, force=force, argv=sys.argv, compiling=compiling(progress))

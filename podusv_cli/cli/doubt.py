@@ -10,7 +10,7 @@ import typer
 
 from podusv_cli.cli import options
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+from podusv_cli.cli.terminal import Warnings, echo, echo_table, show
 
 if TYPE_CHECKING:
     from podusv_cli.doubt.outputs import Doubted
@@ -36,18 +36,25 @@ def doubt(
     """
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import doubt as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     warned = Warnings(quiet)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         request = Request(
-            assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            workers=workers, trust=trust, compiling=compiling(bars, wanted=not (quiet or as_json)),
-        )  # fmt: skip
+            assign or (),
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            allow_large=allow_large,
+            workers=workers,
+            warn=warned,
+            compiling=compiling(bars, wanted=not (quiet or as_json)),
+        )
         done = workflow.doubt(Path(config), request, bars)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.status == "interrupted":
         echo("interrupted; the table is about what was tried so far", err=True)
         raise typer.Exit(INTERRUPTED)

@@ -61,17 +61,24 @@ def export(
         _check(Path(config), trusted=trust)
         return
     from podusv_cli.workflows import export as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.request import Request
 
     def say(text: str) -> None:
         if not quiet:
             echo(text, err=True)
 
-    folder = to or Path(f"{Path(config.removeprefix('podusv:')).stem}-law")
-    request = workflow.Request(
-        folder, assign or (), controller, force, with_c, with_fmu, platform or (), sys.argv,
-        plugin or (), trust, say,
-    )  # fmt: skip
-    done = workflow.export(Path(config), request)
+    request = Request(
+        assign or (),
+        to,
+        force=force,
+        argv=sys.argv,
+        plugins=plugin or (),
+        trust=trust,
+        controller=controller,
+        say=say,
+    )
+    products = workflow.Products(with_c, with_fmu, platform or ())
+    done = workflow.export(Path(config), request, products)
     echo_path(done)
     if not quiet:
         echo(f"check it: podusv export --check --trust {done}", err=True)

@@ -10,7 +10,7 @@ import typer
 
 from podusv_cli.cli import options
 from podusv_cli.cli.exit_codes import INTERRUPTED
-from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table
+from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table, show
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def identify(
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.identify.logs.formats import READERS
     from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     ending = Path(config).suffix.lower()
     if ending and ending in READERS:
@@ -80,13 +80,18 @@ def identify(
         )
     warned = Warnings(quiet)
     request = Request(
-        assign or (), out, force, figures, sys.argv, warned, False, plugin or (), trust=trust
+        assign or (),
+        out,
+        force=force,
+        figures=figures,
+        argv=sys.argv,
+        plugins=plugin or (),
+        trust=trust,
+        warn=warned,
     )
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.identify(Path(config), request, bars)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.status == "interrupted":
         echo("interrupted; the numbers are the best so far", err=True)
         raise typer.Exit(INTERRUPTED)

@@ -58,13 +58,20 @@ def margins(
     steady motion.
     """
     from podusv_cli.workflows import margins as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     formats = [name.strip() for name in form.split(",")]
     request = Request(
-        assign or (), out, force, argv=sys.argv, plugins=plugin or (), formats=formats,
-        controller=controller, trust=trust, warn=Warnings(),
-    )  # fmt: skip
+        assign or (),
+        out,
+        force=force,
+        argv=sys.argv,
+        plugins=plugin or (),
+        trust=trust,
+        controller=controller,
+        formats=formats,
+        warn=Warnings(),
+    )
     result = workflow.margins(Path(config), request, at)
     if as_json:
         echo_json(result.as_json())

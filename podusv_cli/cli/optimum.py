@@ -59,13 +59,21 @@ def optimum(
     """
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import optimum as workflow  # heavy imports only when they are needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     warned = Warnings(quiet)
     request = Request(
-        assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-        controller=controller, trust=trust,
-    )  # fmt: skip
+        assign or (),
+        out,
+        force=force,
+        figures=figures,
+        argv=sys.argv,
+        plugins=plugin or (),
+        trust=trust,
+        allow_large=allow_large,
+        controller=controller,
+        warn=warned,
+    )
     try:
         with progress_bars(wanted=not (quiet or as_json)) as bars:
             done = workflow.optimum(Path(config), request, minimise.value, step, bars)

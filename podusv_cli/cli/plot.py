@@ -63,7 +63,7 @@ def plot(
     Prints every file that it wrote. Files that belong to a finished run are never replaced.
     """
     from podusv_cli.workflows import plot as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     formats = [name.strip() for name in form.split(",")]
     request = Request(out=out, plugins=plugin or (), names=figure or (), formats=formats)

@@ -37,7 +37,7 @@ def rerun(
     """
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import rerun as repeating  # heavy imports only when they are needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     request = Request(
         out=out, force=force, figures=False, argv=sys.argv, allow_large=allow_large, trust=trust

@@ -45,15 +45,25 @@ def run(
     """
     from podusv_cli.cli.progress import compiling, progress_bars
     from podusv_cli.workflows import run as workflow  # heavy imports only when they are needed
+    from podusv_cli.workflows.request import Request
 
     warned = Warnings(quiet)
     with progress_bars(wanted=not (quiet or as_json)) as bars:
-        request = workflow.Request(
-            assign or (), out, force, figures, sys.argv, warned, allow_large, plugin or (),
-            figure or (), controller=controller, trust=trust,
-            compiling=compiling(bars, wanted=not (quiet or as_json)),
+        request = Request(
+            assign or (),
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            allow_large=allow_large,
+            controller=controller,
+            names=figure or (),
             say=lambda line: warned(f"{config}: {line}"),
-        )  # fmt: skip
+            warn=warned,
+            compiling=compiling(bars, wanted=not (quiet or as_json)),
+        )
         done = workflow.run(Path(config), request, partial(bars, str(config)) if bars else None)
     echo_result(done, lambda: _report(done, verbose), as_json=as_json, quiet=quiet)
     for finding in done.warnings:

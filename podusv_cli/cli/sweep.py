@@ -12,7 +12,7 @@ import typer
 from podusv_cli.cli import completion, options
 from podusv_cli.cli.exit_codes import with_exit_codes
 from podusv_cli.cli.progress import StudyLine
-from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_path, echo_result, echo_table
+from podusv_cli.cli.terminal import echo, echo_entry, echo_json, echo_path, echo_table, show
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
@@ -71,14 +71,25 @@ def run(
     hung or was invalid, and when a kept log differs from the table; runs that diverge are results.
     """
     from podusv_cli.workflows import sweep as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.many_runs import Request
+    from podusv_cli.workflows.request import Request
 
     changes = [*(assign or ()), *([f"sweep.draws={draws}"] if draws else [])]
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
-            changes, out, workers, sys.argv, plugin or (), figures, scheduler, trust,
-            seconds(until), part_of(shard), force, line.say, line.warn,
-        )  # fmt: skip
+            changes,
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            workers=workers,
+            scheduler=scheduler,
+            seconds=seconds(until),
+            shard=part_of(shard),
+            say=line.say,
+            warn=line.warn,
+        )
         try:
             done = workflow.run(Path(config), request, line.tell)
         except KeyboardInterrupt as stop:
@@ -117,9 +128,7 @@ def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
 
     Exits with 3 for broken runs, and for kept logs that differ from the table.
     """
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     if done.results and (done.results.broken or done.results.contradicted):
         raise typer.Exit(SOME_FAILED)
 
@@ -174,7 +183,7 @@ def report(
 ) -> None:  # fmt: skip
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
-    from podusv_cli.workflows.many_runs import Request
+    from podusv_cli.workflows.request import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)
@@ -192,7 +201,7 @@ def merge(
 ) -> None:
     """Join the runs of several folders of one study, as `--shard` makes them."""
     from podusv_cli.workflows import merge as joining
-    from podusv_cli.workflows.many_runs import Request
+    from podusv_cli.workflows.request import Request
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(argv=sys.argv, figures=figures, say=line.say, warn=line.warn)

@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 import typer
 
@@ -18,6 +18,7 @@ from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
     from podusv_cli.core.finding import Finding
+    from podusv_cli.process.extras import Failure
 
 WIDEST = 100
 SPACE = "  "  # between the columns of a table
@@ -55,6 +56,28 @@ def echo_result(done: Any, report: Callable[[], None], *, as_json: bool, quiet: 
         echo_path(done.folder)
     else:
         report()
+
+
+class Done(Protocol):
+    """What every command that makes something gives back."""
+
+    @property
+    def folder(self) -> Path:
+        """Where it is."""
+
+    @property
+    def missing(self) -> Sequence[Failure]:
+        """Parts that could not be made, and why."""
+
+    def as_json(self) -> dict[str, Any]:
+        """What `--json` prints."""
+
+
+def show(done: Done, report: Callable[[], None], *, as_json: bool, quiet: bool) -> None:
+    """Print what was made as it was asked for, and on stderr what of it is missing."""
+    echo_result(done, report, as_json=as_json, quiet=quiet)
+    for part in done.missing:
+        echo(part.traced, err=True)
 
 
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:

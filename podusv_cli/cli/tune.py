@@ -10,7 +10,7 @@ import typer
 
 from podusv_cli.cli import options
 from podusv_cli.cli.progress import StudyLine
-from podusv_cli.cli.terminal import echo, echo_result, echo_table
+from podusv_cli.cli.terminal import echo, echo_table, show
 
 if TYPE_CHECKING:
     from podusv_cli.workflows.tune import Tuned
@@ -41,20 +41,27 @@ def tune(
     Optuna (podusv[tune]).
     """
     from podusv_cli.workflows import tune as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.many_runs import Request, silent
+    from podusv_cli.workflows.request import Request, silent
 
     with StudyLine(wanted=not (quiet or as_json)) as line:
         request = Request(
-            assign or (), out, workers, sys.argv, plugin or (), figures, scheduler,
-            trust, say=line.say, warn=line.warn, force=force,
+            assign or (),
+            out,
+            force=force,
+            figures=figures,
+            argv=sys.argv,
+            plugins=plugin or (),
+            trust=trust,
+            workers=workers,
+            scheduler=scheduler,
+            say=line.say,
+            warn=line.warn,
             begin=silent if quiet or as_json else line.note,
-        )  # fmt: skip
+        )
         done = workflow.tune(Path(config), request, line.advance)
     for refused in done.refused:
         echo(f"warning: {refused}", err=True)
-    echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    for part in done.missing:
-        echo(part.traced, err=True)
+    show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
 
 
 def _report(done: Tuned) -> None:

@@ -32,7 +32,7 @@ def validate(
     fits neither on the disk nor into memory.
     """
     from podusv_cli.workflows import validate as workflow  # heavy imports only when needed
-    from podusv_cli.workflows.run import Request
+    from podusv_cli.workflows.request import Request
 
     request = Request(
         assign or (), allow_large=allow_large, plugins=plugin or (), trust=trust, warn=echo

@@ -24,6 +24,8 @@ from podusv_cli.metrics.measured import (
 )
 
 POSE = tuple(signal.name for signal in STATE[:3])
+PLANE = POSE[:2]
+START, PLACE = "start", "place"  # ways to lay a log on a run: clock and place, or its place alone
 TARGET = ("x_d", "y_d")
 NO_LAW = "measured"
 ABOUT_LOG = "measured-log"  # code of what is doubtful about it
@@ -34,44 +36,67 @@ Marks = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Track:
-    """What a log measured: times [s], and x, y, psi at each; u, v, r where it has them.
+    """What a log measured: times [s], and x, y at each; psi, u, v, r where it has them.
 
-    Times are those of the runs. `remarks` say what is doubtful about it. `at_start`: it is to begin
-    where a run is at that time.
+    Times are those of the runs. `remarks` say what is doubtful about it. `aligned`: how it is to be
+    laid on the first run, `START` or `PLACE`, "" for as it is; `shifted` is by how much its clock
+    was moved for that [s].
     """
 
     file: Path
     times: Vector
     signals: Mapping[str, Vector]
     remarks: tuple[Finding, ...] = ()
-    at_start: bool = False
+    aligned: str = ""
+    shifted: float = 0.0
 
     def common(self, begin: float, end: float) -> Marks:
         """Which of its times lie in a span [s]."""
         return (self.times >= begin) & (self.times <= end)
 
-    def placed(self, run: Recording) -> Track:
-        """It, moved so that its first position at a time of the run is the run's."""
-        if not self.at_start:
+    def timed(self, begin: float) -> Track:
+        """It; where it is to begin as the runs do, with its first position at this time [s]."""
+        if self.aligned != START:
             return self
-        rows = np.flatnonzero(self.common(run["time"][0], run["time"][-1]))
-        if not len(rows):
-            return self
-        moved = {
-            name: self.signals[name] + np.interp(self.times[rows[0]], run["time"], run[name])
-            - self.signals[name][rows[0]]
-            for name in POSE[:2]
-        }  # fmt: skip
-        return replace(self, signals={**self.signals, **moved})
+        shifted = begin - float(self.times[0])
+        return replace(self, times=self.times - self.times[0] + begin, shifted=shifted)
 
-    def about(self, run: RunAbout) -> RunAbout:
-        """What it says about itself beside a run: the same task, as long as it lasts, no law."""
+    def placed(self, label: str, run: Recording) -> Track:
+        """It; where that is asked for, with its first position at a time of the run the run's.
+
+        A remark says what was moved, and by how much.
+        """
+        rows = np.flatnonzero(self.common(run["time"][0], run["time"][-1]))
+        if not self.aligned or not len(rows):
+            return self
+        at = self.times[rows[0]]
+        north, east = (
+            float(np.interp(at, run["time"], run[name]) - self.signals[name][rows[0]])
+            for name in PLANE
+        )
+        moved = {
+            name: self.signals[name] + by for name, by in zip(PLANE, (north, east), strict=True)
+        }
+        clock = f"its clock by {self.shifted:+.14g} s, and " if self.aligned == START else ""
+        text = (
+            f"--align {self.aligned} moves {clock}x by {north:+.4g} m, y by {east:+.4g} m: its "
+            f"position at {at:.4g} s of the runs is that of {label} then"
+        )
+        signals = {**self.signals, **moved}
+        return replace(self, signals=signals, remarks=(*self.remarks, self.remark(text)))
+
+    def about(self, run: RunAbout, counts_to: float = math.inf) -> RunAbout:
+        """What it says about itself beside a run: the same task, as long as it lasts, no law.
+
+        `counts_to` [s] is when the last of the runs beside it has done its path.
+        """
         said = {**run.said, "controller": NO_LAW}
         return run.model_copy(
             update={
                 "duration": float(self.times[-1]), "settings": (), "law": (), "said": said,
                 "values": {**run.values, "controller": {"kind": NO_LAW}},
-                "polar": False, "optimum_of": "",
+                "polar": False, "optimum_of": "", "path_steady": {},
+                "path_end": {"time": counts_to} if math.isfinite(counts_to) else {},
             }
         )  # fmt: skip
 
@@ -89,27 +114,27 @@ class Track:
     def departures(self, run: Recording) -> dict[str, float]:
         """How far a run is from it where times agree, by metric; over FEWEST instants at least.
 
-        Headings count where the track has one.
+        Headings count where the track has one; they are NaN where it has fewer than FEWEST.
         """
         times = run["time"]
         rows = self.common(times[0], times[-1]) if len(times) else np.zeros(len(self.times), bool)
         count = int(np.count_nonzero(rows))
         if count < FEWEST:
             return {log_instants.name: float(count)}
+        nothing = np.full(len(self.times), np.nan)
         x, y, psi = (
-            np.interp(self.times[rows], times, run[name]) - self.signals[name][rows]
+            np.interp(self.times[rows], times, run[name]) - self.signals.get(name, nothing)[rows]
             for name in POSE
         )
         distances, turned = np.hypot(x, y), np.remainder(psi + math.pi, 2.0 * math.pi) - math.pi
         turned = turned[np.isfinite(turned)]
-        numbers = {
+        enough = len(turned) >= FEWEST
+        return {
             log_distance_rms.name: math.sqrt(np.mean(distances**2)),
             log_distance_max.name: float(distances.max()),
+            log_heading_rms.name: math.sqrt(np.mean(turned**2)) if enough else math.nan,
             log_instants.name: float(count),
         }
-        if len(turned) >= FEWEST:
-            numbers[log_heading_rms.name] = math.sqrt(np.mean(turned**2))
-        return numbers
 
     def beside_speeds(self, label: str, run: Recording) -> list[Finding]:
         """A remark where it is much faster or slower than a run, as in other units."""

@@ -21,10 +21,14 @@ METRIC = "metric"
 END = "path_time"  # the metric that says when a path was over
 HEAD = ("", "unit")  # before the runs
 LAST = "name"  # of a metric in claims and in comparison.csv, after the runs
-NOTE = (
+RANKED = (
     "* smallest of its row among the runs that end at their target, except for measured times and, "
     "where a law keeps a standoff, for numbers that contain it; in brackets the ratio to the first "
-    "run; - not defined, or the run did not finish"
+    "run; "
+)
+UNDEFINED = (
+    "- not defined, or the run did not finish, or it was made before: times that were measured at "
+    "another time do not compare"
 )
 DIGITS = 5  # of a number
 FEW = 3  # where there is room for the numbers alone
@@ -149,6 +153,11 @@ def window(frame: Table) -> str:
     )
 
 
+def note(frame: Table) -> str:
+    """What the marks of the table mean; a run by itself is not ranked."""
+    return f"{RANKED if len(frame.columns) > 1 else ''}{UNDEFINED}"
+
+
 def rows(
     frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
     *, chosen: Sequence[str] = (), brief: bool = False, ratios: bool = True,
@@ -156,14 +165,15 @@ def rows(
     """The rows of the metrics `chosen`, in this order; best numbers marked with *.
 
     None chosen: all, those that a reader sees first before the others. `unsettled` are the runs
-    that do not end at their target; they are never the best. `brief` numbers have FEW digits.
+    that do not end at their target; they are never the best, and neither is a run by itself.
+    `brief` numbers have FEW digits.
     """
     of_metrics = dict[str, Row]()
     unranked, finished = _unranked(frame, known), frame.finished
-    out = [label in unsettled for label in frame.columns]
+    out, is_ranked = [label in unsettled for label in frame.columns], len(frame.columns) > 1
     for name, numbers in frame.rows.items():
         ranked = [x for x, off in zip(numbers, out, strict=True) if not (off or math.isnan(x))]
-        best = math.nan if name in unranked else min(ranked, default=math.nan)
+        best = min(ranked, default=math.nan) if name not in unranked and is_ranked else math.nan
         first, metric = numbers[0], known[name]
         texts = [
             metric.undefined if metric.happens and finished[i] and math.isnan(number) else
@@ -265,7 +275,7 @@ def as_markdown(
     lines = [top, ["---", "---", *["---:"] * len(frame.columns), "---"], *texts]
     return (
         "\n".join("| " + " | ".join(line) + " |" for line in lines)
-        + f"\n\n{'; '.join(filter(None, (NOTE, escaping.markdown(window(frame)))))}\n"
+        + f"\n\n{'; '.join(filter(None, (note(frame), escaping.markdown(window(frame)))))}\n"
         + ("\n".join(["", *failures, ""]) if failures else "")
     )
 

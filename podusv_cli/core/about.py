@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, PositiveInt, model_validator
 
@@ -214,7 +214,8 @@ class RunAbout(_Plain):
     one. `outages` are times without samples of each of x, y, psi, u, v, r. `polar` says that the
     law is of the first paper's family, `optimum_of` which metric the motion minimises, if it is no
     law's. `said` is what each part says of itself, by the key of its section; `settings` are what
-    the scenario sets itself, `law` all keys of the law.
+    the scenario sets itself, `law` all keys of the law. `log_columns` and `log_frame` are
+    what a log beside the run calls its quantities, as under `identify`.
     """
 
     values: dict[str, Any]
@@ -241,6 +242,8 @@ class RunAbout(_Plain):
     law: tuple[SettingAbout, ...]
     path_end: dict[str, float] = {}  # runs of older versions have neither
     path_steady: dict[str, float] = {}
+    log_columns: dict[str, str] = {}
+    log_frame: Literal["ned", "enu"] = "ned"
 
     @property
     def name(self) -> str:

@@ -158,13 +158,13 @@ def installed() -> Plugins:
             if point.group in GROUPS
         )
         # the first one hides another
-        if points and package.name not in by_package and _is_from_installer(package):
+        if points and package.name not in by_package and is_from_installer(package):
             digest = _package_digest(points)
             by_package[package.name] = Plugin(package.name, digest, package.version, offers=points)
     return tuple(by_package[name] for name in sorted(by_package))
 
 
-def _is_from_installer(package: Distribution) -> bool:
+def is_from_installer(package: Distribution) -> bool:
     """Whether this package lies where installers of this Python put it, or in one's own folder.
 
     Python looks for packages in the current folder too: `python -m` and notebooks do.

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
@@ -31,7 +33,7 @@ HIGH_MAP = 3.1  # inches, the height of a map beside close-ups
 MAP_WIDTHS = (1.0, 3.6)  # inches, of such a map
 WIDE_MAP = 1.6  # times as wide as high, from where a map stands above the close-ups
 NAME = 36  # letters of a run's name in a title
-DEVIATION = "e_ct"  # from a path that is followed
+DEVIATION, LEG = "e_ct", "leg"  # from a path that is followed, and how much of it is done
 FRAME: dict[str, Any] = {"fill": False, "edgecolor": "#444444", "linewidth": 0.5}
 LEAST_DISTANCE = 1e-4  # m, on a logarithmic axis
 NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
@@ -68,11 +70,11 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 @figure(
     "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
     caption="tracks and target or path, on a map, with hulls enlarged where its title says so, and "
-    "close up, with hulls to scale: on a path where a run is farthest from the path, else at the "
-    "end and, where runs were farther apart before, at their largest gap; curves are the distance "
-    "of each run from the path, of a run alone from the target, else from the first run at the "
-    "same time; of tracks that coincide, the first is the broadest; x marks where a run ended "
-    "early",
+    "close up, with hulls to scale: on a path where a run is farthest from the path once it has "
+    "come to a leg, else at the end and, where runs were farther apart before, at their largest "
+    "gap; curves are the distance of each run from the path, of a run alone from the target, else "
+    "from the first run at the same time; of tracks that coincide, the first is the broadest; x "
+    "marks where a run ended early",
 )  # fmt: skip
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
@@ -176,7 +178,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     scale = enlargement(runs)
     for run in runs:
         for t in run.start + run.look.places * (run.end - run.start):
-            axes.add_patch(Polygon(hull_of(run, float(t), scale), **_outline(run)))
+            _draw_hull(axes, run, float(t), scale)
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")
     given = {point for run in runs for point in run.about.waypoints}
@@ -194,10 +196,16 @@ def _accepting(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.add_patch(Circle((east, north), radius, **ACCEPTANCE))
 
 
-def _outline(run: Shown) -> dict[str, Any]:
-    """How a hull is drawn: not filled, and in the run's line style, so that none hides another."""
-    style = run.linestyle
-    return {"fill": False, "edgecolor": run.color, "linestyle": style, "linewidth": 0.7}
+def _draw_hull(axes: Axes, run: Shown, t: float, scale: float) -> None:
+    """Draw a run's hull at a time [s], where its heading is known; grey after the end of its path.
+
+    It is not filled, and in the run's line style, so that none hides another.
+    """
+    outline = hull_of(run, t, scale) if run.has("psi") else np.full((1, 2), np.nan)
+    color = run.color if t <= run.counts_to else AFTER["color"]
+    look = {"fill": False, "edgecolor": color, "linestyle": run.linestyle, "linewidth": 0.7}
+    if np.isfinite(outline).all():
+        axes.add_patch(Polygon(outline, **look))
 
 
 def _mark_ends(axes: Axes, runs: Sequence[Shown], east: Span, north: Span) -> None:
@@ -235,7 +243,7 @@ def views(runs: Sequence[Shown]) -> list[View]:
     finished = scaling(runs)
     target = next(target for target in targets(runs) if finished[0] in target.runs)
     kept = [run for run in finished if run in target.runs]
-    last = min(run.end for run in kept)
+    last = min(run.counts_to for run in kept)
     if target.in_sight and not target.is_ahead and all(run.has(DEVIATION) for run in kept):
         return [_deviation(kept, target, last)]
     names = ("y_d", "x_d") if target.is_ahead else ("y", "x")
@@ -245,7 +253,7 @@ def views(runs: Sequence[Shown]) -> list[View]:
 
 def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle: Vector) -> View:
     """The runs at a time, with the tracks before and after it."""
-    last = min(run.end for run in runs)
+    last = min(run.counts_to for run in runs)
     span = t - LAST_PART * last, min(t + LAST_PART * last, last)
     at = np.array([[run.at(t, name) for name in ("y", "x")] for run in runs])
     away = 1.3 * float(np.max(np.hypot(*(at - middle).T)))
@@ -256,14 +264,30 @@ def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle:
 
 def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
     """Where a run is farthest from its path, once the approach is over."""
-    after = (APPROACH * last, last)
-    worst = max(runs, key=lambda run: float(np.max(np.abs(run.during(DEVIATION, after)[1]))))
-    t, error = np.abs(worst.during(DEVIATION, after))
-    instant = float(t[np.argmax(error)])
+    errors = [np.where(_is_on_leg(run, last), np.abs(run.signal(DEVIATION)), 0.0) for run in runs]
+    largest = int(np.argmax([error.max() for error in errors]))
+    worst, error = runs[largest], errors[largest]
+    instant = float(worst.recording["time"][np.argmax(error)])
     middle = np.array([worst.at(instant, name) for name in ("y", "x")])
     reach = min(max(NEAREST * worst.length, 1.5 * float(error.max())), FARTHEST * worst.length)
     name = "farthest from the path"
     return View(name, instant, runs, (0.0, np.inf), [worst], target, middle, reach)
+
+
+def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
+    """At which instants, after the approach, the run has come to its leg.
+
+    At a change of legs the error begins anew, with up to the radius of acceptance. That is the
+    corner's until the vessel crosses the leg, or is as near to it as on half of the leg.
+    """
+    t, error = run.recording["time"], run.signal(DEVIATION)
+    counts = (t >= APPROACH * last) & (t <= last)
+    begins = [*np.flatnonzero(np.diff(run.signal(LEG))) + 1, len(t)] if run.has(LEG) else []
+    for begin, end in pairwise(begins):
+        own, size = error[begin:end], np.abs(error[begin:end])
+        came = int(np.argmax((own * own[0] <= 0.0) | (size <= np.median(size))))
+        counts[begin : begin + came] = False
+    return counts
 
 
 def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
@@ -285,7 +309,7 @@ def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
     """Tracks around the time of the view, hulls to scale."""
     _draw_tracks(axes, [view.target], view.tracks, view.span, among)
     for run in view.hulls:
-        axes.add_patch(Polygon(hull_of(run, view.t, 1.0), **_outline(run)))
+        _draw_hull(axes, run, view.t, 1.0)
     if view.target.is_ahead:
         aim = [[view.tracks[0].at(view.t, name)] for name in ("y_d", "x_d")]
         label = f"{view.target.line_style['label']} at this time"

@@ -44,6 +44,7 @@ from podusv_cli.workflows.in_memory import run_in_memory
 from podusv_cli.workflows.measured import is_log
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
+from podusv_cli.workflows.request import Request
 
 
 class _Noticed(BaseModel):
@@ -111,14 +112,15 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
 def compare(
     sources: Source | Run | Iterable[Source | Run], changes: Changes | None = None, *,
     out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
-    align: Literal["", "start"] = "",
+    align: Literal["", "start", "place"] = "",
 ) -> Comparison:  # fmt: skip
     """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
 
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
-    mixture; beside them a log of a boat, such as "sea_trial.csv". With `align="start"` the log is
-    moved to where the first run is at the first instant that both have. Raises ScenarioError,
-    UsageError, StorageError.
+    mixture; beside them a log of a boat, such as "sea_trial.csv". With `align="start"` its clock
+    and place are moved so that its first position is the first run's at the first instant; with
+    "place" its place alone, by the first instant that both have. Raises ScenarioError, UsageError,
+    StorageError.
 
     >>> import podusv
     >>> scenario = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": 30.0})
@@ -293,9 +295,9 @@ def _single(given: Loaded) -> Scenario:
     return scenario.alone()
 
 
-def request(out: Any, force: bool, figures: bool) -> running.Request:
+def request(out: Any, force: bool, figures: bool) -> Request:
     """The options of a run that is written."""
-    return running.Request(out=Path(out) if out is not None else None, force=force, figures=figures)
+    return Request(out=Path(out) if out is not None else None, force=force, figures=figures)
 
 
 def _opened(member: Member) -> Run:

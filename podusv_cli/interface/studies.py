@@ -23,7 +23,8 @@ from podusv_cli.studies.telling.outputs import as_frame
 from podusv_cli.studies.telling.results import Results, judged
 from podusv_cli.workflows import studies as folders
 from podusv_cli.workflows import sweep as sweeping
-from podusv_cli.workflows.many_runs import Config, Request
+from podusv_cli.workflows.many_runs import Config
+from podusv_cli.workflows.request import Request
 
 if TYPE_CHECKING:
     import xarray
@@ -153,7 +154,7 @@ def sweep(
     {'law': 1, 'draw': 4}
     """
     config, overrides = _config(source, changes)
-    request = Request(overrides, _path(out), workers, figures=figures, trust=trust)
+    request = Request(overrides, _path(out), workers=workers, figures=figures, trust=trust)
     done = sweeping.run(config, request, lambda tally: None)
     if done.results is None:
         raise UsageError(f"{done.folder} is not whole: {continue_with('sweep run', done.folder)}")
@@ -217,7 +218,7 @@ def tune(
     from podusv_cli.workflows import tune as searching
 
     config, overrides = _config(source, changes)
-    request = Request(overrides, _path(out), workers, figures=figures, trust=trust)
+    request = Request(overrides, _path(out), workers=workers, figures=figures, trust=trust)
     done = searching.tune(config, request, lambda tally, text: None)
     answer = done.as_json()
     return Tuning(
@@ -267,9 +268,9 @@ def bench(
     axes = {"tasks": tasks, "vessels": vessels, "conditions": conditions}
     place = Path(folder) if folder else shipped_bench()
     wanted: Selection = Selection(place, [Path(law) for law in laws], assignments(changes), axes)
-    request = benching.Request(Path(out), force, figures, workers, optimum=optimum)
-    done = benching.bench(wanted, request)
-    return Bench(done.folder, done.runs, done.board, done.missing)
+    request = Request(out=Path(out), force=force, figures=figures, workers=workers)
+    done = benching.bench(wanted, request, optimum=optimum)
+    return Bench(done.folder, done.runs, done.board, tuple(map(str, done.missing)))
 
 
 def _config(source: Source, changes: Changes | None) -> tuple[Config, Sequence[str]]:

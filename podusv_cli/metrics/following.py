@@ -73,7 +73,7 @@ e_ct_rms = Metric(
 e_ct_max = Metric(
     "e_ct_max",
     "m",
-    "largest cross-track error",
+    "largest cross-track error, which begins anew at each change of legs, with up to `acceptance`",
     OF,
     lambda seen, step: float(seen[LARGEST]),
     place=1,

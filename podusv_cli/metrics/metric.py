@@ -70,10 +70,10 @@ class Accumulator:
     The kernel `watch(t, weight, steady, s, row, k, seen)` is called like a probe's, see
     `Probe`, up to the end of a path that has one (`spans`). `steady` is 1 in the steady window, 0
     before it, and 2 where the window begins anew: what was gathered of it is void. Its `seen` are
-    `size` numbers, 0 at first; with size 0 it is left out. It reads `constants` from `k`; a name
-    used by several accumulators must have one value. Every run of a batch has constants of its own,
-    and the same size. Runs march side by side only with runs of equal constants, but for those
-    named in `differing`.
+    `size` numbers, at first those of `first` and then 0; with size 0 it is left out. It reads
+    `constants` from `k`; a name used by several accumulators must have one value. Every run of a
+    batch has constants of its own, and the same size. Runs march side by side only with runs of
+    equal constants, but for those named in `differing`.
 
     `of_target`: what is gathered is about the distance to a target. Neither a manoeuvring trial nor
     a path that is followed has one; it is left out there.
@@ -88,6 +88,7 @@ class Accumulator:
     integrals: int = 0
     differing: tuple[str, ...] = ()
     of_target: bool = False
+    first: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

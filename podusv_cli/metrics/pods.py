@@ -56,9 +56,9 @@ at_angle_limit = Metric(
     words="share of time at a pod's angle limit",
 )  # fmt: skip
 at_rate_limit = Metric(
-    "at_rate_limit", "1", "part of the time with a pod's angle at its rate limit", OF,
+    "at_rate_limit", "1", "part of the time in which a pod turns as fast as its drive can", OF,
     ratio(RATE, TIME), place=6,
-    words="share of time at a pod's rate limit",
+    words="share of time at a pod's fastest turning",
 )  # fmt: skip
 energy = Metric(
     "energy_pod", "J", "integral of the propellers' power, where it is known", OF,

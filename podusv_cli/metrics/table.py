@@ -16,9 +16,9 @@ from podusv_cli.core.kernel import Vector, kernel, specialise, tail, taking
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.metrics import spans
+from podusv_cli.metrics import spans, windows
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, close_integrals
-from podusv_cli.metrics.windows import NONE, Radii, Windows, named
+from podusv_cli.metrics.windows import ERROR_RMS, NONE, Radii, Windows, named
 
 
 @cache
@@ -74,11 +74,17 @@ def chained(
 
 @cache
 def _watch(parts: Parts) -> Callable[..., None]:
-    """One kernel that calls those of all parts, each with the numbers that follow the last's."""
+    """One kernel that calls those of all parts, each with the numbers that follow the last's.
+
+    How many numbers the last part gathers is no part of the code.
+    """
     if not parts:
         return first_kernel
     (first, count), *others = parts
-    kernels = {"first_kernel": taking(first.watch, WATCH), "other_kernels": _watch(tuple(others))}
+    inner = taking(first.watch, WATCH)
+    if not others:
+        return inner  # type: ignore[no-any-return]
+    kernels = {"first_kernel": inner, "other_kernels": _watch(tuple(others))}
     return specialise(chained, "metrics", COUNT=count, **kernels)  # type: ignore[no-any-return]
 
 
@@ -117,6 +123,16 @@ class Metrics(Probe):
                     what = f"has another constant {name!r} than another metric"
                     raise LawError(f"metric {metric}: its accumulator {what}; give it another name")
         return constants
+
+    def first(self) -> Vector:
+        """What is gathered before the first instant: numbers that accumulators begin with."""
+        return self._first.copy()
+
+    @cached_property
+    def _first(self) -> Vector:
+        parts = [np.zeros(self.ahead)]
+        parts += [np.array([*p.first, *[0.0] * (n - len(p.first))]) for p, n in self.parts]
+        return np.concatenate(parts)
 
     @cached_property
     def _accumulators(self) -> dict[Accumulator, str]:
@@ -167,7 +183,8 @@ class Metrics(Probe):
 
         `seen` has a row a run, too.
         """
-        seen = np.where(seen.any(axis=1, keepdims=True), seen, np.nan)  # no instant at all: NaN
+        begun = (seen != self._first).any(axis=1, keepdims=True)
+        seen = np.where(begun, seen, np.nan)  # no instant at all: NaN
         seen = seen[:, self.ahead :]
         ends = np.cumsum([size for _, size in self.parts])[:-1]
         own = {
@@ -206,8 +223,15 @@ def metrics_probe(
 
 
 def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
-    """Every accumulator, with a metric that is computed from it."""
-    return {metric.accumulator: name for name, metric in known.items() if metric.accumulator}
+    """Every accumulator, with a metric that is computed from it.
+
+    That of windows and radii is always there and the last, so that any of them need the same code.
+    """
+    found = {metric.accumulator: name for name, metric in known.items() if metric.accumulator}
+    own = next((part for part in found if part.watch is windows.watch), None)
+    last = own or windows.accumulator(*NONE)
+    name = found.pop(last, ERROR_RMS.name)
+    return {**found, last: name}
 
 
 def _asked_span(layout: Measured) -> dict[str, float]:
@@ -227,7 +251,11 @@ def _asked(part: Accumulator, metric: str, layout: Measured) -> tuple[int, dict[
         return 0, {}
     try:
         size = part.size(layout)
-        return size, dict(part.constants(layout)) if size else {}
+        constants = dict(part.constants(layout)) if size else {}
     except Exception as error:  # a plug-in's function may raise anything
         what = "its accumulator, asked for size and constants"
         raise LawError(f"metric {metric}, {what}: {in_a_line(error)}") from error
+    if size and len(part.first) > size:
+        what = f"begins with {len(part.first)} numbers and gathers {size}"
+        raise LawError(f"metric {metric}: its accumulator {what}; give `first` at most {size}")
+    return size, constants

@@ -9,15 +9,17 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from podusv_cli.core.kernel import Vector, kernel, specialise
+from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.engine.step.layout import DISTANCE
 from podusv_cli.metrics.metric import Accumulator, Metric, Result, standoff_of
 
 NAMED = "NAME"  # stands for a scenario's word in the name of a metric
 NEAR = 1e-9  # s; an instant this near to an end of a window belongs to it
-FROM, TO, RADIUS = math.inf, math.inf, 0.0  # placeholders of one window [s] and one radius [m]
-LENGTH, SQUARE, LARGEST, BEYOND, NOW, LAST, WINDOW = range(7)
+# Positions of what is gathered: the instant before; then each window, and then each radius.
+NOW, LAST, EACH = range(3)
+FROM, TO, LENGTH, SQUARE, LARGEST, BEYOND, WINDOW = range(7)
 CROSSED, BEFORE, DISTANCE_BEFORE, SETTLING = range(4)
+RADIUS = 1 + SETTLING  # the radius itself, and what `settle` gathers
 
 Windows = tuple[tuple[str, tuple[float, float]], ...]  # from and to [s]
 Radii = tuple[tuple[str, float], ...]  # m
@@ -25,16 +27,16 @@ NONE: tuple[Windows, Radii] = ((), ())
 
 
 @kernel
-def window(t: float, row: Vector, k: Any, seen: Vector) -> None:
+def window(
+    t: float, z_e: float, standoff: float, before: float, z_e_before: float, own: Vector
+) -> None:
     """Gather z_e^2 from one instant to the next, both in the window, and the largest errors."""
-    z_e = row[DISTANCE]
-    if t >= FROM - NEAR and t <= TO + NEAR:
-        if t > 0.0 and seen[NOW] >= FROM - NEAR:
-            seen[LENGTH] += t - seen[NOW]
-            seen[SQUARE] += 0.5 * (t - seen[NOW]) * (z_e * z_e + seen[LAST] * seen[LAST])
-        seen[LARGEST] = max(seen[LARGEST], z_e)
-        seen[BEYOND] = max(seen[BEYOND], abs(z_e - k.standoff))
-    seen[NOW], seen[LAST] = t, z_e
+    if t >= own[FROM] - NEAR and t <= own[TO] + NEAR:
+        if t > 0.0 and before >= own[FROM] - NEAR:
+            own[LENGTH] += t - before
+            own[SQUARE] += 0.5 * (t - before) * (z_e * z_e + z_e_before * z_e_before)
+        own[LARGEST] = max(own[LARGEST], z_e)
+        own[BEYOND] = max(own[BEYOND], abs(z_e - standoff))
 
 
 @kernel
@@ -52,9 +54,19 @@ def settle(t: float, z_e: float, radius: float, at: int, seen: Vector) -> None:
 
 
 @kernel
-def within(t: float, row: Vector, seen: Vector) -> None:
-    """Gather when z_e last came within the radius."""
-    settle(t, row[DISTANCE], RADIUS, 0, seen)
+def watch(t: float, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather over each window, and when z_e last came within each radius.
+
+    Their numbers are data in `seen`, not in the code: one kernel serves any windows and radii.
+    """
+    z_e, at = row[DISTANCE], EACH
+    for _ in range(int(k.own_windows)):
+        window(t, z_e, k.standoff, seen[NOW], seen[LAST], tail(seen, at))
+        at += WINDOW
+    for _ in range(int(k.own_radii)):
+        settle(t, z_e, seen[at], at + 1, seen)
+        at += RADIUS
+    seen[NOW], seen[LAST] = t, z_e
 
 
 def settled_from(crossed: float) -> float:
@@ -82,13 +94,17 @@ SETTLED = Metric(
 )  # fmt: skip
 
 
-def _over(to: float, number: Callable[[Vector], float]) -> Result:
-    """A number of a window; NaN for a run that ended before it."""
-    return lambda seen, step: number(seen) if seen[NOW] >= to - NEAR else math.nan
+def _over(to: float, at: int, number: Callable[[Vector], float]) -> Result:
+    """A number of the window that stands at this place; NaN for a run that ended before it."""
+    return lambda seen, step: number(seen[at : at + WINDOW]) if seen[NOW] >= to - NEAR else math.nan
 
 
-def _rms(seen: Vector) -> float:
-    return math.sqrt(seen[SQUARE] / seen[LENGTH]) if seen[LENGTH] else math.nan
+def _rms(own: Vector) -> float:
+    return math.sqrt(own[SQUARE] / own[LENGTH]) if own[LENGTH] else math.nan
+
+
+def _at(position: int) -> Callable[[Vector], float]:
+    return lambda own: float(own[position]) if own[LENGTH] else math.nan
 
 
 def _named(
@@ -100,18 +116,12 @@ def _named(
     )  # fmt: skip
 
 
-def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
-    watch = specialise(window, f"window_{name}", FROM=start, TO=to)
-    of = Accumulator(
-        watch, lambda layout: WINDOW, standoff_of, differing=("standoff",), of_target=True
-    )
+def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> tuple[Metric, ...]:
+    """The metrics of a window whose numbers stand at this place."""
     span = f"from {start:g} s to {to:g} s"
-    largest = _over(to, lambda seen: float(seen[LARGEST]) if seen[LENGTH] else math.nan)
-    beyond = _over(to, lambda seen: float(seen[BEYOND]) if seen[LENGTH] else math.nan)
+    rms, largest, beyond = (_over(to, at, f) for f in (_rms, _at(LARGEST), _at(BEYOND)))
     return (
-        _named(
-            ERROR_RMS, name, f"rms of z_e {span}", of, _over(to, _rms), f"rms distance {span}"
-        ),
+        _named(ERROR_RMS, name, f"rms of z_e {span}", of, rms, f"rms distance {span}"),
         _named(ERROR_MAX, name, f"largest z_e {span}", of, largest, f"largest distance {span}"),
         _named(
             BEYOND_MAX, name, f"largest |z_e - standoff| {span}", of, beyond,
@@ -120,21 +130,45 @@ def _of_window(name: str, start: float, to: float) -> tuple[Metric, ...]:
     )  # fmt: skip
 
 
-def _of_radius(name: str, radius: float) -> Metric:
-    watch = specialise(within, f"within_{name}", RADIUS=radius)
-    of = Accumulator(watch, lambda layout: SETTLING, lambda layout: {}, of_target=True)
+def _of_radius(name: str, radius: float, of: Accumulator, at: int) -> Metric:
+    """The metric of a radius whose numbers stand at this place."""
     meaning = f"time from which z_e stays within {radius:g} m"
     return _named(
-        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[CROSSED]),
+        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[at + 1 + CROSSED]),
         f"within {radius:g} m after",
     )  # fmt: skip
 
 
-@cache  # an accumulator's numbers are found by the accumulator itself
+@cache  # a probe finds an accumulator's numbers by the accumulator itself
+def accumulator(windows: Windows, radii: Radii) -> Accumulator:
+    """What gathers for these windows and radii; also for none, so that the code is the same."""
+    blank = [0.0] * EACH
+    of_windows = [x for _, ends in windows for x in (*ends, *[0.0] * (WINDOW - 2))]
+    of_radii = [x for _, radius in radii for x in (radius, *[0.0] * SETTLING)]
+    first = (*blank, *of_windows, *of_radii)
+    counts = {"own_windows": float(len(windows)), "own_radii": float(len(radii))}
+    return Accumulator(
+        watch,
+        lambda layout: len(first),
+        lambda layout: standoff_of(layout) | counts,
+        differing=("standoff",),
+        of_target=True,
+        first=first,
+    )
+
+
+@cache
 def named(windows: Windows, radii: Radii) -> dict[str, Metric]:
     """The metrics of these windows and radii, by name."""
-    metrics = [metric for name, ends in windows for metric in _of_window(name, *ends)]
-    metrics += [_of_radius(name, radius) for name, radius in radii]
+    of, after = accumulator(windows, radii), EACH + WINDOW * len(windows)
+    metrics = [
+        metric
+        for i, (name, ends) in enumerate(windows)
+        for metric in _of_window(name, *ends, of, EACH + WINDOW * i)
+    ]
+    metrics += [
+        _of_radius(name, radius, of, after + RADIUS * i) for i, (name, radius) in enumerate(radii)
+    ]
     return {metric.name: metric for metric in metrics}
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 import secrets
+import sys
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from queue import Empty, SimpleQueue
@@ -40,6 +41,11 @@ class _Server(ThreadingHTTPServer):
         self.base = f"/{secrets.token_urlsafe(16)}/"
         self.hosts = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
         self.page, self.jobs = page(self.base).encode(), SimpleQueue[_Job]()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Print what went wrong; nothing where the browser has left, which is no fault."""
+        if not isinstance(sys.exception(), ConnectionError):
+            super().handle_error(request, client_address)
 
 
 class _Handler(BaseHTTPRequestHandler):

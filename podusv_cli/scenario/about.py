@@ -11,23 +11,27 @@ from podusv_cli.core.about import BESIDE_RUNS, RunAbout
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.metrics.table import METRICS
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.settings import changed, parts, settings
 
 
-def about_of(scenario: Scenario) -> RunAbout:
+def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
     """What the run of a scenario with one law says about itself.
+
+    `identify` says what a log beside the run calls its quantities; the scenario of one run has no
+    such section.
 
     Raises LawError where a component of a plug-in fails when it is asked.
     """
     try:
-        return _told_by(scenario)
+        return _told_by(scenario, identify or Identify())
     except Exception as error:  # a plug-in's method may raise anything
         what = f"what {scenario.name} says about itself (hull, path, limits, standoff)"
         raise LawError(f"{what} cannot be had: {in_a_line(error)}") from error
 
 
-def _told_by(scenario: Scenario) -> RunAbout:
+def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
     law, approach = scenario.controller, scenario.controller.approach()
     return RunAbout(
         **_of_parts(scenario),
@@ -42,6 +46,7 @@ def _told_by(scenario: Scenario) -> RunAbout:
         settling_radius=scenario.metrics.settling_radius,
         said={name: _said(part) for name, part in (parts(scenario) | {"controller": law}).items()},
         settings=tuple(changed(scenario)), law=tuple(settings(law, scenario.facts)),
+        log_columns=identify.columns, log_frame=identify.frame,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import evaluated
 from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.reference import Reference, reference
 from podusv_cli.scenario.resolved import resolved_yaml
@@ -22,11 +23,13 @@ from podusv_cli.scenario.resolved import resolved_yaml
 class Case:
     """A scenario with one law, its plan, and what is needed of it several times, computed once.
 
-    The plan is the run's loop on its grid, with the probe of all metrics.
+    The plan is the run's loop on its grid, with the probe of all metrics. `identify` says what a
+    log beside the run calls its quantities.
     """
 
     scenario: Scenario
     plan: Plan
+    identify: Identify | None = None
 
     @classmethod
     def of(cls, scenario: Scenario) -> Case:
@@ -41,7 +44,7 @@ class Case:
     @cached_property
     def about(self) -> RunAbout:
         """What readers of its run need."""
-        return about_of(self.scenario)
+        return about_of(self.scenario, self.identify)
 
     @cached_property
     def resolved_yaml(self) -> str:

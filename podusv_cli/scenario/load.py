@@ -92,11 +92,14 @@ class Loaded:
     def cases(self) -> dict[str, Case]:
         """The case of each law's run, by label; none where values contradict."""
         singles = self.scenario.singles()
-        return {label: Case(singles[label], plan) for label, plan in self.plans.items()}
+        return {
+            label: Case(singles[label], plan, self.scenario.identify)
+            for label, plan in self.plans.items()
+        }
 
     def case(self, single: Scenario) -> Case:
         """That of one run, with the plan that `plan` has for it."""
-        return Case(single, self.plan(single))
+        return Case(single, self.plan(single), self.scenario.identify)
 
     @cached_property
     def clashes(self) -> list[tuple[str, str]]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from functools import cache
-from importlib.resources import as_file, files
 from pathlib import Path
 
+import podusv_cli
 from podusv_cli.core.phrases import did_you_mean
 
 PREFIX = "podusv:"
@@ -17,10 +17,11 @@ RENAMED = "renamed.txt"  # beside the scenarios: a folder's old name and its new
 def folder(room: str = "configs") -> Path:
     """Where the shipped scenarios, or pages or examples, are on this machine.
 
-    It is a link to the checkout's folder, and in an installed package the files themselves.
+    An installed package has them inside; in a checkout they lie beside it.
     """
-    with as_file(files("podusv_cli") / room) as path:
-        return path
+    package = Path(podusv_cli.__file__).parent
+    inside = package / room
+    return inside if inside.is_dir() else package.parent / room
 
 
 @cache

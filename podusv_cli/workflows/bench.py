@@ -20,20 +20,10 @@ from podusv_cli.studies.bench.bench_folder import draw_figures, write_files
 from podusv_cli.studies.bench.cases import BenchCase, Selection, cases
 from podusv_cli.studies.bench.optima import Least
 from podusv_cli.studies.bench.runs import BenchRun, crashed, play
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True)
-class Request:
-    """The options of `podusv bench`; see its help."""
-
-    out: Path
-    force: bool = False
-    figures: bool = True
-    workers: int = 0
-    argv: Sequence[str] = ()
-    optimum: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,7 +32,7 @@ class Benched:
 
     folder: Path
     runs: pd.DataFrame
-    missing: tuple[str, ...] = ()
+    missing: tuple[Failure, ...] = ()
 
     @property
     def board(self) -> pd.DataFrame:
@@ -59,20 +49,24 @@ class Benched:
         board = self.board.astype(object).where(self.board.notna(), None)
         return {
             "format": 1, "folder": str(self.folder), "runs": len(self.runs),
-            "leaderboard": board.reset_index().to_dict("records"), "missing": self.missing,
+            "leaderboard": board.reset_index().to_dict("records"),
+            "missing": [str(failure) for failure in self.missing],
         }  # fmt: skip
 
 
-def bench(wanted: Selection, request: Request, progress: Progress | None = None) -> Benched:
-    """Simulate every law in every case and write the leaderboard.
+def bench(
+    wanted: Selection, request: Request, progress: Progress | None = None, *, optimum: bool = False
+) -> Benched:
+    """Simulate every law in every case and write the leaderboard; `optimum` finds that of each.
 
     Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before
     anything is simulated, StorageError, and KeyboardInterrupt; then nothing is written.
     """
-    if request.optimum:
+    if optimum:
         casadi()
     every = list(cases(wanted))
-    with RunWriter(request.out, force=request.force, argv=request.argv) as writer:
+    folder = request.out or RESULTS / "bench"
+    with RunWriter(folder, force=request.force, argv=request.argv) as writer:
         extras = writer.extras
         scenarios = [scenario for case in every for scenario in case.laws.values()]
         for position, scenario in enumerate(scenarios, 1):
@@ -81,7 +75,7 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
                 progress("compiling, once", position / len(scenarios))
         runs = list(_simulated(every, request, progress))
         made = standing.table(runs)
-        solved = list(_solved(every, runs, request, progress, extras)) if request.optimum else []
+        solved = list(_solved(every, runs, request, progress, extras)) if optimum else []
         made = standing.with_optima(made, solved) if solved else made
         with interrupts_deferred():
             figures = draw_figures(runs, made, extras) if request.figures else []
@@ -89,7 +83,7 @@ def bench(wanted: Selection, request: Request, progress: Progress | None = None)
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
             write_files(writer, made, figures, writer.add_origin(plugins), solved)
-            return Benched(writer.finish(), made, tuple(map(str, extras.missing)))
+            return Benched(writer.finish(), made, tuple(extras.missing))
 
 
 def _simulated(

@@ -15,12 +15,13 @@ from podusv_cli.comparison import claims, outputs, table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.known_metrics import metrics_of
 from podusv_cli.comparison.optimum import related
+from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.finding import Finding, merged
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.core.recording import Status
+from podusv_cli.core.recording import Recording, Status
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED, metrics_with
@@ -36,7 +37,8 @@ from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
-from podusv_cli.workflows.run import RESULTS, Request, check_asked, opened, writer_of
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS, check_asked, opened, writer_of
 from podusv_cli.workflows.verify import is_verified
 
 if TYPE_CHECKING:
@@ -55,7 +57,7 @@ class Compared:
     status: Status  # "interrupted" where a run or the figures were, else "finished"
     missing: tuple[Failure, ...] = ()  # in the comparison and its runs
     doubted: Doubted | None = None  # what the verdicts hang on, where that was asked for
-    verified: bool = False  # whether `podusv verify` has found all of its numbers converged
+    unverified: tuple[str, ...] = ()  # runs whose numbers `podusv verify` has not found converged
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of a comparison."""
@@ -166,8 +168,10 @@ def compare_gathered(
         origin = writer.add_origin(result.plugins)
         _add_report(writer, result, given.name, origin, extras, progress, request)
         folder = writer.finish(missing=lost)
-        verified = all(is_verified(m.resolved) for m in given.members if not m.track)
-        return Compared(folder, result, writer.status, tuple(extras.missing), doubted, verified)
+        made = {run.label for run in result.runs}
+        runs = [m for m in given.members if m.label in made and not m.track]
+        unverified = tuple(m.label for m in runs if not is_verified(m.resolved))
+        return Compared(folder, result, writer.status, tuple(extras.missing), doubted, unverified)
 
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
@@ -287,15 +291,23 @@ def collect(
 def _placed(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
     """The members; what was measured where it is to stand, with what the runs show of it."""
     logs = {run.label: run.recording for run in runs if len(run.recording["time"])}
+    done = [_done_after(m.about, logs[m.label]) for m in members if m.label in logs]
     placed = []
     for member in members:
         if member.track and logs:
             label, first = next(iter(logs.items()))
             remarks = member.track.beside_speeds(label, first)
-            track = member.track.placed(first)
-            member = replace(member, track=track, noticed=[*member.noticed, *remarks])
+            track = member.track.placed(label, first)
+            remarks = [*track.remarks, *remarks]
+            about = track.about(member.about, max(done))
+            member = replace(member, track=track, noticed=remarks, about=about)
         placed.append(member)
     return placed
+
+
+def _done_after(about: RunAbout, log: Recording) -> float:
+    """When a run has done its path [s], or ends before; infinite for a path without an end."""
+    return float(log.up_to(about.path_end)["time"][-1]) if about.path_end else math.inf
 
 
 def _measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[PastRun]:

@@ -36,7 +36,8 @@ from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.doubt_study import doubt_study
 from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
-from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS, opened, writer_of
 
 Progress = Callable[[str, float], None]
 

@@ -23,8 +23,9 @@ from podusv_cli.scenario import plugins
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.studies.counting.verdict import StudyVerdict
-from podusv_cli.workflows import many_runs, sweep
-from podusv_cli.workflows.run import RESULTS, Request
+from podusv_cli.workflows import sweep
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS
 
 Progress = Callable[[str, float], None]
 NO_LOGS = "sweep.keep=null"  # the study's own has them
@@ -40,7 +41,7 @@ class Studies:
 
     def judged(self, name: str, new: list[str]) -> tuple[Judged, list[StudyVerdict]]:
         """The verdicts of the study with new values; what is there already is not made again."""
-        own = many_runs.Request(
+        own = Request(
             overrides=[*self.request.overrides, NO_LOGS, *new],
             out=self.folder / "studies" / name, workers=self.request.workers, figures=False,
             argv=self.request.argv, plugins=self.request.plugins, trust=self.request.trust,

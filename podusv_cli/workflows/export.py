@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,29 +24,22 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
+from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import others, single
 
 
 @dataclass(frozen=True)
-class Request:
-    """The options of `podusv export`; see its help."""
+class Products:
+    """What an exported law is written as: C, an FMU, and for which platforms (none: the usual)."""
 
-    to: Path
-    overrides: Sequence[str] = ()
-    controller: str = ""
-    force: bool = False
     c: bool = True
     fmu: bool = True
     platforms: Sequence[str] = ()
-    argv: Sequence[str] = ()
-    plugins: Sequence[str] = ()
-    trust: bool = False  # whether plug-in files in a folder of podusv may be executed
-    say: Callable[[str], None] = lambda text: None  # what is being done
 
 
-def export(config: Path, request: Request) -> Path:
+def export(config: Path, request: Request, products: Products = Products()) -> Path:
     """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
-    platforms, linked = _platforms(request), _linked(request) if request.fmu else {}
+    platforms, linked = _platforms(products), _linked(products) if products.fmu else {}
     too_large = limits(allow_large=False)
     checks, plugged = (unknown_codes, too_large), of_files(request.trust)
     loaded = load(config, request.overrides, checks, request.plugins, plugged).told(request.say)
@@ -58,7 +51,8 @@ def export(config: Path, request: Request) -> Path:
             f"too many of them in {scenario.simulation.duration:g} s; simulate less, as --set "
             "simulation.duration=100 [s]"
         )
-    with RunWriter(request.to, force=request.force, argv=request.argv) as writer:
+    folder = request.out or Path(f"{Path(str(config).removeprefix('podusv:')).stem}-law")
+    with RunWriter(folder, force=request.force, argv=request.argv) as writer:
         if names := ", ".join(others(loaded, request.controller)):
             request.say(f"exporting `controller`; --controller chooses among {names}")
         request.say("simulating the run that the law is checked against")
@@ -71,12 +65,12 @@ def export(config: Path, request: Request) -> Path:
             request.say(note)
         request.say(f"compiling {law.loop.controller.label} for {', '.join(platforms)}")
         text = objects.together(law.pieces)
-        if request.c:
+        if products.c:
             for name, content in c.sources(law).items():
                 writer.add(name, content.encode())
             for name in platforms:
                 writer.add(f"{name}/law.o", objects.object_file(text, objects.PLATFORMS[name]))
-        if request.fmu:
+        if products.fmu:
             writer.add(FMU, fmu(law, text, linked, law.inputs(samples)[0], request.say))
         writer.add(SAMPLES, _table(law, samples).encode())
         about = law.as_json(platforms, objects.library_functions(text))
@@ -85,14 +79,14 @@ def export(config: Path, request: Request) -> Path:
         return writer.finish()
 
 
-def _platforms(request: Request) -> Sequence[str]:
+def _platforms(products: Products) -> Sequence[str]:
     """The platforms of the object files. Raises UsageError for an unknown one, or for no files."""
-    for name in request.platforms:
+    for name in products.platforms:
         if name not in objects.PLATFORMS:
             raise UsageError(unknown(f"platform {name!r}", name, objects.PLATFORMS))
-    if not (request.c or request.fmu):
+    if not (products.c or products.fmu):
         raise UsageError("--no-c and --no-fmu leave nothing to export; give one of them only")
-    return tuple(dict.fromkeys(request.platforms)) or tuple(objects.PLATFORMS)
+    return tuple(dict.fromkeys(products.platforms)) or tuple(objects.PLATFORMS)
 
 
 def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
@@ -113,9 +107,9 @@ def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
         )
 
 
-def _linked(request: Request) -> Mapping[str, objects.Platform]:
+def _linked(products: Products) -> Mapping[str, objects.Platform]:
     """The platforms of the FMU. Raises UsageError for one without libraries or a linker."""
-    names = request.platforms or (this_machine(),)
+    names = products.platforms or (this_machine(),)
     if "" in names:
         raise UsageError(
             "there is no export for this machine, so no FMU without zig: install it with pip "

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from podusv_cli.comparison.claims import ParsedClaim
-from podusv_cli.comparison.measured import FEWEST, Track
+from podusv_cli.comparison.measured import FEWEST, PLACE, START, Track
 from podusv_cli.comparison.parsing import parse_claims
-from podusv_cli.core import units
 from podusv_cli.core.errors import UsageError
+from podusv_cli.core.kernel import Vector
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
@@ -21,11 +23,11 @@ from podusv_cli.workflows.execute import examined
 from podusv_cli.workflows.measured import is_log, track
 from podusv_cli.workflows.members import Member, distinct, numbered
 from podusv_cli.workflows.members import from_folder as members_of
-from podusv_cli.workflows.run import Request, opened
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import opened
 
-START = "start"  # of a run, to which a log may be moved
 DATED = (9.4e8, 4.2e9)  # s since 1970, of the years 2000 to 2100
-FINER = {unit: float(factor) for unit, factor in units.UNITS["s"].items() if factor < 1}
+BEGIN = 0.0  # s, the first instant of every run
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,15 @@ def measured(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -
             f"{given}: runs are compared with one log at a time; name one, and a scenario or a run "
             "beside it"
         )
-    if align not in ("", START):
-        raise UsageError(f"--align {align}: unknown; write --align {START}, or leave it out")
+    if align not in ("", START, PLACE):
+        raise UsageError(
+            f"--align {align}: unknown; write --align {START} for clock and place, --align {PLACE} "
+            "for the place alone, or leave it out"
+        )
     members = [member for group in groups for member in group.members]
     speeds = [member.case.scenario.facts.U if member.case else math.inf for member in members]
     sections = [group.identify for group in groups if group.identify]
-    log = track(logs[0], sections, max(speeds), at_start=align == START)
+    log = track(logs[0], sections, max(speeds), aligned=align).timed(BEGIN)
     beside = members[0].about
     _check_common(log, max(member.about.duration for member in members))
     name, text = logs[0].stem, repr(log.signals["x"].tolist())
@@ -82,28 +87,55 @@ def measured(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -
 
 def _check_common(log: Track, duration: float) -> None:
     """Raises UsageError where too few instants are common with a run of this duration [s]."""
-    count, first, last = int(log.common(0.0, duration).sum()), log.times[0], log.times[-1]
+    count, first, last = int(log.common(BEGIN, duration).sum()), log.times[0], log.times[-1]
     if count >= FEWEST:
         return
-    span = last - first
-    finer = [unit for unit, f in FINER.items() if last * f <= duration < span and span * f > 1.0]
-    dated = [unit for unit, f in FINER.items() if DATED[0] <= first * f <= DATED[1]]
-    from_begin = "count the log's time from where the run begins"
-    hint = (
-        f'if its times are in {finer[0]}, write time: "COLUMN [{finer[0]}]" under '
-        f'identify.columns, or "time [{finer[0]}]" as the name of the column'
-        if finer
-        else from_begin
-    )
-    if dated:
-        hint = (
-            f'its times seem to be in {dated[0]} since 1970: write time: "COLUMN [{dated[0]}]" '
-            f"under identify.columns, and {from_begin}"
-        )
+    hint = _about_unit(log.times - log.shifted, duration) or _about_clock(log, duration)
     raise UsageError(
         f"{log.file}: its times go from {first:.10g} to {last:.10g} s, and the run from 0 to "
-        f"{duration:g} s, with {count} common positions, where {FEWEST} are needed; {hint}"
+        f"{duration:g} s, with {count} common position{'' if count == 1 else 's'}, where {FEWEST} "
+        f"are needed; {hint}"
     )
+
+
+def _about_unit(times: Vector, duration: float) -> str:
+    """What to write where the numbers of a clock are no seconds; "" where they seem to be.
+
+    They tell by dates, by a span that fits the run in another unit, or by the distance of rows.
+    """
+    from podusv_cli.identify.logs.checks import FINER, SLOWEST  # h5py is slow to import
+
+    span, step = float(times[-1] - times[0]), float(np.median(np.diff(times)))
+    dated = [unit for unit, f in FINER.items() if DATED[0] <= times[0] * f <= DATED[1]]
+    finer = [
+        unit
+        for unit, f in FINER.items()
+        if span * f > 1.0 and (span * f <= duration < span or step * f < SLOWEST <= step)
+    ]
+    if not (dated or finer):
+        return ""
+    unit = (dated or finer)[0]
+    since = " since 1970" if dated else ""
+    asked = f"its times seem to be in {unit}{since}:" if dated else f"if its times are in {unit},"
+    late = times[0] * FINER[unit] > duration
+    other_clock = f", and --align {START} if that clock is not the run's" if late else ""
+    return (
+        f'{asked} write time: "COLUMN [{unit}]" under identify.columns, or "time [{unit}]" as the '
+        f"name of the column{other_clock}"
+    )
+
+
+def _about_clock(log: Track, duration: float) -> str:
+    """What to do where a log in seconds hardly has an instant of the run."""
+    if (
+        not log.aligned
+        and replace(log, aligned=START).timed(BEGIN).common(BEGIN, duration).sum() >= FEWEST
+    ):
+        return (
+            f"if its clock is another one, --align {START} takes its first position for the first "
+            "instant of the run"
+        )
+    return "take a run that lasts longer, or a log with more positions"
 
 
 def gathered(groups: Sequence[Members]) -> Members:
@@ -126,7 +158,10 @@ def _opened(path: Path, request: Request, *, alone: bool) -> Members:
 def from_folder(path: Path, files: Sequence[str] = ()) -> Members:
     """The finished runs of a folder; `files` are plug-ins. Raises UsageError, StorageError."""
     members = members_of(path, files)
-    return Members(path.resolve().name, members, [member.label for member in members])
+    abouts = [member.about for member in members if member.about.log_columns]
+    called = [Identify(columns=about.log_columns, frame=about.log_frame) for about in abouts]
+    labels = [member.label for member in members]
+    return Members(path.resolve().name, members, labels, identify=next(iter(called), None))
 
 
 def from_scenario(loaded: Loaded, *, alone: bool) -> Members:

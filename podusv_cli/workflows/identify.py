@@ -24,7 +24,8 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.storage.run_folder import default_folder
-from podusv_cli.workflows.run import RESULTS, Request, opened, writer_of
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS, opened, writer_of
 
 Progress = Callable[[str, float], None]
 SETTLES = 30  # rounds, after which a search has usually settled

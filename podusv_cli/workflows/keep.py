@@ -19,7 +19,7 @@ from podusv_cli.studies.making.plan import StudyPlan
 from podusv_cli.studies.telling.keep import Kept, KeptRun, found, unmade
 from podusv_cli.studies.telling.results import Results
 from podusv_cli.workflows.execute import Task, execute, warm_up
-from podusv_cli.workflows.many_runs import Request
+from podusv_cli.workflows.request import Request
 
 
 def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenario:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 
 from podusv_cli.comparison.parsing import parse_claims
@@ -19,39 +17,15 @@ from podusv_cli.scenario.load import LOOKED_AT, Check, Loaded, Plugged, load, lo
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import files, manifest
 from podusv_cli.studies.making.cluster import executor
-from podusv_cli.studies.making.dispatch import Executor, Shard
+from podusv_cli.studies.making.dispatch import Executor
 from podusv_cli.studies.making.remote import StudyText
 from podusv_cli.studies.making.store import SCENARIO
+from podusv_cli.workflows.request import Request
 
-WHOLE: Shard = (1, 1)  # the only shard
 Tell = Callable[..., None]
 # A scenario's file, the folder of what is to be continued, or a scenario from Python: that is
 # loaded with these checks.
 Config = Path | Callable[[Sequence[Check]], Loaded]
-
-
-def silent(*text: str) -> None:
-    """Tell nobody."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """The options of commands that make many runs; see the help of `podusv sweep run`."""
-
-    overrides: Sequence[str] = ()
-    out: Path | None = None
-    workers: int = 0
-    argv: Sequence[str] = ()
-    plugins: Sequence[str] = ()
-    figures: bool = True
-    scheduler: str = ""  # of a Dask cluster, as tcp://host:port
-    trust: bool = False  # whether plug-in files of the folder may be executed
-    seconds: float = math.inf  # of computing, after which no unit of a study is begun
-    shard: Shard = WHOLE
-    force: bool = False  # whether a study that is there is removed first
-    say: Tell = silent  # what is done beside the runs
-    warn: Tell = silent  # is told what is odd, and no error
-    begin: Tell = silent  # is told of a search before its first run
 
 
 def loaded_for(

@@ -17,7 +17,8 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
-from podusv_cli.workflows.run import Request, opened, single
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import opened, single
 
 
 @dataclass(frozen=True)

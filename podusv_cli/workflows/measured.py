@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from podusv_cli.comparison.measured import POSE, Track
+from podusv_cli.comparison.measured import PLANE, Track
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
@@ -20,8 +20,13 @@ PSI = STATE[2]
 SELDOM = 0.05  # of the positions, that may lack a heading
 NO_COMMON_PLACE = (
     "the log and the runs have no common place: its x and y count from its first fix, those of the "
-    "runs from where `start` is; `--align start` moves the log to where the first run is at the "
-    "first common instant."
+    "runs from where `start` is; `--align place` moves the log to where the first run is at the "
+    "first common instant, `--align start` its clock as well"
+)
+NO_HEADING = (
+    "no column is called psi: positions alone are compared, headings have no number, and no hull "
+    "is drawn; if a column has the heading, name it under identify.columns, as `podusv identify "
+    "--columns LOG` proposes"
 )
 
 
@@ -35,40 +40,41 @@ def is_log(path: Path) -> bool:
 
 
 def track(
-    path: Path, identify: Sequence[Identify], top_speed: float = math.inf, *, at_start: bool = False
+    path: Path, identify: Sequence[Identify], top_speed: float = math.inf, *, aligned: str = ""
 ) -> Track:
     """The measured track of a log; the first of these sections says what its columns are called.
 
     A row stands where a position is new; all else is straight between its own values, and NaN
     before the first and after the last of them. `top_speed`
-    [m/s] is that of the fastest boat beside it. Raises UsageError where the log has no pose, or
-    has mistakes that its motion shows.
+    [m/s] is that of the fastest boat beside it; `aligned` as in `Track`. Raises UsageError where
+    the log has no positions, or has mistakes that its motion shows.
     """
     from podusv_cli.identify.logs.checks import checked
-    from podusv_cli.identify.logs.reading import Named, delivered, table
+    from podusv_cli.identify.logs.reading import Named, delivered_each, table
 
     named = Named(identify[0].columns, identify[0].frame) if identify else Named()
     log = table(path, STATE, named)
-    if lacking := [name for name in POSE if name not in log.columns]:
+    if lacking := [name for name in PLANE if name not in log.columns]:
         raise UsageError(
             f"{path}: nothing is known of {', '.join(lacking)}; call its columns time, x, y (or "
-            "lat, lon) and psi, with units in brackets where these are not s, m, rad, as "
+            "lat, lon), psi, with units in brackets where these are not s, m, rad, as "
             f"`podusv identify --columns {path}` proposes, or write that under identify.columns in "
             "a scenario beside it"
         )
-    rows = delivered(log.columns["x"], log.columns["y"])
+    new = delivered_each(log.columns)
+    rows = new["x"] & new["y"]
     if np.count_nonzero(rows) < 2:
         raise UsageError(f"{path}: has fewer than two positions, which is no track")
     lines = [*log.warnings, *checked(log, top_speed=top_speed)]
-    if log.from_fix and not at_start:
+    if log.from_fix and not aligned:
         lines.append(NO_COMMON_PLACE)
     signals = {
         signal.name: _at(log.times[rows], log.times, log.columns[signal.name], turns=signal == PSI)
         for signal in STATE
         if np.isfinite(log.columns.get(signal.name, np.nan)).any()
     }
-    lines += _without_heading(log.times[rows], signals[PSI.name])
-    own = Track(path, log.times[rows], signals, at_start=at_start)
+    lines += _without_heading(log.times[rows], signals.get(PSI.name))
+    own = Track(path, log.times[rows], signals, aligned=aligned)
     prefix = f"{log.name}: "
     return replace(own, remarks=tuple(own.remark(line.removeprefix(prefix)) for line in lines))
 
@@ -80,8 +86,11 @@ def _at(at: Vector, times: Vector, values: Vector, *, turns: bool) -> Vector:
     return np.interp(at, times[known], whole, left=np.nan, right=np.nan)
 
 
-def _without_heading(times: Vector, psi: Vector) -> Iterator[str]:
-    """Of a log whose heading begins later or ends earlier than its positions."""
+def _without_heading(times: Vector, psi: Vector | None) -> Iterator[str]:
+    """Of a log without heading, or whose heading begins later or ends earlier than positions."""
+    if psi is None:
+        yield NO_HEADING
+        return
     known = np.isfinite(psi)
     if np.mean(~known) > SELDOM:
         where = "at no position"

@@ -14,7 +14,7 @@ from podusv_cli.studies.making.dispatch import Tally
 from podusv_cli.studies.making.joining import gaps, join, mixture
 from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.store import SCENARIO, Store
-from podusv_cli.workflows.many_runs import Request
+from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.studies import stored
 from podusv_cli.workflows.sweep import Swept, answered
 

@@ -26,7 +26,8 @@ from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
 from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
-from podusv_cli.workflows.run import RESULTS, Request, opened, single
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import RESULTS, opened, single
 
 BESIDE = VelocityVector()  # a law from which the search begins, too: it turns the bow into the load
 Progress = Callable[[str, float], None]

@@ -29,7 +29,7 @@ from podusv_cli.figures.style import STYLES, Look
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.storage import files, manifest
 from podusv_cli.workflows.members import Member, from_folder
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 NARROW = 5.0  # inches; narrower figures have their panels in one column
 LARGEST = 40.0  # inches, of a figure

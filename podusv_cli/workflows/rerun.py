@@ -27,7 +27,7 @@ from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
 from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
 from podusv_cli.workflows.members import Member, runs_of
-from podusv_cli.workflows.run import Request
+from podusv_cli.workflows.request import Request
 
 Progress = Callable[[str, float], None]
 Pairs = Sequence[tuple[RunFolder, Scenario]]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
@@ -20,33 +19,9 @@ from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.yaml_tree import dotted
 from podusv_cli.storage.run_folder import RunWriter, default_folder
 from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
+from podusv_cli.workflows.request import Request
 
 RESULTS = Path("results")
-
-
-@dataclass(frozen=True)
-class Request:
-    """The options that `run` and `compare` share; see `podusv run --help`."""
-
-    overrides: Sequence[str] = ()
-    out: Path | None = None
-    force: bool = False
-    figures: bool = True
-    argv: Sequence[str] = ()
-    warn: Callable[[object], None] = lambda finding: None  # called before any simulation
-    allow_large: bool = False
-    plugins: Sequence[str] = ()  # files beside those that a scenario names
-    names: Sequence[str] = ()  # of figures, as `figures.drawing.chosen` has them
-    formats: Sequence[str] = ("png",)  # of figures of a comparison
-    workers: int = 0  # processes at a time; 0: one a core
-    controller: str = ""  # which of `controllers` to run
-    metrics: Sequence[str] = ()  # those that are asked for; all where empty
-    align: str = ""  # "start" moves a log to where the first run is at the first common instant
-    ratios: bool = False  # whether comparison.tex has ratios to the first run
-    doubt: bool = False  # whether a comparison also says what its verdicts hang on
-    trust: bool = False  # whether plug-in files of a finished run may be executed
-    compiling: Progress | None = None  # is called with the fraction compiled, if any is missing
-    say: Callable[[str], None] = lambda line: None  # called with what one run chose, before it
 
 
 def run(config: Path, request: Request, progress: Progress | None = None) -> Finished:

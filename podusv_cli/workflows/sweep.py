@@ -33,9 +33,7 @@ from podusv_cli.studies.telling.keep import contradiction, found, unmade
 from podusv_cli.studies.telling.results import Results, judged
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
-    WHOLE,
     Config,
-    Request,
     compiling,
     executor_for,
     finish,
@@ -46,6 +44,7 @@ from podusv_cli.workflows.many_runs import (
     refused,
     scenario_texts,
 )
+from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS
 from podusv_cli.workflows.studies import check_study, stored
 
@@ -105,7 +104,7 @@ def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tel
     with executor_for(request, store.folder, made.scenario, store.seal) as executor:
         tally, whole = _marched(store, made, request, started, executor, tell)
     swept = Swept(store.folder, tally, refused=refused(executor))
-    if whole and request.shard != WHOLE:
+    if whole and request.shard != Request().shard:
         whole = _is_whole(store)
         swept = replace(swept, part_is_whole=not whole)
     if not whole:

@@ -33,7 +33,6 @@ from podusv_cli.studies.tuning.space import with_gains
 from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.many_runs import (
     Config,
-    Request,
     compiling,
     executor_for,
     finish,
@@ -44,6 +43,7 @@ from podusv_cli.workflows.many_runs import (
     refused,
     scenario_texts,
 )
+from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS
 
 Tell = Callable[[Tally, str], None]

@@ -19,7 +19,8 @@ from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.yaml_tree import Route
 from podusv_cli.studies.making.check import sweep_faults, unjudged
 from podusv_cli.workflows.execute import examined, warm_up
-from podusv_cli.workflows.run import Request, opened
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import opened
 
 
 @dataclass(frozen=True)

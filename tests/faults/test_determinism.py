@@ -60,7 +60,8 @@ if processor != "-":
     import llvmlite.binding as llvm
     llvm.get_host_cpu_name = lambda: asked.append(processor) or processor
     llvm.get_host_cpu_features = llvm.FeatureMap
-from podusv_cli.workflows.run import Request, run
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.run import run
 run(Path(config), Request(overrides, Path(folder), figures=False))
 assert asked or processor == "-", "the compiler did not ask what it compiles for"
 """

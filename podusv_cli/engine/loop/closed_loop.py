@@ -58,6 +58,10 @@ class Probe:
         """The kernel's constants in a run of this loop."""
         return {"nothing": 0.0}
 
+    def first(self) -> Vector:
+        """What is gathered before the first instant."""
+        return np.zeros(self.size)
+
     def summary(
         self, seen: Vector, failed: Callable[[str, Exception], None] | None = None
     ) -> dict[str, float]:

@@ -293,7 +293,7 @@ class Plan:
             sensed=loop.measurement.first(start, grid.step),
             delay_line=delay_line(loop.actuator.delay(), grid),
             held=np.zeros(HELD_SIGNALS + len(law.signals)), work=np.zeros(law.workspace()),
-            seen=np.zeros(self.probe.size), under_way=np.zeros(2),
+            seen=self.probe.first(), under_way=np.zeros(2),
             log=allocate(rows * layout.width),
         )  # fmt: skip
 

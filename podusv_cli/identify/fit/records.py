@@ -12,7 +12,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.march import APART, COMMANDS, DELIVERED, HOLDS, SHIFTS, VALUES, Record
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.reading import SLACK, Marks, Table, Whole, delivered
+from podusv_cli.identify.logs.reading import SLACK, Marks, Table, Whole, delivered_each
 
 BEGIN = 3.0  # s, from which the velocities at the start are guessed
 FEWEST = 20  # values of the position, or a log says nothing
@@ -60,8 +60,8 @@ def log_of(table: Table, actuator: Actuator, step: float, delay: float = 0.0) ->
     """
     complete(table, actuator)
     table = table.finer(step)
-    nothing = np.full(len(table.times), np.nan)
-    new = np.column_stack([delivered(table.columns.get(s.name, nothing)) for s in STATE])
+    marks, none = delivered_each(table.columns), np.zeros(len(table.times), bool)
+    new = np.column_stack([marks.get(signal.name, none) for signal in STATE])
     kept = _rows(table.times, np.any(new, axis=1), step)
     rows = _record(table, actuator, new, kept, delay)
     counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
@@ -77,7 +77,8 @@ def complete(table: Table, actuator: Actuator) -> None:
             f"{table.name}: nothing is known of {', '.join(lacking)}; name the columns that have "
             "them under identify.columns, or choose the actuator whose commands the log has"
         )
-    fewest = min(int(delivered(table.columns[s.name]).sum()) for s in STATE[:POSE])
+    marks = delivered_each(table.columns)
+    fewest = min(int(marks[signal.name].sum()) for signal in STATE[:POSE])
     if fewest < FEWEST:
         raise LogFault(
             f"{table.name}: has {fewest} values of the pose, at least "

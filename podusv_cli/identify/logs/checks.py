@@ -20,7 +20,8 @@ from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.motion import DEGREES, FAST, RADIANS, Motion
-from podusv_cli.identify.logs.reading import SENSED, UNITS, Table, delivered
+from podusv_cli.identify.logs.ranges import IN_MINUTES
+from podusv_cli.identify.logs.reading import SENSED, UNITS, Table, delivered_each
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
 NEAREST = 2e-3  # s between positions, below which no receiver is
@@ -31,6 +32,7 @@ FAR = 10.0  # standard deviations of a track, that degrees are away from (0, 0)
 SCALED = 20.0  # times a speed, that no error of a hull's numbers explains
 TWICE = 2.0  # times the speed at full thrust, above which a track is doubted
 FASTEST = 60.0  # m/s, which no boat makes
+BRISK = 10.0  # m/s, twice which few boats make
 QUIET = 0.1  # m, rad, m/s or rad/s: smaller steps are no jumps
 GAP = 2.5  # usual distances of values: a step over more says nothing
 OTHER_UNIT = 300.0  # times a speed, that no current explains
@@ -79,7 +81,8 @@ def checked(
     try:
         with np.errstate(invalid="ignore", divide="ignore"), catch_warnings():
             simplefilter("ignore", RuntimeWarning)  # of means over nothing, which are NaN
-            for check in (*(OF_FITS if actuator else ()), *OF_ALL):
+            headed = OF_HEADINGS if "psi" in table.columns else ()
+            for check in (*(OF_FITS if actuator else ()), *OF_ALL, *headed):
                 lines += check(motion)
     except LogFault as error:
         raise LogFault("; also, ".join((f"{table.name}: {error}", *lines))) from error
@@ -140,15 +143,14 @@ def _places(motion: Motion) -> Iterator[str]:
         f"x and y move at {motion.fastest:.2g} m/s at most; if they are latitude and longitude in "
         f"degrees, {CALL_THEM}"
     )
-    if np.nanstd(motion.heading()) > STEADY:
+    if "psi" not in motion.table.columns or np.nanstd(motion.heading()) > STEADY:
         raise LogFault(what)
     yield what
 
 
 def _speeds_apart(motion: Motion) -> Iterator[str]:
     """Tracks that are hundreds of times slower or faster than the log's own speed."""
-    speeds = np.abs(motion.table.columns.get("u", np.zeros(1)))
-    speed = float(np.nanquantile(speeds, FAST)) if np.isfinite(speeds).any() else 0.0
+    speed = motion.own_speed
     if not (speed and motion.fastest) or 1.0 / OTHER_UNIT < motion.fastest / speed < OTHER_UNIT:
         return
     x, y = (motion.table.columns[name] for name in ("x", "y"))
@@ -163,6 +165,22 @@ def _speeds_apart(motion: Motion) -> Iterator[str]:
         hint = LOOK_AT_UNITS
     raise LogFault(f"its track makes {motion.fastest:.2g} m/s, while u is {speed:.3g} m/s; {hint}")
     yield
+
+
+def _degrees_and_minutes(motion: Motion) -> Iterator[str]:
+    """Latitude and longitude as ddmm.mmmm near the equator: a track that is 60 times as fast.
+
+    Raises LogFault where no boat is so fast, or the log's own speed is another.
+    """
+    fast, speed = motion.fastest, motion.own_speed
+    is_fast = fast > TWICE * (speed or min(motion.top_speed, BRISK))
+    if not (motion.table.maybe_minutes and is_fast):
+        return
+    beside = f", and u is {speed:.3g} m/s" if speed else ""
+    what = f"its track makes {fast:.3g} m/s by latitude and longitude{beside}; {IN_MINUTES}"
+    if fast > FASTEST or (speed and fast > SCALED * speed):
+        raise LogFault(what)
+    yield what
 
 
 def _speed_made_good(motion: Motion) -> Iterator[str]:
@@ -286,13 +304,23 @@ def _courses(motion: Motion) -> Iterator[str]:
     best, lack = max(others, key=lambda reading: abs(reading.mean)), 1.0 - abs(own.mean)
     # A reading that takes all headings for the same one agrees as well as the courses alike are.
     least = min(lack, 1.0 - abs(complex(np.nanmean(np.exp(1j * course)))))
-    sure = np.sum(moving) * abs(best.mean) ** 2 > SURE
-    if sure and least > UNLIKE and 1.0 - abs(best.mean) < BETTER * least:
+
+    def sure_of(reading: Reading) -> bool:
+        return bool(np.sum(moving) * abs(reading.mean) ** 2 > SURE and least > UNLIKE)
+
+    if sure_of(best) and 1.0 - abs(best.mean) < BETTER * least:
         raise LogFault(
             f"the track's course and psi agree to {abs(own.mean):.2f} of 1 as "
             f"given, but to {abs(best.mean):.2f} if {best.words}; {best.remedy}"
         )
     yield from _degrees(motion, own, others[1])
+    half = read(0.5 * RADIANS, 1.0)
+    if sure_of(half) and 1.0 - abs(half.mean) < BETTER * least and _is_half(motion):
+        yield (
+            f"the track's course turns twice as far as psi: they agree to {abs(own.mean):.2f} of 1 "
+            f"as given, but to {abs(half.mean):.2f} if psi is half the heading; double its column"
+        )
+        return
     aside = math.degrees(cmath.phase(own.mean))
     if lack < ABEAM and abs(aside) > ASIDE:
         yield (
@@ -307,31 +335,65 @@ def _courses(motion: Motion) -> Iterator[str]:
         )
 
 
+class Left(NamedTuple):
+    """What a heading leaves open of how a boat moves: mean squares [m2/s2].
+
+    `moved` is what there is to explain, `left` what is left of it, `noise` that of positions.
+    """
+
+    moved: float
+    left: float
+    noise: float
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether more is left than positions are noisy."""
+        return self.left > LOUD * self.noise
+
+
+def _is_half(motion: Motion) -> bool:
+    """Whether twice the heading explains motion that the heading does not, in any current.
+
+    In a current of half its speed a sound log's course turns twice as far as its heading, too.
+    """
+    own, doubled = _left(motion), _left(motion, turn=0.5 * RADIANS)
+    return own.is_motion and doubled.left < BETTER * own.left
+
+
 def _unexplained(motion: Motion) -> bool:
-    """Whether headings leave most of how a boat moves open, at any leeway and in any current.
+    """Whether headings leave most of how a boat moves open, at any leeway and in any current."""
+    over = _left(motion, BEYOND * motion.fastest)
+    return over.is_motion and over.left > HALF * over.moved
+
+
+def _left(motion: Motion, fastest: float = math.inf, turn: float = RADIANS) -> Left:
+    """What is left of the motion with a speed through the water of at most so much [m/s].
+
+    So many of the log's own numbers are a full turn of the heading.
 
     By least squares velocities are those of a steady speed through the water at a steady angle to
     the heading, or of the log's own u and v, and a current. The noise of positions is no motion.
     """
-    velocity, heading = motion.velocity, np.exp(1j * motion.heading())
+    velocity, heading = motion.velocity, np.exp(1j * motion.heading(turn))
     if {"u", "v"} <= motion.table.columns.keys():
         heading = heading * (motion.mean("u") + 1j * motion.mean("v"))
     rows = motion.moving & np.isfinite(heading)
     if np.sum(rows) < FEWEST_BINS:
-        return False
+        return Left(0.0, 0.0, 0.0)
     moved, ahead = (values[rows] - np.mean(values[rows]) for values in (velocity, heading))
     speed = complex(np.vdot(ahead, moved) / max(float(np.vdot(ahead, ahead).real), TINY))
-    speed *= min(1.0, BEYOND * motion.fastest / abs(speed)) if speed else 1.0
-    left = float(np.mean(np.abs(moved - speed * ahead) ** 2))
+    speed *= min(1.0, fastest / abs(speed)) if speed else 1.0
     bends = np.abs(velocity[4:] - 2.0 * velocity[2:-2] + velocity[:-4]) ** 2
     noise = float(np.nanmedian(bends)) / (6.0 * math.log(2.0))  # a rate spans two bins
-    return left > max(HALF * float(np.mean(np.abs(moved) ** 2)), LOUD * noise)
+    open_, whole = (float(np.mean(np.abs(part) ** 2)) for part in (moved - speed * ahead, moved))
+    return Left(whole, open_, noise)
 
 
 def _jumps(motion: Motion) -> Iterator[str]:
     """Values that jump: of a receiver that finds itself elsewhere, or in a damaged cell."""
+    new = delivered_each(motion.table.columns)
     for name in [name for name in motion.table.columns if name in SENSED]:
-        rows = np.flatnonzero(delivered(motion.table.columns[name]))
+        rows = np.flatnonzero(new[name])
         values, times = motion.table.columns[name][rows], motion.table.times[rows]
         if len(rows) < FEWEST_BINS:
             continue
@@ -443,9 +505,9 @@ def _idle(motion: Motion) -> Iterator[str]:
 
 
 Check = Callable[[Motion], Iterator[str]]
-# Of every log, and of those that a hull is to be found from.
+# Of every log, of those with headings, and of those that a hull is to be found from.
 OF_ALL: tuple[Check, ...] = (
-    _jumps, _clock, _places, _speeds_apart, _speed_made_good, _empty, _compass, _courses, _yaw_rate,
-    _speeds,
+    _jumps, _clock, _places, _degrees_and_minutes, _speeds_apart, _speed_made_good, _empty,
 )  # fmt: skip
+OF_HEADINGS: tuple[Check, ...] = (_compass, _courses, _yaw_rate, _speeds)
 OF_FITS: tuple[Check, ...] = (_slow_rows, _out_of_reach, _constant, _idle, _manoeuvres)

@@ -14,7 +14,7 @@ import yaml
 
 from podusv_cli.core.escaping import visible
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
-from podusv_cli.identify.logs.contents import Columns, LogFault
+from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.messages import TIME
@@ -25,10 +25,11 @@ SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
 # stands for 1, 2, ... in the order of the log.
 NAMES = {
-    TIME: r"time|t|timestamp|time_?stamp|stamp|timeus|epoch|secs?|seconds",
-    "lat": r"lat|latitude", "lon": r"lon|lng|longitude",
+    TIME: r"time|t|timestamp|time_?stamp|stamp|timeus|epoch|secs?|seconds|date_?time|zeit",
+    "lat": r"lat|latitude|latitud|breite|breitengrad", "lon": r"lon|lng|long|longitude|longitud|"
+    "länge|längengrad|laenge|laengengrad",
     "x": r"x|north|northing|pos_?n|pn|position\.x", "y": r"y|east|easting|pos_?e|pe|position\.y",
-    "psi": r"psi|heading|hdg|compass|yaw",
+    "psi": r"psi|heading|hdg|compass|yaw|kompass|steuerkurs",
     "u": r"u|surge|linear\.x|speed_?x|vx", "v": r"v|sway|linear\.y|speed_?y|vy",
     "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
     "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
@@ -117,6 +118,8 @@ def listing(path: Path) -> Listing:
     doubts = [f"{name!r} {doubt}" for name, doubt in contents.doubts.items() if name in guesses]
     for column, reason in _no_places(columns, guesses):
         doubts.append(f"{column!r} is not taken for {guesses.pop(column)}: {reason}")
+    for column, reason in _no_clocks(contents):
+        doubts.append(f"{column!r} is not taken for {TIME}: it {reason}")
     return Listing(
         [_listed(name, columns, guesses) for name in columns],
         any(name.endswith("orientation.yaw") for name in guesses),
@@ -143,6 +146,13 @@ def _no_places(columns: Columns, guesses: dict[str, str]) -> list[tuple[str, str
     return found
 
 
+def _no_clocks(contents: Contents) -> Iterator[tuple[str, str]]:
+    """Columns that are called as a clock is and have no number, and what they have."""
+    for column, values in contents.columns.items():
+        if re.fullmatch(_pattern(TIME), _plain(column)) and not np.isfinite(values).any():
+            yield column, contents.doubts.get(column, "has no number")
+
+
 def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
     values, quantity = columns[name], guesses.get(name, "")
     known = values[np.isfinite(values)]
@@ -163,17 +173,26 @@ def _numbered(quantity: str, name: str, guesses: dict[str, str]) -> str:
 def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
     """Columns and what they are, each quantity once but those that are numbered."""
     taken: set[str] = set()
-    for quantity, names in NAMES.items():
-        pattern = names.replace("_?", "[_ ]?")
+    for quantity in NAMES:
+        pattern = _pattern(quantity)
         numbered = "#" in quantity
         likely = [pattern] if numbered else pattern.split("|")
         for form in [form.format(name) for form in FORMS for name in likely]:
             for column in columns:
                 free = column not in taken and (numbered or quantity not in taken)
-                own = quantity != TIME or clock_of(column, columns) is None
+                own = quantity != TIME or _may_be_clock(column, columns)
                 if free and own and re.search(form, _plain(column)):
                     taken |= {column, quantity}
                     yield column, quantity
+
+
+def _pattern(quantity: str) -> str:
+    return NAMES[quantity].replace("_?", "[_ ]?")
+
+
+def _may_be_clock(column: str, columns: Columns) -> bool:
+    """Whether a column can have the times of a whole file: numbers, and no message's own times."""
+    return clock_of(column, columns) is None and bool(np.isfinite(columns[column]).any())
 
 
 def _plain(column: str) -> str:

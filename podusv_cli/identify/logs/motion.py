@@ -101,6 +101,12 @@ class Motion:
         return float(np.quantile(speeds[known], FAST)) if known.any() else 0.0
 
     @cached_property
+    def own_speed(self) -> float:
+        """The size of the log's own u that hardly any row exceeds [m/s]; 0 where it has none."""
+        speeds = np.abs(self.table.columns.get("u", np.zeros(1)))
+        return float(np.nanquantile(speeds, FAST)) if np.isfinite(speeds).any() else 0.0
+
+    @cached_property
     def moving(self) -> Marks:
         """The bins in which the course of the track says something."""
         speed = np.abs(self.velocity)

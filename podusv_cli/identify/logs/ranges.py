@@ -14,6 +14,9 @@ Marks = npt.NDArray[np.bool_]
 PLACES = {LAT.name: ("latitude", 90.0), LON.name: ("longitude", 180.0)}  # and most [deg]
 SELDOM = 0.05  # of the values, that may be out of range
 MINUTES = 100.0  # a degree, where degrees and minutes are written as one number
+IN_MINUTES = (
+    "is it in NMEA's degrees and minutes, ddmm.mmmm? Convert it to degrees: dd + mm.mmmm / 60"
+)
 FINE, COARSE = 1e-7, 1e-6  # deg, the units of positions that are integers
 FEWEST = 1e3  # times the largest degrees, below which integers are in none of these
 TURN = 360.0  # deg
@@ -99,14 +102,16 @@ def integers_of(lat: Vector, lon: Vector) -> bool:
     )
 
 
+def may_be_minutes(degrees: Vector) -> bool:
+    """Whether places may be NMEA's degrees and minutes as one number, ddmm.mmmm."""
+    return bool(np.all(np.abs(degrees[np.isfinite(degrees)]) % MINUTES < 60.0))
+
+
 def _reason(name: str, values: Vector, most: float) -> str:
     """What such numbers probably are, and what to write."""
     size = np.abs(values)
-    if size.max() <= most * MINUTES + MINUTES and np.all(size % MINUTES < 60.0):
-        return (
-            "is it in NMEA's degrees and minutes, ddmm.mmmm? Convert it to degrees: "
-            "dd + mm.mmmm / 60"
-        )
+    if size.max() <= most * MINUTES + MINUTES and may_be_minutes(values):
+        return IN_MINUTES
     if most * FEWEST < size.max() <= most / FINE and np.all(values == np.round(values)):
         unit, most_fine = "1e-7 deg", size.max() * FINE
         instead = f"; for {size.max() * COARSE:.6g} deg write 1e-6 deg instead"

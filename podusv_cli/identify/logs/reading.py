@@ -22,7 +22,7 @@ from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import LAT, LON, local_plane, turned
 from podusv_cli.identify.logs.messages import TIME
-from podusv_cli.identify.logs.ranges import PLACES, on_earth, without_none
+from podusv_cli.identify.logs.ranges import PLACES, may_be_minutes, on_earth, without_none
 
 Marks = npt.NDArray[np.bool_]
 Whole = npt.NDArray[np.int64]
@@ -50,7 +50,8 @@ class Table:
     """A log: times [s], and of every quantity a value at each time, NaN where there is none.
 
     `notes` says how the log was understood, `warnings` what is doubtful about it. `from_fix`: x and
-    y count from the first fix, since the log has latitude and longitude.
+    y count from the first fix, since the log has latitude and longitude; `maybe_minutes`: these may
+    be degrees and minutes as one number.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Table:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     from_fix: bool = False
+    maybe_minutes: bool = False
 
     def part(self, begin: float, end: float) -> Table:
         """What lies from one time on before another. Raises LogFault where that is nothing."""
@@ -148,9 +150,11 @@ def tables(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = ""
 def _in_frame(whole: Table, frame: str) -> Table:
     """The table north, east, to starboard; of latitude and longitude, which are so in any frame."""
     flat, notes = local_plane(turned(whole.columns, frame))
+    from_fix = "x" in flat and "x" not in whole.columns
+    minutes = from_fix and all(may_be_minutes(whole.columns[place]) for place in PLACES)
     return replace(
         whole, columns=flat, notes=tuple(f"{whole.name}: {note}." for note in notes),
-        from_fix="x" in flat and "x" not in whole.columns,
+        from_fix=from_fix, maybe_minutes=minutes,
     )  # fmt: skip
 
 
@@ -369,4 +373,17 @@ def delivered(*columns: Vector) -> Marks:
     new = np.zeros(len(values), bool)
     new[at[changes]] = True
     new[at[0]] = True
+    return new
+
+
+def delivered_each(columns: Mapping[str, Vector]) -> dict[str, Marks]:
+    """Of every quantity, which rows have a new value. x and y come together: see `delivered`.
+
+    Where one of the two is missing, the other is looked at alone.
+    """
+    new = {name: delivered(values) for name, values in columns.items()}
+    if "x" in new and "y" in new:
+        x, y = np.isfinite(columns["x"]), np.isfinite(columns["y"])
+        together = delivered(columns["x"], columns["y"])
+        new |= {"x": together | (new["x"] & ~y), "y": together | (new["y"] & ~x)}
     return new

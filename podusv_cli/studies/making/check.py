@@ -58,12 +58,17 @@ def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def unjudged(scenario: Scenario) -> str:
-    """A sentence about the claims that a study does not judge; empty where there are none."""
-    if not scenario.claims:
+    """A sentence about the claims that a study does not judge; empty where there are none.
+
+    Also where the study says itself what it judges: then both are meant, each for its command.
+    """
+    sweep = scenario.sweep
+    judges = sweep and (sweep.claims or sweep.success != Sweep().success)
+    if judges or not scenario.claims:
         return ""
     return (
         f"claims ({', '.join(scenario.claims)}) are about single runs, which podusv compare "
-        "judges; a study judges sweep.claims"
+        "judges; a study judges sweep.claims and sweep.success"
     )
 
 

@@ -1,0 +1,55 @@
+"""Commands of installed packages, by entry points of the group `podusv.commands`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import EntryPoint, distributions
+from typing import Any
+
+import typer
+
+from podusv_cli.cli.exit_codes import with_exit_codes
+from podusv_cli.core.errors import LawError, in_a_line
+from podusv_cli.core.plugins import is_from_installer
+
+GROUP = "podusv.commands"
+
+
+@cache
+def installed_commands() -> dict[str, EntryPoint]:
+    """The entry points of all installed packages, by the command's name; the first one counts.
+
+    A package that lies in the folder of a run, study or search offers nothing, as with components.
+    """
+    points: dict[str, EntryPoint] = {}
+    for package in distributions():
+        for point in package.entry_points:
+            if point.group == GROUP and is_from_installer(package):
+                points.setdefault(point.name, point)
+    return dict(sorted(points.items()))
+
+
+def load_command(name: str) -> Any:
+    """The command of this name, as typer makes it of the function that the entry point names.
+
+    One that cannot be imported is a command too, whose only act is to say so.
+    """
+    point = installed_commands()[name]
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    settings: dict[str, Any] = {}
+    try:
+        function = point.load()
+    except Exception as error:
+        function = _refusing(f"podusv {name}: {point.value} cannot be imported: {in_a_line(error)}")
+        settings = {"ignore_unknown_options": True, "allow_extra_args": True}
+    app.command(name, context_settings=settings)(with_exit_codes(function))
+    return typer.main.get_command(app)
+
+
+def _refusing(why: str) -> Callable[[], None]:
+    def refuse() -> None:
+        raise LawError(why)
+
+    refuse.__doc__ = why
+    return refuse
