@@ -25,7 +25,7 @@ from podusv_cli.engine.running import lanes
 from podusv_cli.engine.step import rk4
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.identify.fit import march
-from podusv_cli.interface.scenarios import loaded
+from podusv_cli.interface.scenarios import load_scenario
 from podusv_cli.process.workers import available_workers, run_all
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.scenario.model import BASES
@@ -76,7 +76,7 @@ def scenarios_of_kinds() -> Iterator[Loaded]:
     """What `changes` makes and podusv does not refuse."""
     for change in changes():
         with suppress(PodusvError):
-            yield loaded(str(BOAT), change, silent=True)
+            yield load_scenario(str(BOAT), change, silent=True)
 
 
 def pieces_of(scenarios: Iterable[Loaded]) -> dict[str, Piece]:
@@ -156,10 +156,10 @@ def make() -> int:
 def check(again: int) -> int:
     """Whether all are there, and whether some that are drawn come out as they are."""
     wanted = pieces()
-    ready = {name: piece for name, piece in wanted.items() if piece.shipped}
+    ready = {name: piece for name, piece in wanted.items() if piece.shipped_bitcode}
     drawn = random.sample(sorted(ready), min(again, len(ready)))
     made = bitcode({name: ready[name] for name in drawn})
-    other = [ready[name].label for name in drawn if made[name] != ready[name].shipped]
+    other = [ready[name].label for name in drawn if made[name] != ready[name].shipped_bitcode]
     print(f"{len(ready)} of {len(wanted)} kernels are in {shipped.FILE.name}", end="")
     print(f"; of {again} made anew {len(other)} differ: {', '.join(other)}" if again else "")
     if len(ready) < len(wanted):

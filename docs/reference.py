@@ -21,10 +21,10 @@ from podusv_cli.cli.exit_codes import MEANINGS
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.signal import Signal
 from podusv_cli.figures.drawing import FIGURES, draw
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.explain import Row, explain, signals
+from podusv_cli.scenario.explain import ExplainRow, explain, signals
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.shipped import file_of
@@ -75,7 +75,7 @@ def pictures() -> Iterable[tuple[str, bytes]]:
             if name in ("adaptive_neural", "pid")
         ]
         left = [sheet for name, sheet in FIGURES.items() if f"{name}.png" not in drawn]
-        drawn |= dict(draw(dressed(runs), left, ["png"]))
+        drawn |= dict(draw(dress_runs(runs), left, ["png"]))
     return drawn.items()
 
 
@@ -93,7 +93,7 @@ def gallery_pictures() -> Iterable[tuple[str, bytes]]:
             for label, single in singles.items()
             if label in (laws or singles)
         ]
-        for _, picture in draw(dressed(runs), [FIGURES["trajectory"]], ["png"]):
+        for _, picture in draw(dress_runs(runs), [FIGURES["trajectory"]], ["png"]):
             yield f"{_picture(shown)}.png", picture
 
 
@@ -268,7 +268,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
 }  # fmt: skip
 
 
-def keys_table(rows: Iterable[Row], section: str = "") -> str:
+def keys_table(rows: Iterable[ExplainRow], section: str = "") -> str:
     """Keys of a section with what they may be, default and meaning."""
     made = [(_key(row.key, section), _value(row), _default(row.default), text(row.meaning))
             for row in rows]  # fmt: skip
@@ -279,7 +279,7 @@ def _key(name: str, section: str) -> str:
     return code(name.removeprefix(f"{section}."))
 
 
-def _value(row: Row) -> str:
+def _value(row: ExplainRow) -> str:
     if row.type in ("keys", "kinds"):
         return f"its {row.type}"
     unit = f"[{row.unit}]" if row.unit else ""

@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.style import house_style
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
@@ -77,7 +77,7 @@ def recording(end=100.0, period=0.1, status="finished", shift=0.0, without=(), *
 def shown(*runs):
     """Recordings by label (with a scenario of their own, or the usual one) as figures take them."""
     usual = scenario()
-    return dressed([looked_at(label, log, *(own or [usual])) for label, log, *own in runs])
+    return dress_runs([looked_at(label, log, *(own or [usual])) for label, log, *own in runs])
 
 
 def looked_at(label, log, plan):

@@ -43,7 +43,7 @@ def finding(code: str, *overrides: str) -> Finding:
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
     case = Case.of(scene(*overrides).alone())
-    recording = execute.simulated(case, execute.Stopwatch())
+    recording = execute.simulate_case(case, execute.Stopwatch())
     return recording, execute.summary(case, recording, Extras())
 
 

@@ -3,7 +3,7 @@
 import math
 
 from podusv_cli.components.actuators.pod import Pods
-from podusv_cli.components.vessels.estimated import Hull, estimated
+from podusv_cli.components.vessels.estimated import Hull, estimate_vessel
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
@@ -56,7 +56,7 @@ def ratios():
         known, force = vessel(name), thrust(name)
         has_thrust = not math.isnan(force)
         hull = Hull(known.length, known.beam, known.m, force if has_thrust else 1.0, **options)
-        both = (quantities(n, hull, has_thrust) for n in (estimated(hull), dict(known)))
+        both = (quantities(n, hull, has_thrust) for n in (estimate_vessel(hull), dict(known)))
         for (quantity, guess), number in zip(next(both).items(), next(both).values(), strict=True):
             if number:
                 made.setdefault(quantity, {})[name] = guess / number

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from podusv_cli.core.signal import STATE, TAU
-from podusv_cli.identify.logs.reading import Named, table
+from podusv_cli.identify.logs.reading import NamedQuantities, table
 
 
 def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, tilted=None):
@@ -126,4 +126,4 @@ def written(path, columns):
 
 
 def read(path, columns=None, frame="ned"):
-    return table(path, WANTED, Named(columns or {}, frame))
+    return table(path, WANTED, NamedQuantities(columns or {}, frame))

@@ -39,7 +39,7 @@ def units(folder: Path) -> None:
 
 
 def runs(folder: Path) -> None:
-    studies.stored(folder).write_runs()
+    studies.open_store(folder).write_runs()
 
 
 def report(folder: Path) -> None:

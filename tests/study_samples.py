@@ -10,7 +10,7 @@ import pandas as pd
 
 from podusv_cli.core.about import Claim
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.studies.counting.claims import ParsedClaim, judge, parse
+from podusv_cli.studies.counting.claims import ParsedStudyClaim, judge, parse
 from podusv_cli.studies.counting.verdict import StudyVerdict
 from podusv_cli.studies.telling import summary as tables
 
@@ -76,9 +76,9 @@ def study(cells: Sequence[str] = ("",), **iae: Any) -> Made:
 
 def claim(
     expect: str, laws: Sequence[str], tolerance: float = 0.0, name: str = "S1"
-) -> ParsedClaim:
+) -> ParsedStudyClaim:
     stated = Claim(says="One is better.", source="ours", expect=expect, tolerance=tolerance)
-    return ParsedClaim(name, stated, parse(expect, laws, METRICS))
+    return ParsedStudyClaim(name, stated, parse(expect, laws, METRICS))
 
 
 def judged(runs: Made, *expected: str, tolerance: float = 0.0, level: float = 0.95) -> Any:

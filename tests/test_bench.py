@@ -17,7 +17,7 @@ from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.bench import standing
 from podusv_cli.studies.bench.cases import AXES, BenchCase, Selection, cases, shipped_bench
-from podusv_cli.studies.bench.optima import Least, wanted
+from podusv_cli.studies.bench.optima import Least, wanted_optima
 from podusv_cli.studies.bench.page import as_markdown, page
 from podusv_cli.studies.bench.runs import FAILED, BenchRun, play
 from podusv_cli.studies.bench.standing import leaderboard, middle, profile, table, with_optima
@@ -348,7 +348,7 @@ def test_cases_that_differ_in_what_laws_know_share_an_optimum_and_pods_have_none
         for case in every
         for law, iae in (("li", 9.0), ("pid", 5.0), ("dsc", 7.0))
     ]
-    found, refused = wanted(every, done)
+    found, refused = wanted_optima(every, done)
     shared = {"sea", "hull_light", "hull_heavy", "hull_other", "sampled"}
     assert [{case.condition for case in group.cases} for group in found] == [{"calm"}, shared]
     assert [list(group.laws) for group in found] == [["pid", "dsc"]] * 2

@@ -91,7 +91,7 @@ def cache(tmp_path, monkeypatch):
 
 
 def test_machine_code_is_what_the_kernel_computes():
-    code = compile.compiled(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))
+    code = compile.compile_piece(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))
     for angle in np.random.default_rng(1).uniform(-50, 50, 100):
         assert code(angle) == wrap(angle)
 
@@ -198,14 +198,14 @@ ONE_TO_ONE = CFUNCTYPE(c_double, c_double)
 
 def test_a_piece_that_is_damaged_or_anothers_is_made_anew(cache, monkeypatch):
     for function in (ready, doubled):
-        assert compile.compiled(compile.Piece(function, ONE_TO_ONE))(2.5) == function(2.5)
+        assert compile.compile_piece(compile.Piece(function, ONE_TO_ONE))(2.5) == function(2.5)
     (path,), (other,) = (list(cache.rglob(f"{name}_*")) for name in ("ready", "doubled"))
     whole = path.read_bytes()
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
     for damaged in (b"", whole[:-1], whole[:300], flipped, whole + b".", other.read_bytes()):
         path.write_bytes(damaged)
-        assert compile.compiled(compile.Piece(ready, ONE_TO_ONE))(2.5) == 2.5
+        assert compile.compile_piece(compile.Piece(ready, ONE_TO_ONE))(2.5) == 2.5
         assert object_cache._read(path) is not None
 
 
@@ -248,7 +248,7 @@ def test_what_is_missing_is_compiled_before_it_is_asked_for(cache, monkeypatch, 
     assert fractions == sorted(fractions)
     assert [object_cache.is_cached(piece.name) for piece in pieces] == [False, True, True]
     monkeypatch.setattr(compile.Piece, "compile", lambda piece: pytest.fail("compiled again"))
-    assert [compile.compiled(piece)(2.5) for piece in pieces[1:]] == [ready(2.5), doubled(2.5)]
+    assert [compile.compile_piece(piece)(2.5) for piece in pieces[1:]] == [ready(2.5), doubled(2.5)]
     fractions.clear()
     compile.prepare(pieces[1:], fractions.append)
     assert not fractions
@@ -272,7 +272,7 @@ def test_a_full_disk_costs_time_only(cache, monkeypatch):
 
     assert code_folder.code_folder(object_cache.translators())
     monkeypatch.setattr(os, "replace", full)
-    assert compile.compiled(compile.Piece(ready, ONE_TO_ONE))(2.5) == 2.5
+    assert compile.compile_piece(compile.Piece(ready, ONE_TO_ONE))(2.5) == 2.5
     assert [path.name for path in cache.rglob("*.*")] == [code_folder.MARK]
 
 
@@ -291,7 +291,7 @@ def test_a_kernel_that_allocates_is_refused_and_not_left_to_end_the_process():
         return float(room[0])
 
     with pytest.raises(TypeError, match=r"allocating needs \w+, which is no function"):
-        compile.compiled(compile.Piece(allocating, ONE_TO_ONE))
+        compile.compile_piece(compile.Piece(allocating, ONE_TO_ONE))
 
 
 # --- machine code on disk is never older than the source it was made from
@@ -426,6 +426,6 @@ def test_a_disk_that_takes_no_code_costs_time_and_nothing_else(tmp_path, monkeyp
 
     monkeypatch.setenv("PODUSV_CACHE", str(tmp_path))
     monkeypatch.setattr(object_cache, "_write", full)
-    monkeypatch.setattr(object_cache, "_loaded", lambda prototype, code: code)
+    monkeypatch.setattr(object_cache, "_load_code", lambda prototype, code: code)
     made = object_cache.Code("law", b"code")
-    assert object_cache.stored(None, "law_that_is_not_kept", lambda: made) == made
+    assert object_cache.load_or_translate(None, "law_that_is_not_kept", lambda: made) == made

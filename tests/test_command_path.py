@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
-from podusv_cli.components.actuators.command import Command, Failure
+from podusv_cli.components.actuators.command import Command, EffectivenessLoss
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.components.controllers.pid import Pid
@@ -202,7 +202,10 @@ def passed(path: Command, demand: float) -> float:
 def test_half_of_the_loads_is_left_from_the_step_of_the_failure_on():
     law = Constant(surge=2.0, yaw=1.0)
     out = run(
-        adrift(controller=law, actuator=Ideal(failure=Failure(time=0.995, effectiveness=0.5))), 2.0
+        adrift(
+            controller=law, actuator=Ideal(failure=EffectivenessLoss(time=0.995, effectiveness=0.5))
+        ),
+        2.0,
     )
     np.testing.assert_array_equal(out["tau_u"], np.where(out["time"] < 0.995, 2.0, 1.0))
     np.testing.assert_array_equal(out["tau_r"], np.where(out["time"] < 0.995, 1.0, 0.5))
@@ -211,7 +214,7 @@ def test_half_of_the_loads_is_left_from_the_step_of_the_failure_on():
 
 def test_a_failure_at_an_instant_costs_no_order():
     (a, _), m = linear(), PAPER.m11
-    actuator = Ideal(failure=Failure(time=1.0, effectiveness=0.25))
+    actuator = Ideal(failure=EffectivenessLoss(time=1.0, effectiveness=0.25))
     out = run(braked(0.0, controller=Constant(surge=6.0), actuator=actuator), 2.0, 0.1)
     t, u = out["time"], START[3]
     early = u * np.exp(-a * t) + 6.0 / (m * a) * -np.expm1(-a * t)

@@ -132,7 +132,7 @@ def monitored(*overrides: str) -> monitor.Window:
     """The monitor's window over the whole of a short run."""
     scenario = scene("simulation.duration=2", *overrides)
     loop, grid = scenario.closed_loop(), scenario.time_grid()
-    found = monitor.monitored(Plan(loop, grid), simulate(loop, grid))
+    found = monitor.monitor_recording(Plan(loop, grid), simulate(loop, grid))
     assert found is not None
     assert ("V_dot" in found.recording.signals) == (not overrides)
     return found.windows["whole"]

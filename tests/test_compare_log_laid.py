@@ -16,7 +16,7 @@ from scenario_samples import write
 import podusv as p
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.figures.curves import AFTER
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.trajectory import views
 
 OTTER = """
@@ -150,7 +150,7 @@ def on_legs():
     run = p.run("legs.yaml", out="run", figures=False)
     t, x, y, psi = (run[name][::5] for name in ("time", "x", "y", "psi"))
     log("LOG.csv", "time,x,y,psi", np.column_stack([t, x + 1.0, y, psi]))
-    shown = dressed(compared("run", "LOG.csv").result.runs)
+    shown = dress_runs(compared("run", "LOG.csv").result.runs)
     return shown, float(run.metrics["path_time"])
 
 

@@ -26,9 +26,9 @@ def test_costs_are_median_and_quartiles(monkeypatch):
 
 
 def test_names_are_told_apart():
-    assert members.numbered(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
-    assert members.numbered(["figures", "unit"], outputs.RESERVED) == ["figures_2", "unit_2"]
-    assert members.numbered(["pid", "Pid"]) == ["pid", "Pid_2"]
+    assert members.number_names(["a", "a", "a_2", "b", "a"]) == ["a", "a_2", "a_2_2", "b", "a_3"]
+    assert members.number_names(["figures", "unit"], outputs.RESERVED) == ["figures_2", "unit_2"]
+    assert members.number_names(["pid", "Pid"]) == ["pid", "Pid_2"]
 
 
 @pytest.mark.slow
@@ -42,7 +42,7 @@ def test_drawing_is_progress_too():
     def tell(name, fraction):
         seen.append((name, fraction))
 
-    drawn = outputs.drawn(result, Extras(), tell, ("all",))
+    drawn = outputs.draw_comparison(result, Extras(), tell, ("all",))
     assert "velocities.png" in drawn
     assert {name for name, _ in seen} == {"drawing figures"}
     fractions = [fraction for _, fraction in seen]

@@ -17,7 +17,7 @@ from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.past_run import CHECKS, PastRun
 from podusv_cli.figures.style import STYLES
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.metrics.windows import NAMED, named
+from podusv_cli.metrics.windows import NAMED, metrics_of_windows
 
 # A key of every section that a run has besides its law, and another value.
 OTHERWISE = {
@@ -70,7 +70,7 @@ def test_what_never_happened_in_a_run_that_finished_is_never_and_not_undefined()
 
 
 def test_every_metric_says_what_it_is_in_words_and_no_two_say_the_same():
-    of_windows = named((("late", (5.0, 9.0)),), (("near", 0.5),))
+    of_windows = metrics_of_windows((("late", (5.0, 9.0)),), (("near", 0.5),))
     metrics = [m for m in (METRICS | of_windows).values() if NAMED not in m.name]
     words = [metric.row for metric in metrics]
     assert len(set(words)) == len(words)
@@ -353,7 +353,7 @@ def test_a_run_that_diverged_has_no_metrics_and_ends_early():
 
 
 def test_a_lost_run_has_nothing_but_its_scenario():
-    lost = PastRun.lost("a", about(), "Traceback\n  File\nZeroDivisionError: oops\n")
+    lost = PastRun.without_log("a", about(), "Traceback\n  File\nZeroDivisionError: oops\n")
     assert lost.ending == "has no log: ZeroDivisionError: oops"
     assert math.isnan(lost.metric("iae"))
     assert (lost.compared_metrics(), lost.has("x"), lost.until) == ({}, False, 0.0)

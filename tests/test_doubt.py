@@ -23,7 +23,7 @@ from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.choices import choices, public
 from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judged
-from podusv_cli.doubt.together import counted, drawn
+from podusv_cli.doubt.together import count_turns, draw_worlds
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
 from podusv_cli.workflows import doubt as doubting
@@ -269,7 +269,7 @@ import os, signal
 from podusv_cli.cli import main
 from podusv_cli.doubt import search
 
-found, calls = search.explored, []
+found, calls = search.explore_choice, []
 
 def third(*given):
     calls.append(given)
@@ -277,7 +277,7 @@ def third(*given):
         os.killpg(os.getpgid(0), signal.SIGINT)
     return found(*given)
 
-search.explored = third
+search.explore_choice = third
 main()
 """
 
@@ -341,7 +341,7 @@ def test_hulls_are_drawn_whole_and_judged_as_algebra_has_it():
     section = {"draws": 60, "vary": {"vessel": {"rows": lines}}, "printed": fixed.split()}
     text = WRITTEN.replace(f"doubt: {{{STAY}, draws: 40}}", f"doubt: {json.dumps(section)}")
     loaded = load_text(text, "adrift.yaml", (), (doubt_faults,))
-    report, _ = doubting.doubted(
+    report, _ = doubting.doubt_subject(
         doubting.comparison(loaded), loaded.scenario, Request(workers=1), None
     )
     (choice,) = report.tried.draws.choices
@@ -382,13 +382,13 @@ def test_a_time_of_whole_steps_is_halved_and_doubled_and_not_drawn():
     assert found["measurement.heading.period"].values == (0.3,)
     assert found["control.period"].values == (0.1,)  # of a law at every instant
     assert found["measurement.position.bias_time"].range
-    moving = [choice.name for choice in drawn([*found.values()], 1, 20).choices]
+    moving = [choice.name for choice in draw_worlds([*found.values()], 1, 20).choices]
     assert not any(name.endswith(("period", "delay")) for name in moving)
 
 
 def test_worlds_that_cannot_be_are_counted():
     worlds = [Judged({"C": True}, {}), Judged({}, {}, "no mass"), Judged({"C": False}, {})]
-    turned, known = counted("C", worlds, worlds[0])
+    turned, known = count_turns("C", worlds, worlds[0])
     assert turned.tolist() == [False, False, True]
     assert known.tolist() == [True, False, True]
 

@@ -12,9 +12,9 @@ from podusv_cli.doubt import figures
 from podusv_cli.doubt.alone import TriedChoice, TriedValue, Turn, ends
 from podusv_cli.doubt.answer import Tried
 from podusv_cli.doubt.choices import Choice
-from podusv_cli.doubt.compared import compared
+from podusv_cli.doubt.compared import compared_numbers
 from podusv_cli.doubt.judged import Judged
-from podusv_cli.doubt.ranges import Range
+from podusv_cli.doubt.ranges import DoubtRange
 from podusv_cli.doubt.together import Draws
 from podusv_cli.figures.sketch import ON_PHONE
 from podusv_cli.figures.style import house_style
@@ -24,7 +24,7 @@ from podusv_cli.scenario.sweep import Quantity
 
 def choice(name, own, unit):
     quantity = Quantity(times=Distribution(log_uniform=(1.0 / 3.0, 3.0)))
-    return Choice(name, (), own, unit, Range(quantity, quantity, abs(own)))
+    return Choice(name, (), own, unit, DoubtRange(quantity, quantity, abs(own)))
 
 
 def judged(answer, number):
@@ -38,7 +38,7 @@ def drawn(base, *worlds):
     worlds = [judged(*world) for world in worlds]
     tried = Tried(judged(base, 3.9), [], Draws([gain], shares, shares.tolist()), worlds)
     answer = SimpleNamespace(
-        verdict=SimpleNamespace(name="C", answer=base), number=compared("a.iae < 4.9", 0.05)[0],
+        verdict=SimpleNamespace(name="C", answer=base), number=compared_numbers("a.iae < 4.9", 0.05)[0],
         numbers={"a.iae": 3.9}, explained=(),
     )  # fmt: skip
     alone = [TriedChoice(gain, ())]

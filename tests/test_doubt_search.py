@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 
 from podusv_cli.comparison.expressions import Evaluation
-from podusv_cli.doubt.alone import SHARP, explored
+from podusv_cli.doubt.alone import SHARP, explore_choice
 from podusv_cli.doubt.choices import Choice
-from podusv_cli.doubt.compared import compared
+from podusv_cli.doubt.compared import compared_numbers
 from podusv_cli.doubt.judged import Judged
-from podusv_cli.doubt.ranges import Range
-from podusv_cli.doubt.together import drawn, explained
+from podusv_cli.doubt.ranges import DoubtRange
+from podusv_cli.doubt.together import draw_worlds, explain_turns
 from podusv_cli.scenario.distributions import Distribution
 from podusv_cli.scenario.sweep import Quantity
 
 
 def moving(own=1.0, name="k"):
     quantity = Quantity(times=Distribution(log_uniform=(0.25, 4.0)))
-    return Choice(name, (("a", ("controller", name)),), own, range=Range(quantity, quantity, own))
+    return Choice(
+        name, (("a", ("controller", name)),), own, range=DoubtRange(quantity, quantity, own)
+    )
 
 
 def by(rule):
@@ -35,7 +37,7 @@ def by(rule):
 @pytest.mark.parametrize("place", [3.3, 1.04, 1.0 + 3e-5, 0.9997, 0.31])
 def test_the_place_is_bracketed_however_near(place):
     judge = by(lambda k: (k < place) is (place > 1.0))
-    (turn,) = explored(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
+    (turn,) = explore_choice(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
     assert abs(turn.held - 1.0) < abs(place - 1.0) * (1 + 1e-12)
     assert abs(turn.value - 1.0) >= abs(place - 1.0) * (1 - 1e-12)
     assert turn.distance <= SHARP * abs(turn.held - 1.0) * (1 + 1e-9)
@@ -43,14 +45,14 @@ def test_the_place_is_bracketed_however_near(place):
 
 def test_a_verdict_that_the_last_digit_turns():
     judge = by(lambda k: k == 1.0)
-    turns = explored(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
+    turns = explore_choice(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
     assert [turn.by_rounding for turn in turns] == [True, True]
     assert {turn.value for turn in turns} == {1.0 + math.ulp(1.0), 1.0 - math.ulp(1.0)}
 
 
 def test_a_verdict_that_turns_back_is_seen_at_a_tenth_of_the_range():
     judge = by(lambda k: not 1.2 < k < 1.4)
-    (turn,) = explored(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
+    (turn,) = explore_choice(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
     assert 1.2 < turn.value < 1.2 * SHARP + 0.01
 
 
@@ -63,8 +65,8 @@ def of_distance(law, edge=0.1):
         tried.append(k)
         return Judged({"C": law(k) > edge}, {"C": {"k": law(k)}})
 
-    numbers = {"C": compared(f"k > {edge}")}
-    return explored(moving(), judge, judge({}), numbers), judge({}), tried
+    numbers = {"C": compared_numbers(f"k > {edge}")}
+    return explore_choice(moving(), judge, judge({}), numbers), judge({}), tried
 
 
 @pytest.mark.parametrize("at", [2.87, 1.41, 0.44])
@@ -88,7 +90,9 @@ def test_many_claims_that_fall_at_one_place_look_there_once_each():
         number = 0.1 + abs(next(iter(world.values()), 1.0) - 1.41)
         return Judged(dict.fromkeys(claims, True), {claim: {"k": number} for claim in claims})
 
-    alone = explored(moving(), judge, judge({}), dict.fromkeys(claims, compared("k > 0.1")))
+    alone = explore_choice(
+        moving(), judge, judge({}), dict.fromkeys(claims, compared_numbers("k > 0.1"))
+    )
     assert not alone.turns("C3", judge({}))
     assert len(alone.trials) < 2 + 16 + 2 * 12
 
@@ -106,16 +110,16 @@ def test_a_number_that_does_not_act_is_tried_at_its_ends_and_half_way_alone():
         tried.append(world)
         return Judged({"C": True}, {"C": {"k": 7.0}})
 
-    alone = explored(moving(), judge, judge({}), {"C": []})
+    alone = explore_choice(moving(), judge, judge({}), {"C": []})
     assert len(tried) == 1 + 4
     assert not alone.acts("C", judge({}))
 
 
 def planted(rule, count=300):
     names = ("a", "b", "c")
-    draws = drawn([moving(name=name) for name in names], 1, count)
+    draws = draw_worlds([moving(name=name) for name in names], 1, count)
     turned = np.array([rule(dict(zip(names, u, strict=True))) for u in draws.shares])
-    return explained(draws, turned, np.ones(count, bool), dict.fromkeys(names, True))
+    return explain_turns(draws, turned, np.ones(count, bool), dict.fromkeys(names, True))
 
 
 def test_the_choice_that_turns_draws_is_named():
@@ -134,7 +138,10 @@ def test_chance_explains_nothing():
 
 
 def test_a_draw_depends_on_its_name_and_index_alone():
-    few, many = drawn([moving(name="b")], 1, 5), drawn([moving(name="a"), moving(name="b")], 1, 9)
+    few, many = (
+        draw_worlds([moving(name="b")], 1, 5),
+        draw_worlds([moving(name="a"), moving(name="b")], 1, 9),
+    )
     assert (few.shares[:, 0] == many.shares[:5, 1]).all()
     assert [v[0] for v in few.values] == [v[1] for v in many.values[:5]]
 
@@ -143,15 +150,18 @@ def test_a_draw_depends_on_its_name_and_index_alone():
 
 
 def test_the_numbers_of_a_claim_with_their_limits():
-    assert compared("max(a.x) <= 0.1 and -3 > a.e") == [
+    assert compared_numbers("max(a.x) <= 0.1 and -3 > a.e") == [
         ("max(a.x)", "", (0.1,), False), ("a.e", "", (-3.0,), True),
     ]  # fmt: skip
-    assert compared("1 < a.e < b.e") == [("a.e", "", (1.0,), True), ("a.e", "b.e", (1.0,), True)]
-    (ratio,) = compared("not b.iae > 2 * a.iae")
+    assert compared_numbers("1 < a.e < b.e") == [
+        ("a.e", "", (1.0,), True),
+        ("a.e", "b.e", (1.0,), True),
+    ]
+    (ratio,) = compared_numbers("not b.iae > 2 * a.iae")
     assert ratio == ("b.iae", "2 * a.iae", (1.0,), True)
     assert ratio.of({"b.iae": 3.0, "2 * a.iae": 4.0}) == 0.75
     assert math.isnan(ratio.of({"b.iae": 3.0}))
-    assert compared("finished(a)")[0].of({"finished(a)": 1.0}) == 1.0
+    assert compared_numbers("finished(a)")[0].of({"finished(a)": 1.0}) == 1.0
 
 
 class Numbered:
@@ -178,7 +188,7 @@ class Numbered:
 )  # fmt: skip
 def test_a_number_turns_where_the_verdict_on_the_claim_does(expect, edges):
     """As the claims' own judge has it, a little to both sides of each edge."""
-    (number,) = compared(expect, 0.1)
+    (number,) = compared_numbers(expect, 0.1)
     scale = 5.0 if number.right else 1.0
     for edge in number.edges:
         runs = [{"a": Numbered(scale * edge * f), "b": Numbered(5.0)} for f in (0.999, 1.001)]
@@ -189,10 +199,10 @@ def test_a_number_turns_where_the_verdict_on_the_claim_does(expect, edges):
 
 
 def test_a_strict_comparison_turns_beyond_the_edge_where_it_can_tell_again():
-    (number,) = compared("a.e < 4", 0.1)
+    (number,) = compared_numbers("a.e < 4", 0.1)
     assert number.turning({"a.e": 1.0}) == (4.0 / 0.9,)
     assert number.turning({"a.e": 9.0}) == (3.6,)
-    (equal,) = compared("a.e == 4", 0.1)
+    (equal,) = compared_numbers("a.e == 4", 0.1)
     assert equal.turning({"a.e": 4.0}) == pytest.approx((3.6, 4.4))
 
 
@@ -201,17 +211,17 @@ def test_what_keeps_a_verdict_is_no_value_that_leaves_it_open():
         k = next(iter(world.values()), 1.0)
         return Judged({"C": None if 1.3 < k < 2.0 else k <= 1.3}, {"C": {"k": k}})
 
-    (turn,) = explored(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
+    (turn,) = explore_choice(moving(), judge, judge({}), {"C": []}).turns("C", judge({}))
     assert turn.value == pytest.approx(2.0, rel=SHARP - 1.0)
     assert turn.held <= 1.3
 
 
 def test_the_margin_is_counted_in_half_widths_of_the_draws():
-    (number,) = compared("a.e <= 0.5")
+    (number,) = compared_numbers("a.e <= 0.5")
     worlds = [Judged({}, {"C": {"a.e": x}}) for x in np.linspace(0.0, 1.0, 101)]
     spread = number.spread("C", [*worlds, Judged({}, {}, "no such world")])
     assert spread == pytest.approx((0.05, 0.5, 0.95))
     assert number.margin({"a.e": 0.2}, spread) == pytest.approx(0.3 / 0.45)
     assert number.margin({"a.e": 0.2}, (0.2, 0.2, 0.2)) == math.inf
-    (equal,) = compared("a.e == 0.5", 0.1)
+    (equal,) = compared_numbers("a.e == 0.5", 0.1)
     assert equal.margin({"a.e": 0.5}, spread) == pytest.approx(0.05 / 0.45)

@@ -20,7 +20,7 @@ EPSILON = np.finfo(float).eps
 
 
 def compiled(function: Any, numbers: Vector) -> Vector:
-    inner = compile_numba.inlined(function)
+    inner = compile_numba.inline_kernel(function)
     code = njit(lambda x: inner(x))
     return np.array([code(x) for x in numbers])
 

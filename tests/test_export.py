@@ -35,7 +35,7 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import podusv
-from podusv_cli.components.actuators.command import Command, Failure
+from podusv_cli.components.actuators.command import Command, EffectivenessLoss
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.errors import StorageError, UsageError
@@ -191,7 +191,7 @@ def test_the_description_of_the_fmu_names_every_variable_once():
         **c.template_values(law), "guid": "g", "outputs": [13, 14], "stop": "30.0",
         "units": ["N"], "variables": variables(law, np.arange(15.0)), "loads": True,
     }  # fmt: skip
-    tree = ET.fromstring(c.rendered("modelDescription.xml", about))
+    tree = ET.fromstring(c.render_file("modelDescription.xml", about))
     found = [variable.get("name") for variable in tree.iter("ScalarVariable")]
     assert found == law.columns[1:]
     starts = [real.get("start") for real in tree.iter("Real")]
@@ -245,14 +245,14 @@ def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
         cut = np.clip(demand, np.negative(limits), limits)
         loads = actuator._driven(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
         assert np.array_equal(loads, [cut[0], 0.0, cut[1]]) == actuator.only_cuts
-    for around in (Command(), Failure(time=1e9)):
+    for around in (Command(), EffectivenessLoss(time=1e9)):
         name = type(around).__name__.lower()
         assert not actuator.model_copy(update={name: around}).only_cuts
 
 
 def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(monkeypatch):
     monkeypatch.setattr(link, "find_spec", lambda name: name == "ziglang")
-    assert [*workflow._linked(workflow.Products())] == [link.this_machine()]
+    assert [*workflow._linkable_platforms(workflow.Products())] == [link.this_machine()]
     asked = workflow.Products(platforms=["win64", "linux64"])
     said: list[str] = []
     monkeypatch.setattr(
@@ -260,7 +260,9 @@ def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(m
     )
     law = ExportedLaw.of(scenario("pid"))
     inputs = np.zeros(12)
-    units.fmu(law, objects.together(law.pieces), workflow._linked(asked), inputs, said.append)
+    units.fmu(
+        law, objects.together(law.pieces), workflow._linkable_platforms(asked), inputs, said.append
+    )
     builds = "the first time, zig builds the platform's C library, a minute or two"
     assert said == [
         f"linking the FMU for win64; {builds}", "win64",

@@ -29,10 +29,10 @@ from podusv_cli.core import escaping
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.spectrum import periodogram
 from podusv_cli.figures.animation import stage
-from podusv_cli.figures.curves import thinned
+from podusv_cli.figures.curves import thin_curve
 from podusv_cli.figures.drawing import FIGURES, draw
 from podusv_cli.figures.looks import LOOKS, nth_style
-from podusv_cli.figures.shown import FEWEST, axis_label, dressed, label, places
+from podusv_cli.figures.shown import FEWEST, axis_label, dress_runs, label, places
 from podusv_cli.figures.style import STYLES, WIDTHS, Look, house_style, image, new_figure
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
@@ -179,15 +179,15 @@ def test_thinning_keeps_the_extremes_of_every_bin_in_order():
     t = np.linspace(0, 1, 100_000)
     y = np.sin(50 * t)
     y[[777, 54_321]] = 9.0, -9.0
-    few, kept = thinned(t, y)
+    few, kept = thin_curve(t, y)
     assert len(few) <= 1500 + 2
     assert np.all(np.diff(few) > 0)
     assert (kept.max(), kept.min()) == (9.0, -9.0)
     smooth = np.sin(50 * t)
-    assert np.interp(t, *thinned(t, smooth)) == pytest.approx(smooth, abs=0.1)
-    assert np.array_equal(thinned(t[:1500], y[:1500])[1], y[:1500])
-    assert len(thinned(t[:2500], y[:2500])[0]) <= 1500 + 2
-    level = thinned(t, np.zeros_like(t))[0]
+    assert np.interp(t, *thin_curve(t, smooth)) == pytest.approx(smooth, abs=0.1)
+    assert np.array_equal(thin_curve(t[:1500], y[:1500])[1], y[:1500])
+    assert len(thin_curve(t[:2500], y[:2500])[0]) <= 1500 + 2
+    level = thin_curve(t, np.zeros_like(t))[0]
     assert (level[0], level[-1]) == (t[0], t[-1])
 
 
@@ -342,7 +342,7 @@ def followed():
 
 
 def labelled(parts):
-    return dressed(
+    return dress_runs(
         [PastRun(label, about, log) for label, (log, about) in zip(ODD, parts, strict=True)]
     )
 
@@ -421,7 +421,7 @@ def test_a_claim_that_names_a_peak_is_found_and_drawn_in_the_panel_of_the_demand
     loaded = load(CONFIGS / "mu_2017/figures_compare_standoff.yaml")
     found = peaks(parse_claims(loaded))
     assert found == {"tau_u_cmd": 300.0, "tau_r_cmd": 1000.0}
-    runs = dressed([looked_at("a", recording(), scenario())], found)
+    runs = dress_runs([looked_at("a", recording(), scenario())], found)
     with house_style():
         axes = FIGURES["controls"].family(runs, 2).axes
     levels = {

@@ -15,7 +15,7 @@ from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.finding import finding_kinds, postflight, preflight
 from podusv_cli.findings.limit_cycle import limit_cycle
-from podusv_cli.findings.outcome import saturated
+from podusv_cli.findings.outcome import warn_of_saturation
 from podusv_cli.findings.proof import argument
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
@@ -192,11 +192,11 @@ def test_limits_that_are_over_are_told_where_memory_winds_up_or_the_run_is_lost(
     told_of_loads = scenario.model_copy(update={"controller": law})
     approach = out["time"] < 0.5 * out["time"][-1]
     early, late = changed(out, saturated=1.0 * approach), changed(out, saturated=1.0 * ~approach)
-    assert len(list(saturated.search(scenario, early))) == 1
-    assert list(saturated.search(told_of_loads, early)) == []
-    (text,) = saturated.search(told_of_loads, late)
+    assert len(list(warn_of_saturation.search(scenario, early))) == 1
+    assert list(warn_of_saturation.search(told_of_loads, early)) == []
+    (text,) = warn_of_saturation.search(told_of_loads, late)
     assert "100.0% of the steady window" in text
-    (text,) = saturated.search(told_of_loads, replace(early, status="diverged"))
+    (text,) = warn_of_saturation.search(told_of_loads, replace(early, status="diverged"))
     assert "of the run" in text
 
 
@@ -206,13 +206,13 @@ def test_what_helps_against_windup_is_what_the_law_has():
     def advice(**own):
         quiet = {"slots": lambda: (1,), "wants_loads": lambda: False}
         law = SimpleNamespace(**quiet | own)
-        (text,) = saturated.search(scenario.model_copy(update={"controller": law}), out)
+        (text,) = warn_of_saturation.search(scenario.model_copy(update={"controller": law}), out)
         return text
 
     assert "anti_windup" not in advice(against_windup=Controller.against_windup)
     assert "after_saturation" in advice(against_windup=Controller.against_windup)
     assert "no memory" in advice(slots=tuple)
-    (text,) = saturated.search(scenario, out)
+    (text,) = warn_of_saturation.search(scenario, out)
     assert text.endswith("consider anti_windup: auxiliary")
 
 

@@ -13,9 +13,9 @@ from continuous import continuous
 from findings_samples import BARE, CONFIGS, PLAIN, codes, finding, late, log, scene, simulated
 
 from podusv_cli.components.controllers.velocity_loop import Loop
-from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.finding import Finding, merge_findings
 from podusv_cli.findings.finding import preflight
-from podusv_cli.findings.outcome import saturated
+from podusv_cli.findings.outcome import warn_of_saturation
 from podusv_cli.findings.stability import loops, rk4_growth, sampled_growth
 from podusv_cli.scenario.load import load
 
@@ -269,10 +269,10 @@ def test_steepness_is_that_of_waves_of_the_peak_s_period():
 )
 def test_what_makes_the_demand_swing_is_told_in_place_of_windup(override, says):
     tight = ("actuator={kind: saturated, surge_limit: 2.0}", "simulation.duration=5")
-    (text,) = saturated.search(scene(*tight, *override).alone(), log(*tight))
+    (text,) = warn_of_saturation.search(scene(*tight, *override).alone(), log(*tight))
     assert says in text
     assert "anti_windup" not in text
-    (text,) = saturated.search(scene(*tight).alone(), log(*tight))
+    (text,) = warn_of_saturation.search(scene(*tight).alone(), log(*tight))
     assert text.endswith("consider anti_windup: auxiliary")
 
 
@@ -326,12 +326,12 @@ def test_an_unknown_code_is_refused_with_a_suggestion(podusv):
 
 def test_findings_that_not_all_runs_share_name_their_runs():
     shared, some, own = (Finding(code, "actuator", code) for code in ("a", "b", "c"))
-    found = merged({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
+    found = merge_findings({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
     assert [str(finding) for finding in found] == [
         "warning[a]: actuator: a", "warning[b]: x, y: actuator: b", "warning[c]: y, z: actuator: c",
     ]  # fmt: skip
-    assert merged({"x": [shared], "there already": []})[0].runs == ("x",)
-    assert merged({"x": [shared]}) == [shared]
+    assert merge_findings({"x": [shared], "there already": []})[0].runs == ("x",)
+    assert merge_findings({"x": [shared]}) == [shared]
 
 
 def transcripts() -> list[tuple[str, list[str]]]:

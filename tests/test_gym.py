@@ -112,7 +112,9 @@ def test_without_a_seed_no_draw_of_the_study_comes_up():
     assert judged.isdisjoint(starts)
     assert min(starts) < -6.0 < 6.0 < max(starts)
     task, first = env._task, SimpleNamespace(integers=lambda most: 0)
-    assert task.drawn(None, first).start.x not in judged  # also with the number of a study's draw
+    assert (
+        task.draw_scenario(None, first).start.x not in judged
+    )  # also with the number of a study's draw
     again = single()
     again.reset(seed=7)
     again.reset()

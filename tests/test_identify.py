@@ -30,11 +30,11 @@ from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
-from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.answer import Identification
 from podusv_cli.identify.fit.estimate import (
     OPEN,
     SILENT,
-    Estimate,
+    HullEstimate,
     directions,
 )
 from podusv_cli.identify.fit.march import (
@@ -44,17 +44,17 @@ from podusv_cli.identify.fit.march import (
     HOLDS,
     NAMES,
     VALUES,
-    Record,
+    FilterRecord,
     side_by_side,
 )
-from podusv_cli.identify.fit.problem import Problem, hull_numbers
+from podusv_cli.identify.fit.problem import FitProblem, hull_numbers
 from podusv_cli.identify.fit.records import log_of
-from podusv_cli.identify.logs.reading import Table, delivered
-from podusv_cli.identify.outputs import drawn
+from podusv_cli.identify.logs.reading import LogTable, mark_new_values
+from podusv_cli.identify.outputs import rows_of_draws
 from podusv_cli.identify.phrases import early_words, summary, thrust_words, worse_words
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows.identify import answered
+from podusv_cli.workflows.identify import answer_logs
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
     fine[:, HOLDS] /= 40.0
     fine[np.arange(len(fine)) % 40 > 0, DELIVERED : DELIVERED + 6] = 0.0
     run = side_by_side(Ideal())(
-        Record(fine, count), [np.array([constants[n] for n in NAMES])], [start], False
+        FilterRecord(fine, count), [np.array([constants[n] for n in NAMES])], [start], False
     )
     expected = filtered(rows, x, P, bundle(constants), filter_, current)
     assert np.column_stack([run.innovations, run.variances]) == pytest.approx(
@@ -156,7 +156,7 @@ def test_a_few_numbers_come_out_of_two_logs(boat):
     found = fitted(given)
     ways = directions(found.covariance, len(given.hull))
     assert found.settled
-    assert ways.known == 4
+    assert ways.determined_count == 4
     values, sd, truth = given.values(found.y), np.sqrt(np.diag(found.covariance)), HULL.constants()
     for i, number in enumerate(given.hull):
         width = number.sd * sd[i]
@@ -172,9 +172,9 @@ def test_slopes_take_the_room_of_innovations_and_variances(boat):
     """Tracks of all runs, or slopes of all values at once, would each take more than this."""
     given = problem(boat)
     size, values = len(given.numbers), sum(log.record.delivered for log in boat)
-    given.search.scored(np.zeros(size))
+    given.search.score(np.zeros(size))
     tracemalloc.start()
-    given.search.scored(np.zeros(size))
+    given.search.score(np.zeros(size))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1.5 * 2 * 8 * values * (size + 1 + LANES)
@@ -200,7 +200,7 @@ def test_a_hull_comes_out_of_its_logs_with_its_error(boat):
     assert values["m11"] == pytest.approx(HULL.m11, rel=0.02)
     assert values["m33"] == pytest.approx(HULL.m33, rel=0.04)
     assert given.vessel(found.y).m33 == pytest.approx(values["m33"])
-    assert 6 <= ways.known < len(given.hull)
+    assert 6 <= ways.determined_count < len(given.hull)
 
 
 STILL = np.zeros(400)
@@ -228,7 +228,7 @@ def test_a_straight_or_moored_boat_leaves_what_it_does_not_show_as_it_was(push, 
     given = problem([log], otter.changed({"X_u": -50.0}), current=0.0)
     found = fitted(given)
     ways = directions(found.covariance, len(given.hull))
-    assert ways.known == len(determined)
+    assert ways.determined_count == len(determined)
     sd = np.sqrt(np.diag(found.covariance))
     for number, y, width in zip(given.hull, found.y, sd, strict=False):
         if number.name in determined:
@@ -269,11 +269,11 @@ def test_on_a_straight_track_a_current_along_it_is_left_to_the_load(boat):
 def test_draws_keep_what_is_determined_and_spread_as_before_where_nothing_is():
     """Of two numbers only a weighted sum is known; a third is as open as its prior."""
     wanted = Identify(logs=LOGS, free=("X_u", "Y_v", "N_r"), draws=4000, prior=0.8)
-    given = Problem(SCENARIO, wanted, [])
+    given = FitProblem(SCENARIO, wanted, [])
     sum_of = np.array([0.6, 0.8, 0.0])
     covariance = np.eye(3) - (1.0 - 1e-4) * np.outer(sum_of, sum_of)
-    found = Estimate(np.zeros(3), 0.0, covariance, 1)
-    hulls = Answer(given, found, directions(covariance, 3), (), ()).draws
+    found = HullEstimate(np.zeros(3), 0.0, covariance, 1)
+    hulls = Identification(given, found, directions(covariance, 3), (), ()).draws
     factors = np.array([[getattr(h, n) / getattr(HULL, n) for n in wanted.free] for h in hulls])
     sd = given.sd[0]
     assert np.std((factors - 1.0) / sd @ sum_of) == pytest.approx(0.01, rel=0.05)
@@ -310,8 +310,8 @@ def untold(prior, **wanted):
     """An answer where no log says anything."""
     given = problem([], prior=prior, **wanted)
     size = len(given.hull)
-    found = Estimate(np.zeros(size), 0.0, np.eye(size), 1, True)
-    return Answer(given, found, directions(found.covariance, size), (), ())
+    found = HullEstimate(np.zeros(size), 0.0, np.eye(size), 1, True)
+    return Identification(given, found, directions(found.covariance, size), (), ())
 
 
 def test_hulls_are_drawn_from_wide_priors_too():
@@ -338,8 +338,8 @@ def test_thrust_that_is_found_is_said_since_the_hull_has_no_place_for_it(boat):
         given = problem(boat[2:], free=free, prior=0.5)
         size = len(given.numbers)
         y = np.array([math.log(0.8) / n.sd if n.name == "thrust" else 0.0 for n in given.numbers])
-        found = Estimate(y, 0.0, np.eye(size), 1, True)
-        lines = thrust_words(Answer(given, found, directions(np.eye(size), 2), (), ()))
+        found = HullEstimate(y, 0.0, np.eye(size), 1, True)
+        lines = thrust_words(Identification(given, found, directions(np.eye(size), 2), (), ()))
         assert len(lines) == count
     assert lines[0].startswith("thrust is 0.8 (")
     assert "multiply the actuator's thrust" in lines[0]
@@ -351,8 +351,8 @@ def test_a_boat_that_moves_before_its_commands_is_doubted(boat, off, count):
     given = problem(boat[2:], free=("N_r",), prior=0.5)
     size = len(given.numbers)
     y = np.array([off * (n.name == "delay") for n in given.numbers])
-    found = Estimate(y, 0.0, 0.01 * np.eye(size), 1, True)
-    lines = early_words(Answer(given, found, directions(np.eye(size), 2), (), ()))
+    found = HullEstimate(y, 0.0, 0.01 * np.eye(size), 1, True)
+    lines = early_words(Identification(given, found, directions(np.eye(size), 2), (), ()))
     assert len(lines) == count
     assert all(line.startswith("delay is -0.075 s (-0.085 to -0.065)") for line in lines)
 
@@ -360,7 +360,7 @@ def test_a_boat_that_moves_before_its_commands_is_doubted(boat, off, count):
 def test_a_hull_times_a_factor_under_thrust_times_it_moves_as_before():
     times = np.arange(0.0, 20.0, 0.2)
     commands, start = commands_of(times), np.array([0.0, 0.0, 0.0, 0.4, 0.1, 0.0])
-    double = problem([], free=("N_r", "thrust"), prior=0.5).scaled(np.zeros(2), 2.0)
+    double = problem([], free=("N_r", "thrust"), prior=0.5).scale_by_thrust(np.zeros(2), 2.0)
     assert double.m == 2.0 * HULL.m
     assert double.m23 == pytest.approx(2.0 * HULL.m23)
     twice = motion(2.0 * commands, times, start, double)
@@ -372,8 +372,10 @@ def test_draws_move_as_the_logs_leave_possible_with_the_one_thrust_that_is_said(
     given = problem([], free=("N_r", "thrust"), prior=0.5, draws=1000)
     ratio = np.array([1.0, -1.0]) / math.sqrt(2.0)
     covariance = np.eye(2) - (1.0 - 1e-6) * np.outer(ratio, ratio)
-    found = Estimate(np.zeros(2), 0.0, covariance, 1)
-    rows = pd.DataFrame(drawn(Answer(given, found, directions(covariance, 2), (), ())))
+    found = HullEstimate(np.zeros(2), 0.0, covariance, 1)
+    rows = pd.DataFrame(
+        rows_of_draws(Identification(given, found, directions(covariance, 2), (), ()))
+    )
     assert (rows.N_r / HULL.N_r).to_numpy() == pytest.approx(np.ones(1000), abs=0.01)
     thrust = np.quantile(HULL.m / rows.m, (0.025, 0.5, 0.975))
     assert thrust == pytest.approx(
@@ -394,7 +396,7 @@ def test_a_log_of_few_seconds_gives_a_hull_without_scores():
     given = problem(
         [log_of(table_of(times[:41], states, commands[:41]), Ideal(), 0.05)], free=("N_r",), draws=5
     )
-    answer = answered(given.scenario, given.wanted, [(given.logs[0], "fit")], None)
+    answer = answer_logs(given.scenario, given.wanted, [(given.logs[0], "fit")], None)
     assert answer.scores == []
     assert 0.2 < answer.vessel.envelope.speed < 0.6
     assert len(answer.forces) == 9
@@ -404,10 +406,10 @@ def test_ctrl_c_while_logs_are_judged_keeps_the_hull(boat, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(judge, "estimated", interrupted)
+    monkeypatch.setattr(judge, "estimate_hull", interrupted)
     given = problem(boat[2:], free=("N_r",))
     logs = [(boat[2], "fit")]
-    answer = answered(given.scenario, given.wanted, logs, None)
+    answer = answer_logs(given.scenario, given.wanted, logs, None)
     assert answer.estimate.interrupted
     assert answer.estimate.settled
     assert answer.judged == [(boat[2], "fit", ())]
@@ -429,17 +431,17 @@ def test_who_keeps_the_velocities_of_an_instant_goes_round_a_circle():
 def test_values_that_a_logger_repeats_count_once():
     rng = np.random.default_rng(0)
     true = rng.normal(size=100)
-    assert delivered(true).all()
+    assert mark_new_values(true).all()
     held = np.repeat(true, 5)
-    assert delivered(held).sum() == 100
-    assert delivered(held)[::5].all()
+    assert mark_new_values(held).sum() == 100
+    assert mark_new_values(held)[::5].all()
     uneven = true[np.floor(np.arange(350) / 3.5).astype(int)]  # 3 and 4 rows in turn
-    assert delivered(uneven).sum() == 100
+    assert mark_new_values(uneven).sum() == 100
     coarse = np.round(np.cumsum(rng.normal(0.0, 0.6, 400)))  # a resolution, not a rate
-    assert delivered(coarse).all()
+    assert mark_new_values(coarse).all()
     gaps = true.copy()
     gaps[10:20] = np.nan
-    assert delivered(gaps).sum() == 90
+    assert mark_new_values(gaps).sum() == 90
 
 
 def test_a_log_becomes_rows_of_which_none_is_lost():
@@ -453,7 +455,7 @@ def test_a_log_becomes_rows_of_which_none_is_lost():
         "psi": pose * 0.1 * rng.normal(size=count), "r": rng.normal(size=count),
         "tau_u": np.linspace(0.0, 1.0, count), "tau_r": np.zeros(count),
     }  # fmt: skip
-    log = log_of(Table("a", times, columns), Ideal(), 0.1)
+    log = log_of(LogTable("a", times, columns), Ideal(), 0.1)
     assert log.counts.tolist() == [count // 5] * 3 + [0, 0, count]
     rows = log.record.rows
     assert rows[:, HOLDS].sum() == pytest.approx(times[-1] - times[0])

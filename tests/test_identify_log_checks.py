@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from log_files import read, written
 
-from podusv_cli.identify.logs.checks import checked
+from podusv_cli.identify.logs.checks import check_log
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.reading import Table
+from podusv_cli.identify.logs.reading import LogTable
 
 TIMES = np.arange(0.0, 120.0, 0.2)
 HEADINGS = {
@@ -37,13 +37,13 @@ def sailed(heading, swayed, noise=0.02):
     places = np.cumsum(velocity) * 0.2
     rng = np.random.default_rng(len(heading) + len(swayed))
     x, y = (axis + noise * rng.normal(size=len(psi)) for axis in (places.real, places.imag))
-    return Table("boat.csv", TIMES, {"x": x, "y": y, "psi": psi})
+    return LogTable("boat.csv", TIMES, {"x": x, "y": y, "psi": psi})
 
 
 @pytest.mark.parametrize("swayed", SWAYED)
 @pytest.mark.parametrize("heading", [*HEADINGS, *STRAIGHT])
 def test_a_sound_heading_is_no_half_one(heading, swayed):
-    lines = checked(sailed(heading, swayed))
+    lines = check_log(sailed(heading, swayed))
     assert not any("twice as far as psi" in line for line in lines)
 
 
@@ -56,7 +56,7 @@ def test_a_heading_that_turns_half_as_far_as_the_course_is_doubted(heading, sway
         log, columns={**log.columns, "psi": 0.5 * (log.columns["psi"] % (2.0 * math.pi))}
     )
     for wrong in (halved, wrapped):
-        *_, line = checked(wrong)  # before it one on jumps, where it is wrapped
+        *_, line = check_log(wrong)  # before it one on jumps, where it is wrapped
         assert "the track's course turns twice as far as psi" in line
         assert line.endswith("if psi is half the heading; double its column.")
 
@@ -65,7 +65,7 @@ def test_a_heading_that_turns_half_as_far_as_the_course_is_doubted(heading, sway
 def test_a_heading_of_the_other_sign_is_refused_in_drift_too(heading):
     log = sailed(heading, "drift")
     with pytest.raises(LogFault, match=r'write psi: "-COLUMN"'):
-        checked(replace(log, columns={**log.columns, "psi": -log.columns["psi"]}))
+        check_log(replace(log, columns={**log.columns, "psi": -log.columns["psi"]}))
 
 
 # Latitude and longitude as degrees and minutes in one number
@@ -93,21 +93,21 @@ def fixes(speed, lat=0.61, lon=0.4):
 def test_degrees_and_minutes_below_90_are_named(tmp_path, speed, has_u):
     right = fixes(speed) | ({"u": 0.0 * TIMES + speed} if has_u else {})
     log = read(written(tmp_path / "log.csv", right))
-    assert checked(log) == []
+    assert check_log(log) == []
     wrong = right | {name: as_one_number(right[name]) for name in ("lat", "lon")}
     log = read(written(tmp_path / "log.csv", wrong))
     says = r"m/s by latitude and longitude.*degrees and minutes, ddmm\.mmmm\? Convert it"
     if not has_u and speed < 1.0:  # 30 m/s, which some boats make
-        (line,) = checked(log)
+        (line,) = check_log(log)
         assert "ddmm.mmmm" in line
         return
     with pytest.raises(LogFault, match=says):
-        checked(log)
+        check_log(log)
 
 
 def test_a_fast_boat_at_a_place_that_may_be_minutes_is_none(tmp_path):
     """43 N, 7 E: 43 and 7 are below 60. Its own u says that it makes 25 m/s."""
     fast = fixes(25.0, 43.2, 7.1) | {"u": 0.0 * TIMES + 25.0}
-    assert not any("ddmm" in line for line in checked(read(written(tmp_path / "log.csv", fast))))
+    assert not any("ddmm" in line for line in check_log(read(written(tmp_path / "log.csv", fast))))
     slow = fixes(2.0, 43.2, 7.1)
-    assert checked(read(written(tmp_path / "log.csv", slow))) == []
+    assert check_log(read(written(tmp_path / "log.csv", slow))) == []

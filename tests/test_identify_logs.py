@@ -13,18 +13,18 @@ from log_files import read, written
 
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.errors import UsageError
-from podusv_cli.identify.fit.problem import Problem
+from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.intake import logs_of, pieces
-from podusv_cli.identify.logs.checks import checked
-from podusv_cli.identify.logs.commands import acted, held
+from podusv_cli.identify.logs.checks import check_log
+from podusv_cli.identify.logs.commands import hold_values, with_actuator_state
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.reading import Table
+from podusv_cli.identify.logs.reading import LogTable
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.identify.phrases import far_words
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
-from podusv_cli.workflows.identify import answered
+from podusv_cli.workflows.identify import answer_logs
 
 LOGS = (LogFile(file="a.csv"),)
 
@@ -41,7 +41,7 @@ def weaving():
     r = 0.1 + 0.4 * np.cos(0.5 * fine)
     found = dict(zip(("x", "y", "psi", "u", "v", "r"), (x, y, psi, u, v, r), strict=True))
     columns = {name: values[::10].copy() for name, values in found.items()}
-    return Table("boat.csv", times, columns | {"tau_u": 0 * times, "tau_r": np.sin(times)})
+    return LogTable("boat.csv", times, columns | {"tau_u": 0 * times, "tau_r": np.sin(times)})
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_headings_may_wrap(sailed):
     wrapped = np.mod(sailed.columns["psi"], 2.0 * math.pi)
     assert np.any(np.abs(np.diff(wrapped)) > 3.0)
     turned = replace(sailed, columns={**sailed.columns, "psi": wrapped})
-    assert checked(turned, Ideal()) == checked(sailed, Ideal()) == []
+    assert check_log(turned, Ideal()) == check_log(sailed, Ideal()) == []
     assert log_of(turned, Ideal(), 0.05).state[3:] == pytest.approx(
         log_of(sailed, Ideal(), 0.05).state[3:]
     )
@@ -124,18 +124,18 @@ MISTAKES = {
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_what_no_motion_explains_is_an_error_that_says_what_to_write(weaving, mistake):
     changes, sentence = MISTAKES[mistake]
-    assert checked(weaving, Ideal()) == []
+    assert check_log(weaving, Ideal()) == []
     changed = {name: change(weaving.columns) for name, change in changes.items()}
     with pytest.raises(LogFault, match=f"(?s)boat.csv: .*{sentence}"):
-        checked(replace(weaving, columns={**weaving.columns, **changed}), Ideal())
+        check_log(replace(weaving, columns={**weaving.columns, **changed}), Ideal())
 
 
 def test_a_compass_that_is_mounted_backwards_is_said_with_what_follows_from_it(weaving):
     given = {**weaving.columns, "psi": weaving.columns["psi"] + math.pi}
     with pytest.raises(LogFault, match=r"u is -1.02 .* also, the boat moves -?1\d\d deg off"):
-        checked(replace(weaving, columns=given), Ideal())
+        check_log(replace(weaving, columns=given), Ideal())
     given.pop("u"), given.pop("v")
-    lines = checked(replace(weaving, columns=given), Ideal())
+    lines = check_log(replace(weaving, columns=given), Ideal())
     assert "deg off its heading on average; check that x is north" in lines[0]
 
 
@@ -146,7 +146,7 @@ def test_a_boat_that_yaws_in_waves_on_a_straight_track_is_no_mistake():
         "x": 1.5 * times + noise[0], "y": 0.1 * times + noise[1],
         "psi": 0.4 * np.sin(1.3 * times), "tau_u": np.sin(times),
     }  # fmt: skip
-    assert checked(Table("waves.csv", times, columns), Ideal()) == []
+    assert check_log(LogTable("waves.csv", times, columns), Ideal()) == []
 
 
 def test_a_yaw_rate_agrees_however_fast_the_boat_weaves():
@@ -157,14 +157,14 @@ def test_a_yaw_rate_agrees_however_fast_the_boat_weaves():
         "x": 1.5 * times, "y": 0.01 * times, "psi": psi, "r": 0.54 * np.cos(1.8 * times),
         "tau_u": np.sin(times),
     }  # fmt: skip
-    assert checked(Table("weaves.csv", times, columns), Ideal()) == []
+    assert check_log(LogTable("weaves.csv", times, columns), Ideal()) == []
     with pytest.raises(LogFault, match=r'write r: "COLUMN \[deg/s\]"'):
-        checked(Table("weaves.csv", times, {**columns, "r": DEG * columns["r"]}), Ideal())
+        check_log(LogTable("weaves.csv", times, {**columns, "r": DEG * columns["r"]}), Ideal())
 
 
 def test_times_in_milliseconds(weaving):
     with pytest.raises(LogFault, match=r'100 s apart.* write time: "COLUMN \[ms\]"'):
-        checked(replace(weaving, times=1e3 * weaving.times), Ideal())
+        check_log(replace(weaving, times=1e3 * weaving.times), Ideal())
 
 
 @pytest.mark.parametrize(
@@ -179,12 +179,12 @@ def test_times_in_milliseconds(weaving):
 def test_what_is_only_unlikely_is_a_warning(weaving, changes, sentence):
     changed = {name: change(weaving.columns) for name, change in changes.items()}
     given = replace(weaving, columns={**weaving.columns, **changed})
-    assert [line for line in checked(given, Ideal()) if sentence in line]
+    assert [line for line in check_log(given, Ideal()) if sentence in line]
 
 
 def test_a_position_that_jumps_is_a_warning(weaving):
     x = weaving.columns["x"] + np.where(weaving.times < 30.0, 0.0, 40.0)
-    (line,) = checked(replace(weaving, columns={**weaving.columns, "x": x}), Ideal())
+    (line,) = check_log(replace(weaving, columns={**weaving.columns, "x": x}), Ideal())
     jump = re.search(r"x jumps by (.*?) at 30 s", line)
     assert float(jump[1]) == pytest.approx(40.0, abs=0.2)
 
@@ -193,7 +193,7 @@ def test_a_straight_run_at_one_speed_tells_little():
     times = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).standard_normal((3, len(times))) * 0.005
     columns = {"x": times + noise[0], "y": noise[1], "psi": noise[2], "tau_u": 0 * times + 1.0}
-    lines = checked(Table("straight.csv", times, columns), Ideal())
+    lines = check_log(LogTable("straight.csv", times, columns), Ideal())
     assert any(
         "determines the drag at one speed and little else; zig-zags" in line for line in lines
     )
@@ -206,7 +206,7 @@ def test_a_propeller_in_rpm_is_told_by_what_the_pods_can_do(weaving):
     most = actuator.reach["n_1"]
     given = {**weaving.columns, "n_1": 50.0 * most * np.abs(np.sin(weaving.times))}
     with pytest.raises(LogFault, match=r'n_1 reaches .* write n_1: "COLUMN \[rpm\]"'):
-        checked(replace(weaving, columns=given), actuator)
+        check_log(replace(weaving, columns=given), actuator)
 
 
 # Mistakes that the table shows
@@ -249,7 +249,7 @@ def test_two_boots_in_a_file_are_two_logs_with_currents_of_their_own(tmp_path, s
     given = scenario()
     logs = logs_of(path, LogFile(file="a.csv", delay=0.0), given)
     assert [log.name for log in logs] == ["a.csv, boot 1", "a.csv, boot 2"]
-    numbers = [number.name for number in Problem(given, given.identify, logs).numbers]
+    numbers = [number.name for number in FitProblem(given, given.identify, logs).numbers]
     assert len(numbers) == len(set(numbers))
     assert "its clock steps back from 89.8 to 0 s" in logs[0].warnings[0]
     alone = written(tmp_path / "b.csv", columns)
@@ -272,7 +272,7 @@ def test_two_parts_of_a_file_are_two_logs_with_currents_of_their_own(tmp_path, s
     parts = [LogFile(file="a.csv", span=span, delay=0.0) for span in ((0.0, 40.0), (40.0, 89.0))]
     given = scenario()
     logs = [log for part in parts for log in logs_of(path, part, given)]
-    numbers = [number.name for number in Problem(given, given.identify, logs).numbers]
+    numbers = [number.name for number in FitProblem(given, given.identify, logs).numbers]
     assert len(numbers) == len(set(numbers))
     assert "current_x, a.csv from 40 to 89 s" in numbers
     times = np.concatenate([log.times for log in logs])
@@ -314,14 +314,14 @@ def test_what_pods_did_follows_from_their_commands():
         "n_cmd_1": np.where(times < 1.0, 0.0, 10.0),
         "delta_cmd_1": np.where(times < 1.0, 0.0, 0.5),
     }
-    log = acted(Table("a.csv", times, ordered), actuator)
+    log = with_actuator_state(LogTable("a.csv", times, ordered), actuator)
     after = np.maximum(times - 1.0, 0.0)
     assert log.columns["n_1"] == pytest.approx(10.0 * (1.0 - np.exp(-after / 0.5)), abs=0.15)
     turning = (after > 0.0) & (after < 1.8)
     assert log.columns["delta_1"][turning] == pytest.approx(0.25 * after[turning], abs=1e-9)
     assert "n_1, delta_1 follow from commands" in log.notes[0]
     own = replace(log, notes=())
-    assert acted(own, actuator) is own
+    assert with_actuator_state(own, actuator) is own
 
 
 @pytest.mark.parametrize(("every", "count"), [(1, 0), (2, 0), (4, 1)])
@@ -348,7 +348,7 @@ def test_rows_that_are_long_beside_a_lag_are_doubted(tmp_path, sailed, every, co
 def later(table, delay):
     """The log with its commands acting so much later."""
     at = np.maximum(np.searchsorted(table.times, table.times - delay + 1e-9, "right") - 1, 0)
-    moved = {n: held(table.columns[n])[at] for n in ("tau_u", "tau_r")}
+    moved = {n: hold_values(table.columns[n])[at] for n in ("tau_u", "tau_r")}
     return replace(table, columns={**table.columns, **moved})
 
 
@@ -370,7 +370,7 @@ def test_a_delay_is_looked_for_where_the_boat_turns(sailed):
     columns = {
         n: np.concatenate([np.full(len(moored), c[0]), c]) for n, c in sailed.columns.items()
     }
-    long = Table("long.csv", np.concatenate([moored, sailed.times]), columns)
+    long = LogTable("long.csv", np.concatenate([moored, sailed.times]), columns)
     assert Clocks(scenario(), long).part.times[-1] == sailed.times[-1]
 
 
@@ -406,7 +406,7 @@ def test_a_hull_ten_times_too_heavy_is_doubted(sailed):
     for hull, far in ((HULL, False), (heavy, True)):
         given = scenario(hull, **wanted)
         logs = [(log_of(sailed, Ideal(), 0.05), "fit")]
-        lines = far_words(answered(given, given.identify, logs, None))
+        lines = far_words(answer_logs(given, given.identify, logs, None))
         assert bool(lines) is far
     assert "Is the vessel's preset of another size" in lines[0]
 
@@ -487,9 +487,9 @@ def pose_alone(log):
 @pytest.mark.parametrize("wrong", WRONG_HEADINGS)
 def test_a_heading_that_no_course_agrees_with_is_doubted(weaving, wrong):
     log = pose_alone(weaving)
-    assert checked(log) == []
+    assert check_log(log) == []
     psi = WRONG_HEADINGS[wrong](log.columns["psi"])
-    lines = checked(replace(log, columns={**log.columns, "psi": psi}))
+    lines = check_log(replace(log, columns={**log.columns, "psi": psi}))
     said = [re.search(r"course and heading agree to (0\.\d\d) of 1; look at", x) for x in lines]
     assert float(next(filter(None, said))[1]) < 0.9
 
@@ -500,7 +500,7 @@ def test_a_heading_in_another_unit_is_an_error_that_names_it(weaving, unit):
     log = pose_alone(weaving)
     psi = change(log.columns["psi"])
     with pytest.raises(LogFault, match=sentence):
-        checked(replace(log, columns={**log.columns, "psi": psi}))
+        check_log(replace(log, columns={**log.columns, "psi": psi}))
 
 
 @pytest.mark.parametrize("rate", [1, 5, 10])
@@ -515,5 +515,5 @@ def test_a_boat_that_drifts_or_goes_sideways_or_slowly_has_a_sound_heading(
     psi = 0.1 * times
     noises = noise * np.random.default_rng(4).standard_normal((2, len(times)))
     place = through * np.exp(1j * psi) / 0.1j + current * times + noises[0] + 1j * noises[1]
-    lines = checked(Table("drift.csv", times, {"x": place.real, "y": place.imag, "psi": psi}))
+    lines = check_log(LogTable("drift.csv", times, {"x": place.real, "y": place.imag, "psi": psi}))
     assert not [line for line in lines if "course and heading" in line]

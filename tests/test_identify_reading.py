@@ -19,7 +19,7 @@ from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import columns_of
 from podusv_cli.identify.logs.frames import LAT, LON, local_plane, radii
 from podusv_cli.identify.logs.listing import listing
-from podusv_cli.identify.logs.reading import Named, Table, delivered_each, table
+from podusv_cli.identify.logs.reading import LogTable, NamedQuantities, delivered_each, table
 
 
 def test_a_ros_bag_gives_its_topics_by_their_stamps(tmp_path):
@@ -109,7 +109,7 @@ def test_propellers_may_be_in_turns_a_second_or_a_minute_and_in_radians(tmp_path
         {"time": [0, 1], "n_1 [rps]": [3, 4], "n_2 [rpm]": [180, 60], "n_3 [rad/s]": [math.pi, 0]},
     )
     speeds = [Signal(f"n_{i}", "1/s", "") for i in (1, 2, 3)]
-    log = table(path, speeds, Named())
+    log = table(path, speeds, NamedQuantities())
     assert log.columns["n_1"].tolist() == [3.0, 4.0]
     assert log.columns["n_2"].tolist() == [3.0, 1.0]
     assert log.columns["n_3"] == pytest.approx([0.5, 0.0])
@@ -281,7 +281,7 @@ def test_positions_count_together_where_a_boat_goes_along_an_axis(along):
     columns = dict.fromkeys(("x", "y"), np.round(0.004 * times, 2))
     columns |= {along: np.round(0.93 * times, 2), "psi": 0.01 * np.sin(times)}
     columns |= {"tau_u": 0.1 * times, "tau_r": 0.0 * times}
-    log = Table("east.csv", times, columns)
+    log = LogTable("east.csv", times, columns)
     complete(log, Ideal())
     assert log_of(log, Ideal(), 0.1).counts[:3].tolist() == [400, 400, 400]
 

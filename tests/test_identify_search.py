@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import brentq
 
 from podusv_cli.identify.fit.estimate import (
+    HullSearch,
     Scored,
-    Search,
     covariance,
-    estimated,
+    estimate_hull,
 )
 
 
@@ -24,7 +24,7 @@ def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
         nu = np.column_stack([z - y[0] for y in points])
         return nu, np.column_stack([np.full(len(z), math.exp(2.0 * y[1])) for y in points])
 
-    found = estimated(Search(innovations, 2, np.arange(400) // 20))
+    found = estimate_hull(HullSearch(innovations, 2, np.arange(400) // 20))
     m, s = found.y
     variance = math.exp(2.0 * s)
     assert found.settled
@@ -48,17 +48,17 @@ def test_an_interrupt_at_any_time_keeps_what_the_first_search_found():
             raise KeyboardInterrupt
         return np.column_stack([z - y[0] for y in points]), np.full((40, len(points)), 0.09)
 
-    search = Search(innovations, 1, np.arange(40) // 20)
-    whole = estimated(search, starts=1)
+    search = HullSearch(innovations, 1, np.arange(40) // 20)
+    whole = estimate_hull(search, starts=1)
     first = len(made)
     made.clear()
-    estimated(search)
+    estimate_hull(search)
     calls = len(made)
     assert calls > first + 3
     for call in range(first + 1, calls + 1):
         made.clear()
         last[0] = call
-        found = estimated(search)
+        found = estimate_hull(search)
         assert found.interrupted
         assert found.value <= whole.value
 
@@ -74,8 +74,8 @@ def test_the_errors_of_a_mean_are_those_of_its_blocks():
         nu = np.stack([values - 1e3 * y[0] for y in points], axis=1)  # the prior says nothing
         return nu, np.ones_like(nu)
 
-    search = Search(innovations, 1, of, 1)
-    found = covariance(search.scored(np.array([means.mean() / 1e3])), 1)[0, 0] * 1e6
+    search = HullSearch(innovations, 1, of, 1)
+    found = covariance(search.score(np.array([means.mean() / 1e3])), 1)[0, 0] * 1e6
     assert found == pytest.approx(np.var(means, ddof=1) / blocks, rel=1e-3)
     assert found > 20.0 / (blocks * each)  # what the curvature says of independent values is 1 / n
 

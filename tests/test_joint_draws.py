@@ -19,7 +19,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.studies.making.check import singles, sweep_faults
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import draw_scenario, draws
 
 NAMES = ("X_u", "Y_vdot", "N_r", "N_rv")
 HULLS = np.array(
@@ -68,7 +68,7 @@ def hulls(loaded: Loaded, first: int, count: int) -> list[list[float]]:
     (single,) = singles(loaded.scenario).values()
     sweep = loaded.scenario.sweep
     assert sweep
-    return [hull(drawn(single, sweep.vary, draw)) for draw in draws(sweep, first, count)]
+    return [hull(draw_scenario(single, sweep.vary, draw)) for draw in draws(sweep, first, count)]
 
 
 def test_a_draw_is_one_row_whole_by_its_position_alone():
@@ -87,7 +87,7 @@ def test_laws_are_told_the_scenario_s_own_hull():
     loaded = study("nominal={preset: cybership2, m: 27.5}")
     (single,) = singles(loaded.scenario).values()
     for draw in draws(loaded.scenario.sweep, 0, 6):
-        world = drawn(single, vary(loaded), draw)
+        world = draw_scenario(single, vary(loaded), draw)
         assert hull(world) != hull(single)
         assert world.nominal == single.nominal
         others = [v.model_dump(exclude={*NAMES}) for v in (world.vessel, single.vessel)]
@@ -99,7 +99,7 @@ def test_with_keys_several_sections_get_the_same_row():
     assert not sweep_faults(loaded)
     (single,) = singles(loaded.scenario).values()
     for draw in draws(loaded.scenario.sweep, 0, 6):
-        world = drawn(single, vary(loaded), draw)
+        world = draw_scenario(single, vary(loaded), draw)
         assert hull(world) == HULLS[draw["hull"]].tolist()
         assert hull(world) == [getattr(world.nominal, name) for name in NAMES]
 

@@ -19,7 +19,7 @@ from podusv_cli.engine.machine.kernel_faults import (
     check_arguments,
     check_kernel,
     faults,
-    unsupported,
+    unsupported_construct,
 )
 from podusv_cli.engine.machine.kernel_source import has_source, source
 
@@ -135,7 +135,7 @@ def test_kernels_that_have_no_source_or_call_themselves_are_looked_at_as_far_as_
     exec("@kernel\ndef plain(a):\n    return a", made)  # noqa: S102  as a notebook may
     for one in (square, harmless, deeper, made["plain"], partial(harmless, 1.0)):
         check_kernel(one)
-    assert unsupported(deeper) == "deeper calls itself; write a loop"
+    assert unsupported_construct(deeper) == "deeper calls itself; write a loop"
 
 
 @kernel

@@ -396,7 +396,7 @@ def test_any_failure_of_the_vectoriser_is_a_reason_to_march_one_by_one(
     def without_a_pass(*given: Any) -> Any:
         raise AttributeError("no attribute 'add_always_inliner_pass'")
 
-    monkeypatch.setattr(object_code.widening, "widened", without_a_pass)
+    monkeypatch.setattr(object_code.widening, "widen_module", without_a_pass)
     (piece,) = [p for p in lanes.pieces(Plan(loop("pid"), GRID)) if p.label.startswith("lanes_law")]
     code = object_code.object_code(piece.function, piece.prototype)
     assert code.symbol == ""

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from line_loops import furthest, line_eigenvalues
 
-from podusv_cli.components.controllers.momentum_schedule import Answer, schedule
+from podusv_cli.components.controllers.momentum_schedule import SwayResponse, schedule
 from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.kernel import bundle
@@ -119,7 +119,7 @@ def test_momentum_vector_s_polynomial_is_a_part_of_the_real_loop_and_stable(hull
 def test_its_gains_bear_every_p_up_to_trust_times_the_told_one(told, damping, more, trust):
     law = MomentumVector(trust=trust)
     k = bundle(law.constants_with(NONLINEAR))
-    eta, k_b = schedule(Answer(told, damping), k)
+    eta, k_b = schedule(SwayResponse(told, damping), k)
     true = SwayAnswer(told * (1.0 + more * (trust - 1.0)), damping)
     grown = growth(momentum_vector_polynomial(true, MomentumGains(eta, k_b, k.Q, k.S, 0.0)))
     assert grown < 0.0
@@ -129,7 +129,7 @@ def test_its_gain_leaves_routh_s_third_condition_a_margin_where_it_binds():
     """(a_3 a_2 - a_1) a_1 > a_3^2 a_0; without its bound it fails here, and the path grows."""
     for trust in (1.0, 1.25):
         k = bundle(MomentumVector(trust=trust).constants_with(NONLINEAR))
-        eta, k_b = schedule(Answer(1.064 / trust, 0.065), k)
+        eta, k_b = schedule(SwayResponse(1.064 / trust, 0.065), k)
         for gain, stable in ((k_b, True), (0.3 * 0.065 / 0.064, False)):
             at = SwayAnswer(1.064, 0.065), MomentumGains(eta, gain, k.Q, k.S, 0.0)
             _, a_3, a_2, a_1, a_0 = found = momentum_vector_polynomial(*at)

@@ -12,7 +12,7 @@ from command_samples import ROOT
 from policy_samples import content
 
 import podusv
-from podusv_cli.components.controllers.policy import INPUTS, Policy, observed
+from podusv_cli.components.controllers.policy import INPUTS, Policy, observe
 from podusv_cli.core.kernel import Vector, bundle, call
 
 pytest.importorskip("gymnasium", reason="Gymnasium is not installed: podusv[gym]")
@@ -50,7 +50,7 @@ def test_the_law_asks_for_what_the_actor_does() -> None:
     cut = 0
     for _ in range(50):
         x, target, seen = random.normal(size=6), random.normal(0.0, 3.0, 6), np.zeros(INPUTS)
-        observed(x, target, seen)
+        observe(x, target, seen)
         h = (seen - mean) / np.sqrt(variance + 1e-8)
         for layer in (0, 2):
             name = f"mlp_extractor.policy_net.{layer}"
@@ -92,6 +92,6 @@ def test_a_model_that_was_trained_asks_for_what_its_law_does(tmp_path: Any) -> N
     law, random = podusv.load(ppo.TASK, config).controller, np.random.default_rng(0)
     for _ in range(20):
         x, target, seen = random.normal(size=6), random.normal(0.0, 3.0, 6), np.zeros(INPUTS)
-        observed(x, target, seen)
+        observe(x, target, seen)
         action, _ = model.predict(envs.normalize_obs(seen), deterministic=True)
         np.testing.assert_allclose(demand(law, x, target), action * ppo.LIMITS, atol=1e-4)

@@ -17,7 +17,7 @@ from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import READERS, columns_of, contents_of
 from podusv_cli.identify.logs.listing import listing
 from podusv_cli.identify.logs.ranges import without_none
-from podusv_cli.identify.logs.reading import OF_LOGS, UNITS, Named, table, tables
+from podusv_cli.identify.logs.reading import OF_LOGS, UNITS, NamedQuantities, table, tables
 
 
 def contents(tmp_path, text, encoding="utf-8"):
@@ -155,7 +155,7 @@ def test_every_unit_of_the_table_is_read_in_a_log(tmp_path):
     for unit, others in UNITS.items():
         for name in others.keys() - {unit}:
             path = written(tmp_path / "log.csv", {"time": [0, 1], f"q [{name}]": [3.0, 30.0]})
-            log = table(path, [Signal("q", unit, "")], Named())
+            log = table(path, [Signal("q", unit, "")], NamedQuantities())
             worth = of_logs[name] if name in OF_LOGS.get(unit, {}) else WORTH[name]
             assert log.columns["q"] == pytest.approx([3.0 * worth, 30.0 * worth], rel=1e-14)
             read_ones += 1
@@ -229,7 +229,7 @@ def test_rows_of_one_time_fill_each_other_s_empty_cells(tmp_path):
 def test_two_boots_are_two_tables(tmp_path):
     times = np.append(np.arange(0.0, 30.0, 0.5), np.arange(0.0, 20.0, 0.5))
     path = written(tmp_path / "log.csv", {"time": times, "x": times, "y": times, "psi": 0 * times})
-    first, other = tables(path, (Signal("x", "m", ""),), Named())
+    first, other = tables(path, (Signal("x", "m", ""),), NamedQuantities())
     assert [first.name, other.name] == ["log.csv, boot 1", "log.csv, boot 2"]
     assert [len(first.times), len(other.times)] == [60, 40]
     assert "steps back from 29.5 to 0 s; it is taken as 2 logs" in first.warnings[0]
@@ -327,19 +327,19 @@ def test_longitudes_from_0_to_360_are_less_a_turn_beyond_180(tmp_path, share):
     signed = (np.arange(200.0) - round(200 * share) + 0.5) * 1e-5
     columns = {"time": range(200), "lat": [48.0] * 200, "psi": [0.0] * 200}
     path = written(tmp_path / "log.csv", {**columns, "lon": signed % 360.0})
-    wanted = table(written(tmp_path / "own.csv", {**columns, "lon": signed}), (), Named())
-    read = table(path, (), Named())
+    wanted = table(written(tmp_path / "own.csv", {**columns, "lon": signed}), (), NamedQuantities())
+    read = table(path, (), NamedQuantities())
     assert read.columns["y"] == pytest.approx(wanted.columns["y"], abs=1e-5)
     assert not read.warnings
     path = written(tmp_path / "log.csv", {**columns, "lon": (signed - 122.0) % 360.0})
-    assert not table(path, (), Named()).warnings
+    assert not table(path, (), NamedQuantities()).warnings
 
 
 def test_a_single_longitude_beyond_180_elsewhere_is_left_out(tmp_path):
     lon = [16.0 + 1e-5 * i for i in range(60)]
     lon[20] = 211.0
     path = written(tmp_path / "log.csv", {"time": range(60), "lat": [48.0] * 60, "lon": lon})
-    read = table(path, (), Named())
+    read = table(path, (), NamedQuantities())
     assert np.isnan(read.columns["y"]).sum() == 1
     assert "lon is out of range once: longitude 211 is beyond 180 deg" in read.warnings[0]
 

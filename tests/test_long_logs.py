@@ -17,7 +17,7 @@ from storage_samples import ENVIRONMENT, PYTHON, TEXTS, files, log, recording
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage import log as log_file
 from podusv_cli.storage.files import disk_array
-from podusv_cli.workflows.execute import HELD, Task, execute
+from podusv_cli.workflows.execute import HELD, RunTask, execute
 
 GIVEN = {
     "schedule": ', rows: "0, 1, 0\\n200, 2, 0.5\\n"', "zigzag": ", check_every: 0.05",
@@ -41,7 +41,7 @@ DATED = {"provenance.json", "manifest.json", "metrics.json", "metrics.csv"}  # t
 def made(place: Path, text: str, held: int, figures: bool = False) -> dict[str, bytes]:
     """The files of a run of this scenario, less those that clocks are in."""
     names = ("errors",) if figures else ()
-    folder = execute(Task(loaded(text).scenario, text, place, held=held, figures=names)).folder
+    folder = execute(RunTask(loaded(text).scenario, text, place, held=held, figures=names)).folder
     assert [path.name for path in place.parent.iterdir()] == [place.name]
     return {name: content for name, content in files(folder).items() if name not in DATED}
 
@@ -135,20 +135,20 @@ from podusv_cli.cli.exit_codes import report_error
 from podusv_cli.scenario.load import load_text
 from podusv_cli.core.errors import StorageError
 from podusv_cli.scenario.case import Case
-from podusv_cli.workflows.execute import Task, execute, warm_up
+from podusv_cli.workflows.execute import RunTask, execute, warm_up
 text, limit, held, kind = sys.argv[1], *map(int, sys.argv[2:4]), sys.argv[4]
 scenario = load_text(text, "a.yaml").scenario
 warm_up(Case.of(scenario))
 if kind == "RLIMIT_DATA":  # what a short run imports and allocates is not the log's
     short = text.replace("duration: 2500.0", "duration: 1.0")
-    execute(Task(load_text(short, "a.yaml").scenario, short, Path("short"), force=True))
+    execute(RunTask(load_text(short, "a.yaml").scenario, short, Path("short"), force=True))
     status = Path("/proc/self/status").read_text()
     limit += 1024 * int(status.partition("VmData:")[2].split()[0])
 which = getattr(resource, kind)
 before = resource.getrlimit(which)
 resource.setrlimit(which, (limit, before[1]))
 try:
-    execute(Task(scenario, text, Path("run"), held=held))
+    execute(RunTask(scenario, text, Path("run"), held=held))
 except (StorageError, MemoryError) as error:
     resource.setrlimit(which, before)  # a profiler, say, may write files at the end
     sys.exit(report_error(error))

@@ -13,7 +13,7 @@ from test_velocity_vector import SAMPLED
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers import momentum_adaptation as adaptation
-from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
+from podusv_cli.components.controllers.momentum_guidance import guidance, level_gain, see_target
 from podusv_cli.components.controllers.momentum_vector import MomentumVector, moment_for
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.disturbances.current import Current
@@ -52,9 +52,9 @@ def wanted_velocity(x: Vector, target: Vector, k_p: float, k_b: float) -> tuple[
 
 def test_the_wanted_velocity_is_that_of_the_derivation():
     for x, _, target in situations(LAW, 200):
-        at = seen(x, target, K)
+        at = see_target(x, target, K)
         closing = at.e_a * (at.t_a - x[3]) + at.e_b * (at.t_b - x[4])
-        found = guidance(x, at, levelled(at.k_p, at, closing), 0.1, K)
+        found = guidance(x, at, level_gain(at.k_p, at, closing), 0.1, K)
         V_c, _ = wanted_velocity(x, target, at.k_p, 0.1)
         cos, sin = np.cos(x[2]), np.sin(x[2])
         known = [V_c[0] * cos + V_c[1] * sin, V_c[1] * cos - V_c[0] * sin]
@@ -67,9 +67,9 @@ def test_near_the_target_its_surge_rate_is_the_gains_times_the_rate_of_e():
         x[:2] = target[:2] - 1e-9
         cos, sin = np.cos(x[2]), np.sin(x[2])
         rate = target[2:4] - [x[3] * cos - x[4] * sin, x[3] * sin + x[4] * cos]
-        at = seen(x, target, K)
+        at = see_target(x, target, K)
         _, gains = wanted_velocity(x, target, at.k_p, 0.1)
-        found = guidance(x, at, levelled(at.k_p, at, 0.0), 0.1, K)
+        found = guidance(x, at, level_gain(at.k_p, at, 0.0), 0.1, K)
         known = (target[4:6] + gains @ rate) @ [cos, sin]
         np.testing.assert_allclose(found.A_a, known, rtol=1e-7, atol=1e-9)
 

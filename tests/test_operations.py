@@ -15,7 +15,7 @@ from podusv_cli.core.kernel import kernel, scratch
 from podusv_cli.core.kinematics import direction
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.running.simulate import run
-from podusv_cli.metrics.operations import Tally, operations
+from podusv_cli.metrics.operations import OperationTally, operations
 from podusv_cli.scenario.load import load
 
 CONFIGS = Path(__file__).parents[1] / "configs"
@@ -38,7 +38,7 @@ def sample(x, k, out):
 
 
 def test_every_operation_is_counted_once_and_the_numbers_stay():
-    tally, plain = Tally(), np.zeros(1)
+    tally, plain = OperationTally(), np.zeros(1)
     sample(np.array([4.0, 5.0]), SimpleNamespace(slope=2.0), plain)
     x, out = tally.vector([4.0, 5.0]), tally.vector([0.0])
     tally.kernel(sample)(x, SimpleNamespace(slope=tally.vector([2.0])[0]), out)
@@ -46,11 +46,11 @@ def test_every_operation_is_counted_once_and_the_numbers_stay():
 
 
 def test_cosine_and_sine_count_their_arithmetic_and_a_direction_once():
-    tally = Tally()
+    tally = OperationTally()
     cosine, sine = tally.kernel(cos_sin)(tally.number(2.0))
     assert (float(cosine), float(sine)) == cos_sin(2.0)
     assert tally.count > 30
-    tally = Tally()
+    tally = OperationTally()
     angle = tally.kernel(direction)(tally.number(1.0), tally.number(2.0))
     assert (tally.count, float(angle)) == (3, math.atan2(2.0, 1.0))  # two sums beside
 

@@ -20,9 +20,9 @@ from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import NotConvergedError, UsageError
-from podusv_cli.core.kernel import bundle, kernel, transplanted
+from podusv_cli.core.kernel import bundle, kernel, transplant
 from podusv_cli.optimum import collocation, feedback
-from podusv_cli.optimum.feedback import MOST_ROWS, _chosen
+from podusv_cli.optimum.feedback import MOST_ROWS, _choose_rows
 from podusv_cli.optimum.problem import Motion, problem
 from podusv_cli.process.interrupts import interrupts_caught
 from podusv_cli.scenario.load import load, load_text
@@ -74,7 +74,7 @@ def test_full_thrust_is_reversed_when_pontryagin_says_so():
     assert (e[t < t_c - 1e-3] > 0).all()
     assert (e[t > t_c + 1e-3] < 0).all()  # what was assumed
     guess = Motion(np.array([0.0, 5.0]), np.zeros((2, 6)), np.zeros((2, 2)))
-    stages, motion = collocation.searched(problem(chase, "iae"), {"rest": guess}, 0.05)
+    stages, motion = collocation.search_optima(problem(chase, "iae"), {"rest": guess}, 0.05)
     known = np.trapezoid(abs(e), t)
     assert stages[-1].integral == pytest.approx(known, rel=1e-4)
     surge = motion.demands[:, 0]
@@ -152,9 +152,9 @@ def test_a_kernel_is_transplanted_with_all_that_it_calls():
         def sqrt(self, x):
             return x / 2
 
-    found = transplanted(arithmetic, {math: Roots(), float: Fraction})
+    found = transplant(arithmetic, {math: Roots(), float: Fraction})
     assert found(Fraction(1)) == Fraction(1) / 3.0 + Fraction(1, 2)
-    other = transplanted(arithmetic, {third: lambda x: -x, math: Roots()})
+    other = transplant(arithmetic, {third: lambda x: -x, math: Roots()})
     assert other(4.0) == -2.0
     assert arithmetic(9.0) == 6.0  # as it was
 
@@ -204,7 +204,7 @@ def test_the_square_has_an_optimum_of_its_own():
     scenario = load_text(SHORT, "a.yaml").scenario
     guess = Motion(np.array([0.0, 8.0]), np.zeros((2, 6)), np.zeros((2, 2)))
     found = {
-        name: collocation.searched(problem(scenario, name), {"rest": guess}, 0.4)[1]
+        name: collocation.search_optima(problem(scenario, name), {"rest": guess}, 0.4)[1]
         for name in ("iae", "ise")
     }
     places = problem(scenario, "iae").places(found["iae"].times)
@@ -256,7 +256,7 @@ def test_an_interrupt_ends_the_solver_at_its_next_iteration():
             os.kill(os.getpid(), signal.SIGINT)
 
     with interrupts_caught(), pytest.raises(KeyboardInterrupt):
-        collocation.searched(wanted, {"rest": guess}, 0.4, interrupt)
+        collocation.search_optima(wanted, {"rest": guess}, 0.4, interrupt)
     assert 3 <= len(told) <= 4
 
 
@@ -281,7 +281,7 @@ def test_a_law_that_diverges_is_no_beginning(podusv, monkeypatch):
         begun.extend(guesses)
         raise NotConvergedError("enough")
 
-    monkeypatch.setattr(collocation, "searched", stop)
+    monkeypatch.setattr(collocation, "search_optima", stop)
     Path("a.yaml").write_text(SHORT)
     assert podusv("optimum", "a.yaml", *WILD).code == 3
     assert begun == ["velocity_vector"]
@@ -299,7 +299,7 @@ def test_every_law_of_a_comparison_is_a_beginning_unless_one_is_chosen(podusv, m
         begun.append([*guesses])
         raise NotConvergedError("enough")
 
-    monkeypatch.setattr(collocation, "searched", stop)
+    monkeypatch.setattr(collocation, "search_optima", stop)
     Path("a.yaml").write_text(SHORT + "controllers: {stiff: {K_Pu: 200.0}, soft: {K_Pu: 5.0}}\n")
     podusv("optimum", "a.yaml")
     podusv("optimum", "a.yaml", "--controller", "soft")
@@ -309,7 +309,7 @@ def test_every_law_of_a_comparison_is_a_beginning_unless_one_is_chosen(podusv, m
 
 def test_a_taken_place_is_told_before_anything_is_computed(podusv, monkeypatch):
     pytest.importorskip("casadi", reason=REASON)
-    monkeypatch.setattr(collocation, "searched", None)
+    monkeypatch.setattr(collocation, "search_optima", None)
     Path("a.yaml").write_text(SHORT)
     Path("there").mkdir()
     Path("there/mine").write_text("")
@@ -389,10 +389,10 @@ def test_what_only_a_law_is_told_makes_no_other_task(podusv):
 
 
 def test_a_long_motion_keeps_the_rows_where_its_demand_bends():
-    assert _chosen(np.zeros((100, 2))) == list(range(100))
+    assert _choose_rows(np.zeros((100, 2))) == list(range(100))
     demands = np.zeros((3 * MOST_ROWS, 2))
     demands[5001:] = 8.0, 0.0
-    kept = _chosen(demands)
+    kept = _choose_rows(demands)
     assert {0, 5000, 5001, len(demands) - 1} <= set(kept)
     assert len(kept) <= MOST_ROWS + 1
     assert np.diff(kept).max() <= 6

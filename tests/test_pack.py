@@ -479,7 +479,7 @@ def test_many_small_files_are_synced_together_and_their_bytes_are_counted(tmp_pa
     parts, syncs, whole = [], [], []
     monkeypatch.setattr(os, "fsync", syncs.append)
     monkeypatch.setattr(os, "sync", lambda: whole.append(len(parts)))
-    with workflow.opened(tmp_path / "many.zip") as packed:
+    with workflow.open_packed(tmp_path / "many.zip") as packed:
         packed.unpack(tmp_path / "again", parts.append)
     assert (len(parts), parts == sorted(parts), parts[-1]) == (41, True, 1.0)
     assert whole == [41]  # after the last file

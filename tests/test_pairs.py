@@ -36,7 +36,7 @@ from podusv_cli.studies.making.check import gathered_metrics
 from podusv_cli.workflows import export as exporting
 from podusv_cli.workflows import rerun as repeating
 from podusv_cli.workflows import studies
-from podusv_cli.workflows.execute import Stopwatch, simulated
+from podusv_cli.workflows.execute import Stopwatch, simulate_case
 from podusv_cli.workflows.request import Request
 
 Pair = Callable[[Drawn, Path], None]
@@ -79,7 +79,7 @@ def signals(run: Run) -> Mapping[str, Any]:
 
 def marched(scenario: Scenario) -> Mapping[str, Any]:
     """What a run logs, without what is made of its log."""
-    return simulated(Case.of(scenario), Stopwatch()).signals
+    return simulate_case(Case.of(scenario), Stopwatch()).signals
 
 
 @pair

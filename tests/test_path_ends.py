@@ -16,7 +16,7 @@ from podusv import gym
 from podusv_cli.components.paths.legs import Legs
 from podusv_cli.figures.curves import AFTER
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 
 SCENARIO = """
 name: ends
@@ -243,7 +243,7 @@ def test_tables_and_pages_say_up_to_when_they_count_and_the_rest_is_grey(
     for shown in (chase, curves):
         assert [run["counts"] for run in shown["runs"]] == [time, 47.0]
     run = done["one"]
-    shown = dressed([run.past])
+    shown = dress_runs([run.past])
     axes = next(
         axes for axes in FIGURES["path"].family(shown, 2).axes if "e_{ct}" in axes.get_ylabel()
     )

@@ -70,7 +70,7 @@ def stillborn(place):
 
 
 def plot(*runs, out, figures=("velocities",), formats=("svg",), animate=False, **choice):
-    choice = plotting.Choice(**{"look": Look(1), "animated": animate, **choice})
+    choice = plotting.PlotChoice(**{"look": Look(1), "animated": animate, **choice})
     return plotting.plot(runs, Request(out=out, names=figures, formats=formats), choice)
 
 

@@ -11,7 +11,7 @@ from command_samples import ROOT, write
 from policy_samples import content, drawn, packed, symmetric
 
 import podusv
-from podusv_cli.components.controllers.policy import INPUTS, OBSERVED, Policy, observed
+from podusv_cli.components.controllers.policy import INPUTS, OBSERVED, Policy, observe
 from podusv_cli.components.controllers.policy_weights import PERIOD, tensors
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import bundle, call
@@ -33,7 +33,7 @@ def _in_an_empty_folder(tmp_path, monkeypatch):
 
 def seen(x, target):
     out = np.zeros(INPUTS)
-    observed(np.asarray(x, float), np.asarray(target, float), out)
+    observe(np.asarray(x, float), np.asarray(target, float), out)
     return dict(zip(OBSERVED, out, strict=True))
 
 

@@ -17,7 +17,7 @@ from test_report_chase import browsed, needs_browser
 
 from podusv_cli import pages
 from podusv_cli.core.derived_signals import derived_with
-from podusv_cli.core.quantities import lettered
+from podusv_cli.core.quantities import letters_of_symbol
 from podusv_cli.figures import traces
 
 ODD = "</script><script>alert(1)</script><!--"
@@ -35,7 +35,7 @@ def test_a_spike_survives_and_stands_at_its_time():
     numbers = np.sin(np.linspace(0.0, 6.0, 31_001))
     numbers[20_000] = 7.5
     numbers[100:300] = np.nan
-    kept, places = traces.thinned(numbers)
+    kept, places = traces.thin_trace(numbers)
     assert len(kept) == len(places) == 2 * traces.PIECES
     assert (np.nanmax(kept), np.nanmin(kept)) == (7.5, numbers[np.isfinite(numbers)].min())
     at = int(np.nanargmax(kept))
@@ -49,7 +49,7 @@ def test_the_page_puts_a_spike_at_its_time():
     """By the script's own function, not by a second one in Python."""
     numbers = np.zeros(31_001)
     numbers[20_001] = 7.5
-    curve = traces.encoded(*traces.thinned(numbers))
+    curve = traces.encode_trace(*traces.thin_trace(numbers))
     template = Path(pages.__file__).parent / "templates" / "curves.js"
     (function,) = re.findall(r"^  const decoded = .*?^  };$", template.read_text(), re.M | re.S)
     script = f"""{function}
@@ -64,14 +64,14 @@ def test_the_page_puts_a_spike_at_its_time():
 
 def test_a_short_signal_is_whole_and_evenly_spaced():
     numbers = np.linspace(0.0, 1.0, 2 * traces.PIECES)
-    kept, places = traces.thinned(numbers)
+    kept, places = traces.thin_trace(numbers)
     assert kept is numbers
     assert len(places) == 0
 
 
 def test_what_comes_out_of_base_64_is_what_went_in_and_beyond_numbers_there_is_none():
     numbers, places = np.array([1.5, -2e300, np.inf, np.nan]), np.array([0, 255, 3, 4])
-    back, where = decoded(traces.encoded(numbers, places))
+    back, where = decoded(traces.encode_trace(numbers, places))
     assert back[0] == 1.5
     assert np.isnan(back[1:]).all()
     assert where.tolist() == [0, 255, 3, 4]
@@ -153,13 +153,13 @@ def test_numbers_that_are_no_powers_have_a_place_on_a_logarithmic_axis(floor, nu
     ],
 )
 def test_a_symbol_is_text_on_the_line_and_below(symbol, pieces):
-    assert lettered(symbol) == pieces
+    assert letters_of_symbol(symbol) == pieces
 
 
 def test_every_symbol_of_podusv_becomes_text_without_latex():
     derived = {name: one.signal for name, one in derived_with(()).items()}
     for signal in {**ABOUT, **derived}.values():
-        assert not re.search(r"[\\{}_^$]", "".join(map("".join, lettered(signal.symbol))))
+        assert not re.search(r"[\\{}_^$]", "".join(map("".join, letters_of_symbol(signal.symbol))))
 
 
 def test_no_text_of_a_user_reaches_the_script():

@@ -13,7 +13,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, shipped_bench
 from podusv_cli.studies.bench.page import as_markdown
 from podusv_cli.studies.bench.standing import by_vessel, leaderboard, middle
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import draw_scenario, draws
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.plan import TunePlan
 
@@ -415,7 +415,7 @@ def test_no_published_study_draws_what_a_metric_is_measured_by(config):
         probe = single.probe()
         same = probe.constants_for(single.closed_loop())
         for draw in draws(scenario.sweep, 0, 2):
-            loop = drawn(single, scenario.sweep.vary, draw).closed_loop()
+            loop = draw_scenario(single, scenario.sweep.vary, draw).closed_loop()
             assert probe.constants_for(loop) == same
 
 

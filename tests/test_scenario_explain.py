@@ -17,7 +17,7 @@ from podusv_cli.components.vessels.vessel import VESSELS as SHIPPED
 from podusv_cli.core.about import Claim
 from podusv_cli.core.component import Component
 from podusv_cli.findings.finding import finding_kinds
-from podusv_cli.scenario.explain import Row, UnknownKeyError, explain, kinds
+from podusv_cli.scenario.explain import ExplainRow, UnknownKeyError, explain, kinds
 from podusv_cli.scenario.keys import (
     BOUNDS,
     NAME,
@@ -32,7 +32,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_names
 from podusv_cli.scenario.schema import json_schema
 from podusv_cli.scenario.settings import settings
-from podusv_cli.scenario.yaml_tree import dotted
+from podusv_cli.scenario.yaml_tree import dotted_key
 
 
 def models(model: type[Component] = Scenario) -> Iterator[type[Component]]:
@@ -152,7 +152,7 @@ def test_a_kind_is_explained_by_its_name_alone():
 
 def test_a_key_says_everything_that_its_field_says():
     assert explain("controller.pid.T_d") == [
-        Row(
+        ExplainRow(
             "controller.T_d",
             "time constant of the derivative's lag",
             "a number",
@@ -190,7 +190,7 @@ def test_a_default_is_what_the_section_has_when_it_is_left_out():
 
 def test_every_signal_is_explained():
     for name, signal in ABOUT.items():
-        assert Row(name, signal.meaning, "signal", signal.unit) in explain(name)
+        assert ExplainRow(name, signal.meaning, "signal", signal.unit) in explain(name)
 
 
 @pytest.mark.parametrize(
@@ -342,7 +342,7 @@ def test_a_file_can_extend_another():
 def test_every_key_of_the_models_is_there_with_its_meaning_and_unit():
     for key in (key for key in SCENARIO.all() if not key.is_kind):
         found = places(SCHEMA, key.path)
-        assert found, dotted(key.route)
+        assert found, dotted_key(key.route)
         if key.path[-1] != "kind":
             unit = (key.field.json_schema_extra or {}).get("unit")
             shown = f"{key.field.description} [{unit}]" if unit else key.field.description

@@ -16,7 +16,7 @@ from podusv_cli.core.errors import SizingError
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.keys import limits, members, sections
-from podusv_cli.scenario.limits import LEAST_COMPRESSED, Size, needed
+from podusv_cli.scenario.limits import LEAST_COMPRESSED, Size, disk_needed
 from podusv_cli.scenario.load import load, load_stored, load_text, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.resolved import HEADING, resolved_yaml
@@ -260,4 +260,4 @@ def test_the_manifest_of_many_runs_is_read_back(tmp_path):
 def test_runs_made_at_once_may_be_those_that_need_the_most_disk(at_once, largest):
     sizes = [Size(1, 1, 50, 0.0, scratch, compressed=True) for scratch in (100, 10, 1000)]
     packed = LEAST_COMPRESSED * 150
-    assert needed(sizes, at_once) == pytest.approx(packed + largest)
+    assert disk_needed(sizes, at_once) == pytest.approx(packed + largest)

@@ -16,7 +16,7 @@ from podusv_cli.components.disturbances.waves import Waves
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.base import FRESH, KNOWN, VALUE
-from podusv_cli.components.measurements.sensors import ERRORS, HEAD, Sensor, Sensors, rounded
+from podusv_cli.components.measurements.sensors import ERRORS, HEAD, Sensor, Sensors, round_to
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.signal import STATE
 from podusv_cli.engine.running.batch import simulate_many
@@ -107,8 +107,8 @@ def test_an_outage_leaves_the_last_value():
 
 @pytest.mark.parametrize(("number", "nearest"), [(0.26, 0.25), (-0.26, -0.25), (0.12, 0.0)])
 def test_a_resolution_rounds_to_multiples(number, nearest):
-    assert rounded(number, 0.25) == nearest
-    assert rounded(number, 0.0) == number
+    assert round_to(number, 0.25) == nearest
+    assert round_to(number, 0.0) == number
 
 
 def test_errors_do_not_depend_on_the_other_sensors_or_on_the_length_of_the_run():

@@ -117,12 +117,12 @@ def test_a_kernel_that_is_edited_has_another_name(room: str) -> None:
     kernel_of = {"controllers": "law", "actuators": "drive"}.get(room, "evaluate")
     for kind in kinds(room).values():
         inner = getattr(kind, kernel_of)
-        before = [*object_cache.ingredients(inner, {}, shipped.written)]
+        before = [*object_cache.ingredients(inner, {}, shipped.source_of)]
         numbers = {n: v for n, v in inner.__globals__.items() if type(v) in (int, float)}
         read = {n: v for n, v in numbers.items() if n in inner.__code__.co_names}
         for name, number in read.items():
             other = specialise(inner, "other", **{name: number + 1})
-            assert [*object_cache.ingredients(other, {}, shipped.written)][2:] != before[2:], name
+            assert [*object_cache.ingredients(other, {}, shipped.source_of)][2:] != before[2:], name
 
 
 def test_a_number_that_a_called_kernel_reads_is_part_of_the_name(monkeypatch) -> None:
@@ -229,6 +229,6 @@ class Own(Controller):
 
 
 def podusv_loaded() -> Any:
-    from podusv_cli.interface.scenarios import loaded
+    from podusv_cli.interface.scenarios import load_scenario
 
-    return loaded(SCENARIO, {"simulation.duration": 5.0})
+    return load_scenario(SCENARIO, {"simulation.duration": 5.0})

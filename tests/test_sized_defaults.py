@@ -29,7 +29,7 @@ from podusv_cli.scenario.load import Loaded, load_text
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import route
 from podusv_cli.studies.making.check import sweep_faults
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import draw_scenario, draws
 from podusv_cli.studies.tuning.space import gains
 
 LAWS = [kind for kind in kinds("controllers").values() if kind.rules]
@@ -198,7 +198,10 @@ def each(vary: str, *overrides: str) -> list:
     given = loaded(*overrides, text=CATAMARAN + STUDY % vary)
     assert not sweep_faults(given)
     own = given.scenario
-    return [own, *(drawn(own.alone(), own.sweep.vary, draw) for draw in draws(own.sweep, 0, 4))]
+    return [
+        own,
+        *(draw_scenario(own.alone(), own.sweep.vary, draw) for draw in draws(own.sweep, 0, 4)),
+    ]
 
 
 def test_draws_of_the_true_vessel_do_not_reach_the_law():

@@ -11,7 +11,7 @@ from command_samples import ROOT, commanded, one_line
 from hull_ratios import ratios, scatter, table
 
 import podusv as library
-from podusv_cli.components.vessels.estimated import HOERNER, SCATTER, Hull, estimated
+from podusv_cli.components.vessels.estimated import HOERNER, SCATTER, Hull, estimate_vessel
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.init import SCHEMA
 
@@ -41,7 +41,7 @@ def podusv(tmp_path, monkeypatch, capsys):
 
 def test_added_mass_in_surge_is_that_of_mss_for_the_otter():
     """otter.m has 5.2815 kg in sea water of 1025 kg/m3: it goes with rho^(-2/3)."""
-    surge = -estimated(Hull(2.0, 1.08, 55.0, 239.0))["X_udot"]
+    surge = -estimate_vessel(Hull(2.0, 1.08, 55.0, 239.0))["X_udot"]
     assert surge * 1.025 ** (-2 / 3) == pytest.approx(5.2815, rel=1e-4)
 
 
@@ -53,7 +53,7 @@ def test_cross_flow_drag_has_the_coefficient_of_the_otter():
 @pytest.mark.parametrize("speed", [math.nan, 1.2, 3.0])
 def test_full_thrust_gives_the_top_speed(speed):
     hull = Hull(4.9, 2.4, 180.0, 360.0, speed=speed)
-    numbers = estimated(hull)
+    numbers = estimate_vessel(hull)
     u = hull.top_speed
     assert -(numbers["X_u"] + numbers["X_uu"] * u) * u == pytest.approx(360.0)
     assert max(numbers["X_u"], numbers["X_uu"]) <= 0.0
@@ -62,7 +62,7 @@ def test_full_thrust_gives_the_top_speed(speed):
 def test_loads_are_those_of_strips_summed_one_by_one():
     """Added mass and cross-flow drag of two hulls, in 20 000 strips each."""
     hull = Hull(4.9, 2.4, 180.0, 360.0, hulls=2, hull_beam=0.4)
-    numbers, count = estimated(hull), 20000
+    numbers, count = estimate_vessel(hull), 20000
     draught = 180.0 / (1000.0 * 0.5 * 2 * 4.9 * 0.4)
     coefficient = float(np.interp(0.4 / (2.0 * draught), *HOERNER))
     inertia = sway = moment = mass = 0.0
@@ -81,7 +81,7 @@ def test_loads_are_those_of_strips_summed_one_by_one():
 def test_damping_is_that_of_the_regression_written_out():
     """Clarke, Gedling and Hine: Y_v' and N_r' in the prime system of rho L^2 U / 2."""
     hull = Hull(100.0, 16.0, 5.0e6, 1e5, speed=10.0)
-    numbers, T, U = estimated(hull), hull.draught, hull.cruise
+    numbers, T, U = estimate_vessel(hull), hull.draught, hull.cruise
     S, q = math.pi * (T / 100.0) ** 2, 0.5 * 1000.0 * 100.0**2 * U
     assert pytest.approx(6.25) == T
     assert numbers["Y_v"] == pytest.approx(-q * S * (1.0 + 0.4 * 0.5 * 16.0 / T))
@@ -146,7 +146,7 @@ def test_what_is_estimated_is_marked_and_varied(podusv):
     podusv("start", "boat", *BOATS["catamaran"])
     scenario, text = load("boat.yaml").scenario, Path("boat.yaml").read_text()
     marked = [line.split(":")[0].strip() for line in text.splitlines() if "estimated:" in line]
-    assert sorted(marked) == sorted(estimated(Hull(1.0, 1.0, 100.0, 1.0)))
+    assert sorted(marked) == sorted(estimate_vessel(Hull(1.0, 1.0, 100.0, 1.0)))
     drawn = [key for quantity in scenario.sweep.vary.values() for key in quantity.keys]
     assert sorted(drawn) == sorted(f"vessel.{name}" for name in marked)
     assert sorted(scenario.doubt.vary) == sorted(drawn)

@@ -15,7 +15,7 @@ from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.studies.counting import statistics as st
 from podusv_cli.studies.counting.claims import judge
-from podusv_cli.studies.counting.expressions import parse_success, succeeded
+from podusv_cli.studies.counting.expressions import judge_success, parse_success
 
 inf, nan = math.inf, math.nan
 LAWS = ["proposed", "pid", "li"]
@@ -166,10 +166,10 @@ def test_success_is_a_condition_on_one_run() -> None:
     tree = parse_success("finished and z_e_steady <= 1.5", METRICS)
     values = {"z_e_steady": np.array([1.0, 1.6, 1.0, nan])}
     finished = np.array([True, True, False, True])
-    assert succeeded(tree, values, finished, METRICS).tolist() == [True, False, False, False]
+    assert judge_success(tree, values, finished, METRICS).tolist() == [True, False, False, False]
     for unknown in ("not z_e_steady > 1.5", "not settling_time < 9"):
         ended = np.array([False])
-        assert not succeeded(parse_success(unknown, METRICS), {}, ended, METRICS).any()
+        assert not judge_success(parse_success(unknown, METRICS), {}, ended, METRICS).any()
 
 
 # verdicts ----------------------------------------------------------------------------------------
@@ -257,7 +257,7 @@ def test_what_cannot_be_told_says_how_many_draws_would_tell() -> None:
     assert judged(study(a=np.ones(368)), "failures(a) <= 0.01").answer is True
     values = np.r_[np.zeros(48), np.ones(2)]
     quantile = judged(study(a=values), "quantile(a.iae, 0.9) <= 0.5")
-    assert quantile.more == st.needed(0.96, 0.9, 0.95)
+    assert quantile.more == st.draws_for_share(0.96, 0.9, 0.95)
     assert judged(study(a=1 - values), "quantile(a.iae, 0.1) >= 0.5").more == quantile.more
     bound = judged(study(a=np.r_[np.zeros(5), np.full(5, inf)]), "failures(a) <= 0.5")
     assert "it cannot be said how many draws would decide" in bound.evidence()
@@ -265,7 +265,7 @@ def test_what_cannot_be_told_says_how_many_draws_would_tell() -> None:
 
 def test_the_draws_needed_decide_the_quantile_too() -> None:
     share, q = 0.96, 0.9
-    n = st.needed(share, q, 0.95)
+    n = st.draws_for_share(share, q, 0.95)
     assert n
     for factor, answer in ((0.8, None), (1.2, True)):
         count = round(n * factor / 25) * 25

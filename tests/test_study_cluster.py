@@ -148,7 +148,7 @@ def test_a_lost_scheduler_is_a_sentence_and_units_are_kept(tmp_path):
     client = stub(lost_after=3)
     with pytest.raises(StorageError, match="connection to the scheduler was lost"):
         marched(tmp_path / "study", client)
-    there = Store(tmp_path / "study", about(small())).covered()
+    there = Store(tmp_path / "study", about(small())).covered_draws()
     assert sum(int(mask.sum()) for mask in there.values()) == 3 * marching.FIRST
 
 
@@ -161,7 +161,7 @@ def test_an_interrupt_keeps_what_is_written_and_cancels_the_rest(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         marched(tmp_path / "study", client, tell)
-    there = Store(tmp_path / "study", about(small())).covered()
+    there = Store(tmp_path / "study", about(small())).covered_draws()
     assert sum(int(mask.sum()) for mask in there.values()) == 24
     assert len(client.cancelled) == client.submitted - 3
     _, _, (tally, whole) = marched(tmp_path / "study", stub())

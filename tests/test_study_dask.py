@@ -13,7 +13,7 @@ import pytest
 from small_study import TEXT, made, small
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.studies.making.cluster import TALKERS, _client, connected
+from podusv_cli.studies.making.cluster import TALKERS, _client, connect_cluster
 from podusv_cli.studies.making.dispatch import dispatch
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.remote import StudyText
@@ -44,7 +44,7 @@ def test_a_worker_that_is_killed_changes_no_byte(distributed, tmp_path):
     recipe = StudyText(TEXT)
     with (
         distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as local,
-        connected(local.scheduler_address, recipe, store.seal) as executor,
+        connect_cluster(local.scheduler_address, recipe, store.seal) as executor,
     ):
         _, finished = dispatch(store, small(), tell, executor)
     assert finished
@@ -115,7 +115,7 @@ def test_no_scheduler_is_a_sentence(distributed, monkeypatch):
     monkeypatch.setattr("podusv_cli.studies.making.cluster.PATIENCE", 0.3)
     with (
         pytest.raises(StorageError, match=r"--scheduler tcp://127.0.0.1:9: no scheduler answers"),
-        connected("tcp://127.0.0.1:9", StudyText(TEXT), ""),
+        connect_cluster("tcp://127.0.0.1:9", StudyText(TEXT), ""),
     ):
         pass
 

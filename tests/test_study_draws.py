@@ -23,13 +23,21 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.random_words import in_unit_interval
-from podusv_cli.scenario.address import ValueRefused, described, with_values
+from podusv_cli.scenario.address import ValueRefused, describe_key, with_values
 from podusv_cli.scenario.load import load_text, values
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sweep import Quantity, Sweep
 from podusv_cli.scenario.yaml_tree import route
-from podusv_cli.studies.making.draws import drawing, drawn, draws, seeds, table, uniforms, words
+from podusv_cli.studies.making.draws import (
+    draw_scenario,
+    drawing,
+    draws,
+    seeds,
+    table,
+    uniforms,
+    words,
+)
 
 VARY = """
 sweep:
@@ -140,7 +148,7 @@ def test_a_draw_changes_what_it_names_and_nothing_else() -> None:
         "path.points[1][0]": -0.5, "controller.network.nodes[1]": 4,
         "controller.coupling": "printed",
     }  # fmt: skip
-    made = drawn(one, vary, draw)
+    made = draw_scenario(one, vary, draw)
     before, after = one.model_dump(), made.model_dump()
     assert after["vessel"] == before["vessel"] | {
         "m": 1.25 * one.vessel.m, "X_u": 0.5 * one.vessel.X_u, "X_uu": 0.5 * one.vessel.X_uu
@@ -152,12 +160,12 @@ def test_a_draw_changes_what_it_names_and_nothing_else() -> None:
     left = set(before) - {"vessel", "start", "path", "controller"}
     assert {name: after[name] for name in left} == {name: before[name] for name in left}
     assert made.nominal == one.nominal == one.vessel  # no law knows
-    assert drawn(one, vary, {}) == one
+    assert draw_scenario(one, vary, {}) == one
 
 
 def test_the_nominal_vessel_is_a_key_like_others() -> None:
     vary = {"nominal.m": Quantity.model_validate({"times": {"uniform": (0.5, 2.0)}})}
-    made = drawn(scenario(), vary, {"nominal.m": 1.5})
+    made = draw_scenario(scenario(), vary, {"nominal.m": 1.5})
     assert made.nominal.m == 1.5 * made.vessel.m
     assert made.vessel == scenario().vessel
 
@@ -182,7 +190,7 @@ def test_the_nominal_vessel_is_a_key_like_others() -> None:
 )
 def test_a_draw_out_of_range_names_quantity_value_key_and_range(draw: Any, words: str) -> None:
     with pytest.raises(ValueRefused) as told:
-        drawn(scenario(), swept().vary, draw)
+        draw_scenario(scenario(), swept().vary, draw)
     assert words in str(told.value)
 
 
@@ -247,7 +255,7 @@ def asked(scenario: Scenario, section: str, *, times: bool) -> list[tuple[str, f
         steps = route(key)
         if steps[0] != section or isinstance(own, bool) or not isinstance(own, (int, float)):
             continue
-        if not times or described(scenario, steps).unit == "s":
+        if not times or describe_key(scenario, steps).unit == "s":
             found += [(key, number) for number in awkward(own)]
     return found
 

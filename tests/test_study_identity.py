@@ -14,11 +14,11 @@ from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making import plan as plans
 from podusv_cli.studies.making import store as stores
-from podusv_cli.studies.making.check import unjudged
-from podusv_cli.studies.making.dispatch import ENDED, Driver
+from podusv_cli.studies.making.check import unjudged_claims
+from podusv_cli.studies.making.dispatch import ENDED, StudyDriver
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.store import RUNS, Store
-from podusv_cli.studies.making.unit import crashed
+from podusv_cli.studies.making.unit import crashed_unit
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
 
@@ -54,10 +54,10 @@ def test_claims_that_a_study_does_not_judge_are_named(tmp_path):
     config.write_text(alone)
     sweep.run(config, request, lambda tally: None)
     assert "claims (M) are about single runs" in warnings[0]
-    assert "claims (M) are about" in unjudged(load_text(alone, "small.yaml").scenario)
+    assert "claims (M) are about" in unjudged_claims(load_text(alone, "small.yaml").scenario)
     for own in (text % "li.iae < pid.iae", alone.replace("seed: 7", "success: iae < 1")):
         judging = load_text(own, "small.yaml").scenario
-        assert unjudged(judging) == ""
+        assert unjudged_claims(judging) == ""
 
 
 def test_runs_of_other_kernels_are_read(whole, tmp_path, updated, podusv):
@@ -152,7 +152,7 @@ def test_a_study_that_was_killed_while_its_draws_were_raised_goes_on(tmp_path, m
     monkeypatch.undo()
     done = sweep.run(folder, sweep.Request(figures=False), lambda tally: None)
     asked = json.loads((folder / "study.json").read_text())["draws"]
-    assert done.tally.wanted == done.results.wanted == 2 * asked
+    assert done.tally.wanted == done.results.wanted_runs == 2 * asked
 
 
 def test_invalid_runs_are_told_before_the_first_run(tmp_path):
@@ -166,7 +166,7 @@ def test_invalid_runs_are_told_before_the_first_run(tmp_path):
 
     request = sweep.Request(("sweep.draws=12",), units.parent, figures=False, warn=warn)
     done = sweep.run(config, request, lambda tally: None)
-    runs = studies.stored(done.folder).runs()
+    runs = studies.open_store(done.folder).runs()
     count = sum(int(runs.broken(law).sum()) for law in ("pid", "li"))
     assert 0 < count < 24
     ((text, there),) = told
@@ -213,7 +213,7 @@ def placed_in(path, dataset):
 )
 def test_every_array_of_the_table_is_sealed(tmp_path, dataset):
     store = made(tmp_path / "study", draws=2)
-    store.write(crashed(Unit("pid", 0, 1, 1), store.about.measured, "it ended its process"))
+    store.write(crashed_unit(Unit("pid", 0, 1, 1), store.about.measured, "it ended its process"))
     store.write_runs()
     table, (place, size) = store.folder / RUNS, placed_in(store.folder / RUNS, dataset)
     sound = bytearray(table.read_bytes())
@@ -232,7 +232,7 @@ def test_a_table_of_the_first_format_is_read(whole, tmp_path):
     folder = shutil.copytree(whole, tmp_path / "study")
     with h5py.File(folder / RUNS, "r+") as file:
         del file["sha256_rest"]
-    assert "sha256_rest" not in studies.stored(folder).runs().metrics
+    assert "sha256_rest" not in studies.open_store(folder).runs().metrics
     assert studies.status(folder).rows[0][2] == 8
 
 
@@ -241,9 +241,9 @@ def test_a_run_that_ends_its_process_is_told_alike_by_every_engine(tmp_path):
     store = Store(tmp_path / "study", about(plan))
     store.open("now")
     for end in ("exit code -9", "the worker ended"):
-        driver = Driver(store, plan, lambda tally: None, float("inf"), (1, 1))
+        driver = StudyDriver(store, plan, lambda tally: None, float("inf"), (1, 1))
         (number, _, unit), *_ = driver
-        driver.done(number, Outcome(failure=end, killed=True))
+        driver.take_outcome(number, Outcome(failure=end, killed=True))
         (result,) = store.results()
         assert result.causes == (ENDED,)
         assert driver.tally.ended == {f"{unit.law}[0] draw 0": end}

@@ -138,7 +138,7 @@ def test_each_file_is_read_a_fixed_number_of_times(shards, tmp_path, monkeypatch
     into.open("now")
     join(into, others)
     assert len(reads) == 2 * 2 * SHARDS  # compared, then written: two laws in each shard
-    assert np.all([mask.all() for mask in into.covered().values()])
+    assert np.all([mask.all() for mask in into.covered_draws().values()])
 
 
 def test_a_machine_is_told_from_a_sitting_of_this_machine():

@@ -14,7 +14,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.storage import manifest
 from podusv_cli.storage.run_folder import open_run
 from podusv_cli.studies.telling import keep
-from podusv_cli.studies.telling.results import judged
+from podusv_cli.studies.telling.results import judge_study
 from podusv_cli.workflows import run as running
 from podusv_cli.workflows import studies, sweep
 from podusv_cli.workflows.merge import merge
@@ -59,7 +59,7 @@ def same(metrics, table):
 @pytest.mark.slow
 def test_kept_runs_are_those_asked_for(study):
     runs, names = study.results.runs, {path.name for path in (study.folder / "logs").iterdir()}
-    wanted = keep.wanted(study.results)
+    wanted = keep.wanted_runs(study.results)
     assert names == {one.name for one in wanted}
     assert "failed" in {one.why for one in wanted}
     for law in ("pid", "li"):
@@ -74,14 +74,14 @@ def test_kept_runs_are_those_asked_for(study):
 
 def test_kept_runs_equal_the_table(study):
     assert study.missing == ()
-    for one in keep.wanted(study.results):
+    for one in keep.wanted_runs(study.results):
         kept = open_run(study.folder / "logs" / one.name)
         assert same(kept.metrics, table_of(study, one.law, one.cell, one.draw))
         assert kept.recording.status == "finished"
 
 
 def test_a_kept_log_that_differs_leaves_no_verdict(study, tmp_path, podusv):
-    (one, other, *_) = keep.wanted(study.results)
+    (one, other, *_) = keep.wanted_runs(study.results)
     folder = tmp_path / "study"
     shutil.copytree(study.folder, folder)
     shutil.rmtree(folder / "logs" / one.name)
@@ -90,7 +90,7 @@ def test_a_kept_log_that_differs_leaves_no_verdict(study, tmp_path, podusv):
     assert before["claims"]
     code, out, err = podusv("sweep", "report", str(folder), "--no-figures")
     assert code == 3
-    kept = len(keep.wanted(study.results))
+    kept = len(keep.wanted_runs(study.results))
     assert f"1 of {kept} kept logs differ from it; in that of {one.name}, iae is" in out
     assert f"logs/{one.name} differs from runs.h5: iae is" in err
     assert "could not be made" not in err + (folder / "missing.json").read_text()
@@ -106,9 +106,9 @@ def test_continuing_keeps_what_is_kept(study, tmp_path):
     shutil.copytree(study.folder, folder)
     before = {p: p.stat().st_mtime_ns for p in (folder / "logs").rglob("log.h5")}
     grown = run(folder, None, overrides=["sweep.draws=9"])
-    assert grown.results.made == 9 * 4
+    assert grown.results.made_runs == 9 * 4
     assert {p: p.stat().st_mtime_ns for p in before} == before
-    assert {one.name for one in keep.wanted(grown.results)} <= {
+    assert {one.name for one in keep.wanted_runs(grown.results)} <= {
         path.name for path in (folder / "logs").iterdir()
     }
     assert grown.missing == ()
@@ -120,7 +120,7 @@ def test_a_kept_run_that_cannot_be_made_costs_nothing_else(study, tmp_path):
     shutil.rmtree(folder / "logs")
     (folder / "logs").write_text("in the way")
     again = run(folder, None)
-    assert again.results.made == again.results.wanted
+    assert again.results.made_runs == again.results.wanted_runs
     assert any(missing.what.startswith("logs/pid-") for missing in again.missing)
     assert json.loads((folder / "missing.json").read_text())["missing"]
     assert (folder / "report.html").exists()
@@ -173,7 +173,7 @@ def test_a_finished_study_lists_all_its_files_and_one_being_continued_none(study
     assert late.results is None
     assert not (folder / manifest.NAME).exists()
     part = sweep.report(folder, sweep.Request(figures=False))
-    assert part.results.made == 6 * 4 < part.results.wanted
+    assert part.results.made_runs == 6 * 4 < part.results.wanted_runs
     assert manifest.check(folder).status == "interrupted"
 
 
@@ -199,14 +199,14 @@ def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):
     runs = study.results.runs
     assert list(runs.drawn) == sorted(study.results.about.quantities)
     assert set(runs.drawn["start.y"].tolist()) <= {0.0, 2.5}
-    assert set(judged(study.results.about, runs).sensitivity.quantity) == set(runs.drawn)
+    assert set(judge_study(study.results.about, runs).sensitivity.quantity) == set(runs.drawn)
 
 
 def test_seeds_have_no_sensitivity_because_their_numbers_have_no_order(study):
     about, runs = study.results.about, study.results.runs
     seed = about.quantities["start.y"].model_copy(update={"is_seed": True})
     seeded = about.model_copy(update={"quantities": about.quantities | {"start.y": seed}})
-    assert set(judged(seeded, runs).sensitivity.quantity) == set(runs.drawn) - {"start.y"}
+    assert set(judge_study(seeded, runs).sensitivity.quantity) == set(runs.drawn) - {"start.y"}
 
 
 @pytest.mark.parametrize("command", ["plot", "compare", "rerun", "diff"])

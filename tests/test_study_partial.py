@@ -10,7 +10,7 @@ from small_study import TEXT, small, written
 
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.studies.counting.runs import Unit
-from podusv_cli.studies.making.dispatch import Driver
+from podusv_cli.studies.making.dispatch import StudyDriver
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.store import Store
 from podusv_cli.studies.making.unit import make
@@ -20,7 +20,7 @@ from podusv_cli.workflows import sweep
 def partial_study(folder, **ranges):
     """A study of 40 draws, of which each law has only some."""
     config = written(folder / "small.yaml")
-    plan, place, texts = sweep._planned(config, sweep.Request(out=folder / "study"))
+    plan, place, texts = sweep._plan_study(config, sweep.Request(out=folder / "study"))
     store = Store(place, about(plan))
     store.open("now", texts)
     for law, pieces in ranges.items():
@@ -45,10 +45,10 @@ def test_an_unfinished_study_compares_laws_on_the_draws_that_all_have(podusv, tm
     said = podusv("sweep", "report", store.folder, "--no-figures")
     assert said.out.startswith(f"{told}; continue with: podusv sweep run ")
     assert told.capitalize() in (store.folder / "report.html").read_text()
-    assert done.results.made == 40  # all runs are kept, exported and not made again
+    assert done.results.made_runs == 40  # all runs are kept, exported and not made again
     table = podusv("sweep", "export", store.folder).out.strip()
     assert len(Path(table).read_text().splitlines()) == 41
-    assert {law: int(mask.sum()) for (law, _), mask in store.covered().items()} == {
+    assert {law: int(mask.sum()) for (law, _), mask in store.covered_draws().items()} == {
         "pid": 20, "li": 20,
     }  # fmt: skip
 
@@ -57,12 +57,12 @@ def test_laws_without_a_common_draw_are_not_compared(tmp_path):
     store = partial_study(tmp_path, pid=[(0, 8)], li=[(8, 8)])
     with pytest.raises(UsageError, match=r"no draw in "):
         sweep.report(store.folder, sweep.Request(figures=False))
-    assert sum(int(mask.sum()) for mask in store.covered().values()) == 16
+    assert sum(int(mask.sum()) for mask in store.covered_draws().values()) == 16
 
 
 def test_laws_advance_together(tmp_path):
     plan = small(draws=1000, grid="{disturbance.scale: [0.5, 1]}")
-    driver = Driver(
+    driver = StudyDriver(
         Store(tmp_path / "study", about(plan)), plan, lambda tally: None, float("inf"), (1, 1)
     )
     reached = dict.fromkeys(driver.missing(), 0)

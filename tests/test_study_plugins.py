@@ -45,14 +45,14 @@ def test_a_study_keeps_its_plugin(config, tmp_path, monkeypatch):
     config.parent.rename(tmp_path / "gone")
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
-    assert sweep.report(study, sweep.Request(figures=False)).results.made == 24
+    assert sweep.report(study, sweep.Request(figures=False)).results.made_runs == 24
     assert sweep.run(
         study, sweep.Request(("sweep.draws=16",), figures=False, trust=True), lambda tally: None
     ).results
     assert (study / RUNS).read_bytes() != first
     drawn = studies.draw(study, "mine", 3, 0, None, trusted=True)
     alone = running.run(drawn, running.Request(figures=()))
-    table = studies.stored(study).runs()
+    table = studies.open_store(study).runs()
     assert alone.metrics["iae"] == table.metric("mine", "iae")[0, 3]
     merged = merge([study], tmp_path / "merged", sweep.Request(figures=False))
     assert (merged.folder / RUNS).read_bytes() == (study / RUNS).read_bytes()
@@ -65,7 +65,7 @@ def test_a_mistake_in_a_law_leaves_no_folder_that_the_mended_law_does_not_fit(co
         swept(config, tmp_path / "study")
     assert not (tmp_path / "study").exists()
     law.write_text(LAW)
-    assert swept(config, tmp_path / "study", overrides=["sweep.draws=2"]).results.made == 6
+    assert swept(config, tmp_path / "study", overrides=["sweep.draws=2"]).results.made_runs == 6
 
 
 @pytest.mark.parametrize("name", ["law", "until", "sha256", "success"])
@@ -83,7 +83,7 @@ def test_a_worker_needs_no_file_of_a_plugin(config, tmp_path, monkeypatch):
     """It gets the text, and makes the same bits."""
     study = swept(config, tmp_path / "study", overrides=["sweep.draws=8"]).folder
     text, unit = (study / SCENARIO).read_text(), Unit("mine", 0, 0, 4)
-    plan = studies.planned(study, trusted=True)
+    plan = studies.read_plan(study, trusted=True)
     recipe = StudyText(text, tuple(plan.scenario.plugin_files().items()))
     ours = digests(make(plan, unit))
     study.rename(tmp_path / "gone")

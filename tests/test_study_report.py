@@ -129,7 +129,7 @@ def test_runs_that_ended_first_come_first(whole, monkeypatch):
     ],
 )
 def test_the_run_that_missed_success_by_most_comes_first_of_its_law(whole, success, missed):
-    runs = runs_file.Table(whole.folder / "runs.h5", success, whole.results.known)
+    runs = runs_file.RunsTable(whole.folder / "runs.h5", success, whole.results.known)
     listed = report.runs_that(replace(whole.results, runs=runs), runs.failed).first
     for law in runs.laws:
         by = np.where(
@@ -144,7 +144,7 @@ def test_the_run_that_missed_success_by_most_comes_first_of_its_law(whole, succe
 def test_a_comparison_that_a_run_keeps_does_not_rank_it(whole):
     """All keep the first, each by another margin; the second decides."""
     success = "finished and iae < 1e3 and z_e_steady <= 0"
-    runs = runs_file.Table(whole.folder / "runs.h5", success, whole.results.known)
+    runs = runs_file.RunsTable(whole.folder / "runs.h5", success, whole.results.known)
     listed = report.runs_that(replace(whole.results, runs=runs), runs.failed).first
     for law in runs.laws:
         steady, of_law = runs.metric(law, "z_e_steady"), [row for row in listed if row.law == law]
@@ -243,7 +243,7 @@ def test_an_interrupt_while_figures_are_drawn_costs_figures_alone(drawn, tmp_pat
     folder = tmp_path / "stopped"
     shutil.copytree(drawn.folder, folder)
     (folder / "summary.csv").unlink()
-    monkeypatch.setattr("podusv_cli.figures.sketch.rendered", interrupted)
+    monkeypatch.setattr("podusv_cli.figures.sketch.render_sketches", interrupted)
     with pytest.raises(KeyboardInterrupt, match=f"podusv sweep report {folder}"):
         sweep.report(folder, sweep.Request())
     same = (drawn.folder / "summary.csv").read_bytes()
@@ -271,7 +271,7 @@ def test_a_study_with_runs_missing_is_preliminary(whole, tmp_path):
     answer = section(tree((tmp_path / "s" / "report.html").read_text()), "answer")
     assert "Preliminary: 3 of 6 draws that all 2 laws have." in answer.text
     assert "6 of 12 runs are made" in answer.text
-    assert done.results.made == 6
+    assert done.results.made_runs == 6
 
 
 def test_broken_runs_are_told_with_their_causes(whole, monkeypatch):

@@ -46,7 +46,7 @@ def test_five_thousand_units_cost_little_time_and_memory(tmp_path):
     assert whole
     assert client.submitted == 5000
     began = time.perf_counter()
-    store.covered()
+    store.covered_draws()
     scan = time.perf_counter() - began
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     march_time = client.seconds * tally.made  # processor time of all workers

@@ -195,10 +195,10 @@ def test_the_interval_of_a_win_rate_contains_the_truth() -> None:
 
 
 def test_draws_needed_are_the_first_that_decide() -> None:
-    assert st.needed(0.0, 0.01, 0.95) == 368  # 0.99**n <= 0.025
-    assert st.needed(1.0, 0.99, 0.95) == 368
-    assert st.needed(0.01, 0.01, 0.95) is None
-    count = st.needed(0.97, 0.95, 0.95)
+    assert st.draws_for_share(0.0, 0.01, 0.95) == 368  # 0.99**n <= 0.025
+    assert st.draws_for_share(1.0, 0.99, 0.95) == 368
+    assert st.draws_for_share(0.01, 0.01, 0.95) is None
+    count = st.draws_for_share(0.97, 0.95, 0.95)
     assert count
     whole = 100 * round(count / 100)
     assert st.share(0.97 * whole * 1.1, whole * 1.1, 0.95).low > 0.95
@@ -206,11 +206,11 @@ def test_draws_needed_are_the_first_that_decide() -> None:
 
 
 def test_draws_needed_grow_towards_the_bound_and_with_the_level() -> None:
-    closer = [st.needed(share, 0.5, 0.95) for share in (0.9, 0.7, 0.6, 0.55, 0.51)]
-    surer = [st.needed(0.6, 0.5, level) for level in (0.8, 0.95, 0.99)]
+    closer = [st.draws_for_share(share, 0.5, 0.95) for share in (0.9, 0.7, 0.6, 0.55, 0.51)]
+    surer = [st.draws_for_share(0.6, 0.5, level) for level in (0.8, 0.95, 0.99)]
     for counts in (closer, surer):
         assert all(a and b and a < b for a, b in pairwise(counts))
-    assert st.needed(0.5 + 1e-9, 0.5, 0.95) is None
+    assert st.draws_for_share(0.5 + 1e-9, 0.5, 0.95) is None
 
 
 # Holm --------------------------------------------------------------------------------------------

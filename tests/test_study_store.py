@@ -18,11 +18,11 @@ from podusv_cli.studies.counting.runs import Unit
 from podusv_cli.studies.making import dispatch as marching
 from podusv_cli.studies.making import runs_writer
 from podusv_cli.studies.making import unit as units
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import draw_scenario, draws
 from podusv_cli.studies.making.record import about
 from podusv_cli.studies.making.sessions import SessionLog, sessions
 from podusv_cli.studies.making.store import RUNS, UNITS, Store
-from podusv_cli.studies.telling.results import judged
+from podusv_cli.studies.telling.results import judge_study
 from podusv_cli.workflows import studies, sweep
 
 
@@ -39,7 +39,7 @@ def test_a_run_of_the_table_is_the_run_that_simulate_makes(whole):
     runs, plan = whole.runs(), small()
     for law, number in (("pid", 0), ("li", 39)):
         (draw,) = draws(plan.sweep, number, 1)
-        single = drawn(plan.single(law, 0), plan.sweep.vary, draw)
+        single = draw_scenario(plan.single(law, 0), plan.sweep.vary, draw)
         probe = single.probe()
         log = simulate(single.closed_loop(), single.time_grid(), probe=probe)
         alone = probe.summary(log.seen)
@@ -131,7 +131,7 @@ def test_a_unit_that_comes_while_the_table_is_written_is_kept(whole, tmp_path, m
     late = Unit("pid", 0, 20, 4)
     finishing(monkeypatch, lambda: store.write(units.make(small(), late)))
     store.write_runs()
-    assert store.covered()["pid", 0].sum() == 24
+    assert store.covered_draws()["pid", 0].sum() == 24
     monkeypatch.undo()
     assert content(made(store.folder)) == content(whole)
     assert not list((store.folder / UNITS).iterdir())
@@ -188,7 +188,7 @@ def test_time_over_keeps_what_is_made(tmp_path, monkeypatch):
     tally, whole = marching.dispatch(store, small(), lambda tally: None, executor, seconds=2.0)
     assert not whole
     assert 0 < tally.made < tally.wanted
-    assert sum(int(mask.sum()) for mask in store.covered().values()) == tally.made
+    assert sum(int(mask.sum()) for mask in store.covered_draws().values()) == tally.made
 
 
 def test_a_full_disk_while_the_table_is_filled_keeps_the_units(whole, tmp_path, monkeypatch):
@@ -246,9 +246,11 @@ def test_draws_beyond_those_asked_for_are_refused(whole, tmp_path):
 
 
 def test_success_is_evaluated_once_for_each_law(whole, monkeypatch):
-    runs, real, times = whole.runs(), runs_file.succeeded, []
-    monkeypatch.setattr(runs_file, "succeeded", lambda *given: (times.append(1), real(*given))[1])
-    judged(whole.about, runs)
+    runs, real, times = whole.runs(), runs_file.judge_success, []
+    monkeypatch.setattr(
+        runs_file, "judge_success", lambda *given: (times.append(1), real(*given))[1]
+    )
+    judge_study(whole.about, runs)
     assert len(times) == 2
 
 

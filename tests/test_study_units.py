@@ -11,7 +11,7 @@ from podusv_cli.core.errors import StorageError
 from podusv_cli.studies.counting.runs import Unit, UnitResult
 from podusv_cli.studies.making import runs_writer
 from podusv_cli.studies.making import store as stores
-from podusv_cli.studies.making.store import UNITS, decoded, encoded, read
+from podusv_cli.studies.making.store import UNITS, decode_unit, encode_unit, read
 
 
 def test_a_whole_study_removes_only_units_that_it_read(tmp_path, monkeypatch):
@@ -36,7 +36,7 @@ def test_a_unit_that_cannot_be_read_is_an_error_and_not_missing(tmp_path, monkey
         raise OSError(errno.EIO, "Input/output error")
 
     monkeypatch.setattr(stores.Path, "read_bytes", fail)
-    for act in (store.covered, store.write_runs, lambda: list(store.results())):
+    for act in (store.covered_draws, store.write_runs, lambda: list(store.results())):
         with pytest.raises(StorageError, match=r"cannot read .*units/.*: Input/output error"):
             act()
     assert sorted((store.folder / UNITS).iterdir()) == there
@@ -46,16 +46,16 @@ def test_a_unit_with_any_other_byte_is_damaged(tmp_path):
     store = made(tmp_path / "study", part=(1, 5))
     path = next((store.folder / UNITS).glob("pid-*"))
     sound = path.read_bytes()
-    there = store.covered()["pid", 0].sum()
+    there = store.covered_draws()["pid", 0].sum()
     head = sound.index(b"\n") + 9
     places = [*range(0, head, 7), *np.linspace(head, len(sound) - 1, 40).astype(int)]
     spoilt = [sound[:at] + bytes([sound[at] ^ 1]) + sound[at + 1 :] for at in places]
     for content in (b"", sound[:-9], sound[:300], sound + b"0", *spoilt):
         path.write_bytes(content)
         assert read(path, store.seal) is None
-        assert store.covered()["pid", 0].sum() == 0 < there
+        assert store.covered_draws()["pid", 0].sum() == 0 < there
     path.write_bytes(sound)
-    assert store.covered()["pid", 0].sum() == there
+    assert store.covered_draws()["pid", 0].sum() == there
 
 
 @pytest.mark.parametrize("law", ["pid", "ä" * 400])
@@ -63,10 +63,10 @@ def test_a_unit_of_any_name_is_read_as_it_was(law):
     numbers = np.array([1.5, np.nan])
     unit = Unit(law, 3, 70, 2)
     result = UnitResult(unit, {"iae": numbers}, np.array([0, 1], np.uint8), numbers, ("", "ü"))
-    content = encoded(result, "seal")
-    again = decoded(content, "seal")
+    content = encode_unit(result, "seal")
+    again = decode_unit(content, "seal")
     assert (again.unit, again.causes) == (unit, result.causes)
     assert np.array_equal(again.metrics["iae"], numbers, equal_nan=True)
     assert np.array_equal(again.until, numbers, equal_nan=True)
     assert again.status.tolist() == [0, 1]
-    assert decoded(content, "other") is None
+    assert decode_unit(content, "other") is None

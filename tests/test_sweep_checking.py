@@ -19,7 +19,7 @@ from podusv_cli.scenario.sweep import Quantity
 from podusv_cli.scenario.yaml_tree import DISTRIBUTIONS, QUANTITY
 from podusv_cli.studies.making.cells import MOST, cells
 from podusv_cli.studies.making.check import singles, sweep_faults
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import draw_scenario, draws
 from podusv_cli.studies.making.invalid import invalid_runs
 
 ROOT = Path(__file__).parents[1]
@@ -233,7 +233,7 @@ def test_all_draws_that_a_run_could_not_take_are_counted(text: str) -> None:
     for i, draw in enumerate(draws(sweep, 0, 60)):
         for law in laws:
             try:
-                drawn(law, sweep.vary, draw)
+                draw_scenario(law, sweep.vary, draw)
             except ValueRefused as error:
                 reasons.append((i, str(error)))
     found = invalid_runs(laws, sweep)
@@ -301,7 +301,9 @@ def test_a_quantity_of_one_of_several_disturbances():
     several = BASE.replace("{kind: harmonic}", "[{kind: step}, {kind: current, speed: 0.5}]")
     sweep = '  draws: 5\n  vary: {flow: {keys: ["disturbance[1].speed"], uniform: [%s, %s]}}\n'
     scenario = load_text(several + sweep % (0.1, 1), "a.yaml", checks=[sweep_faults]).scenario
-    each = [drawn(scenario, scenario.sweep.vary, draw) for draw in draws(scenario.sweep, 0, 5)]
+    each = [
+        draw_scenario(scenario, scenario.sweep.vary, draw) for draw in draws(scenario.sweep, 0, 5)
+    ]
     speeds = [run.disturbance[1].speed for run in each]
     assert len(set(speeds)) == 5
     assert all(0.1 < speed < 1.0 for speed in speeds)

@@ -19,7 +19,7 @@ from podusv_cli.components.controllers.polar_backstepping import PolarBacksteppi
 from podusv_cli.core.derived_signals import derived_with
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.stability import FAR, POINTS
 from podusv_cli.scenario.load import load
 from podusv_cli.storage.log_reader import read_log
@@ -252,7 +252,7 @@ def test_thinned_logs_are_monitored_where_they_are_logged(tmp_path, log):
 
 def test_a_stack_shows_parts_that_make_up_all_of_V(log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    shown = dressed([looked_at(label, log, scenario) for label in ("one", "other")])
+    shown = dress_runs([looked_at(label, log, scenario) for label in ("one", "other")])
     value, _, *stacks = FIGURES["stability"].family(shown, 2).axes
     assert value.get_yscale() == "log"
     for stack in stacks:
@@ -268,7 +268,7 @@ def tops_of(stack: Axes) -> list[float]:
 
 def test_V_of_a_single_run_is_stacked_below_its_bound(log):
     scenario = load(CONFIGS / "theory/monitor.yaml", SHORT).scenario
-    stack = FIGURES["stability"].family(dressed([looked_at("one", log, scenario)]), 2).axes[0]
+    stack = FIGURES["stability"].family(dress_runs([looked_at("one", log, scenario)]), 2).axes[0]
     tops = tops_of(stack)
     assert len(tops) == len(TERMS)
     width = -(-len(log["V"]) // POINTS)

@@ -38,7 +38,7 @@ from podusv_cli.engine.running.replay import rates_replay
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.lyapunov import TERMS
-from podusv_cli.theory.monitor import Monitored, monitored
+from podusv_cli.theory.monitor import Monitored, monitor_recording
 from podusv_cli.theory.rates import error_rates
 
 GAINS: dict[str, Any] = {"Gamma_u": 1.0, "Gamma_r": 1.0, "gamma_u": 10.0, "gamma_r": 10.0}
@@ -49,7 +49,7 @@ every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.label)
 def watched(loop: ClosedLoop, duration: float, step: float = 0.01, **options: Any) -> Monitored:
     """A run with its monitor."""
     grid = TimeGrid(step, round(duration / step))
-    monitor = monitored(Plan(loop, grid), run(loop, duration, step, **options))
+    monitor = monitor_recording(Plan(loop, grid), run(loop, duration, step, **options))
     assert monitor
     return monitor
 
@@ -209,7 +209,7 @@ def test_a_wrong_sign_planted_in_the_law_is_caught(sign):
 
     loop = smooth(Wrong(**GENTLE.model_dump()))
     recording = run(loop, 1.0, 0.02, compiled=False)
-    monitor = monitored(Plan(loop, TimeGrid(0.02, 50)), recording, compiled=False)
+    monitor = monitor_recording(Plan(loop, TimeGrid(0.02, 50)), recording, compiled=False)
     assert monitor
     assert mismatch(loop, monitor) > 1e-5
     honest = replace(loop, controller=GENTLE)
@@ -261,7 +261,7 @@ def test_sway_stays_below_its_bound():
 
 def test_sampled_control_has_V_but_no_rate():
     loop, grid = smooth(GENTLE), TimeGrid(0.01, 100, hold_every=10)
-    monitor = monitored(Plan(loop, grid), run(loop, 1.0, hold_every=10))
+    monitor = monitor_recording(Plan(loop, grid), run(loop, 1.0, hold_every=10))
     assert monitor
     assert "V" in monitor.recording
     assert "V_dot" not in monitor.recording
@@ -277,7 +277,7 @@ def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
     loop = corrected(controller=law, vessel=PAPER)
     recording = run(loop, 5.0)
     assert recording.status == "diverged"
-    monitor = monitored(Plan(loop, TimeGrid(0.01, 500)), recording)
+    monitor = monitor_recording(Plan(loop, TimeGrid(0.01, 500)), recording)
     assert monitor
     assert len(monitor.recording["V"]) == len(recording["time"])
     assert np.isfinite(monitor.recording["W_star_u"]).all()
@@ -286,7 +286,7 @@ def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
 def test_plain_and_compiled_monitor_agree():
     loop, grid = smooth(GENTLE), TimeGrid(0.05, 20)
     recording = run(loop, 1.0, 0.05)
-    one, other = (monitored(Plan(loop, grid), recording, compiled=c) for c in (True, False))
+    one, other = (monitor_recording(Plan(loop, grid), recording, compiled=c) for c in (True, False))
     assert one
     assert other
     for name in ("V", "V_dot", *(term.name for term in TERMS)):

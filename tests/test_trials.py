@@ -13,7 +13,7 @@ from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.shipped import file_of
-from podusv_cli.workflows.execute import Stopwatch, simulated, summary
+from podusv_cli.workflows.execute import Stopwatch, simulate_case, summary
 
 LEVER, EXECUTE = 0.499, 20.0
 OF_TRIALS = (
@@ -36,7 +36,7 @@ def done(name, *sets, hull=MODEL):
     text = f"extends: podusv:trials/{name}.yaml\nname: trial\n{hull}"
     scenario = load_text(text, "trial.yaml", sets).scenario.alone()
     case = Case.of(scenario)
-    recording = simulated(case, Stopwatch())
+    recording = simulate_case(case, Stopwatch())
     return scenario, recording, summary(case, recording, Extras())
 
 

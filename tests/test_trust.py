@@ -220,7 +220,7 @@ def test_python_loads_it_when_told_to():
 
 def test_a_live_page_does_not_run_it_either():
     with pytest.raises(ScenarioError, match="allow it with --trust"):
-        Live(in_a_subfolder()).loaded({})
+        Live(in_a_subfolder()).load({})
     assert not Path("MARK").exists()
 
 
@@ -299,7 +299,7 @@ def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place
         Path("gift", name).unlink()
     code = (
         "import sys; sys.path.insert(0, '..')\n"
-        "from podusv_cli.core.plugins import installed; print([p.name for p in installed()])\n"
+        "from podusv_cli.core.plugins import installed_plugins; print([p.name for p in installed_plugins()])\n"
         "import podusv; podusv.load('scenario.yaml')"
     )
     Path("gift/evil-1.0.dist-info/scenario.yaml").write_text(Path("gift/scenario.yaml").read_text())
@@ -309,7 +309,7 @@ def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place
     assert "ScenarioError" in said.stderr
 
 
-NAMES = "from podusv_cli.core.plugins import installed; print([p.name for p in installed()])"
+NAMES = "from podusv_cli.core.plugins import installed_plugins; print([p.name for p in installed_plugins()])"
 
 
 def test_a_package_in_one_s_own_folder_is_still_found():

@@ -19,10 +19,10 @@ from podusv_cli.studies.counting.runs import UnitResult
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.sampler import Sampler
-from podusv_cli.studies.tuning.search import Search, _far
+from podusv_cli.studies.tuning.search import GainSearch, _far
 from podusv_cli.studies.tuning.space import Gain
-from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial, best
-from podusv_cli.studies.tuning.validation import chosen
+from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, GainTrial, best
+from podusv_cli.studies.tuning.validation import choose_search
 
 BUDGET = 64
 
@@ -67,7 +67,7 @@ def test_failed_draws_count_as_not_settled_and_half_of_the_draws_are_enough(done
         type(done.results.plan.scenario), "at_target", lambda scenario, numbers: True
     )
     for name, draw in zip(FAILED, draws, strict=True):
-        monkeypatch.setattr(type(done.results), "met", lambda results, law, one=draw: one)
+        monkeypatch.setattr(type(done.results), "outcomes_of", lambda results, law, one=draw: one)
         assert done.results.settles("toy", "before") == (name == "half")
 
 
@@ -204,7 +204,7 @@ def test_gains_that_the_law_refuses_fail_and_cost_no_simulation(optuna, tmp_path
     refused = [trial for trial in found.trials if trial.gains["gain"] >= 2]
     assert refused
     assert all(trial.failures == 1.0 and trial.value == math.inf for trial in refused)
-    assert found.spent == 64
+    assert found.runs_spent == 64
     assert best(found.trials).gains["gain"] < 2
 
 
@@ -251,7 +251,7 @@ def test_a_scenario_without_the_key_is_refused(optuna, podusv, tmp_path):
 
 
 def made_up(number, value, *, excess=0.0, status=FINISHED):
-    return Trial(number, 0, {}, 4, status, value, (excess,), value, 0.0)
+    return GainTrial(number, 0, {}, 4, status, value, (excess,), value, 0.0)
 
 
 def test_the_best_trial_holds_inequalities_first_and_is_finished():
@@ -266,10 +266,12 @@ def test_the_best_trial_holds_inequalities_first_and_is_finished():
 def test_the_gains_that_are_taken_gained_most_beside_the_scenarios_own_on_the_same_draws():
     own = made_up(0, 9.0)
     winners = [made_up(7, 5.0), made_up(7, 0.5, excess=0.1), made_up(3, 4.0), made_up(2, 4.5)]
-    assert chosen([[own, trial] for trial in winners]) == 2
+    assert choose_search([[own, trial] for trial in winners]) == 2
     easy = [made_up(0, 4.5), made_up(3, 4.0)]  # another training set
-    assert chosen([easy, [own, made_up(7, 5.0)]]) == 1
-    assert chosen([[made_up(0, math.inf), made_up(7, 5.0)], easy]) == 1, "by value where own fail"
+    assert choose_search([easy, [own, made_up(7, 5.0)]]) == 1
+    assert choose_search([[made_up(0, math.inf), made_up(7, 5.0)], easy]) == 1, (
+        "by value where own fail"
+    )
 
 
 def test_a_trial_is_far_worse_by_more_than_half():
@@ -282,14 +284,16 @@ def test_a_trial_is_far_worse_by_more_than_half():
 @pytest.mark.parametrize(("excess", "met"), [(0.0, 0), (0.1, 1)])
 def test_only_a_trial_that_holds_all_inequalities_prunes_others(optuna, tmp_path, excess, met):
     """Where a far better one holds them, the next batch begins; else the trials go on to draw 1."""
-    search = Search(
+    search = GainSearch(
         planned(tmp_path, "tune.subject_to=[median(effort_u) >= 0]"), "toy", 0, tmp_path
     )
     search.trials = [made_up(0, 0.01, excess=excess)]
     (tmp_path / trials.FOLDER).mkdir()
     nothing = np.zeros(1)
     following = [
-        search.done(place, UnitResult(unit, {"effort_u": np.ones(1)}, nothing, nothing, ("",)))
+        search.take_result(
+            place, UnitResult(unit, {"effort_u": np.ones(1)}, nothing, nothing, ("",))
+        )
         for place, _, unit in search.begin()
     ]
     assert {unit.first for _, _, unit in following[-1]} == {met}
@@ -311,7 +315,7 @@ def test_trials_that_have_not_ended_keep_others_away(optuna):
 def test_trials_read_back_with_infinite_numbers(tmp_path):
     (tmp_path / trials.FOLDER).mkdir()
     written = [
-        Trial(0, 0, {"a": 0.1 + 0.2, "b": "word", "n": 3}, 4, FINISHED, math.inf, (), 1.0, 1.0)
+        GainTrial(0, 0, {"a": 0.1 + 0.2, "b": "word", "n": 3}, 4, FINISHED, math.inf, (), 1.0, 1.0)
     ]
     trials.write(tmp_path, "pid-0", written)
     assert trials.read(tmp_path, "pid-0") == written

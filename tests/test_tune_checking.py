@@ -101,7 +101,7 @@ def test_another_range_replaces_an_inherited_one():
         TUNED, "a.yaml", ["tune.space.K_Pu.log=[1, 2]", "tune.space.T_d={uniform: [1, 2]}"]
     )
     space = loaded.scenario.tune.space
-    assert space["T_d"].given == ["uniform"]
+    assert space["T_d"].given_keys == ["uniform"]
     assert set(space) == {"around", "K_Pu", "T_d"}
     assert {*Range.model_fields} <= RANGE | DISTRIBUTIONS
 

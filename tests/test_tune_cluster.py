@@ -51,7 +51,7 @@ class Near(StubClient):
         else:
             self.made.append(Unit(*future.args[2]))
             future.status = "finished"
-            future.value = remote.made(*future.args)
+            future.value = remote.make_unit(*future.args)
         callback(future)
 
     def _gain(self, variant):

@@ -15,7 +15,7 @@ from podusv_cli.studies.making.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning import folder as place
 from podusv_cli.studies.tuning import sampler, trials
 from podusv_cli.studies.tuning.plan import VALIDATE
-from podusv_cli.studies.tuning.trials import FINISHED, Trial
+from podusv_cli.studies.tuning.trials import FINISHED, GainTrial
 from podusv_cli.studies.tuning.validation import FOLDER, _clear, contestants
 from podusv_cli.workflows import tune as workflow
 
@@ -59,7 +59,7 @@ def at_every_call(work):
 
 def opened(out, plan, texts=MappingProxyType({})):
     """Begin a search in a folder, or continue it."""
-    place.write(out, plan, place.known(out, plan), "now", texts)
+    place.write(out, plan, place.read_known(out, plan), "now", texts)
 
 
 @pytest.mark.slow
@@ -109,7 +109,7 @@ def test_force_begins_a_search_anew_and_spares_what_is_no_search(tmp_path, optun
 
 def validation(folder, gain):
     """The store of the fresh draws for a gain that was found."""
-    found = Trial(0, 0, {"gain": gain}, 4, FINISHED, 1.0, (), 1.0, 0.0)
+    found = GainTrial(0, 0, {"gain": gain}, 4, FINISHED, 1.0, (), 1.0, 0.0)
     plan = planned(folder)
     made = plan.variant(contestants(plan, {"toy": [[found]]}), VALIDATE, 12)
     return Store(folder / FOLDER, about(made))
@@ -179,7 +179,7 @@ def test_a_larger_budget_continues_as_if_it_had_been_asked_for_at_once(whole, tm
     parts = tuned(tmp_path / "parts", ONCE)
     assert first.gains != whole.results.winner("toy").gains
     assert contents(parts.folder) == contents(whole.folder)
-    assert parts.results.spent == {"toy": 64}
+    assert parts.results.runs_spent == {"toy": 64}
 
 
 @pytest.mark.slow
@@ -226,7 +226,7 @@ def test_trials_of_other_gains_than_are_asked_for_are_not_thrown_away(optuna, tm
     assert path.read_text() == other
 
 
-TRIAL = Trial(0, 0, {"gain": 2.0}, 4, FINISHED, 0.5, (0.1, float("inf")), float("inf"), 0.25)
+TRIAL = GainTrial(0, 0, {"gain": 2.0}, 4, FINISHED, 0.5, (0.1, float("inf")), float("inf"), 0.25)
 SHAPES = {
     "gains": (None, 3, "x", [1]), "runs": (None, "4", [], -1, 1.5), "status": ("done", None),
     "value": ("x", []), "excesses": (None, "ab", {}, [None, "x"]), "first": ({},), "number": (-1,),

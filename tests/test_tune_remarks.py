@@ -33,7 +33,7 @@ def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(rati
         searches=pairs(ratio, *ends), shown=["iae"],
         plan=SimpleNamespace(tune=SimpleNamespace(objective="median(iae)"), metrics=METRICS),
     )  # fmt: skip
-    (unranked,) = remarks._unsettled(results)
+    (unranked,) = remarks._remark_unsettled(results)
     assert unranked.endswith(": lost")
     (text,) = remarks._answer(results)
     assert text.startswith("pid has the least median(iae) in the median of its searches")
@@ -44,7 +44,7 @@ def test_a_repeat_that_is_better_on_fresh_draws_than_the_one_taken_is_told():
     results = SimpleNamespace(winners={"pid": [1, 2], "li": [1, 2]})
     results.spread = {"pid": [2.0, 3.0], "li": [2.0, 2.01]}.get
     results.winner = {"pid": 2, "li": 2}.get
-    (text,) = remarks._overfitted(results)
+    (text,) = remarks._remark_overfitted(results)
     assert text.startswith("pid: the search that gained most on its training draws has 3 on the fr")
 
 

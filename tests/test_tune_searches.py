@@ -79,28 +79,28 @@ def test_what_all_laws_share_of_a_training_set_is_in_no_interval():
 
 def test_searches_that_are_not_as_many_for_every_training_set_are_refused():
     with pytest.raises(ValueError, match="a: 6 searches on 5 training sets"):
-        searches.compared({"a": np.ones((6, 4)), "b": np.ones((1, 4))}, 0.95, 1, sets=5)
+        searches.compare_laws({"a": np.ones((6, 4)), "b": np.ones((1, 4))}, 0.95, 1, sets=5)
 
 
 def test_a_training_set_on_which_one_law_is_lucky_widens_its_interval():
     lucky = np.array([0.6, 1.0, 1.0, 1.0, 1.4])[np.arange(20) % 5][:, None]
     runs = {"a": lucky, "b": np.ones((20, 1))}
-    clustered, alone = (searches.compared(runs, 0.95, 1, sets=sets) for sets in (5, 1))
+    clustered, alone = (searches.compare_laws(runs, 0.95, 1, sets=sets) for sets in (5, 1))
     assert clustered.samples.std() > 1.5 * alone.samples.std()
 
 
 def test_the_omnibus_probability_and_the_power_follow_the_size_of_a_difference():
     random = np.random.default_rng(7)
-    equal = searches.compared(
+    equal = searches.compare_laws(
         scattered(random, 6, 5, 4, of_set=0.03, of_search=0.03), 0.95, 1, sets=5
     )
     apart = {**scattered(random, 6, 5, 4, of_set=0.03, of_search=0.03, best=0.5)}
     assert equal.omnibus > 0.05
-    assert searches.compared(apart, 0.95, 1, sets=5).omnibus < 0.01
+    assert searches.compare_laws(apart, 0.95, 1, sets=5).omnibus < 0.01
     assert equal.power(0.999) < 0.05 < equal.power(0.85) < equal.power(0.7)
     assert equal.power(0.5) == 1.0
     assert np.isnan(
-        searches.compared({"a": np.ones((1, 3)), "b": np.full((1, 3), np.inf)}, 0.95, 1).omnibus
+        searches.compare_laws({"a": np.ones((1, 3)), "b": np.full((1, 3), np.inf)}, 0.95, 1).omnibus
     )
 
 
@@ -110,7 +110,7 @@ def test_the_power_is_how_often_a_better_law_has_the_first_place_in_tables_made_
     random, first, said = np.random.default_rng(11), 0, []
     for trial in range(100):
         runs = scattered(random, 8, 5, 4, of_set=0.04, of_search=0.04, best=0.8)
-        found = searches.compared(runs, 0.95, trial, sets=5)
+        found = searches.compare_laws(runs, 0.95, trial, sets=5)
         first += searches.places(found.table(), list(runs))["law 0"] == (1, 1)
         said.append(found.power(0.8))
     assert first / 100 == pytest.approx(np.mean(said), abs=0.15)

@@ -76,7 +76,7 @@ def test_every_unit_of_the_table_is_exact():
     """No two units of one kind are one, and each is its own spelling."""
     for own, others in units.UNITS.items():
         assert len({*others.values(), 1}) == len(others) + 1
-        assert all(units.spelled(name) == name for name in (own, *others))
+        assert all(units.spell_unit(name) == name for name in (own, *others))
 
 
 # What one of each is in podusv's unit, from the definitions: the yard of 1959, the pound, the knot.
@@ -230,5 +230,5 @@ def test_editors_take_what_podusv_takes():
 
 def test_other_spellings_are_read():
     for other, unit in units.SPELLINGS.items():
-        (own, *_) = [own for own in (*units.UNITS,) if unit in units.allowed(own)]
+        (own, *_) = [own for own in (*units.UNITS,) if unit in units.units_allowed_for(own)]
         assert units.number(f"2 {other}", own) == units.number(f"2 {unit}", own), other

@@ -18,7 +18,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.ranking import ranking
 from podusv_cli.verification.richardson import estimate, estimate_position
-from podusv_cli.verification.step_halving import refined, run_level
+from podusv_cli.verification.step_halving import refine_grid, run_level
 from podusv_cli.verification.verify import POSITION, check, verify
 from podusv_cli.workflows import verify as verifying
 
@@ -84,11 +84,11 @@ def test_a_position_is_judged_by_the_hulls_length():
 
 def test_times_in_seconds_stay_when_the_step_is_halved():
     scenario = scene("control.period=0.04", "log.every=3", "simulation.duration=1.2")
-    grid = refined(scenario, 2)
+    grid = refine_grid(scenario, 2)
     assert (grid.step, grid.steps, grid.hold_every) == (0.0025, 480, 16)
     assert grid.rows == 2
     sampled = scene(*DIFFERENCE)
-    assert sampled.plan(refined(sampled, 2)).layout.sample_every == 4
+    assert sampled.plan(refine_grid(sampled, 2)).layout.sample_every == 4
 
 
 def test_the_first_level_is_the_run_itself():
@@ -156,16 +156,16 @@ def test_the_continuous_loop_is_the_engines():
 def test_a_held_difference_leaves_chattering_unconverged():
     """What results/README.md warns of: finer steps see more of the sawtooth."""
     printed = load(CONFIGS / "printed.yaml", ["simulation={step: 0.0025, duration: 40}"]).scenario
-    names = check(printed.alone()).unconverged(0.01)
+    names = check(printed.alone()).unconverged_numbers(0.01)
     assert "tv_tau_r" in names
     assert "iae" not in names
 
 
 def test_a_step_that_is_too_coarse_is_found_out():
     coarse = scene("simulation={step: 0.04, duration: 20}")
-    assert "status" in check(coarse).unconverged(0.01)
+    assert "status" in check(coarse).unconverged_numbers(0.01)
     hardly = scene("simulation={step: 0.02, duration: 20}", "start={u: 0.5, psi: 0.5}")
-    assert "peak_tau_u" in check(hardly).unconverged(0.01)
+    assert "peak_tau_u" in check(hardly).unconverged_numbers(0.01)
 
 
 # --- rankings
@@ -304,7 +304,7 @@ def test_what_is_not_converged_ends_with_3_and_is_named(podusv):
     assert "\nquick: status\n" in end
     strict = podusv("verify", "two.yaml", "--tolerance", "1e-9")
     assert strict.code == 3
-    assert verify(two(), 1e-9).unconverged.keys() == {"quick", "slow"}
+    assert verify(two(), 1e-9).unconverged_by_run.keys() == {"quick", "slow"}
 
 
 @pytest.mark.parametrize("size", [1e-20, 1e-15, 1e-13])

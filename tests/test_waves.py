@@ -10,7 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import WAVE_MOTION
-from podusv_cli.components.disturbances.reflection import BOW_AND_STERN, SIDES, reflected
+from podusv_cli.components.disturbances.reflection import BOW_AND_STERN, SIDES, interpolate_shares
 from podusv_cli.components.disturbances.spectra import GRAVITY, WATER
 from podusv_cli.components.disturbances.total import Total
 from podusv_cli.components.disturbances.wave_kernels import short_crested
@@ -276,11 +276,13 @@ def test_regular_waves_push_ships_as_strip_theory_has_it(size):
 
 @pytest.mark.parametrize("curve", [BOW_AND_STERN, SIDES])
 def test_the_curve_goes_through_its_points_and_on_beyond_them(curve):
-    np.testing.assert_allclose(reflected(curve, np.array(curve.size)), curve.share, rtol=1e-12)
+    np.testing.assert_allclose(
+        interpolate_shares(curve, np.array(curve.size)), curve.share, rtol=1e-12
+    )
     low, high = curve.size[0], curve.size[-1]
-    assert reflected(curve, np.array([10.0 * high]))[0] == pytest.approx(curve.share[-1])
+    assert interpolate_shares(curve, np.array([10.0 * high]))[0] == pytest.approx(curve.share[-1])
     steep = math.log(curve.share[1] / curve.share[0]) / math.log(curve.size[1] / low)
-    below = reflected(curve, np.array([0.1 * low]))[0]
+    below = interpolate_shares(curve, np.array([0.1 * low]))[0]
     assert below == pytest.approx(curve.share[0] * 0.1**steep, rel=1e-9)
 
 

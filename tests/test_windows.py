@@ -25,7 +25,7 @@ from podusv_cli.engine.machine import compile, shipped
 from podusv_cli.engine.running import lanes
 from podusv_cli.engine.running.batch import simulate_many
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.interface.scenarios import loaded
+from podusv_cli.interface.scenarios import load_scenario
 from podusv_cli.metrics.metric import Accumulator, Metric
 from podusv_cli.metrics.table import METRICS, metrics_probe, metrics_with
 from podusv_cli.scenario.load import Loaded, load_text
@@ -74,7 +74,10 @@ def test_a_window_of_awkward_numbers_needs_no_numba_and_is_what_the_log_says(
 ) -> None:
     scenario, folder = tmp_path / "own.yaml", tmp_path / "run"
     scenario.write_text(BOAT + OWN)
-    if not ship_kernels.pieces_of([loaded(str(scenario))]).keys() <= shipped._kernels().keys():
+    if (
+        not ship_kernels.pieces_of([load_scenario(str(scenario))]).keys()
+        <= shipped._kernels().keys()
+    ):
         pytest.skip("no kernels.xz with the kernels of this scenario")
     command = [sys.executable, "-c", RUN, str(scenario), "--no-figures", "--out", str(folder)]
     empty = os.environ | {"PODUSV_CACHE": str(tmp_path / "cache")}

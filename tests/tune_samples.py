@@ -9,7 +9,7 @@ from podusv_cli.studies.tuning import trials
 from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.dispatch import dispatch
 from podusv_cli.studies.tuning.plan import TunePlan
-from podusv_cli.studies.tuning.search import Search
+from podusv_cli.studies.tuning.search import GainSearch
 from podusv_cli.workflows import tune as workflow
 
 # They have times, and the report the last session.
@@ -140,7 +140,7 @@ def searched(folder, *changes, engine=None):
     """The trials of the toy law's searches, by the driver alone."""
     plan = planned(folder, *changes)
     (folder / trials.FOLDER).mkdir(exist_ok=True)
-    found = [Search(plan, "toy", number, folder) for number in range(plan.tune.searches)]
+    found = [GainSearch(plan, "toy", number, folder) for number in range(plan.tune.searches)]
     prepare(plan.base, "toy", 0)  # before the fork
     dispatch(found, engine or Processes(1), lambda tally, searches: None)
     return found

@@ -29,7 +29,7 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.loop_margins import loop_margins
-from podusv_cli.workflows.execute import Stopwatch, simulated
+from podusv_cli.workflows.execute import Stopwatch, simulate_case
 
 Item, Value = TypeVar("Item"), TypeVar("Value")
 PAPER = Path(__file__).parents[2] / "configs/mu_2017"
@@ -74,7 +74,7 @@ def laws(config: str, *overrides: str) -> dict[str, Scenario]:
 def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     """Metrics and log of a run."""
     case = Case.of(scenario)
-    recording = simulated(case, Stopwatch())
+    recording = simulate_case(case, Stopwatch())
     seen = recording.seen
     assert seen is not None  # the probe saw it
     return case.plan.probe.summary(seen), recording

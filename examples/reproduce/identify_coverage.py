@@ -34,10 +34,10 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import simulate
-from podusv_cli.identify.answer import AXES, SIDE, Answer
-from podusv_cli.identify.fit.estimate import OPEN, directions, estimated, prior_kept
-from podusv_cli.identify.fit.problem import Problem
-from podusv_cli.identify.fit.records import Log
+from podusv_cli.identify.answer import AXES, SIDE, Identification
+from podusv_cli.identify.fit.estimate import OPEN, directions, estimate_hull, prior_kept
+from podusv_cli.identify.fit.problem import FitProblem
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.model import Scenario
@@ -79,14 +79,14 @@ def known(hull: str) -> Scenario:
     )  # fmt: skip
 
 
-def true_hull(problem: Problem, rng: np.random.Generator) -> Vessel:
+def true_hull(problem: FitProblem, rng: np.random.Generator) -> Vessel:
     """A hull drawn from the prior; another where none can be like that."""
     while True:
         with suppress(ValidationError):
             return problem.vessel(rng.standard_normal(len(problem.hull)))
 
 
-def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[Log]:
+def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[FilterLog]:
     """What the sensors deliver in one manoeuvre; none where the run does not end."""
     kind, share, angle = MANOEUVRES[i]
     facts, seed = before.facts, 1 + cell.number
@@ -191,25 +191,25 @@ def rows(cell: Cell) -> list[tuple[Any, ...]]:
     """What comes out of one set of logs, beside the truth."""
     before = known(cell.hull)
     rng = np.random.default_rng([1 + cell.number, [*HULLS].index(cell.hull), GNSS.index(cell.gnss)])
-    true = true_hull(Problem(before, WANTED, []), rng)
+    true = true_hull(FitProblem(before, WANTED, []), rng)
     try:
         given = [log for i in range(len(MANOEUVRES)) for log in logs(before, true, cell, i)]
         if not given:
             return []
-        problem = Problem(before, WANTED, given)
-        found = prior_kept(problem.search, estimated(problem.search))
+        problem = FitProblem(before, WANTED, given)
+        found = prior_kept(problem.search, estimate_hull(problem.search))
     except UsageError as error:
         print(f"{cell}: {error}", file=sys.stderr)
         return []
     ways = directions(found.covariance, len(problem.hull))
-    answer = Answer(problem, found, ways, (), ())
+    answer = Identification(problem, found, ways, (), ())
     return [
         (*cell, *row, found.settled)
         for row in (*of_numbers(answer, true), *of_forces(answer, true))
     ]
 
 
-def of_numbers(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
+def of_numbers(answer: Identification, true: Vessel) -> Iterator[tuple[Any, ...]]:
     """Of every number of the hull: how far off in its own standard deviations."""
     truth = true.constants()
     for p in answer.parameters[: len(answer.problem.hull)]:
@@ -231,7 +231,7 @@ def of_numbers(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
         )
 
 
-def of_forces(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
+def of_forces(answer: Identification, true: Vessel) -> Iterator[tuple[Any, ...]]:
     """Of every damping force at speeds of the logs."""
     k = bundle(true.constants())
     for f in answer.forces:

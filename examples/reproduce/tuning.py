@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from podusv_cli.studies.tuning.searches import compared
+from podusv_cli.studies.tuning.searches import compare_laws
 
 RESULTS = Path(__file__).parents[2] / "results"
 LEVEL = 0.95  # of intervals that hold together
@@ -146,7 +146,7 @@ def _apart_given_draws(case: str) -> tuple[int, int]:
     spread = table(case, "spread").sort_values(["search", "training_set"])
     medians = {law: rows["median"].to_numpy()[:, None] for law, rows in spread.groupby("law")}
     sets = spread.training_set.nunique()
-    tables = [compared(medians, LEVEL, seed, sets=sets).table() for seed in range(SEEDS)]
+    tables = [compare_laws(medians, LEVEL, seed, sets=sets).table() for seed in range(SEEDS)]
     apart = [_those_apart(table)[["a", "b"]] for table in tables]
     without = [pairs[~pairs.eq("pid").any(axis=1)] for pairs in apart]
     return int(np.median([*map(len, apart)])), int(np.median([*map(len, without)]))

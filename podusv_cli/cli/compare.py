@@ -121,7 +121,7 @@ def compare(
         if ending:
             echo(*f"{label}: {ending}".splitlines(), err=True)
     for part in done.missing:
-        echo(part.traced, err=True)
+        echo(part.sentence_with_trace, err=True)
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
@@ -142,10 +142,10 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
-    echo(f"compared {_counted(result.runs)}: {done.folder}")
+    echo(f"compared {_count_words(result.runs)}: {done.folder}")
 
 
-def _counted(past: Sequence[PastRun]) -> str:
+def _count_words(past: Sequence[PastRun]) -> str:
     """How many runs, and how many logs beside them."""
     from podusv_cli.comparison.measured import NO_LAW
 
@@ -174,7 +174,7 @@ def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
     from podusv_cli.comparison.table import cells, head, note, window
 
     result = done.result
-    rows = cells(result.table, result.metrics, result.unsettled, chosen=metrics)
+    rows = cells(result.table, result.metrics, result.unsettled_runs, chosen=metrics)
     echo_table(head(result.table), rows)
     echo(*filter(None, (note(result.table), window(result.table))))
 
@@ -185,7 +185,12 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
 
     result = done.result
     every = rows(
-        result.table, result.metrics, result.unsettled, chosen=metrics, brief=True, ratios=False
+        result.table,
+        result.metrics,
+        result.unsettled_runs,
+        chosen=metrics,
+        brief=True,
+        ratios=False,
     )
     shown = [r for r in every if metrics or (r.metric.headline and {*r.texts} != {"-"})]
     if not shown:

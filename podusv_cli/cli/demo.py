@@ -57,7 +57,7 @@ def demo(
         raise typer.Exit(INTERRUPTED)
     echo_comparison(done, METRICS)
     for part in done.missing:
-        echo(part.traced, err=True)
+        echo(part.sentence_with_trace, err=True)
     _open(done.folder / "report.html", browser)
     echo(
         "", "Three commands to try next:",

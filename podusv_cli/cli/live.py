@@ -46,7 +46,7 @@ def live(
     gc.freeze()
     gc.set_threshold(10_000)
 
-    def started(address: str) -> None:
+    def print_address(address: str) -> None:
         import webbrowser
 
         has_display = sys.platform == "darwin" or any(map(os.environ.get, DISPLAYS))
@@ -54,4 +54,4 @@ def live(
         echo(f"{'opened' if opened else 'open in a browser:'} {address}", "Ctrl-C ends it")
         sys.stdout.flush()
 
-    serve(partial(live_page, config), shown.answer, started, port)
+    serve(partial(live_page, config), shown.answer, print_address, port)

@@ -132,14 +132,16 @@ def _rows(label: str, law: LoopMargins) -> list[list[str]]:
     for axis, loop in law.loops.items():
         crossed = ", ".join(f"{omega:.4g}" for omega in loop.crossovers) or "-"
         phase = f"{loop.phase_margin:.4g} ({math.degrees(loop.phase_margin):.1f} deg)"
-        known = phase if math.isfinite(loop.phase_margin) else _told(loop.phase_margin)
-        numbers = [_told(getattr(loop, name)) for name in NUMBERS[1:]]
+        known = phase if math.isfinite(loop.phase_margin) else _format_margin(loop.phase_margin)
+        numbers = [_format_margin(getattr(loop, name)) for name in NUMBERS[1:]]
         rows.append([label, f"{axis} load", crossed, known, *numbers])
     together = {"both demands": law.delay_margin, "both loads": law.delay_margin_loads}
-    more = [[label, what, *[""] * 4, _told(delay), "", ""] for what, delay in together.items()]
+    more = [
+        [label, what, *[""] * 4, _format_margin(delay), "", ""] for what, delay in together.items()
+    ]
     return [*rows, *more]
 
 
-def _told(number: float) -> str:
+def _format_margin(number: float) -> str:
     """A margin; - where the loop has none."""
     return "-" if math.isnan(number) else f"{number:.4g}"

@@ -83,7 +83,7 @@ def optimum(
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     for finding in done.run.warnings:
         warned(finding)
-    for text in (done.run.message, *(part.traced for part in done.run.missing)):
+    for text in (done.run.message, *(part.sentence_with_trace for part in done.run.missing)):
         if text:
             echo(f"{config}: {text}", err=True)
     raise typer.Exit(EXIT_CODES[done.run.status])

@@ -67,7 +67,7 @@ def plot(
 
     formats = [name.strip() for name in form.split(",")]
     request = Request(out=out, plugins=plugin or (), names=figure or (), formats=formats)
-    choice = workflow.Choice(
+    choice = workflow.PlotChoice(
         signal or (),
         since,
         until,

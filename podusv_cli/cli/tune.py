@@ -66,11 +66,11 @@ def tune(
 
 def _report(done: Tuned) -> None:
     from podusv_cli.studies.tuning.remarks import remarks
-    from podusv_cli.studies.tuning.report import intervals, percent, ratio, spread, turned
+    from podusv_cli.studies.tuning.report import count_change, intervals, percent, ratio, spread
 
     results = done.results
     rows = [
-        [row["law"], turned(row, "rank"), turned(row, "better_than"),
+        [row["law"], count_change(row, "rank"), count_change(row, "better_than"),
          intervals(row, "before"), intervals(row, "after"),
          ratio(row) if row["runs"] else "-",
          f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}", spread(row)]

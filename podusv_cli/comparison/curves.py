@@ -108,14 +108,14 @@ def rate(curve: Curve) -> Curve:
     """The derivative: central differences, one-sided at the ends. Raises CannotTell."""
     for label, run in curve.runs.items():
         if run.every > 1:
-            raise _thinned("rate", label, run)
+            raise _refuse_thinned_log("rate", label, run)
     several = len(curve.values) > 1
     rates = np.gradient(curve.values, curve.time) if several else curve.values * np.nan
     return Curve(curve.time, rates, curve.runs)
 
 
 @np.errstate(all="ignore")
-def reduced(
+def reduce_curve(
     name: str, text: str, curve: Curve, settings: Sequence[float], window: Sequence[float]
 ) -> float:
     """One number for a curve, over the whole run or a window (start and end [s], or empty).
@@ -130,7 +130,7 @@ def reduced(
             raise CannotTell(f"{text}: {label} {run.ending or f'ends at {run.until:g} s'}")
         last = name == "final" and not window and abs(t[-1] - run.until) <= NEAR
         if run.every > 1 and not last:
-            raise _thinned(text, label, run)
+            raise _refuse_thinned_log(text, label, run)
     if window:
         inside = (t >= window[0] - NEAR) & (t <= window[1] + NEAR)
         t, y = t[inside], y[inside]
@@ -139,7 +139,7 @@ def reduced(
     return float(REDUCERS[name](t, y, *settings))
 
 
-def _thinned(text: str, label: str, run: ClaimedRun) -> CannotTell:
+def _refuse_thinned_log(text: str, label: str, run: ClaimedRun) -> CannotTell:
     return CannotTell(
         f"{text}: {label} logs only one step in {run.every}, and the signal is unknown in between; "
         "log every step (log.every: 1), or use a metric, which sees every step"

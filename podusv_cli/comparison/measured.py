@@ -54,14 +54,14 @@ class Track:
         """Which of its times lie in a span [s]."""
         return (self.times >= begin) & (self.times <= end)
 
-    def timed(self, begin: float) -> Track:
+    def start_clock_at(self, begin: float) -> Track:
         """It; where it is to begin as the runs do, with its first position at this time [s]."""
         if self.aligned != START:
             return self
         shifted = begin - float(self.times[0])
         return replace(self, times=self.times - self.times[0] + begin, shifted=shifted)
 
-    def placed(self, label: str, run: Recording) -> Track:
+    def place_beside(self, label: str, run: Recording) -> Track:
         """It; where that is asked for, with its first position at a time of the run the run's.
 
         A remark says what was moved, and by how much.

@@ -15,7 +15,7 @@ from podusv_cli.process.extras import Extras, Failure
 TASK = ("vessel", "start", "path", "disturbance", "actuator")
 
 
-def related(runs: Sequence[PastRun], extras: Extras) -> list[PastRun]:
+def with_optimum_ratios(runs: Sequence[PastRun], extras: Extras) -> list[PastRun]:
     """The runs, each with its ratio to the optimum among them that has the same task.
 
     A run of another task has no ratio; `extras` says what differs.

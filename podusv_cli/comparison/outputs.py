@@ -10,11 +10,11 @@ from typing import Any
 from podusv_cli.comparison import claims, report, table
 from podusv_cli.core import json_text
 from podusv_cli.core.about import MetricAbout, RunAbout
-from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.finding import Finding, merge_findings
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures import chase, traces
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
@@ -42,7 +42,7 @@ class Result:
     runs: Sequence[PastRun]
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
-    table: table.Table
+    table: table.MetricTable
     verdicts: Sequence[claims.RunsVerdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
@@ -55,7 +55,7 @@ class Result:
     meanings: Mapping[str, str] = field(default_factory=dict)  # of the codes of warnings
 
     @property
-    def unsettled(self) -> list[str]:
+    def unsettled_runs(self) -> list[str]:
         """The runs that do not end at their target, which no table ranks."""
         return [run.label for run in self.runs if run.off_target]
 
@@ -79,12 +79,12 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
     forms: dict[str, Callable[[], bytes]] = {
         TABLE: lambda: table.as_csv(lasting, result.metrics).encode(),
         "comparison.md": lambda: table.as_markdown(
-            lasting, result.endings, result.metrics, result.unsettled, chosen=result.chosen
+            lasting, result.endings, result.metrics, result.unsettled_runs, chosen=result.chosen
         ).encode(),
         "comparison.tex": lambda: table.as_latex(
             lasting,
             result.metrics,
-            result.unsettled,
+            result.unsettled_runs,
             chosen=result.chosen or headlines,
             ratios=result.ratios,
         ).encode(),
@@ -102,12 +102,12 @@ def _claims(verdicts: Iterable[claims.RunsVerdict]) -> dict[str, Any]:
 
 def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], bytes]) -> None:
     """Write what `form` returns into a file of the folder; if it fails, `extras` notes it."""
-    content = extras.made(name, form)
+    content = extras.make_or_record(name, form)
     if content is not None:
         writer.add(name, content)
 
 
-def drawn(
+def draw_comparison(
     result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
     names: Sequence[str] = (), formats: Sequence[str] = ("png",), workers: int = 0,
 ) -> dict[str, bytes]:  # fmt: skip
@@ -116,12 +116,12 @@ def drawn(
     `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
     """
     # matplotlib is slow to import
-    from podusv_cli.figures.drawing import PHONE, chosen, draw_in_parallel
+    from podusv_cli.figures.drawing import PHONE, choose_sheets, draw_in_parallel
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
-    shown = dressed(result.runs, result.peaks)
-    sheets = chosen(names, shown, extras)
+    shown = dress_runs(result.runs, result.peaks)
+    sheets = choose_sheets(names, shown, extras)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT, PHONE)))
     return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
 
@@ -148,15 +148,15 @@ def as_report(
             for name, sheet in figures_of([result.plugins]).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-    shown = dressed(result.runs)
+    shown = dress_runs(result.runs)
     story = report.Story(
         title=title, abouts=result.abouts, meanings=result.meanings,
         endings=result.endings, missing=[str(part) for part in missing],
         differences=result.differences,
-        noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
+        noticed=merge_findings(result.warnings), table=result.table, verdicts=result.verdicts,
         theories={run.label: run.theory for run in result.runs if run.theory},
         figures=pictures, provenance=provenance, chase=chase.chase(shown),
-        traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled,
+        traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled_runs,
         doubts=result.doubts,
     )  # fmt: skip
     return report.page(story)

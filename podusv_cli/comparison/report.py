@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
-from podusv_cli.comparison.table import Row, Table, leaders, rows, window
+from podusv_cli.comparison.table import MetricRow, MetricTable, leaders, rows, window
 from podusv_cli.core.about import MetricAbout, RunAbout, SettingAbout
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.phrases import value_text
@@ -37,7 +37,7 @@ class Story:
     endings: Mapping[str, str]  # how each run ended
     differences: Mapping[str, Mapping[str, Any]]
     noticed: Sequence[Finding]
-    table: Table
+    table: MetricTable
     verdicts: Sequence[RunsVerdict]
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
     figures: Sequence[Picture]
@@ -100,7 +100,7 @@ class Standing(NamedTuple):
     more: int
 
 
-def _standings(story: Story, rows: Sequence[Row]) -> dict[str, Standing]:
+def _standings(story: Story, rows: Sequence[MetricRow]) -> dict[str, Standing]:
     """Every run that finished, by label; the rows are those that a reader sees first."""
     best = leaders(story.table, story.metrics, story.unsettled)
     standings = {}

@@ -18,7 +18,7 @@ def derived_with(plugins: Plugins) -> dict[str, Derived]:
     return {
         name: derived
         for package in ("podusv_cli.components.controllers", "podusv_cli.theory")
-        for name, derived in registry.named(package, Derived, plugins).items()
+        for name, derived in registry.find_by_name(package, Derived, plugins).items()
     }
 
 

@@ -46,7 +46,7 @@ class Finding:
         return {"code": self.code, "where": self.where, "text": self.text}
 
 
-def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
+def merge_findings(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
     """Findings of several runs (by label), each once, with its runs unless all runs have it."""
     alike: dict[Finding, list[str]] = {}
     for label, several in findings.items():

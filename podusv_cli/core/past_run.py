@@ -55,7 +55,7 @@ class PastRun:
     failure: str = ""
 
     @classmethod
-    def lost(cls, label: str, about: RunAbout, failure: str) -> PastRun:
+    def without_log(cls, label: str, about: RunAbout, failure: str) -> PastRun:
         """A run of which there is no log; `failure` is its error message, in several lines."""
         nothing = Recording("interrupted", "", {"time": np.empty(0)})
         return cls(label, about, nothing, failure=failure)
@@ -66,7 +66,7 @@ class PastRun:
         return self.log if isinstance(self.log, Recording) else self.log.recording
 
     @property
-    def counted(self) -> Recording:
+    def counted_recording(self) -> Recording:
         """The log up to the end of a path that has one, which metrics count."""
         return self.recording.up_to(self.about.path_end)
 

@@ -107,13 +107,13 @@ def by_name(
             other, known = owners.setdefault(signal.name, (part, signal))
             if (other, known) != (part, signal):
                 raise LawError(
-                    f"{part()}: it logs {signal.name!r}, {described(signal)}, and {other()} logs "
-                    f"{described(known)} under this name; give one of them another name"
+                    f"{part()}: it logs {signal.name!r}, {describe_signal(signal)}, and {other()} logs "
+                    f"{describe_signal(known)} under this name; give one of them another name"
                 )
     return {name: signal for name, (_, signal) in owners.items()}
 
 
-def described(signal: Signal) -> str:
+def describe_signal(signal: Signal) -> str:
     """`distance to the target (18) [m]`."""
     along = f" along {', '.join(signal.axes)}" if signal.axes else ""
     return f"{signal.meaning} [{signal.unit}]{along}"

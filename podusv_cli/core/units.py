@@ -58,7 +58,7 @@ SIGNS = str.maketrans({"°": "deg", "º": "deg", "·": " ", "*": " ", "^": "", "
 WITH_UNIT = re.compile(rf"({NUMBER.pattern})(?:\s*(?=[^\W\d_]|[°º%])|\s+(?=1/))(\S.*)")
 
 
-def allowed(unit: str) -> dict[str, Fraction]:
+def units_allowed_for(unit: str) -> dict[str, Fraction]:
     """What may be written where podusv has `unit`, its own first, and what one of each is in it.
 
     A unit may be several, as "m or m/s" is.
@@ -67,13 +67,13 @@ def allowed(unit: str) -> dict[str, Fraction]:
     return {name: f for one in own for name, f in ({one: Fraction(1)} | UNITS.get(one, {})).items()}
 
 
-def spelled(unit: str) -> str:
+def spell_unit(unit: str) -> str:
     """A unit as the table has it: `deg` for `°`, `kn` for `knots`, `N m` for `Nm`."""
     plain = " ".join(unit.translate(SIGNS).split())
     return SPELLINGS.get(plain, plain)
 
 
-def parted(text: str) -> tuple[str, str] | None:
+def split_quantity(text: str) -> tuple[str, str] | None:
     """Number and unit of "45 deg", "45deg" or "45°"; None for any other text."""
     match = WITH_UNIT.fullmatch(text.strip())
     return (match[1], match[match.lastindex or 0].strip()) if match else None
@@ -81,8 +81,8 @@ def parted(text: str) -> tuple[str, str] | None:
 
 def number(text: str, unit: str) -> int | float | None:
     """A number with a unit in podusv's `unit`, rounded once; None where the unit does not fit."""
-    parts = parted(text)
-    factor = allowed(unit).get(spelled(parts[1])) if parts else None
+    parts = split_quantity(text)
+    factor = units_allowed_for(unit).get(spell_unit(parts[1])) if parts else None
     if parts is None or factor is None or not math.isfinite(float(parts[0])):
         return None
     own = Fraction(repr(float(parts[0]))) * factor  # its text may have an exponent of any size
@@ -93,7 +93,7 @@ def number(text: str, unit: str) -> int | float | None:
 
 def pattern(unit: str) -> str:
     """What a number with a unit that fits matches, as a regular expression of JSON schemas."""
-    ways = [way for way in allowed(unit) if way != PURE]
+    ways = [way for way in units_allowed_for(unit) if way != PURE]
     ways += [other for other, way in SPELLINGS.items() if way in ways]
     ways += [sign for sign, way in (("°", "deg"), ("°/s", "deg/s")) if way in ways]
     words = "|".join(re.sub(r"[().^*]", r"\\\g<0>", way) for way in ways)
@@ -102,13 +102,13 @@ def pattern(unit: str) -> str:
 
 def misfit(text: str, unit: str) -> str:
     """Why a number with a unit is none in podusv's `unit`, and what would be; else empty."""
-    parts = parted(text)
+    parts = split_quantity(text)
     if parts is None or number(text, unit) is not None:
         return ""
-    units = allowed(unit)
-    if spelled(parts[1]) in units or not math.isfinite(float(parts[0])):
+    units = units_allowed_for(unit)
+    if spell_unit(parts[1]) in units or not math.isfinite(float(parts[0])):
         return "; it is too large, numbers must be finite"
     if list(units) == [PURE, "%"]:
         return f"; it has no unit here: write {parts[0]}"
-    meant = did_you_mean(spelled(parts[1]), units)
+    meant = did_you_mean(spell_unit(parts[1]), units)
     return f"; {parts[1]} does not fit{meant} (units here: {', '.join(units)})"

@@ -62,7 +62,7 @@ class ClaimNumber(NamedTuple):
         return (max(self.edges, key=lambda edge: abs(edge - own)),) if self.between else self.edges
 
 
-def compared(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
+def compared_numbers(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
     """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
     tree = ast.parse(expect, mode="eval").body
     links = []

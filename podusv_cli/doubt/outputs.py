@@ -12,7 +12,7 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import as_yaml, value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.doubt.alone import ends
-from podusv_cli.doubt.answer import Answer, DoubtReport, as_json, place
+from podusv_cli.doubt.answer import DoubtAnswer, DoubtReport, as_json, place
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
@@ -28,7 +28,7 @@ class Doubted:
     """What the verdicts of a scenario hang on, and where the tables, figures and page are."""
 
     folder: Path
-    answers: Sequence[Answer]
+    answers: Sequence[DoubtAnswer]
     status: Status
     missing: tuple[Failure, ...] = ()
 
@@ -41,7 +41,7 @@ class Doubted:
         }  # fmt: skip
 
 
-def in_words(answer: Answer) -> str:
+def in_words(answer: DoubtAnswer) -> str:
     """What the verdict hangs on: its word, and how near the nearest place is."""
     nearest = answer.turns[0].share if answer.turns else math.inf
     far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
@@ -55,7 +55,7 @@ def _share(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-def row(answer: Answer) -> list[str]:
+def row(answer: DoubtAnswer) -> list[str]:
     """A claim's row of the table."""
     open_ = f", {answer.unknown} cannot tell" if answer.unknown and answer.word else ""
     kept = f"{answer.kept} of {answer.draws}{open_}" if answer.draws else "-"
@@ -82,7 +82,7 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
     writer.add("report.html", page(report, pictures, origin).encode())
 
 
-def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
+def table(answers: Sequence[DoubtAnswer]) -> Iterator[Sequence[Any]]:
     """A head, and a row a claim."""
     yield (
         "claim", "verdict", "word", "word_for_neighbours", "kept", "turned", "unknown", "failed",
@@ -122,9 +122,9 @@ def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
 
 def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
     from podusv_cli.doubt.figures import sketches  # matplotlib is slow to import
-    from podusv_cli.figures.sketch import rendered
+    from podusv_cli.figures.sketch import render_sketches
 
-    return rendered(sketches(report), extras)[1]
+    return render_sketches(sketches(report), extras)[1]
 
 
 def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:

@@ -19,7 +19,7 @@ from podusv_cli.scenario.sweep import Quantity
 GRAVITY = 9.81  # m/s2
 
 
-class Range(NamedTuple):
+class DoubtRange(NamedTuple):
     """How a number moves, as a study draws it: one at a time, and with all others.
 
     `scale` is what its distance from the scenario's own is measured by, in the unit of the number.
@@ -30,45 +30,45 @@ class Range(NamedTuple):
     scale: float
 
 
-Way = Callable[[float, Scenario, Key], Range | None]  # how a number of this key moves
+Way = Callable[[float, Scenario, Key], DoubtRange | None]  # how a number of this key moves
 
 
 def _times(alone: float, together: float) -> Way:
     """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
 
-    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
+    def range_times(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         ends = [_inside([own / f, own * f], key) for f in (alone, together)]
         if not own or any(low * high <= 0.0 for low, high in ends):
             return None
         ways = [tuple(sorted((low / own, high / own))) for low, high in ends]
         drawn = [Quantity(times=Distribution(log_uniform=(low, high))) for low, high in ways]
-        return Range(drawn[0], drawn[1], abs(own))
+        return DoubtRange(drawn[0], drawn[1], abs(own))
 
-    return moved
+    return range_times
 
 
 def _plus(scale: Callable[[Scenario], float], alone: float, together: float) -> Way:
     """A summand up to a share of a scale, inside the key's bounds."""
 
-    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
+    def range_plus(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         if not (unit := scale(scenario)):
             return None
         ends = [
             _inside([own - share * unit, own + share * unit], key) for share in (alone, together)
         ]
         drawn = [Quantity(plus=Distribution(uniform=(low - own, high - own))) for low, high in ends]
-        return Range(drawn[0], drawn[1], unit)
+        return DoubtRange(drawn[0], drawn[1], unit)
 
-    return moved
+    return range_plus
 
 
-def _place(own: float, scenario: Scenario, key: Key) -> Range | None:
+def _place(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
     """A summand of a coordinate; a factor of a length that has bounds, as a radius."""
     way = _times(2.0, 1.05) if limits(key.field) else _plus(_length, 5.0, 0.5)
     return way(own, scenario, key)
 
 
-def _load(own: float, scenario: Scenario, key: Key) -> Range | None:
+def _load(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
     """A factor; where there is no load along this axis, up to what drifts the hull at the speed."""
     if own or key.name not in DRIFTS:
         return LOAD(own, scenario, key)

@@ -17,7 +17,7 @@ from podusv_cli.export.law import (
     STEP,
     TARGET_NUMBERS,
     ExportedLaw,
-    Number,
+    ExportedNumber,
 )
 
 if TYPE_CHECKING:
@@ -38,10 +38,10 @@ ASSUMED = {
 def sources(law: ExportedLaw) -> dict[str, str]:
     """The text of law.h and law.c."""
     about = template_values(law)
-    return {name: rendered(name, about) for name in ("law.h", "law.c")}
+    return {name: render_file(name, about) for name in ("law.h", "law.c")}
 
 
-def rendered(name: str, about: Mapping[str, Any]) -> str:
+def render_file(name: str, about: Mapping[str, Any]) -> str:
     """A file of this name from its template."""
     return _environment().get_template(f"{name}.j2").render(about)
 
@@ -67,7 +67,7 @@ def template_values(law: ExportedLaw) -> dict[str, Any]:
         "version": __version__, "period": f"{law.period:.15g}", "signals": law.signals,
         "memory": law.memory, "layout": layout, "texts": _texts(law), "parts": list(PARTS.values()),
         "step": STEP, "h": literal(law.grid.step), "every": layout.hold_every, "tau": layout.tau,
-        "demand": layout.demand, "assumed": _assumed(law),
+        "demand": layout.demand, "assumed": _assumed_loads(law),
         "sizes": {name: len(getattr(vectors, name)) for name in ("stages", "held", "work")},
         "vectors": [VECTORS.get(name, shown.get(name, "&unused")) for name in vectors._fields],
         "arrays": {
@@ -90,7 +90,7 @@ def _lines(numbers: Vector) -> list[list[str]]:
     return [words[i : i + IN_A_LINE] for i in range(0, len(words), IN_A_LINE)]
 
 
-def _assumed(law: ExportedLaw) -> list[str]:
+def _assumed_loads(law: ExportedLaw) -> list[str]:
     """The loads that act where nobody knows them: the demand, cut where the actuator cuts it."""
     demands = [f"row[{law.layout.demand + i}]" for i in range(len(DEMAND_NUMBERS))]
     return [
@@ -114,14 +114,18 @@ def _texts(law: ExportedLaw) -> Mapping[str, str]:
     }  # fmt: skip
 
 
-def _list(numbers: Sequence[Number]) -> str:
+def _list(numbers: Sequence[ExportedNumber]) -> str:
     return ",\n           ".join(
         _comment(f"{number.name} [{number.unit}] {number.meaning}") for number in _few(numbers)
     )
 
 
-def _few(numbers: Sequence[Number], most: int = 40) -> Iterable[Number]:
-    return numbers if len(numbers) <= most else [*numbers[:most], Number("...", "", "and so on")]
+def _few(numbers: Sequence[ExportedNumber], most: int = 40) -> Iterable[ExportedNumber]:
+    return (
+        numbers
+        if len(numbers) <= most
+        else [*numbers[:most], ExportedNumber("...", "", "and so on")]
+    )
 
 
 def _comment(text: str) -> str:

@@ -66,8 +66,8 @@ def fmu(
         "outputs": [i for i, variable in enumerate(shown, 1) if variable.causality == "output"],
         "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),
     }  # fmt: skip
-    files = {**sources, "fmu.c": c.rendered("fmu.c", about)}
-    members = {"modelDescription.xml": c.rendered("modelDescription.xml", about).encode()}
+    files = {**sources, "fmu.c": c.render_file("fmu.c", about)}
+    members = {"modelDescription.xml": c.render_file("modelDescription.xml", about).encode()}
     for name, platform in platforms.items():
         inside = {file: part.encode() for file, part in files.items()}
         inside["law.o"] = objects.object_file(text, platform)

@@ -45,7 +45,7 @@ NOT_SAMPLED = (
 NO_LAW = "the controller gives recorded commands to propellers, which is no law; export a law"
 
 
-class Number(NamedTuple):
+class ExportedNumber(NamedTuple):
     """A number that goes in or comes out: its name, unit and meaning."""
 
     name: str
@@ -53,20 +53,20 @@ class Number(NamedTuple):
     meaning: str
 
 
-def _number(signal: Signal) -> Number:
-    return Number(signal.name, signal.unit, signal.meaning)
+def _number(signal: Signal) -> ExportedNumber:
+    return ExportedNumber(signal.name, signal.unit, signal.meaning)
 
 
 _LOGGED = {signal.name: _number(signal) for signal in LOOP}
 _MOTION = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s2"))
 TARGET_NUMBERS = tuple(
-    Number(name, unit, f"{what} of the target, {way}")
+    ExportedNumber(name, unit, f"{what} of the target, {way}")
     for name, ((what, unit), way) in zip(TARGET, product(_MOTION, ("north", "east")), strict=True)
 )
 STATE_NUMBERS = tuple(map(_number, STATE))
 DEMAND_NUMBERS = tuple(_LOGGED[name] for name in DEMAND)
 LOAD_NUMBERS = tuple(
-    Number(name, unit, f"{what} that acted since the sample before")
+    ExportedNumber(name, unit, f"{what} that acted since the sample before")
     for name, unit, what in zip(
         ("tau_u", "tau_v", "tau_r"), ("N", "N", "N m"),
         ("surge force", "sway force", "yaw moment"), strict=True,
@@ -145,9 +145,9 @@ class ExportedLaw:
             yield "path", nothing, ()
 
     @property
-    def _given(self) -> tuple[Signal, ...]:
+    def _given_state(self) -> tuple[Signal, ...]:
         """The state that the law is given: the vessel's own, or the estimate."""
-        return self.loop.estimated()[: len(STATE)] or STATE
+        return self.loop.estimate_signals()[: len(STATE)] or STATE
 
     @property
     def _slots(self) -> Slots:
@@ -159,15 +159,17 @@ class ExportedLaw:
         return self.loop.actuator.limits()
 
     @cached_property
-    def signals(self) -> tuple[Number, ...]:
+    def signals(self) -> tuple[ExportedNumber, ...]:
         """What the law says beside its demand."""
         return tuple(map(_number, self.loop.controller.signals))
 
     @cached_property
-    def memory(self) -> tuple[Number, ...]:
+    def memory(self) -> tuple[ExportedNumber, ...]:
         """Every number that the law remembers, in order."""
         return tuple(
-            Number(number.name if size == 1 else f"{number.name}[{i}]", number.unit, number.meaning)
+            ExportedNumber(
+                number.name if size == 1 else f"{number.name}[{i}]", number.unit, number.meaning
+            )
             for number, size in self._slots
             for i in range(size)
         )
@@ -204,7 +206,7 @@ class ExportedLaw:
         """
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)
-        state = [log[number.name][rows] for number in self._given]
+        state = [log[number.name][rows] for number in self._given_state]
         loads = [np.where(rows > 0, log[number.name][before], 0.0) for number in LOAD_NUMBERS]
         said = [log[number.name][rows] for number in (*DEMAND_NUMBERS, *self.signals)]
         memory = [log[number.name][rows].reshape(len(rows), -1) for number, _ in self._slots]
@@ -221,13 +223,13 @@ class ExportedLaw:
         step, given = routine(self.pieces[STEP]), len(STATE) + len(TARGET)
         pointers, sizes = signatures.pointers(c), signatures.whole_numbers(n)
 
-        def stepped(sample: int, inputs: Vector) -> list[float]:
+        def step_law(sample: int, inputs: Vector) -> list[float]:
             c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
             c.row[n.tau : n.tau + len(LOAD_NUMBERS)] = inputs[given:]
             step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)
             return [*c.row[n.demand : n.tau], *c.row[n.signals : n.demand], *c.s[n.memory :]]
 
-        return stepped
+        return step_law
 
     def by_itself(self, samples: Vector) -> Vector:
         """These samples with what comes out of the law by itself."""
@@ -245,7 +247,7 @@ class ExportedLaw:
         path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
-            x = np.array([log[number.name][row] for number in self._given])
+            x = np.array([log[number.name][row] for number in self._given_state])
             place = np.array([log[signal.name][row] for signal in path.places])
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.figures.curves import draw_curve, draw_own, draw_run, thinned
+from podusv_cli.figures.curves import draw_curve, draw_own, draw_run, thin_curve
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown, shortened, unit
+from podusv_cli.figures.shown import Shown, shorten, unit
 from podusv_cli.figures.style import WIDTHS, legend, new_figure
 
 PANEL_HEIGHT = 1.15  # inches
@@ -79,7 +79,7 @@ def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
             axes.tick_params(labelbottom=place == len(STATE) - 1, labelleft=column == 0)
             axes.set_ylabel("" if column else _error_label(state).replace(" $", "\n$"))
         axes.set_xlabel(TIME)
-        axes.figure.axes[-len(STATE)].set_title(shortened(run.name, longest), loc="left")
+        axes.figure.axes[-len(STATE)].set_title(shorten(run.name, longest), loc="left")
     legend(figure)
     return figure
 
@@ -97,7 +97,7 @@ def _draw(axes: Axes, run: Shown, name: str, *, fitted: bool, error: bool) -> No
     measured = f"{name}_m"
     if run.has(measured):
         fresh = _fresh(run.signal(measured))
-        dots = thinned(t[fresh], (run.signal(measured) - less)[fresh])
+        dots = thin_curve(t[fresh], (run.signal(measured) - less)[fresh])
         draw_curve(axes, dots, fitted=fitted, color=run.color, label="_measured", **MEASURED)
     draw_run(axes, run, (t, run.signal(f"{name}_est") - less), fitted=fitted, **ESTIMATE)
 

@@ -248,11 +248,11 @@ def _texts(axis: Axis) -> list[str]:
         (axis.get_minorticklocs(), axis.get_minor_formatter()),
     ):
         texts = formatter.format_ticks(list(locations))
-        shown += [t for t, seen in zip(texts, _seen(axis, locations), strict=True) if seen]
+        shown += [t for t, seen in zip(texts, _visible_ticks(axis, locations), strict=True) if seen]
     return [*shown, axis.get_major_formatter().get_offset()]  # which depends on the numbers
 
 
-def _seen(axis: Axis, locations: Locations) -> Any:
+def _visible_ticks(axis: Axis, locations: Locations) -> Any:
     """Which ticks lie on the axis."""
     change = axis.get_transform().transform
     low, high = sorted(change(np.asarray(axis.get_view_interval(), float)))
@@ -299,7 +299,7 @@ class _Stamped(Axis, ABC):
                 continue
             found = self.get_majorticklocs() if which is self.major else self.get_minorticklocs()
             texts = which.formatter.format_ticks(list(found)) if which.formatter else []
-            seen = _seen(self, found) if len(found) else []
+            seen = _visible_ticks(self, found) if len(found) else []
             if not any(seen):
                 continue
             ticks = self.get_major_ticks(1) if which is self.major else self.get_minor_ticks(1)
@@ -321,10 +321,10 @@ class _Stamped(Axis, ABC):
         if tick.gridline.get_visible():
             along = np.repeat(places, 3)
             across = np.tile([0.0, 1.0, np.nan], len(places))
-            tick.gridline.set_data(*self.ordered(along, across))
+            tick.gridline.set_data(*self.order(along, across))
             tick.gridline.draw(renderer)
         if tick.tick1line.get_visible():
-            tick.tick1line.set_data(*self.ordered(places, flat))
+            tick.tick1line.set_data(*self.order(places, flat))
             tick.tick1line.draw(renderer)
         if tick.label1.get_visible():
             for place, text in zip(places, texts, strict=True):
@@ -334,7 +334,7 @@ class _Stamped(Axis, ABC):
                     tick.label1.draw(renderer)
 
     @abstractmethod
-    def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
+    def order(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """Horizontal and vertical positions."""
 
     @abstractmethod
@@ -349,7 +349,7 @@ class _Stamped(Axis, ABC):
 class Across(_Stamped, XAxis):
     """The horizontal axis of a panel."""
 
-    def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
+    def order(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """As they are."""
         return along, across
 
@@ -366,7 +366,7 @@ class Across(_Stamped, XAxis):
 class Up(_Stamped, YAxis):
     """The vertical axis of a panel."""
 
-    def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
+    def order(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """The other way round."""
         return across, along
 
@@ -381,7 +381,7 @@ class Up(_Stamped, YAxis):
         )
 
 
-class _Plain(Formatter):
+class _PlainTicks(Formatter):
     """Numbers at ticks as plain text; set as formulas, they take a quarter of the drawing time."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
@@ -392,11 +392,11 @@ class _Plain(Formatter):
         return exponent(super().get_offset())
 
 
-class PlainNumbers(_Plain, ScalarFormatter):
+class PlainNumbers(_PlainTicks, ScalarFormatter):
     """Of a linear axis."""
 
 
-class PlainPowers(_Plain, LogFormatterSciNotation):
+class PlainPowers(_PlainTicks, LogFormatterSciNotation):
     """Of a logarithmic axis."""
 
 

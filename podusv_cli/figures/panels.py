@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import compress, draw_signal
 from podusv_cli.figures.page import Page
-from podusv_cli.figures.scales import resolved
+from podusv_cli.figures.scales import smallest_distance
 from podusv_cli.figures.sheet import Family, Sheet, figure
 from podusv_cli.figures.shown import Shown, axis_label, constants
 from podusv_cli.figures.style import legend, new_figure
@@ -78,7 +78,7 @@ def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
 def distance_axis(axes: Axes, runs: Sequence[Shown]) -> None:
     """A logarithmic axis for z_e, not below what the runs resolve, with a line at each standoff."""
     axes.set_yscale("log")
-    bottom, floor = axes.get_ylim()[0], resolved(runs)
+    bottom, floor = axes.get_ylim()[0], smallest_distance(runs)
     axes.set_ylim(bottom=max(bottom, floor))
     kept = sorted({run.about.standoff for run in runs} - {0.0})
     for standoff in kept:

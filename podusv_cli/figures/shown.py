@@ -185,10 +185,10 @@ def label(signal: Signal) -> str:
 
 def unit(signal: Signal) -> str:
     """Unit of a signal with its powers raised."""
-    return quantities.raised(signal.unit)
+    return quantities.raise_powers(signal.unit)
 
 
-def shortened(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """A text, or as much of it as so many letters and three dots are."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
@@ -204,7 +204,7 @@ def places(place: int, count: int) -> Vector:
     return np.asarray((np.arange(marks) + (place + 0.5) / count) / marks)
 
 
-def dressed(runs: Sequence[PastRun], peaks: Mapping[str, float] | None = None) -> list[Shown]:
+def dress_runs(runs: Sequence[PastRun], peaks: Mapping[str, float] | None = None) -> list[Shown]:
     """Runs with their looks, in order; without those too short to draw.
 
     A run alone has no markers. `peaks` are those of signals as claims about the runs name them.

@@ -33,14 +33,16 @@ class Sketch:
     draw: Callable[[], Figure]
 
 
-def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, bytes], list[Picture]]:
+def render_sketches(
+    sketches: Iterable[Sketch], extras: Extras
+) -> tuple[dict[str, bytes], list[Picture]]:
     """PNG pictures of figures, drawn in processes of their own: by file name, and of a report.
 
     A figure that cannot be drawn is missing among the `extras`.
     """
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
-    wanted = extras.made("the list of figures", lambda: list(sketches)) or []
+    wanted = extras.make_or_record("the list of figures", lambda: list(sketches)) or []
     outcomes = (
         () if extras.interrupted else run_shares([partial(_images, sketch) for sketch in wanted])
     )

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import Locator
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import draw_run, thinned
+from podusv_cli.figures.curves import draw_run, thin_curve
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
@@ -76,8 +76,8 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
     terms = [_means(run.signal(term.name)) for term in TERMS]
     axes.stackplot(_means(run.recording["time"]), terms, colors=LAYERS.values(), linewidth=0.0)
     value = run.signal("V")
-    axes.plot(*thinned(run.recording["time"], value), **OUTLINE, label="$V$")
-    _compress(axes, _settled(run, "V") or float(np.max(value)))
+    axes.plot(*thin_curve(run.recording["time"], value), **OUTLINE, label="$V$")
+    _compress(axes, _settled_size(run, "V") or float(np.max(value)))
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(MIXED + ", stacked")
 
@@ -125,7 +125,7 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
         near = np.where(np.abs(limit) <= FAR * largest, limit, np.nan)
         add = axes.add_line if run in kept else axes.add_artist  # which leaves the scale as it is
         add(Line2D(run.recording["time"], near, **_thin(run)))
-    _compress(axes, max([*(_settled(run, "V_dot") for run in kept), 1e-9]))
+    _compress(axes, max([*(_settled_size(run, "V_dot") for run in kept), 1e-9]))
     axes.axhline(0.0, color="#444444", linewidth=0.5)
     axes.autoscale_view()
 
@@ -156,7 +156,7 @@ class _Decades(Locator):
         return [tick for tick in ticks if vmin <= tick <= vmax]
 
 
-def _settled(run: Shown, name: str) -> float:
+def _settled_size(run: Shown, name: str) -> float:
     """The largest size of a signal in the run's settled end, 0 where it did not get there."""
     settled = run.recording["time"] >= run.recording["window_start"][-1]
     return float(np.max(np.abs(run.signal(name)[settled]), initial=0.0))

@@ -19,7 +19,7 @@ from podusv_cli.figures.curves import AFTER, CUT, draw_run
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.scales import Span, scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown, shortened
+from podusv_cli.figures.shown import Shown, shorten
 from podusv_cli.figures.style import WIDTHS, legend, new_figure, remark
 from podusv_cli.figures.tracks import Target, bounds, rows_of, targets
 
@@ -143,7 +143,7 @@ def distances(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.set_title("from the path" if name == DEVIATION else "from the target", loc="left")
     else:
         curves = {run: _between(first, run) for run in others}
-        words = escaping.figure(shortened(first.label, NAME))
+        words = escaping.figure(shorten(first.label, NAME))
         axes.set_title(f"from {words}", loc="left")
     if not curves:
         remark(axes, "one run, and no target")

@@ -8,8 +8,8 @@ import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.errors import LawError
-from podusv_cli.core.finding import Finding, FindingKind, merged
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.finding import Finding, FindingKind, merge_findings
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.case import Case
@@ -28,12 +28,12 @@ def finding_kinds(plugins: Plugins = ()) -> dict[str, FindingKind]:
     """
     by_code: dict[str, FindingKind] = {}
     for package in PACKAGES:
-        by_code |= registry.named(f"podusv_cli.{package}", FindingKind, plugins)
+        by_code |= registry.find_by_name(f"podusv_cli.{package}", FindingKind, plugins)
     sections = list(Scenario.model_fields)
     for kind in by_code.values():
         if kind.about.partition(".")[0] not in sections:
             what = f"finding {kind.name!r} is about {kind.about!r}: "
-            raise LawError(what + unknown("section", kind.about.partition(".")[0], sections))
+            raise LawError(what + unknown_word("section", kind.about.partition(".")[0], sections))
     ordered = sorted(by_code.values(), key=lambda n: sections.index(n.about.partition(".")[0]))
     return {kind.name: kind for kind in ordered}
 
@@ -42,7 +42,7 @@ def unknown_codes(loaded: Loaded) -> list[tuple[str, str]]:
     """Key and sentence for every unknown code in `silence`; a check for `load`."""
     codes = tuple(finding_kinds(loaded.scenario.plugged))
     return [
-        (f"silence[{place}]", unknown(f"finding {code!r}", code, codes, "podusv list"))
+        (f"silence[{place}]", unknown_word(f"finding {code!r}", code, codes, "podusv list"))
         for place, code in enumerate(loaded.scenario.silence)
         if code not in codes
     ]
@@ -53,7 +53,7 @@ def preflight(scenario: Scenario) -> list[Finding]:
 
     With `controllers` these are the findings for each law, merged.
     """
-    return merged(
+    return merge_findings(
         {name: find_before_run(Case.of(single)) for name, single in scenario.singles().items()}
     )
 

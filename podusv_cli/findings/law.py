@@ -80,7 +80,7 @@ def _stiff(cause: Cause) -> FindingKind:
     )(partial(_too_fast, cause=cause))  # fmt: skip
 
 
-def _sampled(cause: Cause) -> FindingKind:
+def _sampling_finding(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
         f"sampled-{cause}", about="control.period", meaning=f"{what} too fast for the period",
@@ -90,7 +90,7 @@ def _sampled(cause: Cause) -> FindingKind:
 
 
 stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
-sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
+sampled_adaptation, sampled_derivative, sampled_loop = map(_sampling_finding, LOOPS)
 
 
 def _margin(case: Case) -> float:

@@ -29,7 +29,7 @@ REVERSALS = 3  # of a zig-zag with two overshoots
     "law's memory does not wind up, as an approach or a turn at the limits is then over for good",
     remedy="switch anti-windup on where it is off, or take smaller gains or a stronger actuator",
 )  # fmt: skip
-def saturated(scenario: Scenario, log: Recording) -> Sentences:
+def warn_of_saturation(scenario: Scenario, log: Recording) -> Sentences:
     """The actuator limits the law for long, where that lasts or leaves something behind."""
     if "saturated" not in log:
         return

@@ -23,7 +23,7 @@ def unkept_module(case: Case) -> Sentences:
         if not plugin.path:
             continue
         folder = Path(plugin.path).parent
-        for name in dict.fromkeys(_imported(plugin.text)):
+        for name in dict.fromkeys(_imports_in(plugin.text)):
             file = getattr(sys.modules.get(name), "__file__", None)
             if file and _is_beside(Path(file).resolve(), folder):
                 yield (
@@ -32,7 +32,7 @@ def unkept_module(case: Case) -> Sentences:
                 )
 
 
-def _imported(text: str) -> Iterator[str]:
+def _imports_in(text: str) -> Iterator[str]:
     """The modules that a text names in its imports, with the packages that they are in."""
     for node in ast.walk(ast.parse(text)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

@@ -13,7 +13,7 @@ from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
-from podusv_cli.identify.answer import AXES, Answer, Force
+from podusv_cli.identify.answer import AXES, Force, Identification
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
 from podusv_cli.identify.fit.march import CURRENT, DELAY, THRUST
 from podusv_cli.identify.judge import WHO, Score
@@ -45,7 +45,7 @@ class Identified:
     """A hull from logs, and where its files are."""
 
     folder: Path
-    answer: Answer
+    answer: Identification
     status: Status
     warnings: tuple[str, ...] = ()
     missing: tuple[Failure, ...] = ()
@@ -55,7 +55,7 @@ class Identified:
         return {
             "format": 1, "status": self.status, "folder": str(self.folder),
             "settled": self.answer.estimate.settled,
-            "known": self.answer.directions.known, "of": len(self.answer.problem.hull),
+            "known": self.answer.directions.determined_count, "of": len(self.answer.problem.hull),
             "parameters": [asdict(p) for p in self.answer.parameters],
             "forces": [asdict(f) for f in self.answer.forces],
             "scores": [asdict(s) for s in self.answer.scores],
@@ -65,11 +65,11 @@ class Identified:
 
 
 def write(
-    writer: RunWriter, answer: Answer, text: str, *, warnings: Sequence[str], figures: bool
+    writer: RunWriter, answer: Identification, text: str, *, warnings: Sequence[str], figures: bool
 ) -> None:
     """All files of the folder but the manifest; `text` is the scenario's file."""
     writer.add("scenario.yaml", text.encode())
-    writer.add(IDENTIFIED, (HEADING + yaml_text(given(answer))).encode())
+    writer.add(IDENTIFIED, (HEADING + yaml_text(vessel_keys(answer))).encode())
     for name, rows in {
         "parameters.csv": [
             {"name": p.name, "unit": unit(answer, p.name), **asdict(p)} for p in answer.parameters
@@ -77,7 +77,7 @@ def write(
         "forces.csv": [force_record(f) for f in answer.forces],
         "fits.csv": [asdict(w) for w in answer.whiteness],
         "judged.csv": [score_record(s) for s in answer.scores],
-        POSTERIOR: drawn(answer),
+        POSTERIOR: rows_of_draws(answer),
     }.items():
         writer.add(name, csv_files.records(rows, DIGITS).encode())
     pictures = _pictures(answer, writer.extras) if figures else []
@@ -87,7 +87,7 @@ def write(
     writer.add("report.html", page(answer, pictures, origin, warnings).encode())
 
 
-def given(answer: Answer) -> dict[str, Any]:
+def vessel_keys(answer: Identification) -> dict[str, Any]:
     """The hull as a vessel file has it: without what is 0 or absent anyway."""
     fields = type(answer.vessel).model_fields
     return {
@@ -97,7 +97,7 @@ def given(answer: Answer) -> dict[str, Any]:
     }
 
 
-def drawn(answer: Answer) -> list[dict[str, float]]:
+def rows_of_draws(answer: Identification) -> list[dict[str, float]]:
     """A row a hull, with those of its numbers that differ between hulls."""
     rows = [hull.constants() for hull in answer.onward]
     own = {name for name in rows[0] if name in type(answer.onward[0]).model_fields}
@@ -105,14 +105,14 @@ def drawn(answer: Answer) -> list[dict[str, float]]:
     return [{name: row[name] for name in moving} for row in rows]
 
 
-def _pictures(answer: Answer, extras: Extras) -> list[Picture]:
-    from podusv_cli.figures.sketch import rendered
+def _pictures(answer: Identification, extras: Extras) -> list[Picture]:
+    from podusv_cli.figures.sketch import render_sketches
     from podusv_cli.identify.figures import sketches  # matplotlib is slow to import
 
-    return rendered(sketches(answer), extras)[1]
+    return render_sketches(sketches(answer), extras)[1]
 
 
-def unit(answer: Answer, number: str) -> str:
+def unit(answer: Identification, number: str) -> str:
     """Of a number that was looked for: the hull's, the filter's, or a log's current."""
     name = number.partition(",")[0]
     fields = {**ExtendedKalmanFilter.model_fields, **type(answer.vessel).model_fields}
@@ -137,7 +137,7 @@ def score_record(score: Score) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def parameter_rows(answer: Answer) -> Iterator[list[str]]:
+def parameter_rows(answer: Identification) -> Iterator[list[str]]:
     """Of every number: name, unit, prior, estimate, interval, and whether the logs determine it."""
     for p in answer.parameters:
         determined = "yes" if p.width <= OPEN else "little" if p.width < SILENT else "no"
@@ -147,7 +147,7 @@ def parameter_rows(answer: Answer) -> Iterator[list[str]]:
         ]  # fmt: skip
 
 
-def force_rows(answer: Answer) -> Iterator[list[str]]:
+def force_rows(answer: Identification) -> Iterator[list[str]]:
     """Of every force: where, its value, the interval, and the interval over the prior's."""
     for f in answer.forces:
         axis = AXIS[f.force]
@@ -180,7 +180,10 @@ SCORES = ("log", "role", "after", "runs", *WHO)
 
 
 def page(
-    answer: Answer, pictures: Sequence[Picture], origin: Mapping[str, Any], warnings: Sequence[str]
+    answer: Identification,
+    pictures: Sequence[Picture],
+    origin: Mapping[str, Any],
+    warnings: Sequence[str],
 ) -> str:
     """The page."""
     scenario = answer.problem.scenario
@@ -190,7 +193,7 @@ def page(
         parameters=(PARAMETERS, [*parameter_rows(answer)]), forces=(FORCES, [*force_rows(answer)]),
         scores=(SCORES, [*score_rows(answer.scores)]), whiteness=answer.whiteness,
         widths=[f"{width:.2g}" for width in answer.directions.widths],
-        known=answer.directions.known, least=OPEN, little=SILENT,
+        known=answer.directions.determined_count, least=OPEN, little=SILENT,
         pictures=list(enumerate(pictures, 1)),
         provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
     )  # fmt: skip

@@ -23,7 +23,7 @@ from podusv_cli.interface.border import ParameterError, interrupt_with
 from podusv_cli.interface.hulls import IdentifiedHull
 from podusv_cli.interface.parameters import check_words, columns, in_si, scenarios
 from podusv_cli.interface.results import Comparison, Run
-from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
+from podusv_cli.interface.scenarios import CHECKS, Changes, Source, load_scenario
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -37,8 +37,8 @@ from podusv_cli.workflows.gather import (
     Members,
     from_folder,
     from_scenario,
-    gathered,
-    measured,
+    gather_logs,
+    join_members,
 )
 from podusv_cli.workflows.in_memory import run_in_memory
 from podusv_cli.workflows.measured import is_log
@@ -68,7 +68,7 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     >>> float(run.metrics["iae"].round()), run["z_e"].shape
     (71.0, (3001,))
     """
-    given = loaded(source, changes)
+    given = load_scenario(source, changes)
     case = given.case(_single(given))
     return Run(run_in_memory(case), case.scenario)
 
@@ -87,7 +87,7 @@ def run(
     >>> run.status, sorted(path.name for path in run.folder.iterdir())[:3]
     ('finished', ['about.json', 'log.h5', 'manifest.json'])
     """
-    given = loaded(source, changes)
+    given = load_scenario(source, changes)
     single = _single(given)
     done = running.run_loaded(given, request(out, force, figures))
     made = open_run(done.folder).past
@@ -106,7 +106,7 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
     if len(members) > 1:
         names = ", ".join(f"{folder}/{member.label}" for member in members)
         raise UsageError(f"{folder} is a comparison; open one of its runs: {names}")
-    return _opened(members[0])
+    return _open_member(members[0])
 
 
 def compare(
@@ -134,13 +134,13 @@ def compare(
     given = _several(sources)
     files = [_file(source) for source in given]
     items, options = _items(given, files, changes, align), request(out, force, figures)
-    runs = gathered(items)
+    runs = join_members(items)
     done = comparing.compare_gathered(runs, [f for f in files if f], options)
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
     claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
     failed = {label: text for label, text in done.result.endings.items() if text}
     scenarios = {member.label: member.case.scenario for member in runs.members if member.case}
-    compared = _compared(done, scenarios)
+    compared = _runs_compared(done, scenarios)
     return Comparison(done.folder, compared, done.result.table.frame(), claims, failed)
 
 
@@ -163,7 +163,9 @@ def optimum(
     """
     from podusv_cli.workflows import optimum as finding
 
-    done = finding.optimum_of(loaded(source, changes), request(out, force, figures), minimise, step)
+    done = finding.optimum_of(
+        load_scenario(source, changes), request(out, force, figures), minimise, step
+    )
     return open_run(done.folder)
 
 
@@ -197,7 +199,7 @@ def simulate_many(
     0      50.0  finished
     1      60.0  finished
     """
-    base = loaded(source)
+    base = load_scenario(source)
     scenario = _single(base)
     given = in_si(scenario, columns(parameters))
     if workers < 0:
@@ -231,7 +233,7 @@ def verify(
     >>> bool(found.loc[("pid", "iae"), "converged"])
     True
     """
-    done = verification.verify(loaded(source, changes).scenario, tolerance)
+    done = verification.verify(load_scenario(source, changes).scenario, tolerance)
     rows = {
         (label, name): (e.values[0], e.order, e.relative, e.converged(tolerance))
         for label, run in done.runs.items()
@@ -261,7 +263,7 @@ def doubt(
     >>> podusv.doubt("podusv:own_vessel.yaml", short, out="doubts").loc["A", "verdict"]
     'not reproduced'
     """
-    given = loaded(source, changes, (*CHECKS, doubt_faults))
+    given = load_scenario(source, changes, (*CHECKS, doubt_faults))
     done = doubting.doubt_of(given, replace(request(out, force, figures), workers=workers))
     head, *rows = table(done.answers)
     return pd.DataFrame(rows, columns=list(head)).set_index("claim")
@@ -279,7 +281,7 @@ def identify(
     >>> hull = podusv.identify("otter.yaml", out="hull")  # doctest: +SKIP
     >>> hull.forces[["force", "at", "value", "low", "high"]]  # doctest: +SKIP
     """
-    done = identifying.identify_of(loaded(source, changes), request(out, force, figures))
+    done = identifying.identify_of(load_scenario(source, changes), request(out, force, figures))
     return IdentifiedHull(done.folder, done.answer)
 
 
@@ -300,7 +302,7 @@ def request(out: Any, force: bool, figures: bool) -> Request:
     return Request(out=Path(out) if out is not None else None, force=force, figures=figures)
 
 
-def _opened(member: Member) -> Run:
+def _open_member(member: Member) -> Run:
     there = member.folder
     assert there is not None  # the members of a folder are finished
     warned = tuple(map(str, json_files.read_as(there.path / "metrics.json", _Noticed).warnings))
@@ -308,7 +310,7 @@ def _opened(member: Member) -> Run:
     return Run(replace(past, warnings=warned))
 
 
-def _compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
+def _runs_compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
     """The runs of a comparison that have a log, by label."""
     result = done.result
     return {
@@ -353,7 +355,7 @@ def _items(
     groups = [
         from_folder(folder)
         if folder
-        else from_scenario(loaded(source, changes), alone=len(others) == 1)
+        else from_scenario(load_scenario(source, changes), alone=len(others) == 1)
         for (source, _), folder in zip(others, folders, strict=True)
     ]
-    return [*groups, *measured(logs, groups, align)]
+    return [*groups, *gather_logs(logs, groups, align)]

@@ -17,9 +17,9 @@ from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.past_run import PastRun
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.recording import Recording
-from podusv_cli.interface.border import explained
+from podusv_cli.interface.border import with_short_traceback
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
@@ -54,7 +54,7 @@ class Numbers(pd.Series):
         try:
             return super().__getitem__(name)
         except KeyError:
-            sentence = unknown(f"metric {name!r} of this run", str(name), map(str, self.index))
+            sentence = unknown_word(f"metric {name!r} of this run", str(name), map(str, self.index))
             raise KeyError(sentence) from None
 
 
@@ -151,10 +151,10 @@ class Run:
     def __getitem__(self, signal: str) -> Vector:
         """A signal that the log has or that follows from it; KeyError with those that there are."""
         if not self.past.has(signal):
-            raise KeyError(unknown(f"signal {signal!r}", signal, self.recording.signals))
+            raise KeyError(unknown_word(f"signal {signal!r}", signal, self.recording.signals))
         return self.past.signal(signal)
 
-    @explained
+    @with_short_traceback
     def plot(self, *names: str, columns: int = 2) -> Figure:
         """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
 
@@ -164,7 +164,7 @@ class Run:
         """
         return figure({self.label: self}, names, columns)
 
-    @explained
+    @with_short_traceback
     def play(self) -> Animation:
         """The run as an animation with a slider, which notebooks show. Raises UsageError."""
         return animation({self.label: self})
@@ -207,15 +207,15 @@ class Comparison:
     def __getitem__(self, label: str) -> Run:
         """The run of this label; KeyError with the labels that there are."""
         if label not in self.runs:
-            raise KeyError(unknown(f"run {label!r}", label, self.runs))
+            raise KeyError(unknown_word(f"run {label!r}", label, self.runs))
         return self.runs[label]
 
-    @explained
+    @with_short_traceback
     def plot(self, *names: str, columns: int = 2) -> Figure:
         """All runs in one matplotlib figure; as `Run.plot`."""
         return figure(self.runs, names, columns)
 
-    @explained
+    @with_short_traceback
     def play(self) -> Animation:
         """All runs as one animation; as `Run.play`."""
         return animation(self.runs)
@@ -251,9 +251,9 @@ class Animation:
 def animation(runs: Mapping[str, Run]) -> Animation:
     """Runs chasing their target. Raises UsageError where no run has two rows."""
     from podusv_cli.figures.chase import page
-    from podusv_cli.figures.shown import dressed
+    from podusv_cli.figures.shown import dress_runs
 
-    shown = dressed([replace(run.past, label=label) for label, run in runs.items()])
+    shown = dress_runs([replace(run.past, label=label) for label, run in runs.items()])
     if not shown:
         raise UsageError(f"there is nothing to show: {', '.join(map(repr, runs.values()))}")
     return Animation(page(shown))
@@ -261,10 +261,10 @@ def animation(runs: Mapping[str, Run]) -> Animation:
 
 def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> Figure:
     """One of podusv's figures of several runs, or their signals over time. Raises UsageError."""
-    from podusv_cli.figures.shown import dressed
+    from podusv_cli.figures.shown import dress_runs
     from podusv_cli.figures.style import house_style, image
 
-    shown = dressed([replace(run.past, label=label) for label, run in runs.items()])
+    shown = dress_runs([replace(run.past, label=label) for label, run in runs.items()])
     family = _family(runs, names or ("trajectory",), shown)
     with house_style():
         drawn = family(shown, columns)
@@ -289,7 +289,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
     for name in names:
         if not any(run.has(name) for run in shown):
             known = (*figures, *dict.fromkeys(signals))
-            raise UsageError(unknown(f"figure or signal {name!r}", name, known, "podusv list"))
+            raise UsageError(unknown_word(f"figure or signal {name!r}", name, known, "podusv list"))
     return signals_over_time(*names)
 
 

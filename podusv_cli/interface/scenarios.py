@@ -49,7 +49,7 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
     Traceback (most recent call last):
     podusv_cli.core.errors.ScenarioError: scenario: vessel.lenght: unknown key; did you mean ...
     """
-    return loaded({**(sections or {}), **more}).scenario
+    return load_scenario({**(sections or {}), **more}).scenario
 
 
 def load(
@@ -70,13 +70,13 @@ def load(
     >>> podusv.load(scenario, {"path": {"kind": "circle", "radius": 20.0}}).path.radius
     20.0
     """
-    return loaded(source, changes, trust=trust).scenario
+    return load_scenario(source, changes, trust=trust).scenario
 
 
 CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 
-def loaded(
+def load_scenario(
     source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS,
     *, silent: bool = False, trust: bool = False,
 ) -> Loaded:  # fmt: skip
@@ -84,10 +84,12 @@ def loaded(
 
     Unless it is `silent`, a UserWarning names values that a section loses with its kind.
     """
-    result = _loaded(source, assignments(changes), checks, plugins.of_files(trust))
+    result = _load_source(source, assignments(changes), checks, plugins.of_files(trust))
     if silent:
         return result
-    return result.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
+    return result.warn_of_dropped(
+        lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4)
+    )
 
 
 def assignments(changes: Changes | None) -> list[str]:
@@ -101,11 +103,13 @@ def assignments(changes: Changes | None) -> list[str]:
 
 
 @singledispatch
-def _loaded(source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged) -> Loaded:
+def _load_source(
+    source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged
+) -> Loaded:
     return load_file(os.fspath(source), overrides, checks, plugged=plugged)
 
 
-@_loaded.register
+@_load_source.register
 def _(
     source: model.Scenario, overrides: list[str], checks: Sequence[Check], plugged: Plugged
 ) -> Loaded:
@@ -116,7 +120,7 @@ def _(
     return load_text(text, source.name, overrides, checks, files, plugged, placed=False)
 
 
-@_loaded.register
+@_load_source.register
 def _(
     source: Mapping,  # type: ignore[type-arg]
     overrides: list[str], checks: Sequence[Check], plugged: Plugged,

@@ -40,7 +40,7 @@ def factor(packed: Vector, order: int, lower: Vector) -> bool:
 
 
 @kernel
-def squared(error: Vector, lower: Vector) -> float:
+def normalised_square(error: Vector, lower: Vector) -> float:
     """error^T P^-1 error, with the factor of P."""
     square = 0.0
     for i in range(SIX):
@@ -75,7 +75,12 @@ def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vecto
         sound = factor(tail(s, at + int(k.covariance)), order, lower)
         if t > 0.0:  # at the start the covariance is 0
             add(seen, INTEGRALS, TIME, weight)
-            add(seen, INTEGRALS, SQUARE, weight * (squared(error, lower) if sound else math.inf))
+            add(
+                seen,
+                INTEGRALS,
+                SQUARE,
+                weight * (normalised_square(error, lower) if sound else math.inf),
+            )
 
 
 def _size(layout: Measured) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
-from podusv_cli.core.kernel import bundle, call, scratch, transplanted
+from podusv_cli.core.kernel import bundle, call, scratch, transplant
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
 from podusv_cli.engine.loop.plan import Plan
@@ -31,7 +31,7 @@ law_operations = Metric(
 
 
 @dataclass
-class Tally:
+class OperationTally:
     """How many operations were done so far; stands in a kernel for the module math."""
 
     count: int = 0
@@ -61,7 +61,7 @@ class Tally:
         its sine, and an exponential, count as the arithmetic that they are.
         """
         parts = {math: self, float: lambda x: x, scratch: partial(np.empty, dtype=object)}
-        return transplanted(function, parts | {arctangent: partial(self.apply, math.atan2)})
+        return transplant(function, parts | {arctangent: partial(self.apply, math.atan2)})
 
 
 @dataclass(eq=False, slots=True)
@@ -69,7 +69,7 @@ class Counted:
     """A number whose arithmetic is counted; comparisons and changes of sign are free."""
 
     number: Any
-    tally: Tally
+    tally: OperationTally
 
 
 def _plain(number: Any) -> Any:
@@ -117,7 +117,7 @@ setattr(Counted, "__array_ufunc__", _of_numpy)  # noqa: B010 - as the others
 @np.errstate(all="ignore")
 def operations(plan: Plan, recording: Recording) -> dict[str, float]:
     """The metric of this run's law, by its name."""
-    law, tally = plan.loop.controller, Tally()
+    law, tally = plan.loop.controller, OperationTally()
     rows = logged_rows(plan, recording, 3)
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
     constants = plan.law_constants

@@ -107,7 +107,7 @@ def _at(position: int) -> Callable[[Vector], float]:
     return lambda own: float(own[position]) if own[LENGTH] else math.nan
 
 
-def _named(
+def _name_metric(
     template: Metric, name: str, meaning: str, of: Accumulator, result: Result, words: str
 ) -> Metric:  # fmt: skip
     return replace(
@@ -121,9 +121,9 @@ def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> 
     span = f"from {start:g} s to {to:g} s"
     rms, largest, beyond = (_over(to, at, f) for f in (_rms, _at(LARGEST), _at(BEYOND)))
     return (
-        _named(ERROR_RMS, name, f"rms of z_e {span}", of, rms, f"rms distance {span}"),
-        _named(ERROR_MAX, name, f"largest z_e {span}", of, largest, f"largest distance {span}"),
-        _named(
+        _name_metric(ERROR_RMS, name, f"rms of z_e {span}", of, rms, f"rms distance {span}"),
+        _name_metric(ERROR_MAX, name, f"largest z_e {span}", of, largest, f"largest distance {span}"),
+        _name_metric(
             BEYOND_MAX, name, f"largest |z_e - standoff| {span}", of, beyond,
             f"largest error beyond the standoff {span}",
         ),
@@ -133,7 +133,7 @@ def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> 
 def _of_radius(name: str, radius: float, of: Accumulator, at: int) -> Metric:
     """The metric of a radius whose numbers stand at this place."""
     meaning = f"time from which z_e stays within {radius:g} m"
-    return _named(
+    return _name_metric(
         SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[at + 1 + CROSSED]),
         f"within {radius:g} m after",
     )  # fmt: skip
@@ -158,7 +158,7 @@ def accumulator(windows: Windows, radii: Radii) -> Accumulator:
 
 
 @cache
-def named(windows: Windows, radii: Radii) -> dict[str, Metric]:
+def metrics_of_windows(windows: Windows, radii: Radii) -> dict[str, Metric]:
     """The metrics of these windows and radii, by name."""
     of, after = accumulator(windows, radii), EACH + WINDOW * len(windows)
     metrics = [

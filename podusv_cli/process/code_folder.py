@@ -37,7 +37,7 @@ def code_folder(name: str) -> Path | None:
     refused = []
     for root in _roots():
         try:
-            folder = _made(root, name)
+            folder = _make_folder(root, name)
         except OSError as error:
             refused.append(f"{root}: {error.strerror or error}")
             continue
@@ -80,7 +80,7 @@ def _roots() -> Iterator[Path]:
         yield Path(home, "podusv")
 
 
-def _made(root: Path, name: str) -> Path:
+def _make_folder(root: Path, name: str) -> Path:
     """The folder, there, safe, marked, and rid of what is old. Raises OSError."""
     _check(root)
     root.mkdir(parents=True, exist_ok=True, mode=0o700)

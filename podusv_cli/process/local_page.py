@@ -70,7 +70,7 @@ class _Handler(BaseHTTPRequestHandler):
         if kind != "application/json" or (origin and origin[7:] not in self.server.hosts):
             self._refuse(403, "only the page itself may ask, in JSON")
             return
-        asked = _parsed(self.rfile.read(size))
+        asked = _parse_question(self.rfile.read(size))
         if not isinstance(asked, dict):
             self._refuse(400, "a question must be a JSON object")
             return
@@ -131,10 +131,10 @@ def serve(
                 name, asked, waiting = server.jobs.get(timeout=GLANCE)
             except Empty:  # a signal that comes as the wait begins would else wait for a question
                 continue
-            waiting.put(_told(answer(name, asked)))
+            waiting.put(_encode_answer(answer(name, asked)))
 
 
-def _parsed(question: bytes) -> Any:
+def _parse_question(question: bytes) -> Any:
     """What a question says; None where it is no JSON, or nested too deeply to be read."""
     try:
         return json.loads(question)
@@ -142,7 +142,7 @@ def _parsed(question: bytes) -> Any:
         return None
 
 
-def _told(answer: Mapping[str, Any]) -> _Told:
+def _encode_answer(answer: Mapping[str, Any]) -> _Told:
     """An answer as JSON; a sentence where it has a number that JSON has not, or no such value."""
     try:
         text = json.dumps(answer, separators=(",", ":"), allow_nan=False)

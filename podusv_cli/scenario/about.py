@@ -13,7 +13,7 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.settings import changed, parts, settings
+from podusv_cli.scenario.settings import changed_settings, parts, settings
 
 
 def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
@@ -44,8 +44,8 @@ def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
         duration=scenario.simulation.duration, step=scenario.simulation.step,
         every=scenario.time_grid().log_every, steady_from=scenario.steady_from(),
         settling_radius=scenario.metrics.settling_radius,
-        said={name: _said(part) for name, part in (parts(scenario) | {"controller": law}).items()},
-        settings=tuple(changed(scenario)), law=tuple(settings(law, scenario.facts)),
+        said={name: _describe_part(part) for name, part in (parts(scenario) | {"controller": law}).items()},
+        settings=tuple(changed_settings(scenario)), law=tuple(settings(law, scenario.facts)),
         log_columns=identify.columns, log_frame=identify.frame,
     )  # fmt: skip
 
@@ -64,5 +64,5 @@ def _of_parts(scenario: Scenario) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _said(part: Component) -> str:
+def _describe_part(part: Component) -> str:
     return (inspect.getdoc(type(part)) or "").partition("\n")[0]

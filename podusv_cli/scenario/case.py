@@ -11,7 +11,7 @@ from podusv_cli.components.facts import Facts
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.engine.loop.plan import Plan
-from podusv_cli.engine.running.check import evaluated
+from podusv_cli.engine.running.check import evaluate_law
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
@@ -67,7 +67,7 @@ class Case:
         """The law's signals at t = 0; NaN where undefined, as on top of the target."""
         law = self.scenario.controller
         try:
-            _, _, signals = evaluated(self.plan, 0.0)
+            _, _, signals = evaluate_law(self.plan, 0.0)
         except Exception:  # `check_law` reports a faulty law before the run
             signals = np.full(len(law.signals), np.nan)
         names = (part.name for part in law.signals)

@@ -21,9 +21,9 @@ TIMED = ("simulation", "control", "actuator", "controller", "controllers")  # se
 
 def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other; plans no loop."""
-    parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
+    parts = [*_defaults(scenario), *_conflicts_of_laws(scenario), *_summands(scenario)]
     return parts or [
-        *_recorded(scenario), *of_numbers(scenario), *_names(scenario),
+        *_conflicts_of_commands(scenario), *of_numbers(scenario), *_names(scenario),
         *scenario.metrics.conflicts(),
     ]  # fmt: skip
 
@@ -84,7 +84,7 @@ def _summands(scenario: Scenario) -> Conflicts:
             yield key, text
 
 
-def _recorded(scenario: Scenario) -> Conflicts:
+def _conflicts_of_commands(scenario: Scenario) -> Conflicts:
     """Commands over time that the actuator does not take."""
     for key, law in scenario.laws().items():
         if recorded := law.commands():
@@ -94,7 +94,7 @@ def _recorded(scenario: Scenario) -> Conflicts:
                 yield f"{key}.rows", str(error)
 
 
-def _unanswered(scenario: Scenario) -> Conflicts:
+def _conflicts_of_laws(scenario: Scenario) -> Conflicts:
     """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
     for key, law in scenario.laws().items():
         try:

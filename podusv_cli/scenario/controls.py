@@ -13,7 +13,7 @@ from podusv_cli.scenario.address import is_whole
 from podusv_cli.scenario.explain import choices_of
 from podusv_cli.scenario.keys import NO_DEFAULT, Key, keys_of, limits
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import Route, dotted, route
+from podusv_cli.scenario.yaml_tree import Route, dotted_key, route
 
 REACH = 30.0  # from its number, a logarithmic slider reaches so many times up and down
 WIDE = 3.0  # a linear one so many times the number's size
@@ -27,7 +27,7 @@ TIMES = ("control.period", "simulation.duration")  # whole numbers of steps
 
 
 @dataclass(frozen=True)
-class Control:
+class Knob:
     """A value at a key: its meaning, and a slider from `low` to `high` or the words it may be.
 
     `log`: the slider is even in the number's logarithm. `quantum` is what it is a multiple of.
@@ -49,7 +49,7 @@ class Control:
     choices: tuple[str, ...] = ()
 
 
-def controls(scenario: Scenario, laws: Sequence[str]) -> list[Control]:
+def controls(scenario: Scenario, laws: Sequence[str]) -> list[Knob]:
     """Those of these laws (`controller`, `controllers.pid`), then of the sections in AFTER."""
     ruled = {*scenario.keys_by_rule()}
     seas = list(scenario.disturbances())
@@ -61,7 +61,7 @@ def controls(scenario: Scenario, laws: Sequence[str]) -> list[Control]:
     ]
 
 
-def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Control]:
+def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Knob]:
     component: Any = scenario
     way: Route = ()
     for step in at:
@@ -75,13 +75,13 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
         if isinstance(content, Component):
             yield from _of_part(scenario, f"{part}.{name}", (*at, name), ruled)
         elif found := _control(scenario, part, (*at, name), key.keys[name], content):
-            yield Control(**found, by_rule=(*at, name) in ruled)
+            yield Knob(**found, by_rule=(*at, name) in ruled)
 
 
 def _control(
     scenario: Scenario, part: str, at: Route, key: Key, content: Any
 ) -> dict[str, Any] | None:
-    place, default = dotted(at), key.default
+    place, default = dotted_key(at), key.default
     words = {
         "key": place, "part": part, "name": key.name, "value": content, "unit": key.unit,
         "range": key.range,

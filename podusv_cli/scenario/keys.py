@@ -103,7 +103,7 @@ class Key:
         return f"{noun(self.annotation)} {pattern}".rstrip()
 
     @property
-    def wanted(self) -> str:
+    def expectation(self) -> str:
         """What the value must be, with range and unit: `a number above 0 [s]`."""
         ranges = " and ".join(f"{words} {limit:g}" for _, words, limit in self._bounds)
         unit = f"[{self.unit}]" if self.unit else ""
@@ -214,7 +214,7 @@ class Key:
     @property
     def other_units(self) -> list[str]:
         """The units that its numbers may be written with, beside its own."""
-        return [*units.allowed(self.unit)][1:] if self.unit and self._numeric else []
+        return [*units.units_allowed_for(self.unit)][1:] if self.unit and self._numeric else []
 
     def number(self, content: Any) -> Any:
         """What a number with a unit is in podusv's, where the key takes it; else the content."""

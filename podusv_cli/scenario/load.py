@@ -18,8 +18,8 @@ from podusv_cli.scenario import plugins
 from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.keys import keys_of
-from podusv_cli.scenario.kinds import kept
-from podusv_cli.scenario.layers import composed, self_contained
+from podusv_cli.scenario.kinds import merge_kept
+from podusv_cli.scenario.layers import compose_layers, self_contained
 from podusv_cli.scenario.messages import check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.named_files import with_contents, without_files
@@ -31,7 +31,7 @@ from podusv_cli.scenario.yaml_tree import (
     Mark,
     Node,
     Route,
-    dotted,
+    dotted_key,
     find,
     follow,
     merge,
@@ -70,8 +70,8 @@ class Loaded:
         origins = {}
         for at, _ in _leaves(plain_data(self.scenario), ()):
             node = find(self.filled, at)
-            origins[dotted(at)] = str(node.mark) if node else "default"
-        return origins | {dotted(steps): BY_RULE for steps in self.scenario.keys_by_rule()}
+            origins[dotted_key(at)] = str(node.mark) if node else "default"
+        return origins | {dotted_key(steps): BY_RULE for steps in self.scenario.keys_by_rule()}
 
     @cached_property
     def contradictions(self) -> list[tuple[str, str]]:
@@ -106,40 +106,40 @@ class Loaded:
         """Key and message for every law of which two signals would have one name."""
         return list(clashes(self.scenario, self.plans))
 
-    def checked(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
+    def check(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
         """This. Raises ScenarioError with the faults and with all that the checks find."""
         for key, text in chain(self.contradictions, *map(self._faults_by, checks)):
             steps = route(key) if isinstance(key, str) else key
             mark = follow(self.filled, steps)[-1].mark
-            faults.append(Fault(mark, key if isinstance(key, str) else dotted(key), text))
+            faults.append(Fault(mark, key if isinstance(key, str) else dotted_key(key), text))
         if faults:
-            raise ScenarioError(_ordered(faults, self.root.mark.source))
+            raise ScenarioError(_order_faults(faults, self.root.mark.source))
         return self
 
     def _faults_by(self, check: Check) -> Sequence[tuple[str | Route, str]]:
         """What a check finds; one that is asked for again, as of a study's only cell, has told."""
-        if check not in self._found:
-            self._found[check] = check(self)
-        return self._found[check]
+        if check not in self._faults_found:
+            self._faults_found[check] = check(self)
+        return self._faults_found[check]
 
     @cached_property
-    def _found(self) -> dict[Check, Sequence[tuple[str | Route, str]]]:
+    def _faults_found(self) -> dict[Check, Sequence[tuple[str | Route, str]]]:
         return {}
 
-    def told(self, warn: Callable[[str], object]) -> Loaded:
+    def warn_of_dropped(self, warn: Callable[[str], object]) -> Loaded:
         """This, after a warning of all that was dropped."""
         for lost in self.dropped:
             warn(f"warning: {lost}")
         return self
 
-    def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
+    def merge_over(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
         """The scenario of the same tree with another merged over it. Raises ScenarioError."""
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
-        root = kept(root, keys_of(type(self.scenario)), [])
-        scenario, filled = _made(root, self.scenario.plugged, faults)
+        root = merge_kept(root, keys_of(type(self.scenario)), [])
+        scenario, filled = _build_scenario(root, self.scenario.plugged, faults)
         changed = replace(self, scenario=scenario, filled=filled, root=root)
-        return changed.checked(faults, (CLASHES, *checks)).scenario
+        return changed.check(faults, (CLASHES, *checks)).scenario
 
 
 # What is wrong with what is loaded: key and message. A key as its steps where names have dots.
@@ -149,7 +149,7 @@ CLASHES: Check = attrgetter("clashes")
 
 def load(
     path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str] = (), plugged: Plugged = plugins.loaded,
+    files: Sequence[str] = (), plugged: Plugged = plugins.load_plugins,
 ) -> Loaded:  # fmt: skip
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
@@ -161,13 +161,13 @@ def load(
     source = os.fspath(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
-        raise ScenarioError(_ordered(faults, source))
+        raise ScenarioError(_order_faults(faults, source))
     return load_text(text, source, overrides, checks, files, plugged)
 
 
 def load_text(
     text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str | Plugin] = (), plugged: Plugged = plugins.loaded, *, placed: bool = True,
+    files: Sequence[str | Plugin] = (), plugged: Plugged = plugins.load_plugins, *, placed: bool = True,
 ) -> Loaded:  # fmt: skip
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
@@ -175,13 +175,13 @@ def load_text(
     is wrong.
     """
     faults: list[Fault] = []
-    root = composed(text, source, overrides, faults, placed=placed)
+    root = compose_layers(text, source, overrides, faults, placed=placed)
     if root is None:
-        raise ScenarioError(_ordered(faults, source))
-    root, known, dropped = _known(root, plugged, files, source, faults)
-    scenario, filled = _made(root, known, faults)
+        raise ScenarioError(_order_faults(faults, source))
+    root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
+    scenario, filled = _build_scenario(root, known, faults)
     loaded = Loaded(scenario, filled, text, root, dropped)
-    return loaded.checked(faults, (CLASHES, *checks))
+    return loaded.check(faults, (CLASHES, *checks))
 
 
 def load_stored(
@@ -196,23 +196,25 @@ def load_stored(
     """
     faults: list[Fault] = []
     root = self_contained(text, source, overrides, faults, MOST_RESOLVED)
-    _undamaged(faults, source)
+    _raise_damage(faults, source)
     if root is None or faults:
-        raise ScenarioError(_ordered(faults, source))
-    root, known, dropped = _known(root, plugged, files, source, faults)
+        raise ScenarioError(_order_faults(faults, source))
+    root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
     with_contents(root, keys_of(scenario_class(known)), faults, without_files)
-    _undamaged(faults, source)
-    scenario, filled = _made(root, known, faults)
-    return Loaded(scenario, filled, text, root, dropped).checked(faults, checks)
+    _raise_damage(faults, source)
+    scenario, filled = _build_scenario(root, known, faults)
+    return Loaded(scenario, filled, text, root, dropped).check(faults, checks)
 
 
-def _undamaged(faults: list[Fault], source: str) -> None:
+def _raise_damage(faults: list[Fault], source: str) -> None:
     """Raise StorageError with the first fault in the file called `source`."""
-    for fault in _ordered([fault for fault in faults if fault.mark.source == source], source)[:1]:
+    for fault in _order_faults([fault for fault in faults if fault.mark.source == source], source)[
+        :1
+    ]:
         raise StorageError(f"{fault} (the file is damaged, or podusv did not write it)")
 
 
-def _known(
+def _resolve_plugins(
     root: Node, plugged: Plugged, files: Sequence[str | Plugin], source: str, faults: list[Fault]
 ) -> tuple[Node, Plugins, tuple[str, ...]]:
     """The tree with its plug-ins and with what sections keep of other kinds; what is dropped.
@@ -222,24 +224,24 @@ def _known(
     before, dropped = len(faults), list[str]()
     root, known = plugged(plugins.with_given(root, files), faults)
     if len(faults) > before:
-        raise ScenarioError(_ordered(faults, source))
-    return kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
+        raise ScenarioError(_order_faults(faults, source))
+    return merge_kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
 
 
-def _made(root: Node, known: Plugins, faults: list[Fault]) -> tuple[Scenario, Node]:
+def _build_scenario(root: Node, known: Plugins, faults: list[Fault]) -> tuple[Scenario, Node]:
     """The scenario of a tree, and the tree with what is filled in."""
     top, source = keys_of(scenario_class(known)), root.mark.source
     root = complete(root, top, faults)
     scenario = check(root, top, faults)
     if scenario is None:
-        raise ScenarioError(_ordered(faults, source))
+        raise ScenarioError(_order_faults(faults, source))
     if stands_in(root):  # the very same law says so, see `Scenario.open_choice`
         first = next(iter(scenario.controllers.values()))
         scenario = scenario.model_copy(update={"controller": first})
     return scenario, root
 
 
-def _ordered(faults: list[Fault], first: str) -> list[Fault]:
+def _order_faults(faults: list[Fault], first: str) -> list[Fault]:
     """The faults file by file, the file called `first` ahead, in the order of lines.
 
     Those without a line come last: what is missing may be there under a wrong name.
@@ -255,7 +257,7 @@ def _ordered(faults: list[Fault], first: str) -> list[Fault]:
 
 def values(scenario: Scenario) -> dict[str, Any]:
     """Every value of a scenario by its dotted key, in the order of the fields."""
-    return {dotted(route): content for route, content in _leaves(plain_data(scenario), ())}
+    return {dotted_key(route): content for route, content in _leaves(plain_data(scenario), ())}
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:

@@ -22,7 +22,7 @@ from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.about import BESIDE_RUNS, Claim, at_target
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.plugins import Plugins, from_file, installed
+from podusv_cli.core.plugins import Plugins, from_file, installed_plugins
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
@@ -140,7 +140,7 @@ class Scenario(Component):
         if not any(plugin.text for plugin in self.plugged):
             return super().__reduce_ex__(protocol)
         files = tuple((plugin.path, plugin.text) for plugin in self.plugged if plugin.text)
-        return _unpickled, (files, self.as_given(), self.open_choice)
+        return _unpickle, (files, self.as_given(), self.open_choice)
 
     @property
     def open_choice(self) -> bool:
@@ -287,7 +287,7 @@ class Scenario(Component):
 
     def known_metrics(self) -> dict[str, Metric]:
         """All metrics by name, with those of plug-ins, and of windows and radii named here."""
-        known = metrics_with(self.plugged, self.metrics.named())
+        known = metrics_with(self.plugged, self.metrics.windows_and_radii())
         return {name: metric for name, metric in known.items() if NAMED not in name}
 
     def steady_from(self) -> float:
@@ -354,10 +354,12 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
     return made
 
 
-def _unpickled(
+def _unpickle(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
-    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data).in_numbers()
+    made = scenario_class((*(from_file(*one) for one in files), *installed_plugins()))(
+        **data
+    ).in_numbers()
     if open_choice:
         made = made.model_copy(update={"controller": next(iter(made.controllers.values()))})
     return made

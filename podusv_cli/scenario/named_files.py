@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from podusv_cli.core.component import Component
-from podusv_cli.core.timed_rows import Line, columns, lines_of
+from podusv_cli.core.timed_rows import TextLine, columns, lines_of
 from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import (
@@ -26,7 +26,7 @@ from podusv_cli.scenario.yaml_tree import (
     Mark,
     Node,
     Route,
-    dotted,
+    dotted_key,
     merge,
     plain,
     without_misfits,
@@ -56,11 +56,13 @@ def with_contents(root: Node, top: Key, faults: list[Fault], fill: Fill | None =
     for name, entry in root.mapping.items():
         if key := top.keys.get(name):
             kind = usual.get(name, "")
-            root = root.with_entry(name, _filled(entry, key, (name,), fill or _read, faults, kind))
+            root = root.with_entry(
+                name, _fill_section(entry, key, (name,), fill or _read, faults, kind)
+            )
     return root
 
 
-def _filled(
+def _fill_section(
     node: Node, key: Key, at: Route, fill: Fill, faults: list[Fault], usual: str = ""
 ) -> Node:  # fmt: skip
     """A section with what files hold, the sections in it first; `usual` is a kind not given."""
@@ -70,14 +72,17 @@ def _filled(
             return node
         parts = enumerate(node.content)
         return replace(
-            node, content=tuple(_filled(part, item, (*at, i), fill, faults) for i, part in parts)
+            node,
+            content=tuple(_fill_section(part, item, (*at, i), fill, faults) for i, part in parts),
         )
     own = section.keys if section.section else {}
     for name, entry in node.mapping.items():
         below = own.get(name) or key.item(name)
         if below and (entry.mapping or isinstance(entry.content, tuple)):
-            node = node.with_entry(name, _filled(entry, below, (*at, name), fill, faults, usual))
-    return fill(node, dotted(at), section.section, faults) if section.section else node
+            node = node.with_entry(
+                name, _fill_section(entry, below, (*at, name), fill, faults, usual)
+            )
+    return fill(node, dotted_key(at), section.section, faults) if section.section else node
 
 
 def _read(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
@@ -207,7 +212,7 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
         yield replace(row, content=tuple(cells[i] for i in order if i < len(cells)))
 
 
-def _row(line: Line, mark: Mark, faults: list[Fault]) -> Node:
+def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
     numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.

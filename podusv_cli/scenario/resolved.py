@@ -29,11 +29,11 @@ def resolved_yaml(scenario: Scenario) -> str:
 def yaml_text(data: Mapping[str, Any]) -> str:
     """Plain data as YAML that podusv reads back to the same values."""
     with suppress(UnicodeEncodeError):  # libyaml has no lone surrogates
-        return _dumped(data, _Fast)
-    return _dumped(data, _Dumper)
+        return _dump_yaml(data, _Fast)
+    return _dump_yaml(data, _Dumper)
 
 
-def _dumped(data: Mapping[str, Any], dumper: Any) -> str:
+def _dump_yaml(data: Mapping[str, Any], dumper: Any) -> str:
     text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
     return str(text)
 

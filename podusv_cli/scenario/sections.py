@@ -103,7 +103,7 @@ class MetricSettings(Component):
         {}, "m", "further settling radii, by name: `near` adds the metric settling_time_near"
     )
 
-    def named(self) -> tuple[Windows, Radii]:
+    def windows_and_radii(self) -> tuple[Windows, Radii]:
         """Windows and radii, as metrics take them."""
         return tuple(self.windows.items()), tuple(self.radii.items())
 

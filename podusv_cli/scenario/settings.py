@@ -28,10 +28,10 @@ def settings(part: Component, facts: Facts | None = None) -> list[SettingAbout]:
 
     With the facts of hull and actuator also with defaults that follow from these.
     """
-    return list(_settings(part, _preset(part) or _sized(part, facts)))
+    return list(_settings(part, _preset(part) or _with_defaults(part, facts)))
 
 
-def changed(scenario: Scenario) -> list[SettingAbout]:
+def changed_settings(scenario: Scenario) -> list[SettingAbout]:
     """What the scenario says itself, controllers apart."""
     facts = scenario.facts
     return [
@@ -63,7 +63,7 @@ def _preset(part: Component) -> Component | None:
     return type(part)(**{**plain(node), "preset": name}) if node else None
 
 
-def _sized(part: Component, facts: Facts | None) -> Component | None:
+def _with_defaults(part: Component, facts: Facts | None) -> Component | None:
     """The part with every default, those that follow from the facts too; None without any.
 
     It is read only, and not checked: legs have no points by default.

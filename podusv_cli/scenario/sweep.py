@@ -9,15 +9,15 @@ from pydantic import field_validator, model_validator
 
 from podusv_cli.core.about import Keep, StudyClaim
 from podusv_cli.core.component import OF_SECTION, Component, value
-from podusv_cli.core.timed_rows import Named, named_rows
+from podusv_cli.core.timed_rows import NamedRows, named_rows
 from podusv_cli.scenario.distributions import WAYS, Distribution
-from podusv_cli.scenario.yaml_tree import bracketed
+from podusv_cli.scenario.yaml_tree import bracketed_key
 
 POSTERIOR = "posterior.csv"  # hulls that logs leave possible, in a folder of `podusv identify`
 
 
 @lru_cache(maxsize=16)  # a study asks for it at every draw
-def _lines(text: str) -> Named:
+def _lines(text: str) -> NamedRows:
     return named_rows(text, "`rows`")
 
 
@@ -43,10 +43,10 @@ class Quantity(Distribution):
     @field_validator("keys")
     @classmethod
     def _in_one_form(cls, keys: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(map(bracketed, keys))
+        return tuple(map(bracketed_key, keys))
 
     @property
-    def given(self) -> list[str]:
+    def given_keys(self) -> list[str]:
         """The keys that say how to draw."""
         return [name for name in (*WAYS, "times", "plus", "seed", "rows") if self._says(name)]
 
@@ -62,7 +62,7 @@ class Quantity(Distribution):
         return self.times or self.plus or self
 
     @property
-    def lines(self) -> Named:
+    def lines(self) -> NamedRows:
         """The numbers of `rows`, under the names of keys. Raises ValueError."""
         return _lines(self.rows)
 
@@ -102,7 +102,7 @@ class Quantity(Distribution):
     def _of_numbers(self) -> Self:
         words = [word for word in self.distribution.choice or () if isinstance(word, (str, bool))]
         if self.relative and words:
-            raise ValueError(f"{self.given[0]}: needs numbers, choice has {words[0]!r}")
+            raise ValueError(f"{self.given_keys[0]}: needs numbers, choice has {words[0]!r}")
         return self
 
 

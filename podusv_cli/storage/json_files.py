@@ -19,10 +19,10 @@ Model = TypeVar("Model", bound=BaseModel)
 
 def read(path: Path) -> dict[str, Any]:
     """Read a JSON object; raises StorageError for anything that podusv does not write."""
-    return parsed(read_text(path), path)
+    return parse_json(read_text(path), path)
 
 
-def parsed(text: str, path: Path) -> dict[str, Any]:
+def parse_json(text: str, path: Path) -> dict[str, Any]:
     """As `read`, of the text of the file at `path`."""
     try:
         content = json.loads(
@@ -45,7 +45,9 @@ def read_as(path: Path, model: type[Model]) -> Model:
 def parsed_as(text: str, path: Path, model: type[Model]) -> Model:
     """As `read_as`, of the text of the file at `path`."""
     try:
-        return model.model_validate_json(json.dumps(parsed(text, path)))  # a list is a tuple, too
+        return model.model_validate_json(
+            json.dumps(parse_json(text, path))
+        )  # a list is a tuple, too
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))

@@ -60,13 +60,13 @@ def demand(folder: Path) -> None:
 
 def read(folder: Path) -> Manifest:
     """The manifest of a folder; the files are not checked. Raises StorageError."""
-    return parsed(atomic.read_text(folder / NAME), folder)
+    return parse_manifest(atomic.read_text(folder / NAME), folder)
 
 
-def parsed(text: str, folder: Path) -> Manifest:
+def parse_manifest(text: str, folder: Path) -> Manifest:
     """As `read`, of the text of the folder's manifest."""
     path = folder / NAME
-    content = json_files.parsed(text, path)
+    content = json_files.parse_json(text, path)
     if misfit := other_format(content.get("podusv_format")):
         raise StorageError(f"{path}: {misfit}")
     try:

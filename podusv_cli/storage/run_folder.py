@@ -46,10 +46,10 @@ def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
 
 def free_folder(folder: Path) -> Path:
     """The folder, or where that is taken the same name with a number appended."""
-    return next(path for path in _numbered(folder) if not os.path.lexists(path))
+    return next(path for path in _numbered_folders(folder) if not os.path.lexists(path))
 
 
-def _numbered(folder: Path) -> Iterator[Path]:
+def _numbered_folders(folder: Path) -> Iterator[Path]:
     yield folder
     for number in count(2):
         yield folder.with_name(f"{folder.name}-{number}")
@@ -137,7 +137,7 @@ class RunWriter:
         return self._staging.final
 
     def _publish_beside(self) -> Path:
-        for path in islice(_numbered(self.final), 1, None):
+        for path in islice(_numbered_folders(self.final), 1, None):
             with suppress(Taken):
                 _check_replaceable(path, force=False)
                 self._staging.final = path
@@ -205,7 +205,7 @@ def check_free_space(final: Path, needed: float, remedy: str) -> None:
 
 
 @dataclass(frozen=True)
-class LogFile:
+class UnreadLog:
     """A log.h5 that is read when it is first asked for, once for all who share it."""
 
     path: Path
@@ -243,9 +243,9 @@ class RunFolder:
         return (self.path / LOG).exists()
 
     @cached_property
-    def log(self) -> LogFile:
+    def log(self) -> UnreadLog:
         """Its log, read on first use."""
-        return LogFile(self.path / LOG)
+        return UnreadLog(self.path / LOG)
 
     @property
     def recording(self) -> Recording:

@@ -46,7 +46,7 @@ from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_probe, metrics_with
@@ -125,14 +125,14 @@ def keeps_its_declaration(component: Component) -> None:
 def is_finite(component: Component) -> None:
     """At random states every output is written and finite, and nothing that is only to be read."""
     for seed in range(STATES):
-        for out in evaluated(component, seed):
+        for out in evaluate_component(component, seed):
             assert np.isfinite(out).all(), f"at random state {seed} it writes {out}"
 
 
 def remembers_nothing(component: Component) -> None:
     """The same state gives the same bits, whatever was evaluated in between."""
-    first = [evaluated(component, seed) for seed in range(STATES)]
-    again = [evaluated(component, seed) for seed in reversed(range(STATES))][::-1]
+    first = [evaluate_component(component, seed) for seed in range(STATES)]
+    again = [evaluate_component(component, seed) for seed in reversed(range(STATES))][::-1]
     for seed, (one, other) in enumerate(zip(first, again, strict=True)):
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a, b, f"random state {seed}")
@@ -206,7 +206,7 @@ def picture(sheet: Sheet, count: int, columns: int) -> bytes:
     waves = {name: np.sin(run["time"]) for name in sheet.signals if name not in known}
     about = {name: Signal(name, "1", "a wave") for name in waves}
     run = replace(run, signals={**run.signals, **waves}, about={**run.about, **about})
-    shown = dressed([PastRun(f"run {n}", about_of(scenario), run) for n in range(count)])
+    shown = dress_runs([PastRun(f"run {n}", about_of(scenario), run) for n in range(count)])
     with house_style():
         return image(sheet.family(shown, columns), "png")
 
@@ -237,7 +237,7 @@ def run_with(component: Component, compiled: bool) -> Recording:
     return simulate(loop_with(component), TimeGrid(STEP, STEPS), compiled=compiled)
 
 
-def evaluated(component: Component, seed: int) -> list[Vector]:
+def evaluate_component(component: Component, seed: int) -> list[Vector]:
     """What the component's kernel writes at a random state; NaN where it writes nothing."""
     random = np.random.default_rng(seed)
     t = float(random.uniform(0.0, 300.0))

@@ -42,7 +42,7 @@ class Observed:
 
 
 @dataclass(frozen=True)
-class Condition:
+class GainCondition:
     """A gain and the limit that it must exceed; NaN where a form has no such condition."""
 
     name: str
@@ -83,7 +83,7 @@ class UltimateBound:
 
     corrected: Bound
     printed: Bound
-    conditions: tuple[Condition, ...]
+    conditions: tuple[GainCondition, ...]
 
 
 @dataclass(frozen=True)
@@ -133,14 +133,16 @@ def ultimate_bound(
         _Axis(law.k_psie, law.k_re - 0.5, vessel.m33, A[1], cross),
     )
     return UltimateBound(
-        _corrected(law, axes, observed), _printed(law, axes, observed), _conditions(law, axes)
+        _corrected_bound(law, axes, observed),
+        _printed_bound(law, axes, observed),
+        _conditions(law, axes),
     )
 
 
 Axes = tuple[_Axis, _Axis]
 
 
-def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
     surge, yaw = axes
     candidates = {
         "z_e, y_u": surge.slowest(),
@@ -160,7 +162,7 @@ def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) ->
     return _best(candidates, terms, rates, rooms, observed.drift)
 
 
-def _printed(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
     surge, yaw = axes
     candidates = {
         "z_e": surge.k, "psi_e": yaw.k, "u_e": surge.gain, "r_e": yaw.gain,
@@ -214,7 +216,7 @@ def _half_square(x: float) -> float:
     return x * x / 2.0  # x**2 would raise on overflow
 
 
-def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[Condition, ...]:
+def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[GainCondition, ...]:
     surge, yaw = axes
     why = "must outweigh -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out"
     if surge.cross:
@@ -224,11 +226,11 @@ def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[Condition, ...]:
     leakage = ("Gamma_u", "sigma_u", "Gamma_r", "sigma_r", "gamma_u", "sigma_bu", "gamma_r",
               "sigma_br")  # fmt: skip
     return (
-        Condition("k_ze", law.k_ze, surge.limit(), 0.0, why),
-        Condition("k_psie", law.k_psie, yaw.limit(), 0.0, why),
-        Condition("k_ue", law.k_ue, 0.5, 0.5, half),
-        Condition("k_re", law.k_re, 0.5, 0.5, half),
-        *(Condition(name, getattr(law, name), 0.0, 0.0, leak) for name in leakage),
+        GainCondition("k_ze", law.k_ze, surge.limit(), 0.0, why),
+        GainCondition("k_psie", law.k_psie, yaw.limit(), 0.0, why),
+        GainCondition("k_ue", law.k_ue, 0.5, 0.5, half),
+        GainCondition("k_re", law.k_re, 0.5, 0.5, half),
+        *(GainCondition(name, getattr(law, name), 0.0, 0.0, leak) for name in leakage),
     )
 
 

@@ -10,7 +10,7 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory.course import course
 from podusv_cli.theory.margins import Complex, Cut, Margins, delay_margin, margins, poles, stable
-from podusv_cli.theory.steady import Linear, linearised
+from podusv_cli.theory.steady import Linear, linearise
 
 AXES = {"surge": "u", "yaw": "r"}  # the loops, with the letters that their numbers end in
 NUMBERS = (
@@ -86,7 +86,7 @@ def loop_margins(
             "are those of a law that follows a target with a timetable; take one, as with "
             "--set path.kind=line"
         )
-    linear = linearised(
+    linear = linearise(
         loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
     )
     cuts = {

@@ -106,7 +106,7 @@ def prepare(plan: Plan, compiled: bool) -> None:
         rates_replay(plan, compiled=compiled)
 
 
-def monitored(
+def monitor_recording(
     plan: Plan, recording: Recording,
     *, steady_fraction: float = 0.2, compiled: bool = True, allocate: Allocate = np.empty,
 ) -> Monitored | None:  # fmt: skip
@@ -123,7 +123,7 @@ def monitored(
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(plan, compiled=compiled)
         chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))
-        ideal = ideal_weights.fitted(loop, law, chosen, replayed(chosen))
+        ideal = ideal_weights.fit_weights(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)
         traces: Traces = {}
         for rows in blocks(count, min(BLOCK, max(1, LARGEST_BLOCK // law.network.count))):
@@ -139,7 +139,7 @@ def monitored(
     extended = replace(
         recording,
         signals={**recording.signals, **{name: traces[name] for name in logged}},
-        fixed={**recording.fixed, **_fixed(windows, ideal)},
+        fixed={**recording.fixed, **_fixed_arrays(windows, ideal)},
         about=about(plan),
     )
     return Monitored(extended, windows, traces)
@@ -208,15 +208,15 @@ class _Bounds:
         """The part of the run from a time [s] on."""
         rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
         value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
-        observed = self._observed(rows) if self.continuous and len(value) else None
+        observed = self._observe_rows(rows) if self.continuous and len(value) else None
         bound = bounds.ultimate_bound(self.law, self.loop.vessel, observed)
-        kept = _kept(bound.corrected, value, rate)
+        kept = _share_kept(bound.corrected, value, rate)
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
         sway = bounds.sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])
         return Window(since, observed, bound, sway, _largest(value), largest_v, kept)
 
-    def _observed(self, rows: slice) -> bounds.Observed:
+    def _observe_rows(self, rows: slice) -> bounds.Observed:
         start, ideal = self.law.network.initial_weight, self.ideal
         W = (float(np.linalg.norm(weights - start)) for weights in (ideal.W_u, ideal.W_r))
         return bounds.Observed(
@@ -232,7 +232,7 @@ class _Bounds:
         return bounds.Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
 
 
-def _kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
+def _share_kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
     """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows."""
     if not (np.isfinite(bound.Delta) and len(V)):
         return np.nan
@@ -240,7 +240,9 @@ def _kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
     return sum(int(np.count_nonzero(part)) for part in keeps) / len(V)
 
 
-def _fixed(windows: dict[str, Window], ideal: ideal_weights.IdealWeights) -> dict[str, Vector]:
+def _fixed_arrays(
+    windows: dict[str, Window], ideal: ideal_weights.IdealWeights
+) -> dict[str, Vector]:
     """The arrays of the monitor that are constant in time."""
     parts = windows.values()
     numbers = {

@@ -13,7 +13,7 @@ from podusv_cli.engine.running.replay import Replayed
 
 
 @dataclass(frozen=True)
-class LineOfSight:
+class SightLine:
     """The line of sight to the target at every row; `turn` is -1 while psi_e is folded, else 1."""
 
     turn: Vector
@@ -73,7 +73,7 @@ def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors
     )  # fmt: skip
 
 
-def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> LineOfSight:
+def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> SightLine:
     s, d, u, v = now.signals, now.rates, log["u"], log["v"]
     psi_e, psi_d, distance = s["psi_e"], s["psi_d"], s["z_e"]
     turn = np.where(np.cos(psi_e - psi_d + log["psi"]) < 0.0, -1.0, 1.0)
@@ -87,7 +87,7 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Lin
     w = np.where(held, 0.0, (Q + u * sin_e - v * cos_e) / distance)
     spin = w - log["r"]
     bending = across - P * w + d["u"] * sin_e - d["v"] * cos_e + (u * cos_e + v * sin_e) * spin
-    return LineOfSight(
+    return SightLine(
         turn=turn, side=turn if law.fold == "joint" else np.ones_like(turn),
         distance=distance, distance_rate=distance_rate,
         w=w, w_rate=np.where(held, 0.0, (bending - w * distance_rate) / distance),
@@ -102,7 +102,7 @@ def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
 
 
 def _alpha_u_rate(
-    log: Recording, now: Replayed, law: PolarBackstepping, sight: LineOfSight
+    log: Recording, now: Replayed, law: PolarBackstepping, sight: SightLine
 ) -> Vector:
     """Rate of (21); the paper's X_1 (40) with the true accelerations."""
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]

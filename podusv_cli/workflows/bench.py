@@ -19,7 +19,7 @@ from podusv_cli.studies.bench import optima, standing
 from podusv_cli.studies.bench.bench_folder import draw_figures, write_files
 from podusv_cli.studies.bench.cases import BenchCase, Selection, cases
 from podusv_cli.studies.bench.optima import Least
-from podusv_cli.studies.bench.runs import BenchRun, crashed, play
+from podusv_cli.studies.bench.runs import BenchRun, crashed_run, play
 from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS
 
@@ -40,7 +40,7 @@ class Benched:
         return standing.leaderboards(self.runs)
 
     @property
-    def crashed(self) -> int:
+    def crashed_count(self) -> int:
         """Runs of laws that raised or hung."""
         return int((self.runs.status == "crashed").sum())
 
@@ -73,9 +73,9 @@ def bench(
             scenario.ready()
             if progress:
                 progress("compiling, once", position / len(scenarios))
-        runs = list(_simulated(every, request, progress))
+        runs = list(_simulate_cases(every, request, progress))
         made = standing.table(runs)
-        solved = list(_solved(every, runs, request, progress, extras)) if optimum else []
+        solved = list(_solve_optima(every, runs, request, progress, extras)) if optimum else []
         made = standing.with_optima(made, solved) if solved else made
         with interrupts_deferred():
             figures = draw_figures(runs, made, extras) if request.figures else []
@@ -86,7 +86,7 @@ def bench(
             return Benched(writer.finish(), made, tuple(extras.missing))
 
 
-def _simulated(
+def _simulate_cases(
     every: Sequence[BenchCase], request: Request, progress: Progress | None
 ) -> Iterator[BenchRun]:
     def advance(position: int, fraction: float) -> None:
@@ -100,15 +100,15 @@ def _simulated(
         else:  # its process ended: which law was it?
             for law, single in case.laws.items():
                 (again,) = _run_all([replace(case, laws={law: single})], request)
-                yield from again.result or [crashed(case, law, again.failure)]
+                yield from again.result or [crashed_run(case, law, again.failure)]
 
 
-def _solved(
+def _solve_optima(
     every: Sequence[BenchCase], runs: Sequence[BenchRun], request: Request,
     progress: Progress | None, extras: Extras,
 ) -> Iterator[Least]:  # fmt: skip
     """The optima of all cases; what has none is added to `extras`."""
-    wanted, refused = optima.wanted(every, runs)
+    wanted, refused = optima.wanted_optima(every, runs)
     extras.missing += [Failure("an optimum for some cases", why) for why in refused]
 
     def advance(position: int, fraction: float) -> None:

@@ -24,7 +24,7 @@ def with_margins(
 
     A finished run, and one whose loop has no margins, has none; `extras` says why.
     """
-    named = {pair for claim in claims for pair in _named(claim)}
+    named = {pair for claim in claims for pair in _names_in_claim(claim)}
     wanted = {
         run.label: {n for label, n in named if label == run.label and n in OF_LOOP} for run in runs
     }
@@ -33,14 +33,14 @@ def with_margins(
             why = f"it is finished: podusv margins {run.folder}/resolved.yaml"
             extras.missing.append(Failure(f"margins of {run.folder.name}", why))
     return [
-        _measured(run, made[run.label], wanted[run.label], extras)
+        _with_margins(run, made[run.label], wanted[run.label], extras)
         if wanted[run.label] and run.label in made
         else run
         for run in runs
     ]
 
 
-def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
+def _names_in_claim(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
     """The runs and what of them stands in a claim's expressions."""
     for tree in filter(None, (claim.expect, claim.given)):
         for node in ast.walk(tree):
@@ -49,7 +49,7 @@ def _named(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
                     yield label, name
 
 
-def _measured(run: PastRun, scenario: Scenario, wanted: set[str], extras: Extras) -> PastRun:
+def _with_margins(run: PastRun, scenario: Scenario, wanted: set[str], extras: Extras) -> PastRun:
     what = f"margins of {run.label}"
     if extras.interrupted:
         return run

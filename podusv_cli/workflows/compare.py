@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 from podusv_cli.comparison import claims, outputs, table
 from podusv_cli.comparison.differences import differences
 from podusv_cli.comparison.known_metrics import metrics_of
-from podusv_cli.comparison.optimum import related
+from podusv_cli.comparison.optimum import with_optimum_ratios
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.finding import Finding, merge_findings
 from podusv_cli.core.past_run import PastRun
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.findings.finding import finding_kinds
@@ -29,16 +29,16 @@ from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
 from podusv_cli.scenario.case import Case
-from podusv_cli.scenario.limits import Size, estimate, needed
+from podusv_cli.scenario.limits import Size, disk_needed, estimate
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
 from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
 from podusv_cli.workflows.claimed_margins import with_margins
-from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
+from podusv_cli.workflows.execute import RunTask, execute, warm_up, why_unwritten
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import RESULTS, check_asked, opened, writer_of
+from podusv_cli.workflows.run import RESULTS, check_asked, open_scenario, writer_of
 from podusv_cli.workflows.verify import is_verified
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Compared:
 
     def warnings(self) -> list[Finding]:
         """The findings about the runs made for this comparison, before and after them."""
-        return merged(self.result.warnings)
+        return merge_findings(self.result.warnings)
 
     def _run_as_json(self, run: PastRun) -> dict[str, Any]:
         """As `podusv run --json`, without what is missing; timing only of runs made now."""
@@ -126,7 +126,7 @@ def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
             f"--doubt moves the values of one scenario, and {given} is given; name that alone, or "
             "run podusv doubt on each"
         )
-    loaded = opened(items[0], replace(request, warn=lambda finding: None), (doubt_faults,))
+    loaded = open_scenario(items[0], replace(request, warn=lambda finding: None), (doubt_faults,))
     comparison(loaded)
     return loaded
 
@@ -141,14 +141,14 @@ def compare_gathered(
     """
     check_asked(request, [member.plugins for member in given.members])
     _check_metrics(request, given.members)
-    for finding in merged({member.label: member.noticed for member in given.members}):
+    for finding in merge_findings({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     text = "".join(f"{member.label}\n{member.resolved}" for member in given.members)
     target = request.out or default_folder(RESULTS, given.name, text)
     _keep_apart(items, target)
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
         outcomes = make_runs(given.members, writer.folder, request, progress)
-        lost = unwritten(outcomes.values())
+        lost = why_unwritten(outcomes.values())
         extras = writer.extras
         extras.interrupted = any(outcome.interrupted for outcome in outcomes.values())
         result = collect(given.members, outcomes, given.claims, extras)
@@ -182,7 +182,7 @@ def _check_metrics(request: Request, members: Sequence[Member]) -> None:
     known = dict.fromkeys((*plugged, *own, *logged))
     for name in request.metrics:
         if name not in known:
-            raise UsageError(unknown(f"metric {name!r}", name, known, "podusv list metrics"))
+            raise UsageError(unknown_word(f"metric {name!r}", name, known, "podusv list metrics"))
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
@@ -199,7 +199,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
-    space = needed(sizes(members), request.workers or available_workers())
+    space = disk_needed(sizes(members), request.workers or available_workers())
     return writer_of(request, target, space)
 
 
@@ -219,7 +219,7 @@ def make_runs(
         for _, case in wanted:
             warm_up(case, request.compiling)
     tasks = [
-        Task(
+        RunTask(
             case.scenario, member.text, folder / member.label,
             argv=request.argv, label=member.label, noticed=member.noticed,
         )
@@ -251,8 +251,8 @@ def collect(
     opened_runs = [
         folders[m.label].as_run(m.label, m.about, m.plugins) for m in members if m.label in folders
     ]
-    members = _placed(members, opened_runs)
-    runs = [*opened_runs, *_measured(members, opened_runs)]
+    members = _place_measured(members, opened_runs)
+    runs = [*opened_runs, *_as_finished_runs(members, opened_runs)]
     messages = {run.label: run.recording.message for run in runs}
     endings = {
         m.label: outcomes.get(m.label, Outcome()).failure or messages.get(m.label, "")
@@ -261,11 +261,11 @@ def collect(
     for label, done in finished.items():
         extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
     made = {m.label: m.case for m in members if m.case and m.label in finished}
-    runs = related(_with_costs(runs, made, extras), extras)
+    runs = with_optimum_ratios(_with_costs(runs, made, extras), extras)
     runs = _with_departures(runs, members)
     scenarios = {label: case.scenario for label, case in made.items()}
     runs = with_margins(runs, scenarios, parsed, extras)
-    every = {m.label: PastRun.lost(m.label, m.about, endings[m.label]) for m in members}
+    every = {m.label: PastRun.without_log(m.label, m.about, endings[m.label]) for m in members}
     every |= {run.label: run for run in runs}
     numbers = {label: run.compared_metrics() for label, run in every.items()}
     abouts = {m.label: m.about for m in members}
@@ -277,18 +277,20 @@ def collect(
         endings=endings,
         differences=differences({label: about.values for label, about in abouts.items()}),
         table=table.table(numbers, known),
-        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, every, known))
+        verdicts=extras.make_or_record(
+            "the claims' verdicts", lambda: claims.judge(parsed, every, known)
+        )
         or [],
         timings={label: done.timing for label, done in finished.items()},
         metrics=known,
         peaks=claims.peaks(parsed),
         plugins=plugins,
-        meanings=extras.made("what the warnings mean", lambda: _meanings(plugins)) or {},
+        meanings=extras.make_or_record("what the warnings mean", lambda: _meanings(plugins)) or {},
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
 
 
-def _placed(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
+def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
     """The members; what was measured where it is to stand, with what the runs show of it."""
     logs = {run.label: run.recording for run in runs if len(run.recording["time"])}
     done = [_done_after(m.about, logs[m.label]) for m in members if m.label in logs]
@@ -297,7 +299,7 @@ def _placed(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
         if member.track and logs:
             label, first = next(iter(logs.items()))
             remarks = member.track.beside_speeds(label, first)
-            track = member.track.placed(label, first)
+            track = member.track.place_beside(label, first)
             remarks = [*track.remarks, *remarks]
             about = track.about(member.about, max(done))
             member = replace(member, track=track, noticed=remarks, about=about)
@@ -310,7 +312,7 @@ def _done_after(about: RunAbout, log: Recording) -> float:
     return float(log.up_to(about.path_end)["time"][-1]) if about.path_end else math.inf
 
 
-def _measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[PastRun]:
+def _as_finished_runs(members: Sequence[Member], runs: Sequence[PastRun]) -> list[PastRun]:
     """What was measured as a run, with the target of the first of the others that has a log."""
     logs = (run.recording for run in runs)
     first = next((log for log in logs if len(log["time"])), None)
@@ -321,7 +323,7 @@ def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list
     """The runs; the simulated ones with how far they are from the measured track, if any."""
     measured = {m.label: m.track for m in members if m.track}
     return [
-        replace(run, cost={**run.cost, **track.departures(run.counted)})
+        replace(run, cost={**run.cost, **track.departures(run.counted_recording)})
         if run.label not in measured
         else run
         for track in measured.values()
@@ -359,7 +361,9 @@ def _add_report(
     """Draw the figures that are asked for, and write the report, which has them as PNG."""
     figures: dict[str, bytes] = {}
     if request.figures:
-        draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
+        draw = partial(
+            outputs.draw_comparison, result, extras, progress, request.names, request.formats
+        )
         figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
         if name.partition(".")[2] in request.formats:

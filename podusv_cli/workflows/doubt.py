@@ -31,13 +31,13 @@ from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.resolved import resolved_yaml
-from podusv_cli.scenario.yaml_tree import find, placed
+from podusv_cli.scenario.yaml_tree import find, tree_with
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.doubt_study import doubt_study
-from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
+from podusv_cli.workflows.execute import examine, monitor_case, summary, warm_up
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import RESULTS, opened, writer_of
+from podusv_cli.workflows.run import RESULTS, open_scenario, writer_of
 
 Progress = Callable[[str, float], None]
 
@@ -49,7 +49,7 @@ def doubt(config: Path, request: Request, progress: Progress | None = None) -> o
     tried so far. Raises UsageError without claims, ScenarioError, StorageError.
     """
     checks = (unknown_codes, limits(request.allow_large), doubt_faults)
-    loaded = opened(config, request, checks)
+    loaded = open_scenario(config, request, checks)
     if loaded.scenario.sweep and loaded.scenario.sweep.claims:
         return doubt_study(config, loaded, request, progress)
     return doubt_of(loaded, request, progress)
@@ -63,7 +63,7 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
         interrupts_deferred(),
         writer_of(request, target) as writer,
     ):
-        report, writer.extras.interrupted = doubted(world, scenario, request, progress)
+        report, writer.extras.interrupted = doubt_subject(world, scenario, request, progress)
         outputs.write(writer, report, loaded.text, figures=request.figures)
         return outputs.Doubted(
             writer.finish(), report.answers, writer.status, tuple(writer.extras.missing)
@@ -89,29 +89,33 @@ def comparison(loaded: Loaded) -> Subject:
         )
     named = {label for claim in parsed for label in labels_of(claim.claim)}
 
-    def judged(scenario: Scenario) -> Singles:
+    def judge_comparison(scenario: Scenario) -> Singles:
         singles = with_loads(scenario.singles())
         return {label: single for label, single in singles.items() if label in named}
 
     hulls = find(loaded.root, ("doubt", "hulls"))
     others = {
-        node.content: judged(loaded.changed(placed("vessel.preset", node, loaded.root)))
+        node.content: judge_comparison(
+            loaded.merge_over(tree_with("vessel.preset", node, loaded.root))
+        )
         for node in (hulls.content if hulls else ())
     }
-    return Subject(parsed, judged(loaded.scenario), others)
+    return Subject(parsed, judge_comparison(loaded.scenario), others)
 
 
-def doubted(
+def doubt_subject(
     subject: Subject, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, bool]:
     """All that is tried, and what it says of every claim; whether an interrupt ended it."""
     cases = {label: Case.of(single) for label, single in subject.singles.items()}
     for case in cases.values():
-        examined(case)
+        examine(case)
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
-        runs = {label: _simulated(label, case, subject.parsed) for label, case in cases.items()}
+        runs = {
+            label: _simulate_in_memory(label, case, subject.parsed) for label, case in cases.items()
+        }
     judge, asked = judging(subject, runs), scenario.doubt or Doubt()
     moving = choices(subject.singles, asked)
     parsed = {claim.name: claim.claim for claim in subject.parsed}
@@ -136,9 +140,9 @@ def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
     def judge(world: World) -> Judged:
         labels = dict.fromkeys(label for label, _ in world)
         try:
-            moved = {label: _changed(subject, label, world) for label in labels}
+            moved = {label: _change_scenario(subject, label, world) for label in labels}
             made = {
-                label: _simulated(label, Case.of(new), subject.parsed)
+                label: _simulate_in_memory(label, Case.of(new), subject.parsed)
                 for label, new in moved.items()
             }
         except PodusvError as error:
@@ -152,17 +156,17 @@ def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
     return judge
 
 
-def _changed(subject: Subject, label: str, world: World) -> Scenario:
+def _change_scenario(subject: Subject, label: str, world: World) -> Scenario:
     new = {at: value for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
     single = (subject.hulls[hull] if hull else subject.singles)[label]
     return with_values(single, new)
 
 
-def _simulated(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> PastRun:
+def _simulate_in_memory(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> PastRun:
     """A run in memory, with what a comparison adds to it that these claims name."""
     recording = to_end(case.plan, compiled=case.scenario.simulation.compiled)
-    whole, _ = monitored(case, recording)
+    whole, _ = monitor_case(case, recording)
     numbers = summary(case, recording, Extras())
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)

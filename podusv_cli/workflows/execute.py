@@ -65,7 +65,7 @@ class Stopwatch:
 
 
 @dataclass(frozen=True)
-class Task:
+class RunTask:
     """A scenario, its file's text, where its run folder goes, how it is called and drawn.
 
     `named`: the user asked for this folder. `noticed` is what was found before the run. A log of
@@ -115,7 +115,7 @@ class Finished:
 
 
 def execute(
-    task: Task, progress: Progress | None = None, watch: Stopwatch | None = None,
+    task: RunTask, progress: Progress | None = None, watch: Stopwatch | None = None,
     case: Case | None = None,
 ) -> Finished:  # fmt: skip
     """Simulate, measure, write, draw; `target` is there only when all of it is.
@@ -131,38 +131,46 @@ def execute(
     with (
         interrupts_deferred(),
         folder.RunWriter(
-            task.target, force=task.force, named=task.named, needed=size.needed, argv=task.argv
+            task.target,
+            force=task.force,
+            named=task.named,
+            needed=size.bytes_needed,
+            argv=task.argv,
         ) as writer,
     ):
         long = size.content > task.held and not task.scenario.log.compress
         allocate = partial(files.disk_array, writer.folder) if long else np.empty
-        recording = simulated(case, watch, progress, allocate, task.compiling)
+        recording = simulate_case(case, watch, progress, allocate, task.compiling)
         extras = writer.extras
         extras.interrupted = recording.status == "interrupted"
         with watch.part("metrics"):
             gather = partial(summary, case, recording, extras)
-            metrics = extras.made("the metrics", gather) or {}
+            metrics = extras.make_or_record("the metrics", gather) or {}
             metrics |= extras.attempt("the law's cost", lambda: _cost(case, recording)) or {}
         with watch.part("theory"):
-            whole, theory = extras.made(
+            whole, theory = extras.make_or_record(
                 "theory.json with the stability monitor's signals",
-                lambda: monitored(case, recording, allocate),
+                lambda: monitor_case(case, recording, allocate),
             ) or (recording, {})
         with watch.part("write"):
-            whole = _logged(writer, case, whole, again=long)
+            whole = _write_log(writer, case, whole, again=long)
         with watch.part("metrics"):
-            noticed = extras.made("warnings", lambda: postflight(task.scenario, whole))
+            noticed = extras.make_or_record("warnings", lambda: postflight(task.scenario, whole))
         warnings = *task.noticed, *(noticed or ())
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
-            about = extras.made(f"{folder.ABOUT}, which figures need,", lambda: case.about)
+            about = extras.make_or_record(
+                f"{folder.ABOUT}, which figures need,", lambda: case.about
+            )
             if about:
                 facts = about.model_dump(exclude_defaults=True)
                 writer.add_json(folder.ABOUT, {"format": 1, **facts})
             if theory:
                 writer.add_json("theory.json", theory)
         with watch.part("figures"):
-            figures = extras.attempt("figures", lambda: _drawn(task, whole, about, extras)) or {}
+            figures = (
+                extras.attempt("figures", lambda: _draw_figures(task, whole, about, extras)) or {}
+            )
             for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
@@ -177,7 +185,7 @@ def execute(
     )  # fmt: skip
 
 
-def unwritten(outcomes: Iterable[Outcome]) -> str:
+def why_unwritten(outcomes: Iterable[Outcome]) -> str:
     """Why a run could not be written, "" where none failed for that.
 
     A result without such a run is not worth an older one's place. Raises StorageError where there
@@ -202,7 +210,7 @@ def warm_up(case: Case, compiling: Progress | None = None) -> None:
         monitor.prepare(case.plan, compiled)
 
 
-def examined(case: Case) -> list[Finding]:
+def examine(case: Case) -> list[Finding]:
     """The findings about a scenario whose figures, law and path are asked before.
 
     Raises LawError.
@@ -212,7 +220,7 @@ def examined(case: Case) -> list[Finding]:
     return find_before_run(case)
 
 
-def simulated(
+def simulate_case(
     case: Case, watch: Stopwatch, progress: Progress | None = None,
     allocate: Allocate = np.empty, compiling: Progress | None = None,
 ) -> Recording:  # fmt: skip
@@ -252,12 +260,12 @@ def _cost(case: Case, recording: Recording) -> dict[str, float]:
     return timed | operations(case.plan, recording)
 
 
-def monitored(
+def monitor_case(
     case: Case, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
     plan, scenario = case.plan, case.scenario
-    monitored_run = scenario.log.monitor and monitor.monitored(
+    monitored_run = scenario.log.monitor and monitor.monitor_recording(
         plan, recording,
         steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
         allocate=allocate,
@@ -267,7 +275,7 @@ def monitored(
     return monitored_run.recording, theory_report(plan.loop, plan.grid, monitored_run)
 
 
-def _logged(
+def _write_log(
     writer: folder.RunWriter, case: Case, recording: Recording, *, again: bool
 ) -> Recording:
     """Write log and scenario; the recording, `again` with its signals as they lie in the log.
@@ -287,7 +295,7 @@ def _logged(
 
 
 def _write(
-    writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float],
+    writer: folder.RunWriter, task: RunTask, recording: Recording, metrics: dict[str, float],
     warnings: Sequence[Finding],
 ) -> None:  # fmt: skip
     writer.add("scenario.yaml", task.text.encode())
@@ -301,14 +309,17 @@ def _write(
     writer.add("metrics.csv", csv_files.lines([("metric", "value", "unit"), *rows]).encode())
 
 
-def _drawn(
-    task: Task, recording: Recording, about: RunAbout | None, extras: Extras
+def _draw_figures(
+    task: RunTask, recording: Recording, about: RunAbout | None, extras: Extras
 ) -> dict[str, bytes]:
     if not (task.figures and about):
         return {}
-    from podusv_cli.figures.drawing import chosen, draw_in_parallel  # matplotlib is slow to import
-    from podusv_cli.figures.shown import dressed
+    from podusv_cli.figures.drawing import (  # matplotlib is slow to import
+        choose_sheets,
+        draw_in_parallel,
+    )
+    from podusv_cli.figures.shown import dress_runs
 
     label = task.label or recording.controller
-    shown = dressed([PastRun(label, about, recording, plugins=task.scenario.plugged)])
-    return draw_in_parallel(shown, chosen(task.names, shown, extras), ("png",), extras)
+    shown = dress_runs([PastRun(label, about, recording, plugins=task.scenario.plugged)])
+    return draw_in_parallel(shown, choose_sheets(task.names, shown, extras), ("png",), extras)

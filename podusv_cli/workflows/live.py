@@ -17,24 +17,24 @@ from typing import Any
 
 from podusv_cli.core.errors import PodusvError, ScenarioError, StorageError, UsageError, in_a_line
 from podusv_cli.core.past_run import PastRun
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.engine.running.simulate import run
 from podusv_cli.figures.chase import chase
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.traces import FIRST, traces
 from podusv_cli.findings.finding import find_before_run, postflight, unknown_codes
 from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.address import ValueRefused, with_values
 from podusv_cli.scenario.case import Case
-from podusv_cli.scenario.controls import Control, controls
+from podusv_cli.scenario.controls import Knob, controls
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.scenario.resolved import yaml_text
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted, plain, route
-from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted_key, plain, route
+from podusv_cli.workflows.execute import Stopwatch, monitor_case, simulate_case, summary
 
 FRAMES = 300  # places of a track on the map
 WHOLE = ("simulation", "control", "log", "metrics")  # sections of which numbers are loaded, too
@@ -54,9 +54,9 @@ class Live:
     _puts: dict[str, tuple[Any, Case]] = field(default_factory=dict)  # the last one of each law
     _bases: dict[str, tuple[dict[str, Case], bool]] = field(default_factory=dict)  # by words
 
-    def loaded(self, moved: Moved) -> Loaded:
+    def load(self, moved: Moved) -> Loaded:
         """The scenario with the values moved. Raises ScenarioError."""
-        moves, checks = [*self.given, *assigned(moved)], (unknown_codes, limits())
+        moves, checks = [*self.given, *assignments_of(moved)], (unknown_codes, limits())
         return load(self.source, moves, checks, plugged=of_files(self.trust))
 
     def singles(self, scenario: Scenario) -> dict[str, Scenario]:
@@ -64,10 +64,10 @@ class Live:
         known = scenario.singles()
         for law in self.laws:
             if law not in known:
-                raise UsageError(unknown(f"controller {law!r}", law, known))
+                raise UsageError(unknown_word(f"controller {law!r}", law, known))
         return {law: known[law] for law in self.laws or known}
 
-    def controls(self, scenario: Scenario) -> list[Control]:
+    def controls(self, scenario: Scenario) -> list[Knob]:
         """All that may be moved."""
         several = scenario.controllers
         laws = (
@@ -83,9 +83,9 @@ class Live:
         if lacking := [key for key in wanted if key not in asked]:
             return {"refused": [{"key": "", "text": f"the question lacks {', '.join(lacking)}"}]}
         try:
-            moved = self.allowed(asked["moved"])
+            moved = self.check_offered(asked["moved"])
             if name == "save":
-                return self.saved(moved, str(asked["name"]))
+                return self.save(moved, str(asked["name"]))
             return self.frame(moved, asked["signals"], asked["rest"], asked["controls"])
         except ScenarioError as error:
             faults = [fault for fault in error.faults if isinstance(fault, Fault)]
@@ -99,7 +99,7 @@ class Live:
             traceback.print_exc()
             return {"refused": [{"key": "", "text": f"{in_a_line(error)}; the terminal has more"}]}
 
-    def allowed(self, moved: Mapping[str, Any]) -> Moved:
+    def check_offered(self, moved: Mapping[str, Any]) -> Moved:
         """Numbers and words at keys that the page was offered. Raises UsageError for others.
 
         So no page can name a plug-in or a file. Of a shared address, kinds come before their keys.
@@ -107,7 +107,7 @@ class Live:
         if not moved.keys() <= self.offered.keys():
             kinds = {key: kind for key, kind in moved.items() if key.endswith(".kind")}
             known = kinds if kinds.keys() <= self.offered.keys() else {}
-            self.controls(self.loaded(known).scenario)
+            self.controls(self.load(known).scenario)
         for key, value in moved.items():
             words = self.offered.get(key, ("",))
             if not (value in words if words else isinstance(value, (int, float))):
@@ -126,7 +126,7 @@ class Live:
         if rest or wanted:
             self._bases.clear()
             self._puts.clear()
-            loaded = self.loaded(moved)
+            loaded = self.load(moved)
             cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
         else:
             cases = self._moving(moved)
@@ -137,7 +137,7 @@ class Live:
         runs, findings, numbers = [], dict[str, list[str]](), {}
         for label, case in cases.items():
             if rest:
-                recording, _ = monitored(case, simulated(case, Stopwatch()))
+                recording, _ = monitor_case(case, simulate_case(case, Stopwatch()))
                 for found in (*find_before_run(case), *postflight(case.scenario, recording)):
                     findings.setdefault(str(found), []).append(label)
             else:
@@ -149,7 +149,7 @@ class Live:
                 raise KeyboardInterrupt  # which a march takes for its own end
             numbers[label] = summary(case, recording, Extras())
             runs.append(PastRun(label, case.about, recording, plugins=scenario.plugged))
-        shown = dressed(runs)
+        shown = dress_runs(runs)
         told: dict[str, Any] = {
             "chase": chase(shown, FRAMES),
             "curves": traces(shown, [n for n in signals or FIRST if any(r.has(n) for r in shown)]),
@@ -172,7 +172,7 @@ class Live:
         words = {k: x for k, x in moved.items() if isinstance(x, str) or route(k)[0] in WHOLE}
         known = json.dumps(words)
         if known not in self._bases:
-            loaded = self.loaded(words)
+            loaded = self.load(words)
             cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
             self._bases = {known: (cases, "nominal" in loaded.root.mapping)}
         cases, told = self._bases[known]
@@ -196,7 +196,7 @@ class Live:
         except ValueRefused as error:
             own = f"controllers.{label}" if self.laws or self._labels[1:] else "controller"
             place, _, said = str(error).partition(": ")  # where no single value is to blame
-            key = dotted(error.steps).replace("controller", own, 1) or place
+            key = dotted_key(error.steps).replace("controller", own, 1) or place
             text = str(error) if error.steps else said
             raise ScenarioError([Fault(Mark(self.source), key, text)]) from error
         made, path, approach = (
@@ -219,21 +219,21 @@ class Live:
         """The command line that makes the same runs."""
         verb = "compare" if len(self.laws or self._labels) > 1 else "run"
         only = ["--controller", self.laws[0]] if len(self.laws) == 1 else []
-        sets = [word for text in (*self.given, *assigned(moved)) for word in ("--set", text)]
+        sets = [word for text in (*self.given, *assignments_of(moved)) for word in ("--set", text)]
         return shlex.join(["podusv", verb, self.source, *only, *sets])
 
     @cached_property
     def _labels(self) -> tuple[str, ...]:
-        return self.loaded({}).scenario.labels()
+        return self.load({}).scenario.labels()
 
-    def saved(self, moved: Moved, name: str) -> dict[str, Any]:
+    def save(self, moved: Moved, name: str) -> dict[str, Any]:
         """Write what differs into NAME.yaml in this folder. Raises StorageError where it is there.
 
         It loads to the very scenario that is shown, or is written whole.
         """
         if not re.fullmatch(r"\w[\w-]*", name):
             raise UsageError(f"{name!r} is no name; letters, digits, _ and -")
-        file, loaded = Path(f"{name}.yaml"), self.loaded(moved)
+        file, loaded = Path(f"{name}.yaml"), self.load(moved)
         changed: dict[str, Any] = {}
         for key in [*(text.partition("=")[0] for text in self.given), *moved]:
             steps, inner, node = route(key), changed, loaded.root
@@ -256,7 +256,7 @@ class Live:
         return {"file": str(file.resolve()), "text": text, "command": f"podusv {verb} {file}"}
 
 
-def assigned(moved: Moved) -> list[str]:
+def assignments_of(moved: Moved) -> list[str]:
     """Values as `--set` takes them."""
     return [
         f"{key}={value if isinstance(value, str) else json.dumps(value)}"
@@ -271,7 +271,7 @@ def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> li
         {
             "name": a.name, "row": a.row, "unit": "" if a.unit == "1" else a.unit,
             "values": [
-                own[a.name] if math.isfinite(own.get(a.name, math.nan)) else a.undefined
+                own[a.name] if math.isfinite(own.get(a.name, math.nan)) else a.undefined_word
                 for own in numbers.values()
             ],
         }

@@ -18,7 +18,7 @@ from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import opened, single
+from podusv_cli.workflows.run import open_scenario, single
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def margins(config: Path, request: Request, at: float | None = None) -> MarginsO
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
-    loaded = opened(config, request, checks)
+    loaded = open_scenario(config, request, checks)
     duration, label = loaded.scenario.simulation.duration, request.controller
     if at is not None and at > duration:
         raise UsageError(f"--at {at:g}: the run ends at {duration:g} s; give an earlier time")

@@ -101,10 +101,14 @@ def runs_of(path: Path, *, optional: str = "") -> list[RunFolder]:
     """
     if (path / STUDY).is_file():
         raise UsageError(_about_study(path))
-    inner = _listed(path, optional) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
+    inner = (
+        _find_listed(path, optional)
+        if os.path.lexists(path / manifest.NAME)
+        else _find_unlisted(path)
+    )
     if not inner:
         manifest.demand(path)
-    return [_checked(child, optional) for child in (inner or [path])]
+    return [_check_member(child, optional) for child in (inner or [path])]
 
 
 def _about_study(path: Path) -> str:
@@ -117,13 +121,13 @@ def _about_study(path: Path) -> str:
     )
 
 
-def _unlisted(path: Path) -> list[Path]:
+def _find_unlisted(path: Path) -> list[Path]:
     """Run folders inside a folder that has no manifest; links are not followed."""
     children = sorted(path.iterdir()) if path.is_dir() else ()
     return [c for c in children if not c.is_symlink() and os.path.lexists(c / LOG)]
 
 
-def _listed(path: Path, optional: str) -> list[Path]:
+def _find_listed(path: Path, optional: str) -> list[Path]:
     """The runs of a finished comparison, or of one made again, in its order; none in a run."""
     files = manifest.check(path, optional).files
     runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
@@ -144,7 +148,7 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _checked(path: Path, optional: str) -> RunFolder:
+def _check_member(path: Path, optional: str) -> RunFolder:
     run = open_run(path, optional=optional)
     if run.has_log and (wrong := _fault(run.recording)):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
@@ -181,11 +185,11 @@ def _fault(log: Recording) -> str:
 def distinct(members: Iterable[Member]) -> list[Member]:
     """The members, in order, each with a label of its own."""
     members = list(members)
-    labels = numbered([member.label for member in members], taken=RESERVED)
+    labels = number_names([member.label for member in members], taken=RESERVED)
     return [replace(member, label=label) for member, label in zip(members, labels, strict=True)]
 
 
-def numbered(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+def number_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """The names; repeated ones and those `taken` get a number: pid, pid_2, ...
 
     Some file systems do not tell upper from lower case, so neither does this.

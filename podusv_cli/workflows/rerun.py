@@ -17,7 +17,7 @@ from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.case import Case
-from podusv_cli.scenario.limits import limits, needed
+from podusv_cli.scenario.limits import disk_needed, limits
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_folder
@@ -25,7 +25,7 @@ from podusv_cli.storage import manifest, run_folder
 from podusv_cli.storage.run_folder import LOG, RunFolder
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
-from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
+from podusv_cli.workflows.execute import Finished, RunTask, execute, why_unwritten
 from podusv_cli.workflows.members import Member, runs_of
 from podusv_cli.workflows.request import Request
 
@@ -119,8 +119,8 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
         target, text = request.out or place / "again", original.resolved_yaml
-        task = Task(scenario, text, target, request.force, argv=request.argv)
-        return Repetition({label: _repeated(original, execute(task, advance))}, {})
+        task = RunTask(scenario, text, target, request.force, argv=request.argv)
+        return Repetition({label: _hold_against(original, execute(task, advance))}, {})
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
@@ -133,15 +133,19 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
     ]  # fmt: skip
     with _passing(request) as place:
         target = request.out or place / "again"
-        room = needed(sizes(again), available_workers())
+        room = disk_needed(sizes(again), available_workers())
         with run_folder.RunWriter(
             target, force=request.force, needed=room, argv=request.argv
         ) as writer:
             outcomes = make_runs(again, writer.folder, request, progress)
-            missing = unwritten(outcomes.values())
+            missing = why_unwritten(outcomes.values())
             ended = zip((run for run, _ in runs), outcomes.items(), strict=True)
             done = Repetition(
-                {label: _repeated(run, end.result) for run, (label, end) in ended if end.result},
+                {
+                    label: _hold_against(run, end.result)
+                    for run, (label, end) in ended
+                    if end.result
+                },
                 {label: end.failure for label, end in outcomes.items() if not end.result},
             )
             # the order in which compare and rerun take them, as no table here has it
@@ -166,7 +170,7 @@ def _passing(request: Request) -> Iterator[Path]:
         staging.discard()
 
 
-def _repeated(original: RunFolder, done: Finished) -> Repeated:
+def _hold_against(original: RunFolder, done: Finished) -> Repeated:
     """A run that was made once more, held against the original."""
     differing = difference(original, run_folder.open_run(done.folder))
     return Repeated(

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Node, find, plain, route
 from podusv_cli.storage import files, json_files
@@ -46,7 +46,7 @@ class _Session(BaseModel):
     duration_s: float = 0.0
 
 
-class _Origin(_Session):
+class _RunOrigin(_Session):
     sittings: list[_Session] = []
 
 
@@ -99,7 +99,7 @@ def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRu
     if not known:
         raise UsageError(f"--sort {sort}: there is no run below {root}, and only runs have metrics")
     if sort not in known:
-        raise UsageError(unknown(f"metric {sort!r}", sort, known, "podusv list metrics"))
+        raise UsageError(unknown_word(f"metric {sort!r}", sort, known, "podusv list metrics"))
     measured = (run for run in every if run.kind == "run")
     return sorted(measured, key=lambda run: run.metrics.get(sort, math.inf))
 
@@ -120,7 +120,7 @@ def _read(folder: Path, mark: str) -> ListedRun:
         about = json_files.read_as(folder / mark, model) if model else _Told()
         ending, origin = (
             _if_there(folder / MANIFEST, _Ending),
-            _if_there(folder / PROVENANCE, _Origin),
+            _if_there(folder / PROVENANCE, _RunOrigin),
         )
         text = files.read_text(folder / scenario) if scenario else ""
     except StorageError:
@@ -150,7 +150,7 @@ def _holding(every: Sequence[ListedRun], condition: str) -> list[ListedRun]:
     values = {folder: find(tree, route(key)) for folder, tree in trees.items()}
     if trees and not any(values.values()):
         known = dict.fromkeys(name for tree in trees.values() for name in _keys(tree))
-        wrong = unknown(f"key {key!r}", key, known, "podusv explain")
+        wrong = unknown_word(f"key {key!r}", key, known, "podusv explain")
         raise UsageError(f"--where {condition}: {wrong}")
     return [
         run for run in every if (node := values.get(run.folder)) and plain(node) == plain(wanted)

@@ -11,13 +11,13 @@ from pathlib import Path
 from string import Template
 
 from podusv_cli.components.actuators.pod import Pods
-from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimated
+from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimate_vessel
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core import units
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
-from podusv_cli.core.phrases import unknown
-from podusv_cli.core.plugins import installed
+from podusv_cli.core.phrases import unknown_word
+from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.findings.finding import finding_kinds, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load_text
@@ -84,22 +84,22 @@ def start(boat: Boat, out: Path) -> Path:
     the file exists.
     """
     hull, thrusters = _hull(boat)
-    return _written(out, _of_dimensions(hull, thrusters, known=bool(boat.speed)))
+    return _write_new(out, _of_dimensions(hull, thrusters, known=bool(boat.speed)))
 
 
 def start_from(preset: str, out: Path) -> Path:
     """The same for a vessel of podusv whose thrusters are known, too."""
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
-        raise UsageError(unknown(f"boat {preset!r}", preset, known))
-    return _written(out, _of_preset(preset))
+        raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
+    return _write_new(out, _of_preset(preset))
 
 
-def _written(out: Path, text: str) -> Path:
+def _write_new(out: Path, text: str) -> Path:
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
     _check(text, out)
-    plugins, schema = installed(), out.with_name(SCHEMA)
+    plugins, schema = installed_plugins(), out.with_name(SCHEMA)
     storage.make_folder(out.parent)
     known = schema_text(tuple(finding_kinds(plugins)), plugins)
     storage.write_all({out: text.encode(), schema: known.encode()})
@@ -190,7 +190,7 @@ def _thrusters(boat: Boat) -> Thrusters:
             f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
         )
     if turn > TURN:
-        degrees = turn <= 90.0 and not units.parted(boat.turn)
+        degrees = turn <= 90.0 and not units.split_quantity(boat.turn)
         way = f"; write {boat.turn}deg" if degrees else ""
         raise UsageError(f"--turn {boat.turn}: more than 90 deg to either side{way}")
     if count == 1 and not turn:
@@ -199,10 +199,10 @@ def _thrusters(boat: Boat) -> Thrusters:
 
 
 def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
-    numbers = {name: float(f"{x:.3g}") for name, x in estimated(hull).items()}
+    numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
-    return _filled(title, boat, "\n".join(_study(numbers)))
+    return _fill_template(title, boat, "\n".join(_study(numbers)))
 
 
 def _of_preset(preset: str) -> str:
@@ -210,10 +210,10 @@ def _of_preset(preset: str) -> str:
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
     )
-    return _filled(f"{preset} of podusv with its thrusters.", boat, "")
+    return _fill_template(f"{preset} of podusv with its thrusters.", boat, "")
 
 
-def _filled(title: str, boat: str, study: str) -> str:
+def _fill_template(title: str, boat: str, study: str) -> str:
     scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)

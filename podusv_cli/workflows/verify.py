@@ -39,12 +39,14 @@ def verify(
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
-    scenario = load(config, overrides, checks, plugins, of_files(trust)).told(warn).scenario
+    scenario = (
+        load(config, overrides, checks, plugins, of_files(trust)).warn_of_dropped(warn).scenario
+    )
     if out:
         files.check_places([out])
         _spare(out, force)
     done = verification.verify(scenario, tolerance, progress)
-    if not done.unconverged and tolerance <= TOLERANCE:
+    if not done.unconverged_by_run and tolerance <= TOLERANCE:
         _remember(map(resolved_yaml, scenario.singles().values()))
     return done
 

@@ -89,7 +89,9 @@ def test_without_any_place_it_compiles_leaves_nothing_and_says_so(folder, monkey
     monkeypatch.setattr(tempfile, "tempdir", str(folder / "tmp"))
     for name in ("PODUSV_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, "/dev/null/nowhere")
-    assert compile.compiled(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))(7.0) == wrap(7.0)
+    assert compile.compile_piece(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))(7.0) == wrap(
+        7.0
+    )
     (told,) = caplog.messages
     assert told.startswith("podusv: compiled code is not kept, so each command compiles anew; set")
     assert {path.name for path in folder.rglob("*")} == {"a.yaml", "tmp"}

@@ -30,7 +30,7 @@ from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.files import fingerprint
 from podusv_cli.storage.log_reader import read_log
-from podusv_cli.workflows.execute import Task, execute
+from podusv_cli.workflows.execute import RunTask, execute
 
 ROOT = Path(__file__).parents[2]
 CORRECTED = str(ROOT / "configs/mu_2017/corrected.yaml")
@@ -131,7 +131,7 @@ def test_one_worker_and_many_write_the_same_bytes(tmp_path):
     ]
     for workers in (1, 4):
         folders = [tmp_path / str(workers) / str(i) for i in range(len(gains))]
-        tasks = [Task(s, SOUND, folder) for s, folder in zip(scenarios, folders, strict=True)]
+        tasks = [RunTask(s, SOUND, folder) for s, folder in zip(scenarios, folders, strict=True)]
         outcomes = run_all([partial(execute, task) for task in tasks], workers=workers)
         assert not any(outcome.failure for outcome in outcomes)
     for i in range(len(gains)):
@@ -150,7 +150,7 @@ def test_one_worker_and_many_write_the_same_bytes(tmp_path):
 def test_code_for_other_instruction_sets_writes_the_same_bytes(processor, tmp_path):
     words = ["simulation.duration=20"]
     scenario = load(CORRECTED, words).scenario.alone()
-    here = execute(Task(scenario, Path(CORRECTED).read_text(), tmp_path / "here")).folder
+    here = execute(RunTask(scenario, Path(CORRECTED).read_text(), tmp_path / "here")).folder
     cache = str(tmp_path / "cache")
     there = tmp_path / "there"
     python("-c", ELSEWHERE, CORRECTED, str(there), processor, *words, PODUSV_CACHE=cache)

@@ -109,7 +109,9 @@ def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path):
         folder = tmp_path / str(share)
         with pytest.raises(StorageError, match="the disk is full"):
             written_within(folder, begun + share * (needed - begun))
-        kept.append(sum(int(m.sum()) for m in Store(folder, about(small())).covered().values()))
+        kept.append(
+            sum(int(m.sum()) for m in Store(folder, about(small())).covered_draws().values())
+        )
         assert content(made(folder)) == content(whole)
     assert 0 == kept[0] < kept[1] < kept[2] < 2 * small().sweep.draws
 

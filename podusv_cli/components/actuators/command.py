@@ -53,7 +53,7 @@ class Command(Component):
     )
 
 
-class Failure(Component):
+class EffectivenessLoss(Component):
     """A loss of effectiveness at a time."""
 
     time: float = value(
@@ -66,7 +66,7 @@ class Failure(Component):
 
 
 @kernel
-def rounded(demand: float, resolution: float) -> float:
+def round_to(demand: float, resolution: float) -> float:
     """The nearest multiple of the resolution, of two the even one; as it is for resolution 0."""
     if resolution > 0.0:
         count = demand / resolution
@@ -90,11 +90,11 @@ def _inner(
     """Stands for an actuator's `drive`."""
 
 
-def _lost(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+def _lose_nothing(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
     """Stands for an actuator's `lose`."""
 
 
-def _commanded(
+def _drive_commanded(
     t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
     tau: Vector, rate: Vector, signals: Vector,
 ) -> None:  # fmt: skip
@@ -102,8 +102,8 @@ def _commanded(
     given = scratch(DRIVEN)
     for i in range(DRIVEN):
         given[i] = demand[i]
-    given[0] = beyond(rounded(demand[0], k.command_resolution_u), k.command_dead_zone_u)
-    given[1] = beyond(rounded(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+    given[0] = beyond(round_to(demand[0], k.command_resolution_u), k.command_dead_zone_u)
+    given[1] = beyond(round_to(demand[1], k.command_resolution_r), k.command_dead_zone_r)
     signals[0], signals[1] = given[0], given[1]
     _inner(t, x, state, given, k, table, tau, rate, tail(signals, LOGGED))
 
@@ -115,14 +115,14 @@ def _failing(
     """`drive`, and what is left of its loads in steps that begin after the failure."""
     _inner(t, x, state, demand, k, table, tau, rate, signals)
     if demand[BEGAN] >= k.failure_time:
-        _lost(state, k, table, tau, signals)
+        _lose_nothing(state, k, table, tau, signals)
 
 
 @cache
-def commanded(drive: Drive) -> Drive:
+def with_command_path(drive: Drive) -> Drive:
     """A kernel with the command path before `drive`; the same one for the same kernel."""
     inner = taking(drive, DRIVE)
-    made: Drive = specialise(_commanded, f"{drive.__qualname__}_commanded", _inner=inner)
+    made: Drive = specialise(_drive_commanded, f"{drive.__qualname__}_commanded", _inner=inner)
     return made
 
 

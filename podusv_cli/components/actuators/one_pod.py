@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from podusv_cli.components.actuators.command import Failure
+from podusv_cli.components.actuators.command import EffectivenessLoss
 from podusv_cli.core.component import Component, value
 
 
@@ -86,7 +86,7 @@ class Pod(Component):
         ]  # fmt: skip
 
 
-class PodFailure(Failure):
+class PodFailure(EffectivenessLoss):
     """A pod's loss of thrust at a time."""
 
     pod: int = value(..., "", "the pod that fails, from 0", ge=0)

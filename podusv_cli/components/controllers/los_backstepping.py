@@ -47,7 +47,7 @@ def sight(x: Vector, target: Vector, k: Any) -> float:
 
 
 @kernel
-def turned(memory: Vector, sighted: float, w: float, rate: Vector) -> None:
+def filter_angle(memory: Vector, sighted: float, w: float, rate: Vector) -> None:
     """Rates of the filtered angle and of its two derivatives: a triple pole at -w."""
     rate[1], rate[2] = memory[2], memory[3]
     rate[3] = w * (w * (w * wrap(sighted - memory[1]) - 3.0 * memory[2]) - 3.0 * memory[3])
@@ -127,6 +127,6 @@ class LosBackstepping(Controller):
         tau[0] = k.m11 * faster - k.X_u * u - k.k1 * z_u
         tau[1] = k.m33 * turn - k.N_v * v - k.N_r * r - k.k3 * z_r - z1
         tau[1] += 0.0 if k.sway == LEFT_OUT else k.m32 * rate[0]
-        turned(memory, sighted, k.w, rate)
+        filter_angle(memory, sighted, k.w, rate)
         signals[0], signals[1], signals[2], signals[3] = z1, z_u, v - alpha_2, z_r
         signals[4] = wrap(sighted)

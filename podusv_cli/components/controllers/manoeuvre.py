@@ -26,7 +26,7 @@ STEERING = Signal(
 
 
 @kernel
-def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> None:
+def steer_thrust(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> None:
     """The demand of a thrust that acts `lever` behind the origin and steers at `angle` [rad].
 
     A side of 1 is starboard, -1 port; between them it is the mean over a step in which the side
@@ -39,7 +39,7 @@ def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> 
 
 
 @kernel
-def begun(t: float, k: Any) -> bool:
+def has_begun(t: float, k: Any) -> bool:
     """Whether the trial has begun at this instant; t is a whole number of steps, but rounded."""
     return bool(t > k.execute - NEAR)
 

@@ -23,11 +23,11 @@ from podusv_cli.components.controllers.momentum_adaptation import (
     adapt,
     answer_force,
 )
-from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
+from podusv_cli.components.controllers.momentum_guidance import guidance, level_gain, see_target
 from podusv_cli.components.controllers.momentum_schedule import (
     neutral,
     pace,
-    paced,
+    pace_constants,
     schedule,
     sway_answer,
 )
@@ -104,7 +104,7 @@ class MomentumVector(VelocitySteering):
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
         """With the neutral point, the gains at its pace and the yaw rate that N_m allows."""
         own = neutral(nominal, self.thrust_lever)
-        own |= paced(nominal.m33, self.N_m, self.Q0, self.S0)
+        own |= pace_constants(nominal.m33, self.N_m, self.Q0, self.S0)
         own["fastest"] = min(self.r_m, math.sqrt(self.N_m / nominal.m33))
         return super().constants_with(nominal) | own
 
@@ -124,9 +124,9 @@ class MomentumVector(VelocitySteering):
         signals: Vector,
     ) -> None:  # fmt: skip
         """Yaw first, as far as sway bears it; surge as far as the velocity points the right way."""
-        at, v, r, v_l = seen(x, target, k), x[4], x[5], memory[LOAD_SWAY]
+        at, v, r, v_l = see_target(x, target, k), x[4], x[5], memory[LOAD_SWAY]
         closing = at.e_a * (at.t_a - x[3]) + at.e_b * (at.t_b - v)
-        along = levelled(at.k_p, at, closing)
+        along = level_gain(at.k_p, at, closing)
         V_a, V_b = at.t_a + along.kappa * at.e_a, at.t_b + along.kappa * at.e_b
         V = max(math.sqrt(V_a * V_a + V_b * V_b), k.V_m)
         more = memory[MORE] * k.m22 / k.neutral_mass

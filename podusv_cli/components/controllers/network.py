@@ -62,7 +62,7 @@ class Network(Component):
     )
 
     @model_validator(mode="after")
-    def _spanned(self) -> Self:
+    def _check_span(self) -> Self:
         if not self.centers and any(n < 1 for n in self.nodes):
             raise ValueError(f"every axis needs at least one node, got {list(self.nodes)}")
         if self.count > MOST_NODES:

@@ -173,9 +173,9 @@ class PolarBackstepping(TrackingController):
         count = self.network.count
         learnt = each(BOUNDS) + each(W_HAT, count)
         shortfall = each(SHORTFALL) if self.wants_loads() else ()
-        return HELD + learnt + self.filtered() + self.swaying() + shortfall
+        return HELD + learnt + self.filter_slots() + self.swaying() + shortfall
 
-    def filtered(self) -> Slots:
+    def filter_slots(self) -> Slots:
         """The filter's output, where there is a filter."""
         return ()
 
@@ -255,7 +255,7 @@ class FilteredBackstepping(PolarBackstepping):
         "alpha", "", "filter output at the start: 0, or the virtual control"
     )
 
-    def filtered(self) -> Slots:
+    def filter_slots(self) -> Slots:
         """(beta_u, beta_r)."""
         return each(FILTERED)
 

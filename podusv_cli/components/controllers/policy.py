@@ -31,7 +31,7 @@ RELU, CLIP = 1.0, 1.0  # the places of "relu" and "clip" among the choices, as k
 
 
 @kernel
-def observed(x: Vector, target: Vector, signals: Vector) -> None:
+def observe(x: Vector, target: Vector, signals: Vector) -> None:
     """Write what a policy is given of a state and a target into `signals`, as `OBSERVED`.
 
     The heading error is that of (19): the direction of the target less the heading, in [-pi, pi].
@@ -96,7 +96,7 @@ class Policy(Controller):
         return content
 
     @model_validator(mode="after")
-    def _given(self) -> Self:
+    def _check_weights(self) -> Self:
         if self.content is None:
             raise ValueError(
                 "weights is missing; name a safetensors file, as in weights: policy.safetensors"
@@ -127,7 +127,7 @@ class Policy(Controller):
         """The network's outputs, squashed, times (surge, yaw)."""
         hidden, width, inputs = int(k.hidden), int(k.width), INPUTS
         given, out = work, tail(work, max(inputs, width))
-        observed(x, target, given)
+        observe(x, target, given)
         for i in range(inputs):
             given[i] = (given[i] - table[i]) / table[INPUTS + i]
         weights = tail(table, 2 * INPUTS)

@@ -21,9 +21,9 @@ from podusv_cli.components.controllers.rover import (
     STEERING_I,
     THROTTLE_I,
     Rover,
-    approached,
+    approach_speed,
     beyond,
-    clipped,
+    clip,
     kept_within,
     path_course,
 )
@@ -51,7 +51,7 @@ def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
 @kernel
 def wanted_turn(off: float, k: Any) -> float:
     """Wanted yaw rate for a heading error [rad/s]; 0 below the threshold."""
-    return beyond(clipped(k.yaw_P * off, k.r_m), k.r_least)
+    return beyond(clip(k.yaw_P * off, k.r_m), k.r_least)
 
 
 class Px4(Rover):
@@ -110,7 +110,7 @@ class Px4(Rover):
     @kernel
     def sample(x: Vector, memory: Vector, target: Vector, k: Any) -> None:
         """Begin and end turning on the spot; integrals of what is not wanted begin anew."""
-        off = heading_error(x, target, approached(x, target, k.catch_up, k), k)
+        off = heading_error(x, target, approach_speed(x, target, k.catch_up, k), k)
         bound = k.drives_at if memory[TURNS] > 0.0 else k.stops_at
         memory[TURNS] = 1.0 if abs(off) > bound else 0.0
         memory[THROTTLE_I] *= 1.0 - memory[TURNS]
@@ -123,18 +123,18 @@ class Px4(Rover):
         signals: Vector,
     ) -> None:  # fmt: skip
         """Steering first; the wanted speed is what it leaves room for."""
-        u_d = approached(x, target, k.catch_up, k)
+        u_d = approach_speed(x, target, k.catch_up, k)
         r_d = wanted_turn(heading_error(x, target, u_d, k), k)
         u_d *= 1.0 - memory[TURNS]
         r_e = r_d - beyond(x[5], k.r_least)
-        fed_back = clipped(k.rate_P * r_e + memory[STEERING_I], 1.0)
-        steering = clipped(k.rate_FF * r_d + fed_back, 1.0) if r_d != 0.0 else 0.0
+        fed_back = clip(k.rate_P * r_e + memory[STEERING_I], 1.0)
+        steering = clip(k.rate_FF * r_d + fed_back, 1.0) if r_d != 0.0 else 0.0
         room = 1.0 - abs(steering) if k.mixing == SHARED else 1.0
         u_d = min(u_d, room / k.speed_FF)
         speed = beyond(math.sqrt(x[3] * x[3] + x[4] * x[4]), k.u_least)
         u_e = u_d - (speed if x[3] >= 0.0 else -speed)
-        fed_back = clipped(k.speed_P * u_e + memory[THROTTLE_I], 1.0)
-        throttle = clipped(k.speed_FF * u_d + fed_back, room) if u_d > 0.0 else 0.0
+        fed_back = clip(k.speed_P * u_e + memory[THROTTLE_I], 1.0)
+        throttle = clip(k.speed_FF * u_d + fed_back, room) if u_d > 0.0 else 0.0
         tau[0], tau[1] = k.surge * throttle, k.yaw * steering
         learns_r = k.rate_I * r_e if r_d != 0.0 else 0.0
         learns_u = k.speed_I * u_e if u_d > 0.0 else 0.0

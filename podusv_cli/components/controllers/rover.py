@@ -35,7 +35,7 @@ SHARED = 0.0  # the place of "shared" among the choices of `mixing`
 
 
 @kernel
-def clipped(number: float, most: float) -> float:
+def clip(number: float, most: float) -> float:
     """`number` within +-`most`."""
     return min(max(number, -most), most)
 
@@ -61,7 +61,7 @@ def path_course(x: Vector, target: Vector) -> float:
 
 
 @kernel
-def approached(x: Vector, target: Vector, gain: float, k: Any) -> float:
+def approach_speed(x: Vector, target: Vector, gain: float, k: Any) -> float:
     """The target's speed, and `gain` [1/s] times how far it is ahead, within U."""
     e_x, e_y = target[0] - x[0], target[1] - x[1]
     speed = math.sqrt(target[2] * target[2] + target[3] * target[3])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
-from podusv_cli.components.controllers.base import Slots, Trial, each
-from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, begun, steered
+from podusv_cli.components.controllers.base import ManoeuvreTrial, Slots, each
+from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, has_begun, steer_thrust
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -51,9 +51,9 @@ class Zigzag(Steering):
         """The side, the heading of the approach, the side at the end of the step, the last look."""
         return each(MEMORY)
 
-    def trial(self) -> Trial:
+    def trial(self) -> ManoeuvreTrial:
         """With the change of heading at which steering is reversed."""
-        return Trial("zig-zag", self.execute, self.switch)
+        return ManoeuvreTrial("zig-zag", self.execute, self.switch)
 
     def sample_period(self) -> float:
         """As often as the heading is looked at."""
@@ -69,7 +69,7 @@ class Zigzag(Steering):
         steering is right.
         """
         side = memory[AT_NEXT]
-        if side == 0.0 and begun(t, k):
+        if side == 0.0 and has_begun(t, k):
             side, memory[AT_HEADING] = 1.0, x[2]
         memory[AT_SIDE] = memory[AT_NEXT] = side
         left = k.switch - side * (x[2] - memory[AT_HEADING])
@@ -83,6 +83,6 @@ class Zigzag(Steering):
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """At the angle, to the side of the moment."""
-        steered(k.angle if memory[AT_NEXT] != 0.0 else 0.0, memory[AT_SIDE], k, tau, signals)
+        steer_thrust(k.angle if memory[AT_NEXT] != 0.0 else 0.0, memory[AT_SIDE], k, tau, signals)
         for i in range(SIZE):
             rate[i] = 0.0

@@ -42,7 +42,12 @@ from pydantic import Field, model_validator
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import WAVE_MOTION, Disturbance
-from podusv_cli.components.disturbances.reflection import BOW_AND_STERN, SIDES, Curve, reflected
+from podusv_cli.components.disturbances.reflection import (
+    BOW_AND_STERN,
+    SIDES,
+    ReflectionCurve,
+    interpolate_shares,
+)
 from podusv_cli.components.disturbances.torsethaugen import (
     HIGHEST,
     LONGEST,
@@ -74,9 +79,11 @@ Share = Literal["curve"] | Annotated[float, Field(ge=0, le=1)]
 ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
 
 
-def _shares(chosen: Share, curve: Curve, size: Vector) -> Vector:
+def _shares(chosen: Share, curve: ReflectionCurve, size: Vector) -> Vector:
     """The reflected share of each component."""
-    return reflected(curve, size) if chosen == "curve" else np.full(len(size), float(chosen))
+    return (
+        interpolate_shares(curve, size) if chosen == "curve" else np.full(len(size), float(chosen))
+    )
 
 
 class Waves(Disturbance):
@@ -143,7 +150,7 @@ class Waves(Disturbance):
             )
         if self.spectrum == "torsethaugen":
             self._suits_torsethaugen()
-        kept = self._kept()
+        kept = self._kept_share()
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
@@ -161,7 +168,7 @@ class Waves(Disturbance):
                 f"the torsethaugen spectrum holds up to {HIGHEST:g} m and below {LONGEST:g} s, "
                 f"found {self.height:g} m and {self.period:g} s"
             )
-        kept = self._kept()
+        kept = self._kept_share()
         if kept < BOTH:
             ratio = self.period / peaks(self.height, self.period)[1].period
             bound = f"lowest {0.6 * ratio:.2g}" if ratio < 1.0 else f"highest {3.0 * ratio:.2g}"
@@ -219,7 +226,7 @@ class Waves(Disturbance):
     def _density(self, rate: Vector) -> Vector:
         return DENSITY[self.spectrum](self, rate)
 
-    def _kept(self) -> float:
+    def _kept_share(self) -> float:
         """The share of the spectrum's energy that the cut-offs leave."""
         edges = spectra.even_edges(*self._band, BINS)
         return math.fsum(spectra.in_bins(self._density, edges)) / (self.height / 4.0) ** 2

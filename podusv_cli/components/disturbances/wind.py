@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import Disturbance
-from podusv_cli.components.disturbances.spectra import GROUP, cleared
+from podusv_cli.components.disturbances.spectra import GROUP, clear_sums
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
@@ -30,7 +30,7 @@ def _gust(t: float, count: int, table: Vector) -> float:
     """The sum of all components, by sixteen partial sums, in groups of four."""
     sums = scratch(GROUP)
     widest()
-    cleared(GROUP, sums)
+    clear_sums(GROUP, sums)
     for block in range(count // GROUP):
         for j in range(GROUP):
             i = block * GROUP + j

@@ -62,7 +62,7 @@ INNOVATIONS = (
 
 
 @kernel
-def unpacked(packed: Vector, full: Vector) -> None:
+def unpack_triangle(packed: Vector, full: Vector) -> None:
     """A symmetric matrix from its upper triangle."""
     at = 0
     for i in range(N):
@@ -76,7 +76,7 @@ def unpacked(packed: Vector, full: Vector) -> None:
 def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
     """P' = F P + P F^T + Q; F has entries in rows 0 to 5 and columns 2 to 8 alone."""
     full, moved = scratch(81), scratch(81)
-    unpacked(packed, full)
+    unpack_triangle(packed, full)
     for i in range(MOVING):
         for j in range(N):
             total = 0.0
@@ -101,7 +101,7 @@ def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -
     """
     full, ph = scratch(81), scratch(9)
     packed = tail(state, N)
-    unpacked(packed, full)
+    unpack_triangle(packed, full)
     variance = sigma * sigma
     for j in range(N):
         ph[j] = 0.0

@@ -82,7 +82,7 @@ def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rat
 
 
 @kernel
-def simplified(state: Vector, k: Any, b: Vector) -> None:
+def add_nonlinear_forces(state: Vector, k: Any, b: Vector) -> None:
     """Add to the load what leaves linear damping alone of the nominal vessel's forces."""
     u, v, r = state[3], state[4], state[5]
     less = lacking(u, v, r, k)
@@ -162,7 +162,7 @@ class PassiveObserver(Estimator):
         b[1] = cosine * east - sine * north
         b[2] = state[LOAD + 2] + k.K_4_psi * e_psi
         if k.model != 0.0:
-            simplified(state, k, b)
+            add_nonlinear_forces(state, k, b)
         plant(state, tau, b, k, rate)
         u, v = state[3], state[4]
         axis(0, cosine * u - sine * v, e_x, k.K_3, state, k, rate)

@@ -41,7 +41,9 @@ def force_slopes(
 
 
 @kernel
-def accelerated(column: int, surge: float, sway: float, yaw: float, k: Any, f: Vector) -> None:
+def accelerate_column(
+    column: int, surge: float, sway: float, yaw: float, k: Any, f: Vector
+) -> None:
     """Put M^-1 (surge, sway, yaw) into rows 3 to 5 of a column of F."""
     determinant = k.m22 * k.m33 - k.m23 * k.m32
     f[3 * WIDTH + column] = surge / k.m11
@@ -67,8 +69,8 @@ def slopes(
     f[2 * WIDTH + 5] = 1.0
     force_slopes(u, v, r, unsure_v, unsure_r, k, s)
     for i in range(3):
-        accelerated(3 + i, s[i], s[3 + i], s[6 + i], k, f)
-    accelerated(2, b[1], -b[0], 0.0, k, f)
-    accelerated(6, cosine, -sine, 0.0, k, f)
-    accelerated(7, sine, cosine, 0.0, k, f)
-    accelerated(8, 0.0, 0.0, 1.0, k, f)
+        accelerate_column(3 + i, s[i], s[3 + i], s[6 + i], k, f)
+    accelerate_column(2, b[1], -b[0], 0.0, k, f)
+    accelerate_column(6, cosine, -sine, 0.0, k, f)
+    accelerate_column(7, sine, cosine, 0.0, k, f)
+    accelerate_column(8, 0.0, 0.0, 1.0, k, f)

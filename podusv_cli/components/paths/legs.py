@@ -74,7 +74,7 @@ class Legs(Path):
     )  # fmt: skip
 
     @model_validator(mode="after")
-    def _travelled(self) -> Self:
+    def _check_way(self) -> Self:
         self._traveller()
         return self
 

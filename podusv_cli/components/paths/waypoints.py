@@ -73,7 +73,7 @@ class Waypoints(Path):
     )  # fmt: skip
 
     @model_validator(mode="after")
-    def _travelled(self) -> Self:
+    def _check_way(self) -> Self:
         if len(self.points) < 2:
             raise ValueError(f"needs at least two points, has {len(self.points)}")
         with np.errstate(all="ignore"):

@@ -73,7 +73,7 @@ class Hull(NamedTuple):
         return 0.5 * min(self.top_speed, self.slow)
 
 
-def estimated(hull: Hull) -> dict[str, float]:
+def estimate_vessel(hull: Hull) -> dict[str, float]:
     """Numbers of `Vessel` by name; the linear damping in sway and yaw is that at `hull.cruise`.
 
     - `I_z`: a radius of gyration of 0.25 L.

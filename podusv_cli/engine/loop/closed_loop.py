@@ -154,7 +154,7 @@ class ClosedLoop:
         if texts:
             raise LawError("; ".join(texts))
 
-    def estimated(self) -> tuple[Signal, ...]:
+    def estimate_signals(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""
         return self.estimator.states if self.measured else ()
 
@@ -169,6 +169,6 @@ class ClosedLoop:
         others = (
             *((partial(describe, part), signals) for part, signals in self.disturbance.told()),
             (partial(describe, self.measurement), self.measurement.signals),
-            (partial(describe, self.estimator), self.estimated()),
+            (partial(describe, self.estimator), self.estimate_signals()),
         )
         return signal.by_name((loop, path, (partial(describe, law), law.declared()), own, *others))

@@ -120,7 +120,7 @@ class Plan:
         slots = [part.name for part, size in loop.controller.slots() for _ in range(size)]
         return {
             "vessel": [*STATE], "actuator": _names(loop.actuator.states),
-            "estimator": _names(loop.estimated()), "path": _names(loop.path.places), "law": slots,
+            "estimator": _names(loop.estimate_signals()), "path": _names(loop.path.places), "law": slots,
         }  # fmt: skip
 
     @cached_property

@@ -42,7 +42,11 @@ def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
 def digest(function: Any, prototype: Any, compiler: str) -> str:
     """What a kernel is kept under; empty where its file is gone, or edited since it was loaded."""
     try:
-        words = [compiler, _typed(prototype), *object_cache.ingredients(function, {}, written)]
+        words = [
+            compiler,
+            _name_type(prototype),
+            *object_cache.ingredients(function, {}, source_of),
+        ]
     except (OSError, kernel_source.OtherSource):
         return ""
     return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
@@ -70,7 +74,7 @@ def write(kernels: Mapping[str, bytes]) -> None:
     FILE.write_bytes(lzma.compress(whole, preset=9))
 
 
-def written(function: Any) -> tuple[str, ...]:
+def source_of(function: Any) -> tuple[str, ...]:
     """A function as its file has it; of one that podusv wrote out itself, the whole text."""
     code = function.__code__
     if (text := function.__globals__.get(TEXT)) is not None:
@@ -82,14 +86,14 @@ def written(function: Any) -> tuple[str, ...]:
     return code.co_name, "".join(inspect.getblock(lines))
 
 
-def _typed(kind: Any) -> str:
+def _name_type(kind: Any) -> str:
     """A type of ctypes, alike on all systems."""
     if kind is None:
         return "none"
     if issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
-        return f"{_typed(kind._restype_)}({','.join(map(_typed, kind._argtypes_))})"
+        return f"{_name_type(kind._restype_)}({','.join(map(_name_type, kind._argtypes_))})"
     if issubclass(kind, ctypes._Pointer):
-        return f"{_typed(kind._type_)}*"
+        return f"{_name_type(kind._type_)}*"
     if issubclass(kind, ctypes.Array):
-        return f"{kind._length_}x{_typed(kind._type_)}"
+        return f"{kind._length_}x{_name_type(kind._type_)}"
     return f"{'f' if kind is ctypes.c_double else 'i'}{ctypes.sizeof(kind)}"

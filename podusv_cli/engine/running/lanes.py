@@ -194,7 +194,7 @@ class LaneSorter:
     def _is_worth(self, plan: Plan) -> bool:
         return self._instants >= WORTH or is_compiled(plan)
 
-    def sorted(self, vectors: Vectors, run: Any) -> list[Any]:
+    def sort_in(self, vectors: Vectors, run: Any) -> list[Any]:
         """The runs to start now that this one is ready."""
         if not self.advance:
             return [run]

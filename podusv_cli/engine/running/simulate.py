@@ -14,8 +14,8 @@ from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.running.check import asked, check_law
-from podusv_cli.engine.running.thread import Ending, MarchStatus, marched
+from podusv_cli.engine.running.check import ask_part, check_law
+from podusv_cli.engine.running.thread import Ending, MarchStatus, march
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
@@ -60,11 +60,11 @@ def run(
     vectors, last = plan.vectors(grid.rows, allocate), layout.steps + 1
     advance = partial(marcher(plan, compiled)(vectors, layout, grid.step), 0, last)
     with np.errstate(all="ignore"), interrupts_deferred():
-        ending = marched(
+        ending = march(
             advance, last, vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
-        return replace(recorded(plan, vectors, ending), about=about)
+        return replace(recording_of(plan, vectors, ending), about=about)
 
 
 def to_end(
@@ -85,7 +85,7 @@ def ready(plan: Plan, compiled: bool, compiling: Callable[[float], None] | None 
     """
     check_law(plan)
     plan.loop.check_fit(plan.grid.step)
-    asked(lambda: "the closed loop", plan.vectors)
+    ask_part(lambda: "the closed loop", plan.vectors)
     marcher(plan, compiled, compiling)
 
 
@@ -121,7 +121,7 @@ def marcher(
     return over
 
 
-def recorded(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
+def recording_of(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
     """The recording of a march that ended so, its signals views of the log."""
     layout, law = plan.layout, plan.loop.controller
     rows = -(-ending.reached // layout.log_every)

@@ -28,7 +28,7 @@ from podusv_cli.engine.step.layout import (
     Layout,
     Parts,
     Vectors,
-    shifted,
+    shift_state,
     spread,
 )
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
@@ -130,13 +130,13 @@ def step(t: float, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     k1 = c.stages
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
-    shifted(count, s, 0.5 * h, k1, y)
+    shift_state(count, s, 0.5 * h, k1, y)
     load(t + 0.5 * h, y, p, c, n, False, True)
     rates(t + 0.5 * h, y, k2, p, c, n, False)
-    shifted(count, s, 0.5 * h, k2, y)
+    shift_state(count, s, 0.5 * h, k2, y)
     load(t + 0.5 * h, y, p, c, n, True, True)
     rates(t + 0.5 * h, y, k3, p, c, n, True)
-    shifted(count, s, h, k3, y)
+    shift_state(count, s, h, k3, y)
     load(t + h, y, p, c, n, False, True)
     rates(t + h, y, k4, p, c, n, False)
     for i in range(count):

@@ -13,7 +13,7 @@ from podusv_cli.engine.step.layout import (
     Function,
     Layout,
     Vectors,
-    shifted,
+    shift_state,
 )
 
 
@@ -41,11 +41,11 @@ def remember(
     k2, k3, k4 = tail(k1, n.states), tail(k1, 2 * n.states), tail(k1, 3 * n.states)
     y = tail(k1, 4 * n.states)
     held_rates(t, memory, k1, law, after, c, n)
-    shifted(count, memory, 0.5 * h, k1, y)
+    shift_state(count, memory, 0.5 * h, k1, y)
     held_rates(t + 0.5 * passing, y, k2, law, after, c, n)
-    shifted(count, memory, 0.5 * h, k2, y)
+    shift_state(count, memory, 0.5 * h, k2, y)
     held_rates(t + 0.5 * passing, y, k3, law, after, c, n)
-    shifted(count, memory, h, k3, y)
+    shift_state(count, memory, h, k3, y)
     held_rates(t + passing, y, k4, law, after, c, n)
     for i in range(count):
         memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])

@@ -19,7 +19,13 @@ from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.messages import TIME
 from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
-from podusv_cli.identify.logs.reading import UNITS, clock_of, delivered, listed, parted
+from podusv_cli.identify.logs.reading import (
+    UNITS,
+    clock_of,
+    list_names,
+    mark_new_values,
+    split_unit,
+)
 
 SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
@@ -92,13 +98,13 @@ class Listing:
         for own in self.columns:
             if own.quantity:
                 unit = f" [{own.unit}]" if own.unit else ""
-                lines.append(f"  {own.quantity}: {_in_quotes(parted(own.name)[0] + unit)}")
+                lines.append(f"  {own.quantity}: {_in_quotes(split_unit(own.name)[0] + unit)}")
         known = {own.quantity for own in self.columns}
         lacking = [names[0] for names in NEEDED if not known & {*names}]
         lines += [f"  # {name}: ?   (not guessed; see podusv docs identify)" for name in lacking]
         left = [visible(own.name) for own in self.columns if not own.quantity]
         if left:
-            lines.append(f"  # columns not guessed: {listed(left)}")
+            lines.append(f"  # columns not guessed: {list_names(left)}")
         if self.turned:
             lines.append("frame: enu  # ROS counts x to the east, y to the north, turns to port")
         return lines
@@ -121,7 +127,7 @@ def listing(path: Path) -> Listing:
     for column, reason in _no_clocks(contents):
         doubts.append(f"{column!r} is not taken for {TIME}: it {reason}")
     return Listing(
-        [_listed(name, columns, guesses) for name in columns],
+        [_list_column(name, columns, guesses) for name in columns],
         any(name.endswith("orientation.yaw") for name in guesses),
         tuple(f"{path.name}: {line}." for line in (*contents.warnings, *doubts)),
     )
@@ -153,18 +159,18 @@ def _no_clocks(contents: Contents) -> Iterator[tuple[str, str]]:
             yield column, contents.doubts.get(column, "has no number")
 
 
-def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
+def _list_column(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
     values, quantity = columns[name], guesses.get(name, "")
     known = values[np.isfinite(values)]
     ends = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     seconds = _duration(name, columns, guesses)
-    rate = float(np.sum(delivered(values))) / seconds if seconds > 0.0 else np.nan
+    rate = float(np.sum(mark_new_values(values))) / seconds if seconds > 0.0 else np.nan
     unit = _unit(name, columns, guesses) if quantity else ""
     missing = 1.0 - len(known) / max(len(values), 1)
-    return Listed(name, rate, *ends, missing, _numbered(quantity, name, guesses), unit)
+    return Listed(name, rate, *ends, missing, _number_name(quantity, name, guesses), unit)
 
 
-def _numbered(quantity: str, name: str, guesses: dict[str, str]) -> str:
+def _number_name(quantity: str, name: str, guesses: dict[str, str]) -> str:
     """`n_2` for the second of several."""
     alike = [column for column, guess in guesses.items() if guess == quantity]
     return quantity.replace("#", str(alike.index(name) + 1)) if quantity else ""
@@ -197,7 +203,7 @@ def _may_be_clock(column: str, columns: Columns) -> bool:
 
 def _plain(column: str) -> str:
     """A name in small letters, without its unit, but that of a propeller's speed."""
-    own, unit = parted(column)
+    own, unit = split_unit(column)
     if unit == "rpm":
         own = f"{own} rpm"
     name = own.lower().replace("-", "_").removesuffix("_")
@@ -207,7 +213,7 @@ def _plain(column: str) -> str:
 
 def _unit(name: str, columns: Columns, guesses: dict[str, str]) -> str:
     """Of a column: in brackets, at the end of its name, or by its range."""
-    quantity, (own, unit) = guesses[name], parted(name)
+    quantity, (own, unit) = guesses[name], split_unit(name)
     values, _ = without_none(columns[name])
     if unit:
         return unit

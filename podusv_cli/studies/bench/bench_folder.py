@@ -25,10 +25,10 @@ def draw_figures(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -
 
     `made` is `standing.table` of the runs.
     """
-    from podusv_cli.figures.sketch import rendered
+    from podusv_cli.figures.sketch import render_sketches
     from podusv_cli.studies.bench.figures import sketches  # matplotlib is slow to import
 
-    return rendered(sketches(runs, made), extras)[1]
+    return render_sketches(sketches(runs, made), extras)[1]
 
 
 def write_files(

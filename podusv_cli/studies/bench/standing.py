@@ -188,7 +188,7 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
     return board.sort_values("mean_rank", kind="stable")
 
 
-def written(made: pd.DataFrame) -> list[list[str]]:
+def leaderboard_rows(made: pd.DataFrame) -> list[list[str]]:
     """The leaderboard of one hull in words: its headings, then a row a law."""
     board, shown = leaderboard(made), [column for column in columns(made) if column.heading]
     rows = [[str(law), *(column.text(row) for column in shown)] for law, row in board.iterrows()]

@@ -20,7 +20,7 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import below
 
-MOST = 1_000_000_000  # draws; beyond this `needed` gives up
+MOST = 1_000_000_000  # draws; beyond this `draws_for_share` gives up
 MEDIAN = 0.5
 
 
@@ -183,7 +183,7 @@ def ratios(a: Vector, b: Vector) -> Vector:
         return np.where(np.equal(a, b), 1.0, np.where(np.isposinf(a), inf, a / b))
 
 
-def needed(estimate: float, bound: float, level: float) -> int | None:
+def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
     """Draws after which a share's interval would leave the bound out, were the share as estimated.
 
     None where no number of draws would do, because the estimate lies on the bound.

@@ -73,7 +73,7 @@ def read(folder: Path) -> StudyAbout:
     return json_files.read_as(folder / STUDY, StudyAbout)
 
 
-def begun(folder: Path) -> StudyIdentity:
+def read_identity(folder: Path) -> StudyIdentity:
     """What the runs in a folder depend on, whichever podusv made them. Raises StorageError."""
     return json_files.read_as(folder / STUDY, StudyIdentity)
 

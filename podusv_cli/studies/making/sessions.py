@@ -45,13 +45,13 @@ class _Noted(BaseModel):
     processor_s: dict[str, float] = {}
 
 
-def _noted(session: dict[str, Any]) -> dict[str, Any]:
+def _note_session(session: dict[str, Any]) -> dict[str, Any]:
     _Noted.model_validate(session)
     return session
 
 
 class _Provenance(BaseModel):
-    sittings: list[Annotated[dict[str, Any], AfterValidator(_noted)]]
+    sittings: list[Annotated[dict[str, Any], AfterValidator(_note_session)]]
 
 
 def sessions(folder: Path) -> list[dict[str, Any]]:

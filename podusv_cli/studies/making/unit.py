@@ -108,7 +108,7 @@ def alike(part: Part) -> str:
     return repr((unit.law, unit.cell, {k: v for k, v in law.items() if not isinstance(v, float)}))
 
 
-def crashed(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:
+def crashed_unit(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:
     """The result of a unit of one run that ends its process."""
     nothing = np.full(unit.count, np.nan)
     return UnitResult(

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from podusv_cli.studies.counting.claims import Link, ParsedClaim
+from podusv_cli.studies.counting.claims import Link, ParsedStudyClaim
 from podusv_cli.studies.counting.samples import FAILURES, SHARE
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
@@ -35,7 +35,7 @@ class Bar(NamedTuple):
     ends: tuple[str, str]
 
 
-def bars(claim: ParsedClaim, verdict: StudyVerdict) -> Iterator[Bar]:
+def bars(claim: ParsedStudyClaim, verdict: StudyVerdict) -> Iterator[Bar]:
     """A bar for each comparison of a claim in each cell."""
     for link in claim.parsed.links:
         for part in verdict.parts:

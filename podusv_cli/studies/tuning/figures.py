@@ -50,11 +50,11 @@ def sketches(results: SearchResults) -> Iterator[Sketch]:
     if len(results.effort):
         yield Sketch(
             "effort",
-            f"error against effort: the median {results.shown[0]} over the median total variation "
+            f"error against effort: the median {results.shown_metrics[0]} over the median total variation "
             "of the surge demand on the fresh draws; hollow before, filled after the search, the "
             "median of a law's searches with lines over their middle half; failed runs count as "
             "the worst; down and to the left is better",
-            partial(effort, results.effort, results.shown[0]),
+            partial(effort, results.effort, results.shown_metrics[0]),
         )
     if results.winners:
         yield from _of_searches(results, objective)
@@ -69,11 +69,11 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
         partial(history, results.history, results.label),
     )
     rows = results.pairs[(results.pairs["when"] == "tuning")]
-    rows = rows[rows.metric == (results.shown[0])]
+    rows = rows[rows.metric == (results.shown_metrics[0])]
     if len(rows):
         yield Sketch(
             "ratios",
-            f"what the search changed in {results.shown[0]}: the median ratio of each law after "
+            f"what the search changed in {results.shown_metrics[0]}: the median ratio of each law after "
             "and before in the same fresh draw, with its interval; below 1 is better",
             partial(ratios, rows),
         )
@@ -116,8 +116,8 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     axes = figure.add_subplot()
     for row, law in ordered.iterrows():
         place = float(str(row))
-        _ranged(axes, place - 0.16, law, "before", "none")
-        _ranged(axes, place + 0.16, law, "after", nth_style(1)[0])
+        _draw_range(axes, place - 0.16, law, "before", "none")
+        _draw_range(axes, place + 0.16, law, "after", nth_style(1)[0])
     for when, fill in (("before", "none"), ("after", nth_style(1)[0])):
         colour = nth_style(1 if when == "after" else 0)[0]
         axes.plot(
@@ -158,7 +158,7 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
     return figure
 
 
-def _ranged(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
+def _draw_range(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
     estimate, low, high = (law[f"objective_{when}{end}"] for end in ("", "_low", "_high"))
     colour = nth_style(0)[0] if when == "before" else nth_style(1)[0]
     if np.isfinite([low, high]).all():

@@ -47,7 +47,7 @@ class TuneCall(BaseModel):
     started: str
 
 
-class Record(BaseModel):
+class TuneRecord(BaseModel):
     """What is read of tune.json; there is more."""
 
     model_config = ConfigDict(strict=True, frozen=True)
@@ -56,7 +56,7 @@ class Record(BaseModel):
     history: list[TuneCall]
 
 
-def known(folder: Path, plan: TunePlan) -> Record | None:
+def read_known(folder: Path, plan: TunePlan) -> TuneRecord | None:
     """What tune.json says of this very search; None where the folder is missing or empty.
 
     Raises UsageError where the folder holds something else, naming what is different.
@@ -65,13 +65,13 @@ def known(folder: Path, plan: TunePlan) -> Record | None:
         if not files.is_empty(folder):
             raise UsageError(f"{folder} is no search and not empty; name another with --out")
         return None
-    noted = json_files.read_as(folder / TUNE, Record)
+    noted = json_files.read_as(folder / TUNE, TuneRecord)
     if different := disagreements(noted.identity, _identity(plan)):
         raise UsageError(
             f"{folder} holds another search: {different}; name another folder with --out, or begin "
             "anew with --force"
         )
-    _as_much(folder, _asked(noted), plan.tune)
+    _as_much(folder, _read_asked(noted), plan.tune)
     return noted
 
 
@@ -80,18 +80,18 @@ def clear(folder: Path) -> None:
     manifest.remove(folder, "search", TUNE, UNFINISHED)
 
 
-def _asked(noted: Record | None) -> list[dict[str, Any]]:
+def _read_asked(noted: TuneRecord | None) -> list[dict[str, Any]]:
     return [call.model_dump(by_alias=True) for call in noted.history] if noted else []
 
 
 def write(
-    folder: Path, plan: TunePlan, noted: Record | None, started: str, texts: Mapping[str, str]
+    folder: Path, plan: TunePlan, noted: TuneRecord | None, started: str, texts: Mapping[str, str]
 ) -> None:
     """Note what is asked for, after what is `known` of the search.
 
     `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
     """
-    content = json_text.encode(_content(plan, _asked(noted), started))
+    content = json_text.encode(_content(plan, _read_asked(noted), started))
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
     # without tune.json, a folder that is not empty is no search.
     if noted:
@@ -146,14 +146,14 @@ def tuned_yaml(results: SearchResults) -> bytes:
     tuned = {
         "extends": SCENARIO,
         "name": f"{scenario.name[: LONGEST_NAME - len(end)]}{end}",
-        "description": _told(results),
+        "description": _tell_results(results),
         "controllers": {law: content for law, content in laws.items() if content},
         "tune": None,
     }
     return f"# The gains that podusv tune found.\n{yaml_text(tuned)}".encode()
 
 
-def _told(results: SearchResults) -> str:
+def _tell_results(results: SearchResults) -> str:
     tune = results.plan.tune
     searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
     what = tune.objective

@@ -29,9 +29,11 @@ def write_report(folder: Path, results: SearchResults, extras: Extras, *, figure
 
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
-        from podusv_cli.figures.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.figures.sketch import render_sketches  # matplotlib is slow to import
         from podusv_cli.studies.tuning.figures import sketches
 
-        drawn, shown = rendered(sketches(results), extras)
-    page = extras.made("report.html", lambda: report.page(folder, results, shown, extras.missing))
+        drawn, shown = render_sketches(sketches(results), extras)
+    page = extras.make_or_record(
+        "report.html", lambda: report.page(folder, results, shown, extras.missing)
+    )
     publish(folder, drawn, page, extras)

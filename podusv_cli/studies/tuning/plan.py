@@ -12,7 +12,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
-from podusv_cli.studies.counting.expressions import parse_success, succeeded
+from podusv_cli.studies.counting.expressions import judge_success, parse_success
 from podusv_cli.studies.counting.runs import STATUSES, UnitResult
 from podusv_cli.studies.making.cells import Cell
 from podusv_cli.studies.making.check import singles
@@ -137,7 +137,7 @@ class TunePlan:
     def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> StudyPlan:
         """The study of laws by their new names, on draws of a stream."""
         renamed = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
-        return self.base.varied(Variant(stream, draws, renamed))
+        return self.base.vary(Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
         """The runs of some units, in their order; failed is what the study calls no success."""
@@ -152,7 +152,7 @@ class TunePlan:
             for name in names
         }
         ended = np.concatenate([result.status == STATUSES.index("finished") for result in results])
-        return Outcomes(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
+        return Outcomes(metrics, ~judge_success(self._success, metrics, ended, self.metrics))
 
     @cached_property
     def identity(self) -> dict[str, Any]:
