@@ -40,8 +40,10 @@ PODS = {"actuator": {"kind": "pod", "preset": "otter"}}
 # What people put together, each for every kind of part.
 TASKS: Sequence[Mapping[str, Any]] = [
     WINDAGE | task | seen | thrust
-    for task in ({}, LEGS) for seen in ({}, SENSORS) for thrust in ({}, PODS)
-]  # fmt: skip
+    for task in ({}, LEGS)
+    for seen in ({}, SENSORS)
+    for thrust in ({}, PODS)
+]
 # What a kind cannot do without.
 NEEDS: Mapping[str, Mapping[str, Any]] = {
     "legs": {"points": POINTS},

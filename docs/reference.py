@@ -31,19 +31,22 @@ from podusv_cli.scenario.shipped import file_of
 
 # A figure is drawn from runs of the first of these scenarios that has its signals.
 SHOWN = (
-    "podusv:pod/kept.yaml", "podusv:sea/sensors.yaml", "podusv:sea/state_4.yaml",
+    "podusv:pod/kept.yaml",
+    "podusv:sea/sensors.yaml",
+    "podusv:sea/state_4.yaml",
     "podusv:laws/legs.yaml",
-)  # fmt: skip
+)
 SECONDS = 60.0
 # Runs to look at: scenarios that come with podusv, and which of their laws the gallery draws.
 GALLERY = {
-    "podusv:demo.yaml": (), "podusv:own_vessel.yaml": (),
+    "podusv:demo.yaml": (),
+    "podusv:own_vessel.yaml": (),
     "podusv:mu_2017/corrected_compare.yaml": ("adaptive_neural", "pid"),
     "podusv:pod/kept.yaml": ("adaptive_neural", "pid"),
     "podusv:sea/state_4.yaml": ("adaptive_neural", "pid"),
     "podusv:laws/legs.yaml": ("los_pid", "velocity_vector"),
     "podusv:trials/zigzag_20.yaml": (),
-}  # fmt: skip
+}
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*\n", re.MULTILINE)
 DRAWN = "figures"  # the folder of their pictures
 
@@ -109,18 +112,23 @@ def gallery_page() -> str:
         made = "compare" if loaded.controllers else "run"
         yaml = Path(file_of(shown)).read_text("utf-8")
         parts += [
-            f"## {name}", text(loaded.description),
+            f"## {name}",
+            text(loaded.description),
             f"![tracks of {name}]({DRAWN}/{_picture(shown)}.png)",
             f"    podusv {made} {shown}\n    podusv init {name}    # a copy to edit",
             f"```yaml\n{EDITOR_LINE.sub('', yaml).strip()}\n```",
-        ]  # fmt: skip
+        ]
     return page(parts)
 
 
 KINDS = {
-    "controller": "Control laws", "path": "Paths", "disturbance": "Disturbances",
-    "actuator": "Actuators", "measurement": "Measurements", "estimator": "Estimators",
-}  # fmt: skip
+    "controller": "Control laws",
+    "path": "Paths",
+    "disturbance": "Disturbances",
+    "actuator": "Actuators",
+    "measurement": "Measurements",
+    "estimator": "Estimators",
+}
 
 
 def kinds_page(section: str) -> str:
@@ -253,25 +261,30 @@ def python_page() -> str:
         f".. autoclass:: podusv.{n}\n   :members:\n   :special-members: __getitem__"
         for n in classes
     ]
-    parts = [
-        "# Python interface",
-        "`import podusv`. [podusv from Python](../python.md)",
-    ]
+    parts = ["# Python interface", "`import podusv`. [podusv from Python](../python.md)"]
     return page([*parts, *(f"```{{eval-rst}}\n{text}\n```" for text in made)])
 
 
 PAGES: Mapping[str, Callable[[], str]] = {
-    "scenario": scenario_page, "vessels": vessels_page, "signals": signals_page,
-    "metrics": metrics_page, "findings": findings_page, "figures": figures_page,
-    "commands": commands_page, "exit_codes": exit_codes_page, "python": python_page,
+    "scenario": scenario_page,
+    "vessels": vessels_page,
+    "signals": signals_page,
+    "metrics": metrics_page,
+    "findings": findings_page,
+    "figures": figures_page,
+    "commands": commands_page,
+    "exit_codes": exit_codes_page,
+    "python": python_page,
     "gallery": gallery_page,
-}  # fmt: skip
+}
 
 
 def keys_table(rows: Iterable[ExplainRow], section: str = "") -> str:
     """Keys of a section with what they may be, default and meaning."""
-    made = [(_key(row.key, section), _value(row), _default(row.default), text(row.meaning))
-            for row in rows]  # fmt: skip
+    made = [
+        (_key(row.key, section), _value(row), _default(row.default), text(row.meaning))
+        for row in rows
+    ]
     return table(("key", "value", "default", "meaning"), made)
 
 

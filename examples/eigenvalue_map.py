@@ -81,9 +81,11 @@ def momentum_hull(hull: Vessel, V: float) -> float:
 
 
 def panel(
-    axes: Any, title: str, colour: Callable[[float, float], float],
+    axes: Any,
+    title: str,
+    colour: Callable[[float, float], float],
     judge: Callable[[Vessel, float], float],
-) -> Any:  # fmt: skip
+) -> Any:
     """One law: colours behind, and a curve a hull, dotted where it grows."""
     field = np.array([[colour(p, V) for V in SPEEDS] for p in ANSWERS])
     mesh = axes.pcolormesh(

@@ -51,13 +51,13 @@ def past_run(metrics, status="finished", message="", told=None, **more):
 
 
 def verdicts():
-    runs = {
-        "a": past_run({"iae": 3.0}),
-        "lost": PastRun.without_log("lost", about(), "killed"),
-    }
+    runs = {"a": past_run({"iae": 3.0}), "lost": PastRun.without_log("lost", about(), "killed")}
     texts = {
-        "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
-    }  # fmt: skip
+        "C1": "x.iae == 3",
+        "C2": "x.iae > 4",
+        "C3": "lost.iae < x.iae",
+        "C4": "1 / 3 < 0 * x.iae",
+    }
     parsed = [
         ParsedClaim(
             name,

@@ -86,7 +86,7 @@ double fmax(double, double);
 void *memcpy(void *, const void *, size_t);
 void *memset(void *, int, size_t);
 """,
-}  # fmt: skip
+}
 
 
 def stepped(folder: Path, inputs: bytes) -> bytes:

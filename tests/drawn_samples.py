@@ -26,9 +26,26 @@ metrics: {{steady_fraction: 0.25}}
 simulation: {{duration: {duration}}}
 """
 PLAIN = (
-    "u", "v", "r", "psi_e", "tau_u", "tau_r", "tau_u_cmd", "tau_r_cmd", "b_u", "b_v", "b_r",
-    "alpha_u", "alpha_r", "beta_u", "beta_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r",
-)  # fmt: skip
+    "u",
+    "v",
+    "r",
+    "psi_e",
+    "tau_u",
+    "tau_r",
+    "tau_u_cmd",
+    "tau_r_cmd",
+    "b_u",
+    "b_v",
+    "b_r",
+    "alpha_u",
+    "alpha_r",
+    "beta_u",
+    "beta_r",
+    "b_hat_u",
+    "b_hat_r",
+    "f_hat_u",
+    "f_hat_r",
+)
 CENTER = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, -0.5]])
 WIDTH = np.array([0.5, 1.0, 2.0])
 

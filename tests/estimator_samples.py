@@ -87,9 +87,11 @@ def sailed(
     """A run under a constant demand, which the estimator only watches."""
     compiled = parts.pop("compiled", True)
     moving: dict[str, Any] = {
-        "controller": Constant(surge=1.5, yaw=0.3), "disturbance": Calm(),
-        "start": (0.0, 0.0, 3.0, 0.3, 0.0, 0.1), "vessel": NONLINEAR,
-    }  # fmt: skip
+        "controller": Constant(surge=1.5, yaw=0.3),
+        "disturbance": Calm(),
+        "start": (0.0, 0.0, 3.0, 0.3, 0.0, 0.1),
+        "vessel": NONLINEAR,
+    }
     loop = adrift(**moving | parts, measurement=measurement, estimator=estimator)
     return run(loop, duration, step, compiled=compiled)
 

@@ -39,9 +39,12 @@ def task(kind: str, seconds: int = 300) -> tuple[str, str, str]:
 
 
 def exported(
-    to: Path, kind: str = "pid", source: str = SOURCE, changes: dict[str, Any] | None = None,
+    to: Path,
+    kind: str = "pid",
+    source: str = SOURCE,
+    changes: dict[str, Any] | None = None,
     **options: Any,
-) -> Path:  # fmt: skip
+) -> Path:
     """The folder of a small export for this machine; of other changes in place of the `kind`."""
     given = [f"{key}={json.dumps(value)}" for key, value in (changes or {}).items()]
     return export_law(Path(source), to, given or task(kind, 5), **{"fmu": False} | options)

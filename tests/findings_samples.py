@@ -19,9 +19,12 @@ CONFIGS = PACKAGE.parent / "configs" / "mu_2017"
 PLAIN = ("path={kind: line}", "actuator={kind: ideal}", "simulation.duration=20")
 # No adaptation, calm water: the bare linear loops.
 BARE = (
-    "controller.Gamma_u=0", "controller.Gamma_r=0", "controller.gamma_u=0", "controller.gamma_r=0",
+    "controller.Gamma_u=0",
+    "controller.Gamma_r=0",
+    "controller.gamma_u=0",
+    "controller.gamma_r=0",
     "disturbance={kind: none}",
-)  # fmt: skip
+)
 
 
 def scene(*overrides: str) -> Scenario:

@@ -10,9 +10,13 @@ from podusv_cli.scenario.yaml_tree import plain
 
 # Two hulls where there are two, as wide as otter.m of MSS and the pontoons of VRX say.
 KNOWN = {
-    "otter": {"hulls": 2, "hull_beam": 0.25}, "wamv": {"hulls": 2, "hull_beam": 0.426},
-    "cybership1": {}, "cybership2": {}, "revolt": {}, "milliampere": {},
-}  # fmt: skip
+    "otter": {"hulls": 2, "hull_beam": 0.25},
+    "wamv": {"hulls": 2, "hull_beam": 0.426},
+    "cybership1": {},
+    "cybership2": {},
+    "revolt": {},
+    "milliampere": {},
+}
 
 
 def vessel(name):
@@ -39,14 +43,17 @@ def quantities(numbers, hull, has_thrust):
     of = numbers.get
     surge = of("X_u", 0.0) * u + of("X_uu", 0.0) * u * u + of("X_uuu", 0.0) * u**3
     return {
-        "I_z": numbers["I_z"], "X_udot": -of("X_udot", 0.0), "Y_vdot": -of("Y_vdot", 0.0),
+        "I_z": numbers["I_z"],
+        "X_udot": -of("X_udot", 0.0),
+        "Y_vdot": -of("Y_vdot", 0.0),
         "N_rdot": -of("N_rdot", 0.0),
         "surge_damping": -surge if has_thrust else 0.0,
         "sway_damping": -(of("Y_v", 0.0) * v + of("Y_vv", 0.0) * v * v),
         "yaw_damping": -(of("N_r", 0.0) * r + of("N_rr", 0.0) * r * r),
-        "m11": hull.mass - of("X_udot", 0.0), "m22": hull.mass - of("Y_vdot", 0.0),
+        "m11": hull.mass - of("X_udot", 0.0),
+        "m22": hull.mass - of("Y_vdot", 0.0),
         "m33": numbers["I_z"] - of("N_rdot", 0.0),
-    }  # fmt: skip
+    }
 
 
 def ratios():
@@ -72,10 +79,13 @@ def table():
     """The ratios as docs/start.md has them."""
     heads = ["", *KNOWN, "scatter"]
     rows = [
-        [f"`{quantity}`", *(f"{over[n]:.2g}" if n in over else "-" for n in KNOWN),
-         f"{scatter(over.values()):.2g}"]
+        [
+            f"`{quantity}`",
+            *(f"{over[n]:.2g}" if n in over else "-" for n in KNOWN),
+            f"{scatter(over.values()):.2g}",
+        ]
         for quantity, over in ratios().items()
-    ]  # fmt: skip
+    ]
     return [f"| {' | '.join(row)} |" for row in (heads, ["---"] * len(heads), *rows)]
 
 

@@ -11,10 +11,7 @@ from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.fit.estimate import (
-    estimate_hull,
-    prior_kept,
-)
+from podusv_cli.identify.fit.estimate import estimate_hull, prior_kept
 from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.reading import LogTable
@@ -25,10 +22,12 @@ LOGS = (LogFile(file="a.csv"),)
 SCENARIO = load(
     "podusv:trials/base.yaml",
     [
-        "vessel={preset: cybership2}", "actuator={kind: ideal}", "controller={kind: pid}",
+        "vessel={preset: cybership2}",
+        "actuator={kind: ideal}",
+        "controller={kind: pid}",
         "name=boat",
     ],
-).scenario  # fmt: skip
+).scenario
 HULL = SCENARIO.vessel
 
 

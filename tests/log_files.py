@@ -45,10 +45,11 @@ def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, til
             )
             message = make(
                 "nav_msgs/msg/Odometry",
-                make("std_msgs/msg/Header", stamp, "map"), "boat",
+                make("std_msgs/msg/Header", stamp, "map"),
+                "boat",
                 make("geometry_msgs/msg/PoseWithCovariance", pose, np.zeros(36)),
                 make("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
-            )  # fmt: skip
+            )
             raw = store.serialize_cdr(message, "nav_msgs/msg/Odometry")
             writer.write(odometry, now + 5_000_000, raw)
         for i in range(10):

@@ -46,9 +46,11 @@ def relogged(folder: Path, change: Callable[[dict[str, Any]], None]) -> Callable
     signals = {name: np.array(array) for name, array in recorded.signals.items()}
     change(signals)
     texts = {
-        "resolved_yaml": log_reader.resolved_yaml(folder / "log.h5"), "title": "t", "source": "s",
+        "resolved_yaml": log_reader.resolved_yaml(folder / "log.h5"),
+        "title": "t",
+        "source": "s",
         "version": podusv_cli.__version__,
-    }  # fmt: skip
+    }
     return lambda _: log(replace(recorded, signals=signals), **texts)
 
 

@@ -70,9 +70,17 @@ class HiddenNaN(Constant):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """Right at t = 0 and 0.01, wrong at 0.015."""
         tau[0] = math.nan if 0.012 < t < 0.018 else 1.0
         tau[1] = 0.0

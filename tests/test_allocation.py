@@ -145,9 +145,8 @@ class Problem:
             T = np.where(senses, self.ahead, -self.astern) * random.uniform(0.1, 0.9, count)
             start = np.concatenate([T, self.angle * random.uniform(-1, 1, count)])
             answer = minimize(
-                self.cost_and_slope, start, jac=True, bounds=bounds, method="TNC",
-                options=options,
-            )  # fmt: skip
+                self.cost_and_slope, start, jac=True, bounds=bounds, method="TNC", options=options
+            )
             found = min(found, float(answer.fun))
         return found
 
@@ -162,9 +161,13 @@ LAYOUTS = {
 
 @settings(max_examples=15)
 @given(
-    layout=st.sampled_from(sorted(LAYOUTS)), surge=unit, yaw=unit, size=st.sampled_from([0.3, 1.5]),
-    sway=st.sampled_from([0.0, 0.1]), priority=st.sampled_from(["yaw", "surge"]),
-)  # fmt: skip
+    layout=st.sampled_from(sorted(LAYOUTS)),
+    surge=unit,
+    yaw=unit,
+    size=st.sampled_from([0.3, 1.5]),
+    sway=st.sampled_from([0.0, 0.1]),
+    priority=st.sampled_from(["yaw", "surge"]),
+)
 def test_no_other_thrusts_and_angles_cost_less(layout, surge, yaw, size, sway, priority):
     pods = several(LAYOUTS[layout], sway_weight=sway, priority=priority)
     demand = np.array([surge * size * 8, yaw * size * 3])

@@ -22,17 +22,36 @@ from podusv_cli.core.kernel import bundle
 PERIOD, STEP, TIME = 0.13, 0.013, 59.93
 M11, M22, M33 = 64.0, 110.0, 35.0
 HULL = {
-    "source": "invented", "validity": "this test", "length": 2.0, "beam": 0.8, "m": 60.0,
-    "I_z": 20.0, "X_udot": -4.0, "Y_vdot": -50.0, "N_rdot": -15.0, "X_u": -20.0, "X_uu": -15.0,
-    "Y_v": -80.0, "Y_vv": -100.0, "N_r": -40.0,
-}  # fmt: skip
+    "source": "invented",
+    "validity": "this test",
+    "length": 2.0,
+    "beam": 0.8,
+    "m": 60.0,
+    "I_z": 20.0,
+    "X_udot": -4.0,
+    "Y_vdot": -50.0,
+    "N_rdot": -15.0,
+    "X_u": -20.0,
+    "X_uu": -15.0,
+    "Y_v": -80.0,
+    "Y_vv": -100.0,
+    "N_r": -40.0,
+}
 POINTS = np.array([(0.0, 0.0), (12.0, 3.0), (6.0, 14.0)])
 SPEED, NEAR = 0.7, 1.5
 START = {"x": -2.0, "y": 1.5, "psi": 0.4, "u": 0.2}
 GAINS = {
-    "surge": 80.0, "yaw": 40.0, "U": 1.2, "r_m": 0.6, "speed_FF": 0.45, "speed_P": 0.5,
-    "speed_I": 0.3, "rate_FF": 0.8, "rate_P": 0.5, "rate_I": 0.4,
-}  # fmt: skip
+    "surge": 80.0,
+    "yaw": 40.0,
+    "U": 1.2,
+    "r_m": 0.6,
+    "speed_FF": 0.45,
+    "speed_P": 0.5,
+    "speed_I": 0.3,
+    "rate_FF": 0.8,
+    "rate_P": 0.5,
+    "rate_I": 0.4,
+}
 
 
 def turned(angle: float) -> complex:
@@ -51,12 +70,16 @@ def rates(s: Any, tau: Any) -> Any:
     """Of pose and velocities, for the hull of this file under a force and a moment."""
     psi, u, v, r = s[2:]
     ground = complex(u, v) * turned(psi)
-    return np.array([
-        ground.real, ground.imag, r,
-        (tau[0] + M22 * v * r - 20.0 * u - 15.0 * abs(u) * u) / M11,
-        (-M11 * u * r - 80.0 * v - 100.0 * abs(v) * v) / M22,
-        (tau[1] + (M11 - M22) * u * v - 40.0 * r) / M33,
-    ])  # fmt: skip
+    return np.array(
+        [
+            ground.real,
+            ground.imag,
+            r,
+            (tau[0] + M22 * v * r - 20.0 * u - 15.0 * abs(u) * u) / M11,
+            (-M11 * u * r - 80.0 * v - 100.0 * abs(v) * v) / M22,
+            (tau[1] + (M11 - M22) * u * v - 40.0 * r) / M33,
+        ]
+    )
 
 
 def rk4(f: Any, s: Any, held: Any) -> Any:
@@ -87,12 +110,16 @@ def sailed(law: Any, memory: Any, duration: float, start: dict[str, float] = STA
 
 def scenario(law: dict[str, Any], duration: float) -> dict[str, Any]:
     return {
-        "vessel": HULL, "start": START, "disturbance": {"kind": "none"}, "controller": law,
+        "vessel": HULL,
+        "start": START,
+        "disturbance": {"kind": "none"},
+        "controller": law,
         "path": {"kind": "legs", "speed": SPEED, "acceptance": NEAR, "points": POINTS.tolist()},
-        "actuator": {"kind": "ideal"}, "control": {"period": PERIOD},
+        "actuator": {"kind": "ideal"},
+        "control": {"period": PERIOD},
         "simulation": {"step": STEP, "duration": duration},
         "log": {"every": round(PERIOD / STEP)},
-    }  # fmt: skip
+    }
 
 
 def limited(integral: float, error: float, gain: float, full: bool) -> float:
@@ -136,10 +163,13 @@ def ardupilot(guidance: str) -> Any:
         t, q = clip(throttle), clip(steering)
         over = max(1.0, abs(t) + abs(q))
         both = over > 1.0
-        return [80.0 * t / over, 40.0 * q / over], np.array([
-            limited(m[0], u_e, 0.3, both or abs(throttle) > 1.0),
-            limited(m[1], r_e, 0.4, both or abs(steering) > 1.0), learns,
-        ])  # fmt: skip
+        return [80.0 * t / over, 40.0 * q / over], np.array(
+            [
+                limited(m[0], u_e, 0.3, both or abs(throttle) > 1.0),
+                limited(m[1], r_e, 0.4, both or abs(steering) > 1.0),
+                learns,
+            ]
+        )
 
     return law
 
@@ -248,10 +278,15 @@ def mss(learns: str) -> Any:
         aimed = (SPEED + s[4] * math.sin(chi_off)) / max(math.cos(chi_off), 0.2)
         u_d = min(max(aimed, 0.1, 0.25 * (abs(y) - D)), 1.2)
         surge = 2.0 * m11 * w_u * (u_d - s[3]) + force
-        return [surge, yaw], np.array([
-            *learnt, m11 * w_u**2 * (u_d - s[3]), off,
-            r_d + K_f * angle_of(turned(psi_ref - psi_d)), r_d / T_f,
-        ])  # fmt: skip
+        return [surge, yaw], np.array(
+            [
+                *learnt,
+                m11 * w_u**2 * (u_d - s[3]),
+                off,
+                r_d + K_f * angle_of(turned(psi_ref - psi_d)),
+                r_d / T_f,
+            ]
+        )
 
     return law
 
@@ -259,10 +294,22 @@ def mss(learns: str) -> Any:
 @pytest.mark.parametrize("learns", ["published", "integral"])
 def test_mss_sails_as_in_a_plain_loop_at_an_awkward_period(learns: str) -> None:
     law = {
-        "kind": "mss", "learns": learns, "lookahead": 4.0, "gamma": 0.05, "sigma": 0.05, "K_f": 0.4,
-        "wn": 1.2, "zeta": 0.9, "T": 1.5, "omega_u": 0.8, "k_s": 0.25, "U": 1.2, "U_min": 0.1,
-        "V_m": 0.02, "chi_m": 0.3,
-    }  # fmt: skip
+        "kind": "mss",
+        "learns": learns,
+        "lookahead": 4.0,
+        "gamma": 0.05,
+        "sigma": 0.05,
+        "K_f": 0.4,
+        "wn": 1.2,
+        "zeta": 0.9,
+        "T": 1.5,
+        "omega_u": 0.8,
+        "k_s": 0.25,
+        "U": 1.2,
+        "U_min": 0.1,
+        "V_m": 0.02,
+        "chi_m": 0.3,
+    }
     out = podusv.simulate(scenario(law, TIME))
     memory = ("crab", "offset", "force_i", "heading_i", "psi_f", "xi")
     begins = [0.0] * 4 + [START["psi"]] * 2
@@ -334,13 +381,16 @@ def drifting(**law: Any) -> Any:
     still = {name: {"mean": mean, "sin": 0.0, "cos": 0.0} for name, mean in means.items()}
     out = podusv.simulate(
         {
-            "vessel": HULL | {"Y_v": -150.0, "N_r": -150.0}, "start": START,
+            "vessel": HULL | {"Y_v": -150.0, "N_r": -150.0},
+            "start": START,
             "path": {"kind": "line", "speed": 1.2},
-            "disturbance": {"kind": "harmonic", **still}, "controller": law,
+            "disturbance": {"kind": "harmonic", **still},
+            "controller": law,
             "actuator": {"kind": "saturated", "surge_limit": 160.0, "yaw_limit": 80.0},
-            "simulation": {"step": 0.02, "duration": 300.0}, "log": {"every": 50},
+            "simulation": {"step": 0.02, "duration": 300.0},
+            "log": {"every": 50},
         }
-    )  # fmt: skip
+    )
     last = {name: out[name][-1] for name in ("psi", "u", "v")}
     return last | {"e": out["y"][-1] - out["y_d"][-1], "along": out["x_d"][-1] - out["x"][-1]}
 
@@ -378,13 +428,22 @@ def test_they_stay_at_a_target_that_comes_to_rest(law: dict[str, Any]) -> None:
     """The sources aim at a waypoint itself where the line to it has no length."""
     out = podusv.simulate(
         {
-            "vessel": {"preset": "otter"}, "actuator": {"kind": "pod", "preset": "otter"},
-            "path": {"kind": "waypoints", "legs": "straight", "after": "stop", "speed": 1.0,
-                     "points": [[0.0, 0.0], [30.0, 20.0]]},
-            "disturbance": {"kind": "none"}, "controller": law, "log": {"every": 50},
-            "simulation": {"step": 0.02, "duration": 200.0}, "start": {"x": -5.0, "y": 3.0},
+            "vessel": {"preset": "otter"},
+            "actuator": {"kind": "pod", "preset": "otter"},
+            "path": {
+                "kind": "waypoints",
+                "legs": "straight",
+                "after": "stop",
+                "speed": 1.0,
+                "points": [[0.0, 0.0], [30.0, 20.0]],
+            },
+            "disturbance": {"kind": "none"},
+            "controller": law,
+            "log": {"every": 50},
+            "simulation": {"step": 0.02, "duration": 200.0},
+            "start": {"x": -5.0, "y": 3.0},
         }
-    )  # fmt: skip
+    )
     beside = np.hypot(out["x"] - out["x_d"], out["y"] - out["y_d"])
     assert beside[out["time"] > 50.0].max() < 7.5
 
@@ -393,12 +452,15 @@ def circled(law: dict[str, Any], radius: float) -> tuple[float, float]:
     """Steering over yaw rate and throttle over speed of the Otter in a circle at half its speed."""
     out = podusv.simulate(
         {
-            "vessel": {"preset": "otter"}, "actuator": {"kind": "pod", "preset": "otter"},
+            "vessel": {"preset": "otter"},
+            "actuator": {"kind": "pod", "preset": "otter"},
             "path": {"kind": "circle", "radius": radius, "speed": 1.543},
-            "disturbance": {"kind": "none"}, "controller": law, "log": {"every": 50},
+            "disturbance": {"kind": "none"},
+            "controller": law,
+            "log": {"every": 50},
             "simulation": {"step": 0.02, "duration": 200.0},
         }
-    )  # fmt: skip
+    )
     speed = math.hypot(out["u"][-1], out["v"][-1])
     return abs(out["steering"][-1] / out["r"][-1]), out["throttle"][-1] / speed
 
@@ -411,8 +473,10 @@ def test_gains_are_those_that_quicktune_and_px4_s_guide_measure_on_the_water() -
     turn, throttle = circled({"kind": "ardupilot"}, 1.543 / math.radians(10.0))
     base = {"vessel": {"preset": "otter"}, "actuator": {"kind": "pod", "preset": "otter"}}
     base |= {"path": {"kind": "line"}, "disturbance": {"kind": "none"}}
-    ap, px = (podusv.load(base | {"controller": {"kind": kind}}).controller
-              for kind in ("ardupilot", "px4"))  # fmt: skip
+    ap, px = (
+        podusv.load(base | {"controller": {"kind": kind}}).controller
+        for kind in ("ardupilot", "px4")
+    )
     seen = [0.9 * turn, 0.45 * turn, 0.45 * turn, throttle, throttle, throttle]
     own = [ap.rate_FF, ap.rate_P, ap.rate_I, ap.speed_FF, ap.speed_P, ap.speed_I]
     assert own == pytest.approx(seen, rel=0.02)
@@ -436,13 +500,16 @@ def test_on_a_hull_without_a_stable_course_they_swing_as_the_page_says() -> None
     for law in ({"kind": "ardupilot"}, {"kind": "ardupilot", "guidance": "l1"}, {"kind": "px4"}):
         out = podusv.simulate(
             {
-                "vessel": {"preset": "paper_nonlinear"}, "start": {"x": -1.0, "y": 0.5, "u": 0.5},
+                "vessel": {"preset": "paper_nonlinear"},
+                "start": {"x": -1.0, "y": 0.5, "u": 0.5},
                 "path": {"kind": "legs", "speed": 0.5, "points": [[0, 0], [300, 0]]},
-                "disturbance": {"kind": "none"}, "controller": law | {"mixing": "separate"},
-                "actuator": {"kind": "saturated"}, "log": {"every": 10},
+                "disturbance": {"kind": "none"},
+                "controller": law | {"mixing": "separate"},
+                "actuator": {"kind": "saturated"},
+                "log": {"every": 10},
                 "simulation": {"step": 0.01, "duration": 400.0},
             }
-        )  # fmt: skip
+        )
         found.append(np.abs(out["e_ct"][out["time"] > 300]).max())
     said = "by {:.1f} m with `position`, {:.0f} m with `l1` and {:.1f} m with `px4`"
     assert said.format(*found) in page

@@ -88,9 +88,17 @@ class Lost(Constant):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """1 N, then infinity."""
         tau[0] = 1.0 if t < k.until else math.inf
         tau[1] = 0.0
@@ -185,9 +193,12 @@ def test_no_run_that_fails_changes_a_bit_of_the_others() -> None:
     sound = variants(corrected(), {"start.x": np.linspace(-15, -5, 100)})
     ends = {3: "invalid", 23: "crashed", 43: "invalid", 63: "diverged", 83: "crashed"}
     bad: dict[int, Any] = {
-        3: ValueError("start.x: draw 3 is\nno number"), 23: KeyError("gone"), 43: adrift(),
-        63: replace(corrected(), start=(0.0, 0.0, 0.0, 1e301, 0.0, 0.0)), 83: SystemExit(7),
-    }  # fmt: skip
+        3: ValueError("start.x: draw 3 is\nno number"),
+        23: KeyError("gone"),
+        43: adrift(),
+        63: replace(corrected(), start=(0.0, 0.0, 0.0, 1e301, 0.0, 0.0)),
+        83: SystemExit(7),
+    }
 
     def make(position: int) -> ClosedLoop:
         made = bad.get(position, sound[position])

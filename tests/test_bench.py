@@ -53,10 +53,16 @@ def made_up(law, task, iae, status="finished"):
 
 
 RUNS = [
-    made_up("a", "one", 10.0), made_up("b", "one", 12.0), made_up("c", "one", 30.0, "diverged"),
-    made_up("a", "two", 8.0, FAILED), made_up("b", "two", 4.0), made_up("c", "two", 4.2),
-    made_up("a", "three", 5.0), made_up("b", "three", 5.0), made_up("c", "three", 1.0, "crashed"),
-]  # fmt: skip
+    made_up("a", "one", 10.0),
+    made_up("b", "one", 12.0),
+    made_up("c", "one", 30.0, "diverged"),
+    made_up("a", "two", 8.0, FAILED),
+    made_up("b", "two", 4.0),
+    made_up("c", "two", 4.2),
+    made_up("a", "three", 5.0),
+    made_up("b", "three", 5.0),
+    made_up("c", "three", 1.0, "crashed"),
+]
 
 
 def test_ratios_are_to_the_best_law_that_reached_its_target_and_failures_share_the_last_ranks():
@@ -79,8 +85,10 @@ def test_the_leaderboard_counts_what_the_table_has():
 
 def test_every_hull_has_a_leaderboard_of_its_own():
     """What is best on one is last on the other; no number is one of both."""
-    other = [replace(run, place=("boat", *run.place[1:]), law="bca"["abc".index(run.law)])
-             for run in RUNS]  # fmt: skip
+    other = [
+        replace(run, place=("boat", *run.place[1:]), law="bca"["abc".index(run.law)])
+        for run in RUNS
+    ]
     made = table([*RUNS, *other])
     boards = standing.leaderboards(made)
     assert boards.loc["ship"].index.tolist() == ["b", "a", "c"]
@@ -241,8 +249,10 @@ def test_a_law_that_fails_is_a_row_and_costs_no_other(bench):
     }
     found = {run.law: run for run in play(BenchCase("ship", "line", "calm", laws))}
     assert {law: run.status for law, run in found.items()} == {
-        "far": FAILED, "wild": "diverged", "good": "finished",
-    }  # fmt: skip
+        "far": FAILED,
+        "wild": "diverged",
+        "good": "finished",
+    }
     assert found["wild"].cause.startswith("diverged at t = ")
     assert ";" not in found["wild"].cause
     assert "m off over the steady window" in found["far"].cause

@@ -98,10 +98,15 @@ def test_how_near_autopilots_come_on_each_hull_is_that_of_the_runs(boards: Any) 
 
 def test_where_a_wrong_hull_is_told_ranks_are_those_of_the_runs() -> None:
     ranks = RUNS.pivot_table("rank", "law", ["vessel", "condition"])
-    for vessel, said in (("wamv", "mean ranks {} and {}; `ilos` {} and {}"),
-                         ("otter", "({} and {}; `ilos` {} and {})")):  # fmt: skip
-        told = [f"{ranks.loc[law, (vessel, f'hull_{how}')]:.1f}"
-                for law in ("ardupilot_l1", "ilos") for how in ("heavy", "light")]  # fmt: skip
+    for vessel, said in (
+        ("wamv", "mean ranks {} and {}; `ilos` {} and {}"),
+        ("otter", "({} and {}; `ilos` {} and {})"),
+    ):
+        told = [
+            f"{ranks.loc[law, (vessel, f'hull_{how}')]:.1f}"
+            for law in ("ardupilot_l1", "ilos")
+            for how in ("heavy", "light")
+        ]
         assert said.format(*told) in PAGE
         calm = ranks[vessel].calm
         assert calm.ardupilot_l1 > calm[["alos", "ilos"]].max()

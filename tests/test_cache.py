@@ -34,9 +34,17 @@ FORCE = 0.0
 
 @kernel
 def push(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """FORCE, whatever happens."""
     tau[0] = FORCE
     tau[1] = 0.0
@@ -184,9 +192,19 @@ Fast = Enum("Slow", {"PACE": 2}, module=__name__)
         [specialise(shifted, "shifted", SHIFT=np.array([1.0, n])) for n in (2.0, 3.0)],
         [calling(ready), calling(doubled), calling(halved), calling(math.sin), calling(math.cos)],
     ],
-    ids=["module", "numba", "float32", "complex", "tuple", "enumeration", "inside", "float",
-         "table", "function"],
-)  # fmt: skip
+    ids=[
+        "module",
+        "numba",
+        "float32",
+        "complex",
+        "tuple",
+        "enumeration",
+        "inside",
+        "float",
+        "table",
+        "function",
+    ],
+)
 def test_whatever_a_kernel_reads_is_in_the_fingerprint(variants):
     marks = {object_cache.fingerprint(variant) for variant in variants}
     assert len(marks) == len(variants)
@@ -335,9 +353,13 @@ class Copy:
     def simulate(self, *edits: str) -> dict[str, Any]:
         paths = {"PYTHONPATH": str(self.folder), "PODUSV_CACHE": str(self.cache)}
         out = subprocess.run(
-            [sys.executable, "-c", SCRIPT, *edits], cwd=self.folder, env=os.environ | paths,
-            capture_output=True, text=True, check=True,
-        )  # fmt: skip
+            [sys.executable, "-c", SCRIPT, *edits],
+            cwd=self.folder,
+            env=os.environ | paths,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         result: dict[str, Any] = json.loads(out.stdout)
         return result
 
@@ -411,8 +433,10 @@ finally:
         words = ["run", str(scenario), "--set", "simulation.duration=1.0", "--no-figures"]
         done = subprocess.run(
             [sys.executable, "-c", script, *words, "--out", str(tmp_path / out)],
-            check=True, capture_output=True, text=True,
-        )  # fmt: skip
+            check=True,
+            capture_output=True,
+            text=True,
+        )
         return set(done.stderr.split())
 
     modules("first")  # fills the cache where it is empty

@@ -77,12 +77,16 @@ def by_hand(run: Any, turn: float, limit: float) -> Any:
         yaw = -(M11 - M22) * u_r * v_r + D33 * turn - 9.02 * (r - turn) - 6.74 * (psi - psi_r)
         surge, yaw = np.clip([surge, yaw], -limit, limit)
         return [
-            u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r,
-            (M22 * v * r - D11 * u + surge) / M11, (-M11 * u * r - D22 * v) / M22,
+            u * np.cos(psi) - v * np.sin(psi),
+            u * np.sin(psi) + v * np.cos(psi),
+            r,
+            (M22 * v * r - D11 * u + surge) / M11,
+            (-M11 * u * r - D22 * v) / M22,
             ((M11 - M22) * u * v - D33 * r + yaw) / M33,
-            u_r * np.cos(psi_r) - v_r * np.sin(psi_r), u_r * np.sin(psi_r) + v_r * np.cos(psi_r),
+            u_r * np.cos(psi_r) - v_r * np.sin(psi_r),
+            u_r * np.sin(psi_r) + v_r * np.cos(psi_r),
             turn,
-        ]  # fmt: skip
+        ]
 
     first = [run[name][0] for name in ("x", "y", "psi", "u", "v", "r", "x_d", "y_d", "psi_ref")]
     times = run["time"]
@@ -153,9 +157,16 @@ def test_on_the_virtual_ship_the_demand_keeps_it_there_while_the_target_changes_
         x, target = virtual(t, -0.02)
         tau, rate, out = np.zeros(2), np.zeros(1), np.zeros(6)
         call(
-            law.law, x=x, memory=np.array([-0.02]), target=target, k=k, tau=tau, rate=rate,
-            signals=np.zeros(4), work=np.zeros(4),
-        )  # fmt: skip
+            law.law,
+            x=x,
+            memory=np.array([-0.02]),
+            target=target,
+            k=k,
+            tau=tau,
+            rate=rate,
+            signals=np.zeros(4),
+            work=np.zeros(4),
+        )
         plant_rates(x, np.array([tau[0], 0.0, tau[1]]), np.zeros(3), k, out)
         near = [virtual(t + s, -0.02 + s * rate[0])[0][3] for s in (-h, h)]
         assert out[3] == pytest.approx((near[1] - near[0]) / (2 * h), rel=1e-4)
@@ -185,14 +196,16 @@ def whole_loop() -> Any:
     for _ in range(50):
         v = -M11 * TURN / D22 * math.sqrt(0.05**2 - v * v)
     u, k_u, k_v, k_1, k_2 = math.sqrt(0.05**2 - v * v), *np.abs(GAINS)
-    return np.array([
-        [-(D11 + k_u) / M11, (M22 * TURN + k_v) / M11, M22 * v / M11, 0, -k_1 / M11, k_2 / M11],
-        [-M11 * TURN / M22, -D22 / M22, -M11 * u / M22, 0, 0, 0],
-        [(M11 - M22) * v / M33, (M11 - M22) * u / M33, -(D33 + 9.02) / M33, -6.74 / M33, 0, 0],
-        [0, 0, 1, 0, 0, 0],
-        [1, 0, 0, -v, 0, TURN],
-        [0, 1, 0, u, -TURN, 0],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [-(D11 + k_u) / M11, (M22 * TURN + k_v) / M11, M22 * v / M11, 0, -k_1 / M11, k_2 / M11],
+            [-M11 * TURN / M22, -D22 / M22, -M11 * u / M22, 0, 0, 0],
+            [(M11 - M22) * v / M33, (M11 - M22) * u / M33, -(D33 + 9.02) / M33, -6.74 / M33, 0, 0],
+            [0, 0, 1, 0, 0, 0],
+            [1, 0, 0, -v, 0, TURN],
+            [0, 1, 0, u, -TURN, 0],
+        ]
+    )
 
 
 @pytest.mark.papers

@@ -70,9 +70,16 @@ def test_json_has_the_documented_shape(podusv):
     said = podusv(config, "--out", "x", "--json")
     answer = json.loads(said.out)
     assert list(answer) == [
-        "format", "status", "folder", "runs", "comparison", "failed", "differences", "claims",
+        "format",
+        "status",
+        "folder",
+        "runs",
+        "comparison",
+        "failed",
+        "differences",
+        "claims",
         "missing",
-    ]  # fmt: skip
+    ]
     assert (answer["format"], answer["status"], answer["folder"]) == (1, "finished", "x")
     for run, label in zip(answer["runs"], ("stiff", "soft"), strict=True):
         keys = ["format", "status", "run", "controller", "metrics", "timing", "warnings"]
@@ -114,8 +121,10 @@ def test_claims_speak_of_their_own_scenarios_runs(podusv):
     assert verdicts["C1"]["verdict"] == "reproduced"
     assert verdicts["C2"]["verdict"] == "not reproduced"
     assert list(verdicts["C2"]["numbers"]) == [
-        "stiff_2.peak_tau_u", "soft_2.peak_tau_u", "finished(stiff_2)",
-    ]  # fmt: skip
+        "stiff_2.peak_tau_u",
+        "soft_2.peak_tau_u",
+        "finished(stiff_2)",
+    ]
     assert verdicts["C2"]["expect"].startswith("stiff_2.peak_tau_u > soft_2.peak_tau_u")
 
 
@@ -142,8 +151,10 @@ def test_claims_of_the_same_name_keep_apart(podusv):
     write("b.yaml", TWO + claim("C1", "not finished(soft)"))
     verdicts = claims_of(podusv("a.yaml", "b.yaml", "a.yaml", "--out", "x", "--json"))
     assert {name: verdict["verdict"] for name, verdict in verdicts.items()} == {
-        "a.C1": "reproduced", "b.C1": "not reproduced", "a.C1_2": "reproduced",
-    }  # fmt: skip
+        "a.C1": "reproduced",
+        "b.C1": "not reproduced",
+        "a.C1_2": "reproduced",
+    }
 
 
 def test_cannot_tell_says_why(podusv):
@@ -201,10 +212,7 @@ def test_runs_that_all_die_are_reported(podusv, monkeypatch):
     config = write("two.yaml", TWO + claim("C1", "soft.iae < stiff.iae"))
     said = podusv(config, "--out", "x")
     assert said.code == 3
-    assert said.err.splitlines() == [
-        f"stiff: {lost.failure}",
-        f"soft: {lost.failure}",
-    ]
+    assert said.err.splitlines() == [f"stiff: {lost.failure}", f"soft: {lost.failure}"]
     assert f"soft.iae: soft has no log: {lost.failure}" in said.out
     assert Path("x/comparison.csv").read_text().startswith("metric,unit,stiff,soft")
 
@@ -275,8 +283,10 @@ def test_metrics_that_are_asked_for_are_all_that_a_terminal_shows(podusv, monkey
     on_a_terminal(monkeypatch)
     out = podusv(config, "--out", "x", "--metric", "rmse", "--metric", "iae").out
     first, second = (line.split("  ")[0] for line in out.splitlines()[1:3])
-    assert (first, second) == ("distance to the target, rms [m]",
-                               "distance to the target, integrated [m s]")  # fmt: skip
+    assert (first, second) == (
+        "distance to the target, rms [m]",
+        "distance to the target, integrated [m s]",
+    )
 
 
 @pytest.mark.parametrize("others", [(), ("ise", "energy")])
@@ -314,13 +324,17 @@ def test_findings_of_one_kind_are_one_line_where_runs_go_together(capsys):
 
 def test_a_table_is_as_narrow_as_its_words_allow():
     head, rows = ["", "a_head", "b\n[m]"], [["one two three four five six", "1", "2.5"]]
-    assert grid(head, rows, 50) == ["                             a_    b",
-                                    "                             head  [m]",
-                                    "one two three four five six  1     2.5"]  # fmt: skip
-    assert grid(head, rows, 34) == ["                          a_   b",
-                                    "                          head [m]",
-                                    "one two three four five",
-                                    "six                       1    2.5"]  # fmt: skip
+    assert grid(head, rows, 50) == [
+        "                             a_    b",
+        "                             head  [m]",
+        "one two three four five six  1     2.5",
+    ]
+    assert grid(head, rows, 34) == [
+        "                          a_   b",
+        "                          head [m]",
+        "one two three four five",
+        "six                       1    2.5",
+    ]
     assert grid(head, rows, 20) == []
 
 
@@ -366,9 +380,11 @@ def test_numbers_that_verify_has_found_converged_are_not_doubted_again(podusv, m
 # --- controllers without a controller
 
 SHORT = TWO.replace("duration: 1.0", "duration: 0.1")
-ALONE = SHORT.replace("controller: {kind: pid, K_Pu: 100.0}\n", "").replace(
-    "{stiff: {", "{stiff: {kind: pid, "
-).replace("soft: {", "soft: {kind: pid, ")  # fmt: skip
+ALONE = (
+    SHORT.replace("controller: {kind: pid, K_Pu: 100.0}\n", "")
+    .replace("{stiff: {", "{stiff: {kind: pid, ")
+    .replace("soft: {", "soft: {kind: pid, ")
+)
 
 
 def test_controllers_need_no_controller(podusv, monkeypatch, capsys):

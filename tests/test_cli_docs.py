@@ -69,8 +69,11 @@ def test_a_word_that_no_page_has_is_refused_with_the_nearest_page(podusv: Comman
 def spoken(module: ast.Module) -> Iterator[str]:
     """Every text of a module that is no docstring."""
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef)
-    told = {ast.get_docstring(node, clean=False) for node in ast.walk(module)
-            if isinstance(node, documented)}  # fmt: skip
+    told = {
+        ast.get_docstring(node, clean=False)
+        for node in ast.walk(module)
+        if isinstance(node, documented)
+    }
     constants = (node.value for node in ast.walk(module) if isinstance(node, ast.Constant))
     yield from (text for text in constants if isinstance(text, str) and text not in told)
 

@@ -44,9 +44,11 @@ def test_a_line_each_the_latest_first_with_what_it_is(podusv: Command, results: 
     told = json.loads(podusv("runs", "r", "--json").out)["runs"]
     kinds = {run["folder"]: (run["kind"], run["status"], run["laws"]) for run in told}
     assert kinds == {
-        "r/s": ("study", "finished", ["pid"]), "r/m/60": ("run", "finished", ["pid"]),
-        "r/m/50": ("run", "finished", ["pid"]), "r/m/70": ("run", "damaged", []),
-    }  # fmt: skip
+        "r/s": ("study", "finished", ["pid"]),
+        "r/m/60": ("run", "finished", ["pid"]),
+        "r/m/50": ("run", "finished", ["pid"]),
+        "r/m/70": ("run", "damaged", []),
+    }
     assert told[0]["folder"] == "r/s"
     origin = json.loads(Path("r/m/60/provenance.json").read_text())
     assert (told[1]["seconds"], told[1]["started"]) == (origin["duration_s"], origin["started"])

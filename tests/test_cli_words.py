@@ -30,9 +30,17 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
 HEAVY = {
-    "numpy", "scipy", "numba", "llvmlite", "pandas", "matplotlib", "h5py", "pydantic", "yaml",
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "pandas",
+    "matplotlib",
+    "h5py",
+    "pydantic",
+    "yaml",
     "jinja2",
-}  # fmt: skip
+}
 ROOT = Path(podusv_cli.__file__).parents[1]
 
 
@@ -114,10 +122,24 @@ def test_explain_shows_everything_about_a_key(podusv):
 def test_explain_shows_the_sections_without_a_key(podusv):
     out = podusv("explain").out
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
-        "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
-        "controller", "simulation", "control", "log", "metrics", "sweep", "tune", "doubt",
+        "vessel",
+        "nominal",
+        "start",
+        "path",
+        "disturbance",
+        "actuator",
+        "measurement",
+        "estimator",
+        "controller",
+        "simulation",
+        "control",
+        "log",
+        "metrics",
+        "sweep",
+        "tune",
+        "doubt",
         "identify",
-    ]  # fmt: skip
+    ]
     assert f"    kinds: {', '.join(kinds('paths'))}\n" in out
 
 
@@ -346,7 +368,7 @@ def test_commands_and_options_are_offered_and_nothing_heavy_is_imported(
         ("podusv sweep export x --format p", {"parquet"}),
         ("podusv sweep run a.yaml --set control.p", {"control.period="}),
     ],
-)  # fmt: skip
+)
 def test_keys_kinds_figures_and_names_are_offered(
     tmp_path: Path, typed: str, offered: set[str]
 ) -> None:

@@ -89,16 +89,20 @@ def right_hand_side(t: float, s: Vector) -> Vector:
     m, error = np.array([25.8, 2.76]), np.array([u, r]) - beta
     tau = -np.array([4, 40]) * error - m * (W_hat @ Phi) - b_hat * 2.5 * error + m * beta_dot
     tau += [(z - 0.5) * cosine, psi_e]
-    b = 0.5 + np.array([
-        0.1 * np.sin(0.2 * t) + 0.3 * np.cos(0.5 * t),
-        0.2 * np.sin(0.2 * t) + 0.1 * np.cos(0.4 * t),
-        0.1 * np.sin(0.1 * t) + 0.1 * np.cos(0.2 * t),
-    ])  # fmt: skip
-    nu_dot = np.array([
-        33.8 * v * r - 0.72 * u - 1.32742 * abs(u) * u - 5.86643 * u**3 + tau[0] + b[0],
-        -25.8 * u * r - 0.8896 * v - 36.47287 * abs(v) * v + b[1],
-        (25.8 - 33.8) * u * v - 1.9 * r - 0.75 * abs(r) * r + tau[1] + b[2],
-    ]) / [25.8, 33.8, 2.76]  # fmt: skip
+    b = 0.5 + np.array(
+        [
+            0.1 * np.sin(0.2 * t) + 0.3 * np.cos(0.5 * t),
+            0.2 * np.sin(0.2 * t) + 0.1 * np.cos(0.4 * t),
+            0.1 * np.sin(0.1 * t) + 0.1 * np.cos(0.2 * t),
+        ]
+    )
+    nu_dot = np.array(
+        [
+            33.8 * v * r - 0.72 * u - 1.32742 * abs(u) * u - 5.86643 * u**3 + tau[0] + b[0],
+            -25.8 * u * r - 0.8896 * v - 36.47287 * abs(v) * v + b[1],
+            (25.8 - 33.8) * u * v - 1.9 * r - 0.75 * abs(r) * r + tau[1] + b[2],
+        ]
+    ) / [25.8, 33.8, 2.76]
     over_ground = (u + 1j * v) * np.exp(1j * psi)
     b_hat_dot = 1000 * (2.5 * error**2 - 0.01 * b_hat)
     W_hat_dot = 100 * (np.outer(m * error, Phi) - 0.1 * W_hat)
@@ -110,9 +114,14 @@ def test_the_corrected_run_agrees_with_dop853_on_equations_written_out_anew():
     loop = corrected()
     first = np.concatenate([loop.start, Plan(loop, TimeGrid(0.01, 1)).first_memory[2:]])
     other = solve_ivp(
-        right_hand_side, (0, 10), first, method="DOP853", rtol=1e-12, atol=1e-12,
+        right_hand_side,
+        (0, 10),
+        first,
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-12,
         t_eval=np.arange(11.0),
-    )  # fmt: skip
+    )
     ours = run(loop, 10.0, 0.001, log_every=1000)
     np.testing.assert_allclose(np.delete(last_state(ours, loop), [6, 7]), other.y[:, -1], atol=1e-8)
     # Half the step for the first seconds, where the printed gains leave 1.2e-8.
@@ -134,9 +143,11 @@ def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard(kind):
     parts = {"controller": example(kind), "actuator": Saturated(surge_limit=50.0, yaw_limit=5.0)}
     one = corrected(**parts, path=Circle(angle=0.4), start=(-3.0, -9.0, 0.3, 0.2, 0.1, 0.05))
     other = corrected(
-        **parts, path=Circle(angle=-0.4, turn="port"), disturbance=mirrored(HarmonicDisturbance()),
+        **parts,
+        path=Circle(angle=-0.4, turn="port"),
+        disturbance=mirrored(HarmonicDisturbance()),
         start=(-3.0, 9.0, -0.3, 0.2, -0.1, -0.05),
-    )  # fmt: skip
+    )
     starboard, port = run(one, 10.0), run(other, 10.0)
     signs = {"y": -1, "psi": -1, "v": -1, "r": -1, "y_d": -1, "tau_r": -1, "b_v": -1, "b_r": -1}
     names = (*STATE, "x_d", "y_d", "tau_u", "tau_r", "b_u", "b_v", "b_r", "z_e")
@@ -146,9 +157,14 @@ def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard(kind):
 
 
 AS_PRINTED: dict[str, Any] = {
-    "k_psie": 0.01, "standoff": 0.0, "fold": "printed", "coupling": "printed", "rate": "difference",
-    "first_difference": "from_zero", "filter_start": "zero",
-}  # fmt: skip
+    "k_psie": 0.01,
+    "standoff": 0.0,
+    "fold": "printed",
+    "coupling": "printed",
+    "rate": "difference",
+    "first_difference": "from_zero",
+    "filter_start": "zero",
+}
 
 
 def distance(out: Any) -> Vector:

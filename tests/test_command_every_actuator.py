@@ -35,9 +35,16 @@ class Half(Actuator):
     @staticmethod
     @kernel
     def drive(
-        t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        state: Vector,
+        demand: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+    ) -> None:
         """Half of the surge force only."""
         rate[0] = (0.5 * demand[0] - state[0]) / k.lag
         tau[0], tau[1], tau[2] = state[0], 0.0, 0.0

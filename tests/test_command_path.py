@@ -38,9 +38,17 @@ class Brake(Constant):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """The demand."""
         tau[0] = k.k * (k.u_d - x[3])
         tau[1] = 0.0
@@ -119,9 +127,11 @@ def test_a_delay_of_one_step_is_integrated_with_fourth_order():
 def test_the_whole_loop_with_a_delay_converges_with_fourth_order():
     def end(step: float) -> Vector:
         loop = corrected(
-            actuator=Ideal(command=Command(delay=0.2)), controller=VelocityVector(), path=Line(),
+            actuator=Ideal(command=Command(delay=0.2)),
+            controller=VelocityVector(),
+            path=Line(),
             start=SMOOTH_START,
-        )  # fmt: skip
+        )
         return last_state(run(loop, 4.0, step, log_every=round(1 / step)), loop)
 
     ends = [end(step) for step in (0.04, 0.02, 0.01)]

@@ -33,9 +33,11 @@ def test_a_track_beside_a_run_is_as_far_away_as_it_was_put():
     t, x, y, psi = (run[name][3:61:4] for name in ("time", "x", "y", "psi"))
     aside = np.where(np.arange(len(t)) == 5, 1.7, 0.5)
     turned = np.degrees(psi + 0.31 + 2.0 * np.pi) % 360.0
-    log("LOG.csv", "x,time [ms],psi [deg],y", np.column_stack(
-        [x + 0.6 * aside, 1e3 * t, turned, y - 0.8 * aside]
-    ))  # fmt: skip
+    log(
+        "LOG.csv",
+        "x,time [ms],psi [deg],y",
+        np.column_stack([x + 0.6 * aside, 1e3 * t, turned, y - 0.8 * aside]),
+    )
     done = compared("run", "LOG.csv")
     rms = math.sqrt((1.7**2 + (len(t) - 1) * 0.5**2) / len(t))
     assert numbers(done, "run") == pytest.approx([rms, 1.7, 0.31, len(t)], rel=1e-9)
@@ -61,8 +63,10 @@ def test_sensors_may_come_at_different_times_and_the_log_last_longer():
     for label in ("velocity", "momentum"):
         run = p.open_run(Path("both") / label)
         at = np.arange(0.0, 11.5)
-        off = np.hypot(np.interp(at, run["time"], run["x"]) - 0.3 * at,
-                       np.interp(at, run["time"], run["y"]) - 1.3)  # fmt: skip
+        off = np.hypot(
+            np.interp(at, run["time"], run["x"]) - 0.3 * at,
+            np.interp(at, run["time"], run["y"]) - 1.3,
+        )
         assert numbers(done, label)[:2] == pytest.approx(
             [math.sqrt(np.mean(off**2)), off.max()], rel=1e-9
         )
@@ -148,7 +152,7 @@ def test_columns_alone_are_no_logs_to_identify_from(podusv: Command):
         (["task.yaml", "LOG.csv", "LOG.csv"], "time,x,y,psi", "one log at a time"),
         (["LOG.csv"], "time,x,y,psi", "one log at a time"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_the_log_is_a_sentence(items, head, says):
     log("LOG.csv", head, [[0.0, 0.1, 0.2, 0.3], [1.0, 0.7, 0.9, 0.2]])
     with pytest.raises(PodusvError) as caught:
@@ -373,9 +377,11 @@ def test_a_heading_is_not_held_where_it_has_no_values(begin, end):
 
 def test_fewer_than_ten_headings_are_not_scored():
     times, x, y, psi = turning()
-    log("LOG.csv", "time,x,y,psi", np.column_stack(
-        [times, x, y, np.where(times < 1.7, psi, np.nan)]
-    ))  # fmt: skip
+    log(
+        "LOG.csv",
+        "time,x,y,psi",
+        np.column_stack([times, x, y, np.where(times < 1.7, psi, np.nan)]),
+    )
     made_run()
     own = track(Path("LOG.csv"), ())
     assert math.isnan(own.departures(open_run(Path("run")).recording)[METRICS[2]])

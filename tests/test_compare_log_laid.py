@@ -120,8 +120,12 @@ def test_degrees_that_are_called_x_and_y_are_refused_without_a_heading_too():
 
 def test_a_finished_run_says_what_the_columns_of_a_log_are_called():
     write("names.yaml", "extends: task.yaml\nidentify: {columns: {time: t, x: north, y: east}}\n")
-    run = p.run("names.yaml", {"controllers": None, "controller": {"kind": "momentum_vector"}},
-                out="run", figures=False)  # fmt: skip
+    run = p.run(
+        "names.yaml",
+        {"controllers": None, "controller": {"kind": "momentum_vector"}},
+        out="run",
+        figures=False,
+    )
     t, x, y, psi = (run[name][0:76:4] for name in ("time", "x", "y", "psi"))
     log("LOG.csv", "t,north,east,psi", np.column_stack([t, x, y + 0.7, psi]))
     assert numbers(compared("run", "LOG.csv"), "run")[1] == pytest.approx(0.7)
@@ -133,8 +137,12 @@ def test_a_finished_run_says_what_the_columns_of_a_log_are_called():
 def test_the_frame_of_a_log_comes_from_a_finished_run_too():
     names = "identify: {frame: enu, columns: {x: east, y: north, psi: yaw}}"
     write("enu.yaml", f"extends: task.yaml\n{names}\n")
-    run = p.run("enu.yaml", {"controllers": None, "controller": {"kind": "momentum_vector"}},
-                out="run", figures=False)  # fmt: skip
+    run = p.run(
+        "enu.yaml",
+        {"controllers": None, "controller": {"kind": "momentum_vector"}},
+        out="run",
+        figures=False,
+    )
     t, x, y, psi = (run[name][0:76:4] for name in ("time", "x", "y", "psi"))
     log("LOG.csv", "time,east,north,yaw", np.column_stack([t, y, x, 0.5 * math.pi - psi]))
     assert numbers(compared("run", "LOG.csv"), "run")[:3] == pytest.approx([0.0] * 3, abs=1e-9)

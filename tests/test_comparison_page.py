@@ -21,12 +21,17 @@ ERRORS = Picture("errors", "x_e & y_e, over <time>", b"<svg/>", "the paper's fig
 
 def page(**parts):
     story = {
-        "title": "planted", "abouts": {"a": about()}, "endings": {"a": "", "lost": "killed <9>"},
-        "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}}, "table": FRAME,
+        "title": "planted",
+        "abouts": {"a": about()},
+        "endings": {"a": "", "lost": "killed <9>"},
+        "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}},
+        "table": FRAME,
         "noticed": [Finding("crosswise", "controller", "|x| < 1", ("<a>",))],
-        "verdicts": verdicts(), "theories": {}, "figures": [ERRORS],
+        "verdicts": verdicts(),
+        "theories": {},
+        "figures": [ERRORS],
         "provenance": {"git": {"commit": "abc"}},
-    }  # fmt: skip
+    }
     return report.page(report.Story(**story | parts))
 
 
@@ -148,8 +153,11 @@ def test_equal_numbers_and_measured_times_are_no_ranking():
 def test_the_report_has_every_verdict_escaped():
     claims = section("claims").all("li")
     assert [mark.text for claim in claims for mark in claim.all("b", kind="mark")] == [
-        "reproduced", "not reproduced", "cannot tell", "not reproduced",
-    ]  # fmt: skip
+        "reproduced",
+        "not reproduced",
+        "cannot tell",
+        "not reproduced",
+    ]
     assert "C3 a | <b> (here)" in claims[2].text
     assert "Not <stated>." in claims[2].text
     (folded,) = claims[2].all("details")
@@ -255,5 +263,6 @@ def test_a_law_is_held_against_its_defaults_and_the_other_laws():
     pods = "actuator={kind: pod, preset: cybership2_pod}"
     kept = {one.key for one in about(pods).settings}
     assert {key for key in kept if key.startswith("actuator")} == {
-        "actuator.kind", "actuator.preset",
-    }  # fmt: skip
+        "actuator.kind",
+        "actuator.preset",
+    }

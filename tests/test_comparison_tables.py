@@ -21,11 +21,18 @@ from podusv_cli.metrics.windows import NAMED, metrics_of_windows
 
 # A key of every section that a run has besides its law, and another value.
 OTHERWISE = {
-    "vessel.m": "24.5", "nominal.m": "24.5", "start.x": "1.5", "path.speed": "0.25",
-    "disturbance.b_u.mean": "0.75", "actuator.surge_limit": "4.0", "simulation.step": "0.02",
-    "simulation.duration": "5.0", "control.period": "0.1", "log.every": "2",
+    "vessel.m": "24.5",
+    "nominal.m": "24.5",
+    "start.x": "1.5",
+    "path.speed": "0.25",
+    "disturbance.b_u.mean": "0.75",
+    "actuator.surge_limit": "4.0",
+    "simulation.step": "0.02",
+    "simulation.duration": "5.0",
+    "control.period": "0.1",
+    "log.every": "2",
     "metrics.settling_radius": "3.0",
-}  # fmt: skip
+}
 
 
 # --- table
@@ -158,9 +165,14 @@ def test_latex_has_symbols_or_words_and_numbers_cut_at_their_point():
     rows = [line.removesuffix(r" \\").split(" & ") for line in text.splitlines()]
     by_row = {row[0]: row[1:] for row in rows[6:-2]}
     assert by_row[r"$\int z_e^2\,\mathrm{d}t$"] == [
-        "m$^2$ s", r"\textbf{\boldmath 2}", r"\textbf{\boldmath .00$\times10^{-9}$}",
-        "0", ".0400", "1", ".00",
-    ]  # fmt: skip
+        "m$^2$ s",
+        r"\textbf{\boldmath 2}",
+        r"\textbf{\boldmath .00$\times10^{-9}$}",
+        "0",
+        ".0400",
+        "1",
+        ".00",
+    ]
     assert by_row[r"$\int\tau_r^2\,\mathrm{d}t$"][3:5] == ["3", r".25$\times10^{12}$"]
     words = METRICS["saturated_fraction"].row
     assert by_row[words] == ["1", r"\textbf{0}", r"\textbf{.500}", "-", "", "-", ""]
@@ -191,8 +203,12 @@ def typeset(folder, lines):
     (folder / "page.tex").write_text("\n".join(lines))
     done = subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "page.tex"],
-        cwd=folder, capture_output=True, text=True, errors="replace", check=False,
-    )  # fmt: skip
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
     assert done.returncode == 0, done.stdout[-2000:]
     assert "Overfull" not in done.stdout
     return done.stdout
@@ -215,9 +231,13 @@ def test_latex_fills_a_column_of_a_journal_and_nothing_is_overfull(tmp_path):
         page += [
             rf"{{\footnotesize\sbox{{\all}}{{\def\resizebox#1#2#3{{#3}}{given}}}%",
             rf"\typeout{{{count} runs: \the\wd\all\space of \the\linewidth}}}}",
-            *(rf"\begin{{{n}}}{t}{given}\end{{{n}}}" for n in ("table", "table*")
-              for t in ("", r"\footnotesize")), r"\clearpage",
-        ]  # fmt: skip
+            *(
+                rf"\begin{{{n}}}{t}{given}\end{{{n}}}"
+                for n in ("table", "table*")
+                for t in ("", r"\footnotesize")
+            ),
+            r"\clearpage",
+        ]
     said = typeset(tmp_path, [*page, r"\end{document}"])
     widths = re.findall(r"(\d) runs: ([\d.]+)pt of ([\d.]+)pt", said)
     part = {int(count): float(line) / float(width) for count, width, line in widths}
@@ -244,20 +264,30 @@ def test_latex_lines_of_the_pages_fill_columns_of_these_classes(tmp_path, style,
         figure.savefig(file)
     (tmp_path / "line").mkdir()
     (tmp_path / "line/comparison.tex").write_text(table.as_latex(table.table(numbers)))
-    typeset(tmp_path, [
-        rf"\documentclass[10pt,twocolumn]{{article}}{packages}",
-        rf"\usepackage[textwidth={text},columnsep={between}]{{geometry}}\begin{{document}}",
-        "Words.", *lines, rf"\begin{{figure*}}{wide}\end{{figure*}}", r"\end{document}",
-    ])  # fmt: skip
+    typeset(
+        tmp_path,
+        [
+            rf"\documentclass[10pt,twocolumn]{{article}}{packages}",
+            rf"\usepackage[textwidth={text},columnsep={between}]{{geometry}}\begin{{document}}",
+            "Words.",
+            *lines,
+            rf"\begin{{figure*}}{wide}\end{{figure*}}",
+            r"\end{document}",
+        ],
+    )
 
 
 def test_latex_has_ratios_to_the_first_run_where_they_are_asked_for():
     frame = table.table({"a": {"iae": 8.0}, "b": {"iae": 3.125}, "c": {"iae": 1e-9}})
     (row,) = table.as_latex(frame, ratios=True).splitlines()[6:-2]
     assert row.split(" & ")[2:] == [
-        "8", ".00", "3", ".12~(0.391)",
-        r"\textbf{\boldmath 1}", r"\textbf{\boldmath .00$\times10^{-9}$}~(1.25e-10) \\",
-    ]  # fmt: skip
+        "8",
+        ".00",
+        "3",
+        ".12~(0.391)",
+        r"\textbf{\boldmath 1}",
+        r"\textbf{\boldmath .00$\times10^{-9}$}~(1.25e-10) \\",
+    ]
     assert "(" not in table.as_latex(frame).splitlines()[6].partition("m s")[2]
 
 
@@ -283,9 +313,17 @@ def test_a_difference_in_any_section_is_found(key):
 def test_every_section_of_a_scenario_is_looked_at():
     sections = {key.partition(".")[0] for key in OTHERWISE}
     rest = {
-        "name", "description", "controller", "controllers", "claims", "silence", "plugins",
-        *BESIDE_RUNS, "measurement", "estimator",
-    }  # fmt: skip
+        "name",
+        "description",
+        "controller",
+        "controllers",
+        "claims",
+        "silence",
+        "plugins",
+        *BESIDE_RUNS,
+        "measurement",
+        "estimator",
+    }
     assert sections | rest == set(type(scenario()).model_fields)
 
 
@@ -372,8 +410,11 @@ def test_whether_an_interrupted_run_would_have_finished_cannot_be_told():
 def test_verdicts_have_numbers_reasons_and_the_labels_of_the_comparison():
     by_name = {verdict.name: verdict.as_json() for verdict in verdicts()}
     assert [v["verdict"] for v in by_name.values()] == [
-        "reproduced", "not reproduced", "cannot tell", "not reproduced",
-    ]  # fmt: skip
+        "reproduced",
+        "not reproduced",
+        "cannot tell",
+        "not reproduced",
+    ]
     assert by_name["C1"]["expect"] == "a.iae == 3"
     assert by_name["C1"]["numbers"] == {"a.iae": 3.0}
     assert by_name["C1"]["reason"] == ""

@@ -211,8 +211,9 @@ def test_every_sign_at_its_limits(sign, answers):
     assert [verdict(f"{left} {sign} 2 * a.iae")[0] for left in lefts] == answers
 
 
-@pytest.mark.parametrize(("sign", "answer"), [("<", False), (">", False), ("<=", True),
-                                              (">=", True), ("==", True)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("sign", "answer"), [("<", False), (">", False), ("<=", True), (">=", True), ("==", True)]
+)
 def test_equal_numbers_without_tolerance(sign, answer):
     assert verdict(f"a.iae {sign} 50", tolerance=0.0)[0] is answer
 

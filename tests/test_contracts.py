@@ -118,9 +118,11 @@ def test_kinds_and_class_names_are_unique():
         for room, base in ROOMS.items()
         for path in (PACKAGE / "components" / room).glob("*.py")
         for thing in vars(import_module(f"podusv_cli.components.{room}.{path.stem}")).values()
-        if isinstance(thing, type) and issubclass(thing, base) and "kind" in thing.model_fields
+        if isinstance(thing, type)
+        and issubclass(thing, base)
+        and "kind" in thing.model_fields
         and thing.__module__ == f"podusv_cli.components.{room}.{path.stem}"
-    ]  # fmt: skip
+    ]
     assert len(classes) == len(EVERY)
     for room in ROOMS:
         mine = [c for c in classes if c.__module__.startswith(f"podusv_cli.components.{room}.")]

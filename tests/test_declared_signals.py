@@ -33,9 +33,17 @@ class CrossTrack(Constant):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         tau[0], tau[1] = 1.0, 0.0
         for i in range(3):
             rate[i] = 1.0 + i
@@ -44,8 +52,11 @@ class CrossTrack(Constant):
 
 def test_a_signal_has_a_symbol_of_its_name_and_needs_a_name_that_a_claim_can_use():
     assert [Signal(name, "m", "").symbol for name in ("e", "e_c", "e_ct", "e_c_t")] == [
-        "e", "e_c", "e_{ct}", "e_{c,t}",
-    ]  # fmt: skip
+        "e",
+        "e_c",
+        "e_{ct}",
+        "e_{c,t}",
+    ]
     with pytest.raises(
         ValueError, match="letters, digits and '_', starting with a letter, found 'e ct'"
     ):

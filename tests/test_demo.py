@@ -27,9 +27,7 @@ def test_a_page_is_opened_where_there_is_a_display_and_always_named(
     opened: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     demo._open(Path("c/report.html"), True)
-    assert (opened, capsys.readouterr().out) == (
-        [], "open this page in a browser: c/report.html\n",
-    )  # fmt: skip
+    assert (opened, capsys.readouterr().out) == ([], "open this page in a browser: c/report.html\n")
     monkeypatch.setenv("DISPLAY", ":0")
     demo._open(Path("c/report.html"), False)
     assert opened == []

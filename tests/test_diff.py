@@ -12,11 +12,7 @@ from command_samples import commanded
 from hypothesis import given
 from hypothesis import strategies as st
 from known_signals import ABOUT
-from rerun_samples import (
-    copied,
-    made,
-    replaced,
-)  # fmt: skip
+from rerun_samples import copied, made, replaced
 from storage_samples import recording
 
 from podusv_cli.cli.diff import deviation_in_words
@@ -111,9 +107,10 @@ def test_any_flipped_bit_of_any_signal_is_found(name, row, bit):
 
 def test_the_first_difference_is_the_earliest_and_the_largest_the_widest():
     other = changed(
-        x=bumped("x", 30, 5.0), W_hat_u=bumped("W_hat_u", (12, 3), 1e-9),
+        x=bumped("x", 30, 5.0),
+        W_hat_u=bumped("W_hat_u", (12, 3), 1e-9),
         z_e=bumped("z_e", [20, 40], [1.0, -2.0]),
-    )  # fmt: skip
+    )
     difference = compare(recording(), other)
     assert difference.first
     assert (difference.first.signal, difference.first.time) == ("W_hat_u[3]", 0.12)
@@ -191,9 +188,11 @@ def test_every_key_of_the_scenario_counts():
     one = "name: a\ncontroller: {kind: pid, K_Pu: 1.0}\nvessel: {m: 2.0, source: tank}\n"
     other = "name: b\ncontroller: {kind: pid, K_Pu: 2.0}\nvessel: {m: 2.0}\nlog: {every: 1}\n"
     assert scenario_changes(one, other) == {
-        "name": ("a", "b"), "controller.K_Pu": (1.0, 2.0), "vessel.source": ("tank", None),
+        "name": ("a", "b"),
+        "controller.K_Pu": (1.0, 2.0),
+        "vessel.source": ("tank", None),
         "log.every": (None, 1),
-    }  # fmt: skip
+    }
 
 
 def test_lists_differ_entry_by_entry():

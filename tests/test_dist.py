@@ -33,9 +33,13 @@ def said(*words: object, cwd: Path, **more: str) -> str:
     """What a process prints, which has to end well."""
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     done = subprocess.run(
-        [str(word) for word in words], cwd=cwd, env=environment | more, capture_output=True,
-        text=True, timeout=300,
-    )  # fmt: skip
+        [str(word) for word in words],
+        cwd=cwd,
+        env=environment | more,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

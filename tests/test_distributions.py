@@ -47,11 +47,14 @@ def test_logarithm_and_exponential_are_the_librarys_to_the_last_places() -> None
         ({"triangular": (0.0, 0.0, 1.0)}, [0.0, 0.75], [0.0, 0.5]),
         ({"triangular": (0.0, 1.0, 1.0)}, [0.25, 1.0], [0.5, 1.0]),
         ({"normal": Normal(mean=2.0, sigma=3.0)}, [0.5, 0.975], [2.0, 2 + 3 * 1.959963984540054]),
-        ({"lognormal": LogNormal(median=2.0, sigma=0.5)}, [0.5, 0.025],
-         [2.0, 2 * math.exp(-0.5 * 1.959963984540054)]),
+        (
+            {"lognormal": LogNormal(median=2.0, sigma=0.5)},
+            [0.5, 0.025],
+            [2.0, 2 * math.exp(-0.5 * 1.959963984540054)],
+        ),
         ({"angle": "all"}, [0.0, 0.25, 0.5, 1 - 2.0**-52], [math.pi, math.pi / 2, 0.0, -math.pi]),
     ],
-)  # fmt: skip
+)
 def test_values_worked_out_by_hand(made: Any, u: list[float], known: list[float]) -> None:
     np.testing.assert_allclose(Distribution(**made).at(np.array(u)), known, atol=1e-14)
 

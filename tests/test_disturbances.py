@@ -155,9 +155,14 @@ RECORD = "t, b_u, b_v, b_r\n1, 2, 0, 0  # at first\n3, 4, -1, 0.5\n4, 0, 0, 0\n"
 def test_a_record_is_straight_between_its_rows_and_held_beyond_them():
     sea = FromFile(rows=RECORD)
     for t, expected in (
-        (0.0, [2, 0, 0]), (1.0, [2, 0, 0]), (2.0, [3, -0.5, 0.25]), (3.0, [4, -1, 0.5]),
-        (3.5, [2, -0.5, 0.25]), (4.0, [0, 0, 0]), (99.0, [0, 0, 0]),
-    ):  # fmt: skip
+        (0.0, [2, 0, 0]),
+        (1.0, [2, 0, 0]),
+        (2.0, [3, -0.5, 0.25]),
+        (3.0, [4, -1, 0.5]),
+        (3.5, [2, -0.5, 0.25]),
+        (4.0, [0, 0, 0]),
+        (99.0, [0, 0, 0]),
+    ):
         np.testing.assert_allclose(load_at(sea, t), expected, atol=1e-15)
     assert sea.bounds() == (4.0, 1.0, 0.5)
 
@@ -200,10 +205,15 @@ def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch)
     [
         ("", "the record needs at least two lines, has 0"),
         ("0,1,1\n1,2,3\n", "line 1 of the record has 3; every line must have 4 (t, b_u, b_v, b_r)"),
-        ("0;1;1;0\n1;2;3;0\n", "line 1 of the record has 1 value; separate values by commas: "
-         "every line must have 4 (t, b_u, b_v, b_r)"),
-        ("t,b_u,b_v,b_r\n0;1;1;0\n1;2;3;0\n", "line 2 of the record has 1 value; separate "
-         "values by commas: every line must have 4"),
+        (
+            "0;1;1;0\n1;2;3;0\n",
+            "line 1 of the record has 1 value; separate values by commas: "
+            "every line must have 4 (t, b_u, b_v, b_r)",
+        ),
+        (
+            "t,b_u,b_v,b_r\n0;1;1;0\n1;2;3;0\n",
+            "line 2 of the record has 1 value; separate values by commas: every line must have 4",
+        ),
         ("0,1,1,0\n\n1,s3cret,2,0\n", "line 3, column 2 of the record is no number"),
         ("0,s3cret,5,0\n1,1,2,0\n", "line 1, column 2 of the record is no number"),
         ("O,0,5,0\n1,1,2,0\n2,1,2,0\n", "line 1, column 1 of the record is no number"),
@@ -216,16 +226,21 @@ def test_a_record_is_read_from_a_file_beside_the_scenario(tmp_path, monkeypatch)
         ("0,1,1,0\n1,1e999,2,0\n", "line 2, column 2 of the record is not a finite number"),
         ("0,1,1,0\n1,1,,0\n", "line 2, column 3 of the record is no number"),
         ("0,1,1,0\n1,1,nan,0\n", "line 2, column 3 of the record is not a finite number"),
-        ("0,1,1,0\n0,1,2,0\n", "line 2 of the record: its time is not after that of the line "
-         "before"),
-        ("s3cret,b_u,b_v\n0,0,0,0\n1,1,1,1\n", "line 1 of the record names columns that are not "
-         "t [s], b_u [N], b_v [N], b_r [N m] (in any order, units may be left out): column 1 is "),
+        (
+            "0,1,1,0\n0,1,2,0\n",
+            "line 2 of the record: its time is not after that of the line before",
+        ),
+        (
+            "s3cret,b_u,b_v\n0,0,0,0\n1,1,1,1\n",
+            "line 1 of the record names columns that are not t [s], b_u [N], b_v [N], b_r [N m] "
+            "(in any order, units may be left out): column 1 is ",
+        ),
         ("t,b_u,b_v,s3cret\n0,0,0,0\n1,1,1,1\n", "column 4 is none of these"),
         ("t,b_u [kg],b_v,b_r\n0,0,0,0\n1,1,1,1\n", "column 2 is none of these"),
         ("t,b_u,b_u,b_r\n0,0,0,0\n1,1,1,1\n", "one is missing or twice"),
         ("t,b_u,b_v\n0,0,0,0\n1,1,1,1\n", "one is missing or twice"),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_record_is_told_in_a_sentence_that_repeats_none_of_it(rows, says):
     with pytest.raises(ValidationError) as told:
         FromFile(rows=rows)

@@ -138,10 +138,14 @@ def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
 @pytest.mark.parametrize(
     ("section", "pages"),
     [
-        ("controller", "*"), ("path", "*"), ("disturbance", "sea"), ("actuator", "actuators"),
-        ("estimator", "estimators"), ("measurement", "measurements"),
+        ("controller", "*"),
+        ("path", "*"),
+        ("disturbance", "sea"),
+        ("actuator", "actuators"),
+        ("estimator", "estimators"),
+        ("measurement", "measurements"),
     ],
-)  # fmt: skip
+)
 def test_every_kind_has_its_place_on_a_page(section: str, pages: str) -> None:
     text = "".join(page.read_text() for page in (ROOT / "docs").glob(f"{pages}.md"))
     kinds = kinds_of(scenario_class(()), section)

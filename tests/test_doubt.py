@@ -107,8 +107,9 @@ def test_a_verdict_turns_where_algebra_says(out):
     assert still["word"] == "under conditions"  # it goes straight unless it starts sideways
     sideways = [r for r in rows("turns.csv", out[0]) if r["claim"] == "still"]
     assert {(r["key"], r["task"]) for r in sideways} == {
-        ("start.v", "False"), ("disturbance.b_v", "True"),
-    }  # fmt: skip
+        ("start.v", "False"),
+        ("disturbance.b_v", "True"),
+    }
     starts = [abs(float(r["turns_at"])) for r in sideways if r["key"] == "start.v"]
     assert all(0.1 < v <= SHARP * 0.1 for v in starts)
 
@@ -243,8 +244,12 @@ def test_a_study_hangs_on_what_it_does_not_draw(podusv):
     (turn,) = rows("answer/turns.csv")
     assert turn["turns_at"] == "finished and z_e_steady <= 0.75"
     assert {path.name for path in Path("out/studies").iterdir()} == {
-        "own", "sweep.seed-1", "sweep.seed-2", "sweep.success-1", "sweep.success-2",
-    }  # fmt: skip
+        "own",
+        "sweep.seed-1",
+        "sweep.seed-2",
+        "sweep.success-1",
+        "sweep.success-2",
+    }
     words = ("--set", "sweep.seed=2", "--no-figures", "--workers", "1", "--out", "apart")
     assert podusv("sweep", "run", "drawn.yaml", *words).code == 0
     apart, within = (Path(at, "claims.json") for at in ("apart", "out/studies/sweep.seed-1"))
@@ -322,8 +327,9 @@ def by_name():
 def test_a_value_that_laws_share_moves_in_all():
     shared = by_name()["controllers.a.k_psie"]
     assert {public(place) for place in shared.places} == {
-        "controllers.a.k_psie", "controllers.b.k_psie",
-    }  # fmt: skip
+        "controllers.a.k_psie",
+        "controllers.b.k_psie",
+    }
 
 
 def test_what_two_laws_differ_in_stays_in_claims_about_both():
@@ -450,11 +456,19 @@ def test_the_filter_that_turns_F7w_turns_single_runs(podusv):
     """`podusv run`, beside the search's own loop: 2.1 1/s misses waypoints, 2.2 1/s does not."""
     done = {
         w: podusv(
-            "compare", "podusv:fossen_2003/cybership2.yaml", "--set", f"controllers.paper.w={w}",
-            "--set", f"controllers.one_length.w={w}", "--no-figures", "--json", "--out", str(w),
+            "compare",
+            "podusv:fossen_2003/cybership2.yaml",
+            "--set",
+            f"controllers.paper.w={w}",
+            "--set",
+            f"controllers.one_length.w={w}",
+            "--no-figures",
+            "--json",
+            "--out",
+            str(w),
         )
         for w in (2.1, 2.2)
-    }  # fmt: skip
+    }
     assert done[2.1].code == 0, done[2.1].err
     verdicts = {
         w: {c["claim"]: c["verdict"] for c in json.loads(said.out)["claims"]}
@@ -477,8 +491,9 @@ def test_angles_move_to_either_side_as_the_page_says(key):
         "name: a\nvessel: {preset: paper_nonlinear}\nactuator: {kind: saturated}\n"
         "path: {kind: line, course: 0.3}\nstart: {psi: 0.3}\n"
         "disturbance: {kind: wind, speed: 2.0, direction: 0.3}\n"
-        "controllers: {a: {kind: pid}, b: {kind: los_pid}}\nsimulation: {duration: 1.0}\n", "a.yaml"
-    ).scenario  # fmt: skip
+        "controllers: {a: {kind: pid}, b: {kind: los_pid}}\nsimulation: {duration: 1.0}\n",
+        "a.yaml",
+    ).scenario
     (moved,) = (choice for choice in choices(several.singles()) if choice.name == key)
     alone, together = ANGLES[key]
     assert moved.range.alone.plus.uniform == pytest.approx((-alone, alone), rel=1e-15)

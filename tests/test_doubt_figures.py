@@ -38,9 +38,11 @@ def drawn(base, *worlds):
     worlds = [judged(*world) for world in worlds]
     tried = Tried(judged(base, 3.9), [], Draws([gain], shares, shares.tolist()), worlds)
     answer = SimpleNamespace(
-        verdict=SimpleNamespace(name="C", answer=base), number=compared_numbers("a.iae < 4.9", 0.05)[0],
-        numbers={"a.iae": 3.9}, explained=(),
-    )  # fmt: skip
+        verdict=SimpleNamespace(name="C", answer=base),
+        number=compared_numbers("a.iae < 4.9", 0.05)[0],
+        numbers={"a.iae": 3.9},
+        explained=(),
+    )
     alone = [TriedChoice(gain, ())]
     figure = figures.specification(SimpleNamespace(tried=tried), answer, alone)
     return {line.get_label(): line for line in figure.axes[0].lines}, figure
@@ -87,7 +89,7 @@ def test_a_window_is_orange_as_far_as_it_was_seen_to_reach():
     assert list(figures.turned_spans(row, low, "C", BASE)) == [(-1.0, -1.0)]
     answer = SimpleNamespace(
         verdict=SimpleNamespace(name="C"), neighbours=(), turns=(Turn(omega, 1.0, 0.7, 0.5),)
-    )  # fmt: skip
+    )
     report = SimpleNamespace(tried=SimpleNamespace(base=BASE))
     drawing = FigureCanvasAgg(figures.ranges(report, answer, [row]))
     drawing.draw()
@@ -105,11 +107,13 @@ def test_where_a_verdict_turns_can_be_read_at_any_width(width):
     answer = SimpleNamespace(
         verdict=SimpleNamespace(name="C"),
         turns=(
-            Turn(omega, 0.357, 0.36, 0.143), Turn(omega, 0.881, 0.88, 0.381),
-            Turn(inertia, -1930.0, -1900.0, 696.0), Turn(inertia, -812.0, -815.0, 422.0),
+            Turn(omega, 0.357, 0.36, 0.143),
+            Turn(omega, 0.881, 0.88, 0.381),
+            Turn(inertia, -1930.0, -1900.0, 696.0),
+            Turn(inertia, -812.0, -815.0, 422.0),
         ),
         neighbours=(Turn(psi, 3.14 + 7e-6, 3.14, 7e-6),),
-    )  # fmt: skip
+    )
     turned = [(t.choice, t.value) for t in (*answer.turns, *answer.neighbours)]
     rows = [
         tried(c, dict.fromkeys([*ends(c), *(v for of, v in turned if of is c)], False))
@@ -125,8 +129,12 @@ def test_where_a_verdict_turns_can_be_read_at_any_width(width):
         boxes = [text.get_window_extent(canvas.get_renderer()) for text in axes.texts]
         lines = [bar.get_window_extent(canvas.get_renderer()) for bar in axes.lines]
     assert [text.get_text() for text in axes.texts] == [
-        "down from 0.357", "from 0.881", "from -812", "down from -1.93e+03", "+7e-06",
-    ]  # fmt: skip
+        "down from 0.357",
+        "from 0.881",
+        "from -812",
+        "down from -1.93e+03",
+        "+7e-06",
+    ]
     names = [label.get_text() for label in axes.get_yticklabels()]
     assert names[0] == "controllers.los_pid.omega_psi\n0.5 rad/s"
     for place, box in enumerate(boxes):

@@ -151,8 +151,9 @@ def test_a_draw_depends_on_its_name_and_index_alone():
 
 def test_the_numbers_of_a_claim_with_their_limits():
     assert compared_numbers("max(a.x) <= 0.1 and -3 > a.e") == [
-        ("max(a.x)", "", (0.1,), False), ("a.e", "", (-3.0,), True),
-    ]  # fmt: skip
+        ("max(a.x)", "", (0.1,), False),
+        ("a.e", "", (-3.0,), True),
+    ]
     assert compared_numbers("1 < a.e < b.e") == [
         ("a.e", "", (1.0,), True),
         ("a.e", "b.e", (1.0,), True),
@@ -179,13 +180,19 @@ class Numbered:
 @pytest.mark.parametrize(
     ("expect", "edges"),
     [
-        ("a.iae <= 4", (4.4,)), ("4 <= a.iae", (4.0 / 1.1,)), ("a.iae >= 4", (3.6,)),
+        ("a.iae <= 4", (4.4,)),
+        ("4 <= a.iae", (4.0 / 1.1,)),
+        ("a.iae >= 4", (3.6,)),
         ("4 == a.iae", (4.0 / 0.9, 4.0 / 1.1)),
-        ("a.iae < 4", (3.6, 4.0 / 0.9)), ("a.iae > -4", (-3.6, -4.0 / 0.9)),
-        ("4 > a.iae", (4.0 / 0.9, 3.6)), ("a.iae < b.iae", (0.9, 1.0 / 0.9)),
-        ("a.iae == 4", (3.6, 4.4)), ("a.iae == b.iae", (0.9, 1.1)), ("a.iae <= b.iae", (1.1,)),
+        ("a.iae < 4", (3.6, 4.0 / 0.9)),
+        ("a.iae > -4", (-3.6, -4.0 / 0.9)),
+        ("4 > a.iae", (4.0 / 0.9, 3.6)),
+        ("a.iae < b.iae", (0.9, 1.0 / 0.9)),
+        ("a.iae == 4", (3.6, 4.4)),
+        ("a.iae == b.iae", (0.9, 1.1)),
+        ("a.iae <= b.iae", (1.1,)),
     ],
-)  # fmt: skip
+)
 def test_a_number_turns_where_the_verdict_on_the_claim_does(expect, edges):
     """As the claims' own judge has it, a little to both sides of each edge."""
     (number,) = compared_numbers(expect, 0.1)

@@ -19,7 +19,7 @@ from conftest import (
     load_at,
     run,
     target_at,
-)  # fmt: skip
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -214,9 +214,17 @@ class Exploding(Constant):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """1 N, then infinity."""
         tau[0] = 1.0 if t < 0.4999 else math.inf
         tau[1] = 0.0

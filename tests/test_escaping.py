@@ -133,10 +133,13 @@ def test_every_text_of_the_report_is_text():
     odd = f"<script>{EVIL}"
     plain = page()
     text = page(
-        title=odd, endings={odd: odd}, differences={odd: {odd: odd}},
+        title=odd,
+        endings={odd: odd},
+        differences={odd: {odd: odd}},
         table=replace(FRAME, columns=(odd, *FRAME.columns[1:])),
-        figures=[report.Picture(odd, odd, b"<svg/>", odd)], provenance={odd: odd},
-    )  # fmt: skip
+        figures=[report.Picture(odd, odd, b"<svg/>", odd)],
+        provenance={odd: odd},
+    )
     assert not nasty(text)
     assert len(tree(plain).all("script")) == len(tree(text).all("script"))
 

@@ -76,9 +76,12 @@ def test_the_low_pass_is_as_late_as_its_docstring_says():
 def test_the_low_pass_lets_as_much_noise_through_as_theory_says():
     # Of white samples held for P, a lag T leaves (1 - a)/(1 + a) of the variance, a = exp(-P/T).
     out = sailed(
-        LowPass(T_p=0.3), Taken(every=10, sigma_p=0.02), 600.0,
-        controller=Constant(), start=(0.0,) * 6,
-    )  # fmt: skip
+        LowPass(T_p=0.3),
+        Taken(every=10, sigma_p=0.02),
+        600.0,
+        controller=Constant(),
+        start=(0.0,) * 6,
+    )
     kept = np.exp(-0.2 / 0.3)
     found = errors(out)[500::10, :2].var() / 0.02**2
     np.testing.assert_allclose(found, (1.0 - kept) / (1.0 + kept), rtol=0.06)
@@ -120,10 +123,17 @@ def test_halving_the_step_takes_away_all_but_a_sixteenth_of_the_error(kind):
     # Smooth hulls, that is without |v|; the filter is told a wrong one, so that it has work to do.
     wrong = PAPER.model_copy(update={"Y_v": -2.0, "m": 26.0})
     ends = [
-        sailed(kind(), Taken(every=every), 4.0, 0.2 / every,
-               vessel=PAPER, nominal=wrong, disturbance=Steady())
+        sailed(
+            kind(),
+            Taken(every=every),
+            4.0,
+            0.2 / every,
+            vessel=PAPER,
+            nominal=wrong,
+            disturbance=Steady(),
+        )
         for every in (5, 10, 20)
-    ]  # fmt: skip
+    ]
     states = dict.fromkeys(part.name for part in kind().states)
     last = [np.concatenate([np.ravel(out[name][-1]) for name in states]) for out in ends]
     coarse, fine = abs(last[1] - last[0]).max(), abs(last[2] - last[1]).max()
@@ -133,9 +143,11 @@ def test_halving_the_step_takes_away_all_but_a_sixteenth_of_the_error(kind):
 def test_in_the_loop_a_model_helps_and_a_lag_does_harm():
     def rms(estimator: Estimator) -> float:
         loop = corrected(
-            controller=VelocityVector(), actuator=Saturated(),
-            measurement=Sensors(), estimator=estimator,
-        )  # fmt: skip
+            controller=VelocityVector(),
+            actuator=Saturated(),
+            measurement=Sensors(),
+            estimator=estimator,
+        )
         return float(np.sqrt((run(loop, 120.0)["z_e"][6000:] ** 2).mean()))
 
     assert 1.3 * rms(ExtendedKalmanFilter()) < rms(NoEstimator()) < 0.5 * rms(LowPass())

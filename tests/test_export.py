@@ -20,16 +20,7 @@ import numpy as np
 import pytest
 from command_samples import one_line
 from conftest import example, kinds
-from export_samples import (
-    HARDWARE,
-    SOURCE,
-    export_law,
-    exported,
-    law,
-    needs_cc,
-    scenario,
-    task,
-)  # fmt: skip
+from export_samples import HARDWARE, SOURCE, export_law, exported, law, needs_cc, scenario, task
 from exported_laws import Unit
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
@@ -80,16 +71,21 @@ TASKS: dict[str, tuple[str, dict[str, Any]]] = {
     "an estimate in place of the state": ("podusv:sea/sensors.yaml", {}),
     "an estimate on a path that is followed": (
         "podusv:laws/legs.yaml",
-        {"controllers": None, "controller": {"kind": "los_pid"},
-         "measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}},
+        {
+            "controllers": None,
+            "controller": {"kind": "los_pid"},
+            "measurement": {"kind": "sensors"},
+            "estimator": {"kind": "ekf"},
+        },
     ),
     "a command path": ("podusv:sea/delay.yaml", {}),
     "rounded corners": (
-        "podusv:laws/corners.yaml", {"controllers": None, "controller": {"kind": "hand_position"}}
+        "podusv:laws/corners.yaml",
+        {"controllers": None, "controller": {"kind": "hand_position"}},
     ),
     "a log of some steps": (SOURCE, {"log.every": 7, "controller": {"kind": "momentum_vector"}}),
     "no whole number of periods": (SOURCE, {"simulation.duration": 4.07}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -106,8 +102,13 @@ def test_a_law_that_loads_between_samples_change_is_held_against_itself(tmp_path
     """The C files are given the loads at samples only, so they cannot have the bits of the run."""
     pods = "actuator={kind: pod, preset: otter}"
     said: list[str] = []
-    changes = ["control.period=0.1", "simulation.duration=2", "controller={kind: momentum_vector}",
-               pods, "vessel={preset: otter}"]  # fmt: skip
+    changes = [
+        "control.period=0.1",
+        "simulation.duration=2",
+        "controller={kind: momentum_vector}",
+        pods,
+        "vessel={preset: otter}",
+    ]
     folder = export_law(Path(SOURCE), tmp_path / "law", changes, fmu=False, say=said.append)
     assert any("check your code by that, not by log.h5" in text for text in said)
     assert not any("the run" in text and "samples before" in text for text in said)
@@ -125,10 +126,12 @@ def test_a_run_that_diverges_is_told_and_one_that_is_interrupted_exports_nothing
 
     def ended(status):
         monkeypatch.setattr(
-            simulate, "run", lambda *given, **how: replace(
+            simulate,
+            "run",
+            lambda *given, **how: replace(
                 marched(*given, **how), status=status, message="diverged at once"
             ),
-        )  # fmt: skip
+        )
 
     ended("diverged")
     exported(tmp_path / "far", say=said.append)
@@ -188,9 +191,14 @@ def test_the_table_of_samples_has_what_the_law_was_given(tmp_path):
 def test_the_description_of_the_fmu_names_every_variable_once():
     law = ExportedLaw.of(scenario("momentum_vector", **PODS))
     about = {
-        **c.template_values(law), "guid": "g", "outputs": [13, 14], "stop": "30.0",
-        "units": ["N"], "variables": variables(law, np.arange(15.0)), "loads": True,
-    }  # fmt: skip
+        **c.template_values(law),
+        "guid": "g",
+        "outputs": [13, 14],
+        "stop": "30.0",
+        "units": ["N"],
+        "variables": variables(law, np.arange(15.0)),
+        "loads": True,
+    }
     tree = ET.fromstring(c.render_file("modelDescription.xml", about))
     found = [variable.get("name") for variable in tree.iter("ScalarVariable")]
     assert found == law.columns[1:]
@@ -205,10 +213,17 @@ AROUND: dict[str, tuple[str, dict[str, Any], bool]] = {
     "a failure after the run": (SOURCE, {"actuator": {"failure": {"time": 99.0}}}, True),
     "an estimate beside the third leg": (
         "podusv:laws/legs.yaml",
-        {"controllers": None, "path.points": [[0, 0], [6, 0], [6, 6]], "start.x": 5.0,
-         "start.y": 4.0, "measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}}, False,
+        {
+            "controllers": None,
+            "path.points": [[0, 0], [6, 0], [6, 6]],
+            "start.x": 5.0,
+            "start.y": 4.0,
+            "measurement": {"kind": "sensors"},
+            "estimator": {"kind": "ekf"},
+        },
+        False,
     ),
-}  # fmt: skip
+}
 
 
 @needs_cc
@@ -265,9 +280,11 @@ def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(m
     )
     builds = "the first time, zig builds the platform's C library, a minute or two"
     assert said == [
-        f"linking the FMU for win64; {builds}", "win64",
-        f"linking the FMU for linux64; {builds}", "linux64",
-    ]  # fmt: skip
+        f"linking the FMU for win64; {builds}",
+        "win64",
+        f"linking the FMU for linux64; {builds}",
+        "linux64",
+    ]
 
 
 def test_every_platform_gets_object_code_and_nothing_of_this_machine():
@@ -278,10 +295,14 @@ def test_every_platform_gets_object_code_and_nothing_of_this_machine():
     assert objects.library_functions(text) == []
     assert objects.library_functions("declare double @llvm.sin.f64(double) #1\n") == ["sin"]
     magic = {
-        "linux64": b"\x7fELF", "win64": b"\x64\x86", "darwin64": b"\xcf\xfa\xed\xfe",
-        "aarch64-linux": b"\x7fELF", "armv7": b"\x7fELF", "thumbv7em": b"\x7fELF",
+        "linux64": b"\x7fELF",
+        "win64": b"\x64\x86",
+        "darwin64": b"\xcf\xfa\xed\xfe",
+        "aarch64-linux": b"\x7fELF",
+        "armv7": b"\x7fELF",
+        "thumbv7em": b"\x7fELF",
         "riscv64": b"\x7fELF",
-    }  # fmt: skip
+    }
     assert set(magic) == set(objects.PLATFORMS)
     for name, platform in objects.PLATFORMS.items():
         assert objects.object_file(text, platform).startswith(magic[name]), name
@@ -356,9 +377,14 @@ def test_without_a_linker_or_an_export_the_check_says_what_is_missing(tmp_path, 
 
 
 ABOUT = {
-    "inputs": [{"name": f"i{i}"} for i in range(15)], "demand": [{"name": "u"}, {"name": "r"}],
-    "signals": [], "memory": [], "period": 0.1, "platforms": [], "of_run": True,
-}  # fmt: skip
+    "inputs": [{"name": f"i{i}"} for i in range(15)],
+    "demand": [{"name": "u"}, {"name": "r"}],
+    "signals": [],
+    "memory": [],
+    "period": 0.1,
+    "platforms": [],
+    "of_run": True,
+}
 HEAD = ",".join(["time", *(number["name"] for number in ABOUT["inputs"] + ABOUT["demand"])])
 
 
@@ -379,11 +405,17 @@ def test_a_table_that_is_not_the_one_described_gets_a_sentence(tmp_path, rows):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"inputs": 3}, {"inputs": ABOUT["inputs"][1:]}, {"demand": None}, {"signals": ["e_ct"]},
-        {"memory": {"a": 1}}, {"period": "0.1"}, {"period": -1.0}, {"platforms": "linux64"},
+        {"inputs": 3},
+        {"inputs": ABOUT["inputs"][1:]},
+        {"demand": None},
+        {"signals": ["e_ct"]},
+        {"memory": {"a": 1}},
+        {"period": "0.1"},
+        {"period": -1.0},
+        {"platforms": "linux64"},
         {"of_run": 1},
     ],
-)  # fmt: skip
+)
 def test_a_law_json_of_other_types_gets_a_sentence(tmp_path, changes):
     described(tmp_path, "0\n", **changes)
     (key,) = changes

@@ -205,11 +205,12 @@ def stand_ins(messages: list[Any]) -> dict[str, Any]:
         return SimpleNamespace(wrench=SimpleNamespace(**parts))
 
     return {
-        "rclpy": SimpleNamespace(), "rclpy.node": SimpleNamespace(Node=Node),
+        "rclpy": SimpleNamespace(),
+        "rclpy.node": SimpleNamespace(Node=Node),
         "geometry_msgs.msg": SimpleNamespace(WrenchStamped=wrench),
         "nav_msgs.msg": SimpleNamespace(Odometry=None),
         "std_msgs.msg": SimpleNamespace(Float64MultiArray=None),
-    }  # fmt: skip
+    }
 
 
 def odometry(x: float, y: float, psi: float, u: float, v: float, r: float) -> Any:

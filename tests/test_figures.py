@@ -6,17 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_samples import (
-    CENTER,
-    WIDTH,
-    drawn,
-    line,
-    looked_at,
-    panels,
-    recording,
-    scenario,
-    shown,
-)
+from drawn_samples import CENTER, WIDTH, drawn, line, looked_at, panels, recording, scenario, shown
 from known_signals import ABOUT
 from matplotlib.cbook import is_math_text
 from matplotlib.text import Text
@@ -316,9 +306,11 @@ def test_the_same_runs_give_the_same_bytes_without_a_date(two, form):
 
 # An odd and an even number of $, what they would enclose, and what a legend would leave out.
 ODD = ["_a$x^{2$b \\frac{ 3$", "$\\undefined$\udcff\x1b[31m\n"]
-SCENARIO = SOUND.replace("kind: ideal", "kind: pod, preset: otter").replace("pid", "dsc").replace(
-    "{kind: none}", "[{kind: wind, speed: 1.0}, {kind: current, speed: 0.1}]"
-)  # fmt: skip
+SCENARIO = (
+    SOUND.replace("kind: ideal", "kind: pod, preset: otter")
+    .replace("pid", "dsc")
+    .replace("{kind: none}", "[{kind: wind, speed: 1.0}, {kind: current, speed: 0.1}]")
+)
 SCENARIO += "measurement: {kind: sensors}\n"
 BRIEF = "name: x\nsimulation: {step: 0.01, duration: 0.1, compiled: false}\n"
 

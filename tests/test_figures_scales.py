@@ -89,9 +89,11 @@ def test_controls_show_the_peak_the_whole_run_and_the_settled_part():
         assert curve.get_xdata()[[0, -1]] == pytest.approx(span)
     assert [axes.get_title() for axes in drawn_axes] == ["early", "whole run", "settled"] + [""] * 9
     assert [axes.get_ylabel() for axes in drawn_axes[::3]] == [
-        r"$\tau_u$ [N]", r"$\tau_{u,\mathrm{cmd}}$ [N]",
-        r"$\tau_r$ [N m]", r"$\tau_{r,\mathrm{cmd}}$ [N m]",
-    ]  # fmt: skip
+        r"$\tau_u$ [N]",
+        r"$\tau_{u,\mathrm{cmd}}$ [N]",
+        r"$\tau_r$ [N m]",
+        r"$\tau_{r,\mathrm{cmd}}$ [N m]",
+    ]
     assert [axes.get_xlabel() for axes in drawn_axes] == [""] * 9 + ["time [s]"] * 3
 
 
@@ -264,8 +266,11 @@ def measured(*outages):
 def test_the_sea_is_shown_as_far_as_it_is_logged():
     figure = drawn("sea", shown(("a", recording(**SEA))))
     assert [axes.get_ylabel() for axes in figure.axes] == [
-        r"$\zeta$ [m]", r"$\zeta$ [m]", "$V_w$ [m/s]", "$V_c$ [m/s]",
-    ]  # fmt: skip
+        r"$\zeta$ [m]",
+        r"$\zeta$ [m]",
+        "$V_w$ [m/s]",
+        "$V_c$ [m/s]",
+    ]
     level = SEA["beta_c"](np.zeros(1))[0]
     assert [text.get_text() for text in figure.texts] == [rf"constant: $\beta_c$ = {level:.4g} rad"]
     log = recording(**SEA)

@@ -141,7 +141,7 @@ def moving(u, v, r, **water):
         ((1.0, 0.33, 0.83), ["a speed of up"]),
         ((1.0, 0.1, 0.83), []),
     ],
-)  # fmt: skip
+)
 def test_motion_beyond_what_was_measured_is_told(velocities, says):
     texts = moving(*velocities)
     assert len(texts) == len(says)
@@ -162,8 +162,9 @@ def test_a_filter_that_is_told_wrong_noise_is_told_by_its_innovations():
     assert told("inconsistent-filter", *seen, "estimator={kind: ekf}") == []
     sharp = told("inconsistent-filter", *seen, "estimator={kind: ekf, sigma_psi: 0.001}")
     assert [text.split(" are ")[0] for text in sharp] == [
-        "innovations of the heading", "innovations of the yaw rate"
-    ]  # fmt: skip
+        "innovations of the heading",
+        "innovations of the yaw rate",
+    ]
     assert "give it a larger sigma first" in sharp[0]
     dull = "estimator={kind: ekf, sigma_p: 1, sigma_psi: 1, sigma_u: 1, sigma_v: 1, sigma_r: 1}"
     texts = told("inconsistent-filter", *seen, dull)
@@ -276,10 +277,18 @@ def swinging(periods=4.0, size=0.02, decay=1.0, noise=0.0, load=0.0, turn=0.0):
     random = np.random.default_rng(1).normal(0.0, noise * LONG * size, len(t))
     zero = np.zeros_like(t)
     signals = {
-        "time": t, "x": 0.5 * t, "x_d": 0.5 * t, "y": swing + pushed + random, "y_d": pushed,
-        "u": zero, "v": np.gradient(swing, t), "r": zero, "b_u": zero, "b_r": zero,
+        "time": t,
+        "x": 0.5 * t,
+        "x_d": 0.5 * t,
+        "y": swing + pushed + random,
+        "y_d": pushed,
+        "u": zero,
+        "v": np.gradient(swing, t),
+        "r": zero,
+        "b_u": zero,
+        "b_r": zero,
         "b_v": load * SWAY * rate * rate * swing,
-    }  # fmt: skip
+    }
     scenario = STILL.model_copy(
         update={"simulation": STILL.simulation.model_copy(update={"duration": 20.0})}
     )
@@ -315,9 +324,10 @@ def test_a_stable_law_a_push_and_a_winding_path_are_no_cycle():
     stable = (*CALM, "controller={kind: velocity_vector}", "path={kind: line, speed: 1.1}")
     winding = (*CALM[1:], "controller={kind: velocity_vector}", "path={kind: sinusoid}")
     pushed = (
-        "controller={kind: pid}", "simulation.duration=120",
+        "controller={kind: pid}",
+        "simulation.duration=120",
         "disturbance={kind: harmonic, b_v: {sin: 2.0, sin_rate: 1.3, cos: 0.0}}",
-    )  # fmt: skip
+    )
     out = log(*pushed)
     assert np.ptp(out["y"][out["time"] >= 96.0]) > 0.05
     assert [told("limit-cycle", *run) for run in (stable, winding, pushed)] == [[], [], []]
@@ -338,9 +348,7 @@ def test_the_shipped_corrected_scenario_has_only_the_findings_that_are_true_of_i
 
 def test_the_printed_scenario_is_told_why_it_cannot_track():
     texts = {f.code: f.text for f in preflight(load(CONFIGS / "printed.yaml").scenario)}
-    assert set(texts) == {
-        "path-jump", "sway-drift", "sway-unstable", "coupling-saddle"
-    }  # fmt: skip
+    assert set(texts) == {"path-jump", "sway-drift", "sway-unstable", "coupling-saddle"}
     assert "0.56 m/s" in texts["sway-drift"]
     assert "2.58 kg/s exceeds the sway damping 0.89 kg/s" in texts["sway-unstable"]
 

@@ -192,42 +192,70 @@ SWELL = "{kind: waves, height: 0.02, period: 2, seed: %d}"
 WIND = sea("{kind: wind, speed: 1, gusts: %s}")
 SIGMA = "estimator={kind: ekf, sigma_psi: %s}"
 CASES = [  # code, its key, overrides with it, and without
-    ("large-angle", "disturbance[0].direction", [sea("{kind: current, direction: 225}")],
-     [sea("{kind: current, direction: 3.9}")]),
+    (
+        "large-angle",
+        "disturbance[0].direction",
+        [sea("{kind: current, direction: 225}")],
+        [sea("{kind: current, direction: 3.9}")],
+    ),
     ("late-load", "disturbance[1].time", [STEP % 20], [STEP % 19]),
     ("load-between-steps", "disturbance[1].time", [STEP % 10.005], [STEP % 10.01]),
-    ("load-between-steps", "disturbance[1].time", [STEP % 10.005],
-     [STEP % "10.005, ramp: 1"]),
-    ("late-outage", "measurement", ["measurement={kind: sensors, position: {outages: [[20, 30]]}}"],
-     ["measurement={kind: sensors, position: {outages: [[19, 30]]}}"]),
-    ("dead-zone", "actuator.command.dead_zone_u",
-     ["actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: 20}}"],
-     ["actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: 1}}"]),
-    ("dead-zone", "actuator.command.dead_zone_r",
-     ["actuator={kind: saturated, yaw_limit: 2, command: {dead_zone_r: 2}}"],
-     ["actuator={kind: ideal, command: {dead_zone_r: 2}}"]),
+    ("load-between-steps", "disturbance[1].time", [STEP % 10.005], [STEP % "10.005, ramp: 1"]),
+    (
+        "late-outage",
+        "measurement",
+        ["measurement={kind: sensors, position: {outages: [[20, 30]]}}"],
+        ["measurement={kind: sensors, position: {outages: [[19, 30]]}}"],
+    ),
+    (
+        "dead-zone",
+        "actuator.command.dead_zone_u",
+        ["actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: 20}}"],
+        ["actuator={kind: saturated, surge_limit: 8, command: {dead_zone_u: 1}}"],
+    ),
+    (
+        "dead-zone",
+        "actuator.command.dead_zone_r",
+        ["actuator={kind: saturated, yaw_limit: 2, command: {dead_zone_r: 2}}"],
+        ["actuator={kind: ideal, command: {dead_zone_r: 2}}"],
+    ),
     ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.0024], [SENSORS, FILTER]),
     ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011], [SENSORS, SIGMA % 0.009]),
-    ("estimator-noise", "estimator.sigma_psi", [SENSORS, SIGMA % 0.011],
-     [SENSORS, SIGMA % 0.011, sea("{kind: waves, height: 0.02, period: 2}")]),
-    ("estimator-delay", "estimator.delay_p",
-     [LATE, FILTER],
-     [LATE, TOLD_LATE]),
-    ("estimator-delay", "estimator.delay_p", [SENSORS, TOLD_LATE],
-     [LATE, "estimator={kind: low_pass}"]),
+    (
+        "estimator-noise",
+        "estimator.sigma_psi",
+        [SENSORS, SIGMA % 0.011],
+        [SENSORS, SIGMA % 0.011, sea("{kind: waves, height: 0.02, period: 2}")],
+    ),
+    ("estimator-delay", "estimator.delay_p", [LATE, FILTER], [LATE, TOLD_LATE]),
+    (
+        "estimator-delay",
+        "estimator.delay_p",
+        [SENSORS, TOLD_LATE],
+        [LATE, "estimator={kind: low_pass}"],
+    ),
     ("steep-waves", "disturbance[0].height", [WAVES % 0.5], [WAVES % 0.05]),
-    ("few-components", "disturbance[0].components",
-     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 175}")],  # 0.9 a period: 180
-     [sea("{kind: waves, height: 5e-4, period: 0.1, components: 185}")]),
-    ("few-components", "disturbance[0].components",
-     [sea("{kind: waves, height: 1e-3, period: 0.19, components: 50}")],  # 105 periods
-     [sea("{kind: waves, height: 1e-3, period: 0.21, components: 50}")]),
+    (
+        "few-components",
+        "disturbance[0].components",
+        [sea("{kind: waves, height: 5e-4, period: 0.1, components: 175}")],  # 0.9 a period: 180
+        [sea("{kind: waves, height: 5e-4, period: 0.1, components: 185}")],
+    ),
+    (
+        "few-components",
+        "disturbance[0].components",
+        [sea("{kind: waves, height: 1e-3, period: 0.19, components: 50}")],  # 105 periods
+        [sea("{kind: waves, height: 1e-3, period: 0.21, components: 50}")],
+    ),
     ("same-waves", "disturbance[1].seed", [sea(*[SWELL % 1] * 2)], [sea(SWELL % 1, SWELL % 2)]),
-    ("few-components", "disturbance[0].components",
-     [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 560}")],  # 568
-     [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 580}")]),
+    (
+        "few-components",
+        "disturbance[0].components",
+        [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 560}")],  # 568
+        [LASTING, sea("{kind: wind, speed: 1, gusts: norsok, components: 580}")],
+    ),
     ("model-gusts", "disturbance[0].gusts", [WIND % "norsok"], [WIND % "none"]),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("code", "key", "doubtful", "sound"), CASES)
@@ -297,8 +325,9 @@ def test_warnings_come_on_stderr_in_json_and_in_the_run_folder(podusv):
     assert said.code == 0
     lines = said.err.splitlines()
     assert {line.partition(":")[0] for line in lines} == {
-        "warning[sway-drift]", "warning[sway-unstable]"
-    }  # fmt: skip
+        "warning[sway-drift]",
+        "warning[sway-unstable]",
+    }
     printed = json.loads(said.out)["warnings"]
     assert [f"warning[{w['code']}]: {w['where']}: {w['text']}" for w in printed] == lines
     assert json.loads(Path("out/metrics.json").read_text())["warnings"] == printed
@@ -328,8 +357,10 @@ def test_findings_that_not_all_runs_share_name_their_runs():
     shared, some, own = (Finding(code, "actuator", code) for code in ("a", "b", "c"))
     found = merge_findings({"x": [shared, some], "y": [some, shared, own], "z": [shared, own, own]})
     assert [str(finding) for finding in found] == [
-        "warning[a]: actuator: a", "warning[b]: x, y: actuator: b", "warning[c]: y, z: actuator: c",
-    ]  # fmt: skip
+        "warning[a]: actuator: a",
+        "warning[b]: x, y: actuator: b",
+        "warning[c]: y, z: actuator: c",
+    ]
     assert merge_findings({"x": [shared], "there already": []})[0].runs == ("x",)
     assert merge_findings({"x": [shared]}) == [shared]
 

@@ -18,9 +18,10 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.studies.making.plan import plan
 
 SHIPPED = [
-    path for path in sorted((PACKAGE.parent / "configs").rglob("*.yaml"))
+    path
+    for path in sorted((PACKAGE.parent / "configs").rglob("*.yaml"))
     if not {"vessels", "conditions", "tasks"} & set(path.parts)
-]  # fmt: skip
+]
 SEEING = ("measurement={kind: sensors}", "estimator={kind: ekf}")
 
 
@@ -67,10 +68,14 @@ def test_a_path_faster_than_the_hull_is_named_where_legs_are_left():
 @pytest.mark.parametrize(
     ("far", "near"),
     [
-        ("U=0.5", "U=0.9"), ("U=3.5", "U=3.0"), ("N_m=100", "N_m=120"), ("N_m=1200", "N_m=1100"),
-        ("k_psi=0.16", "k_psi=0.18"), ("k_psi=1.8", "k_psi=1.7"),
+        ("U=0.5", "U=0.9"),
+        ("U=3.5", "U=3.0"),
+        ("N_m=100", "N_m=120"),
+        ("N_m=1200", "N_m=1100"),
+        ("k_psi=0.16", "k_psi=0.18"),
+        ("k_psi=1.8", "k_psi=1.7"),
     ],
-)  # fmt: skip
+)
 def test_a_number_far_from_the_rule_s_is_told_and_a_near_one_is_not(far, near):
     """U 1.66 m/s, N_m 373 N m, k_psi 0.857 1/s, at most 2 c/T_r = 1.71 1/s."""
     (text,) = told("gains-for-another-hull", boat(f"controller.{far}"))
@@ -148,12 +153,15 @@ NONSENSE = [  # overrides, the key that is named, and what is proposed
     ([SEEING[0], "measurement.heading.noise=2.0"], "measurement.heading.noise", "write 0.0349"),
     ([SEEING[0], "measurement.yaw_rate.noise=0.5"], "measurement.yaw_rate.noise", "in deg/s?"),
     ([SEEING[0], "measurement.position.noise=60"], "measurement.position.noise", "write 0.06"),
-    (["path.points=[[63.43, 10.39], [63.431, 10.391], [63.432, 10.39]]"], "path.points",
-     "latitude and longitude in degrees? 0.002 deg of latitude are 222 m"),
+    (
+        ["path.points=[[63.43, 10.39], [63.431, 10.391], [63.432, 10.39]]"],
+        "path.points",
+        "latitude and longitude in degrees? 0.002 deg of latitude are 222 m",
+    ),
     (["path.points=[[0, 0], [0.6, 0], [0.6, 0.6]]"], "path.points", "in degrees?"),
     (["start.x=-6000"], "start.x", "given in mm? then write -6"),
     (["start.y=7000", "path={kind: circle}"], "start.y", "given in mm? then write 7"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("overrides", "key", "says"), NONSENSE)
@@ -166,12 +174,17 @@ def test_a_value_in_another_unit_is_told_with_the_unit(overrides, key, says):
 @pytest.mark.parametrize(
     "overrides",
     [
-        [], ["vessel.m=60"], ["vessel.m=1500"], ["vessel.I_z=100"], ["vessel.beam=0.5"],
-        [SEEING[0], "measurement.heading.noise=0.1"], [SEEING[0], "measurement.position.noise=5"],
+        [],
+        ["vessel.m=60"],
+        ["vessel.m=1500"],
+        ["vessel.I_z=100"],
+        ["vessel.beam=0.5"],
+        [SEEING[0], "measurement.heading.noise=0.1"],
+        [SEEING[0], "measurement.position.noise=5"],
         ["path.points=[[6000, 10], [6000.5, 10], [6001, 10.1], [6003, 10]]", "start={x: 6000}"],
         ["start.x=-600"],
     ],
-)  # fmt: skip
+)
 def test_an_unusual_value_is_not(overrides):
     assert not told("other-unit", boat(*overrides))
 

@@ -311,8 +311,10 @@ def test_the_printed_sign_asks_for_more_than_the_printed_gains():
 
 def test_every_law_with_a_lyapunov_function_has_its_line():
     assert [line.partition(",")[0] for line in said("corrected_compare")] == [
-        "adaptive_neural", "dsc", "full_backstepping",
-    ]  # fmt: skip
+        "adaptive_neural",
+        "dsc",
+        "full_backstepping",
+    ]
 
 
 # --- findings about signs and units

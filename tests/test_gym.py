@@ -31,7 +31,8 @@ SCENARIO: dict[str, Any] = {
     "control": {"period": PERIOD},
     "simulation": {"duration": 3.0},
     "sweep": {
-        "seed": 5, "draws": 20,
+        "seed": 5,
+        "draws": 20,
         "vary": {
             "vessel.m": {"times": {"uniform": [0.8, 1.2]}},
             "start.x": {"uniform": [-12.0, 12.0]},
@@ -39,7 +40,7 @@ SCENARIO: dict[str, Any] = {
             "path.speed": {"uniform": [0.0, 0.6]},
         },
     },
-}  # fmt: skip
+}
 LAW = Policy(content=content(symmetric()))
 
 
@@ -154,9 +155,12 @@ def test_environments_side_by_side_have_the_bits_of_single_ones(reward):
 
 SEEN: dict[str, dict[str, Any]] = {
     "an estimate": {"measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}},
-    "legs": {"path": {"kind": "legs", "points": [[0, 0], [6, 0], [6, 6]]}, "start.y": 0.0,
-             "sweep.vary": {"path.speed": None, "start.x": {"uniform": [0.0, 9.0]}}},
-}  # fmt: skip
+    "legs": {
+        "path": {"kind": "legs", "points": [[0, 0], [6, 0], [6, 6]]},
+        "start.y": 0.0,
+        "sweep.vary": {"path.speed": None, "start.x": {"uniform": [0.0, 9.0]}},
+    },
+}
 
 
 @pytest.mark.parametrize("case", SEEN)
@@ -232,17 +236,20 @@ REFUSED: dict[str, tuple[dict[str, Any], dict[str, Any], str]] = {
     "no metric": ({}, {"reward": "iea"}, "unknown reward 'iea'; did you mean 'i"),
     "a grid": ({"sweep.grid": {"path.course": [0.1, 0.2]}}, {}, "sweep.grid has several"),
     "a gain": (
-        {"controller": {"kind": "pid"}, VARIED: {"controller.K_Pu": {"uniform": [1.0, 2.0]}}}, {},
+        {"controller": {"kind": "pid"}, VARIED: {"controller.K_Pu": {"uniform": [1.0, 2.0]}}},
+        {},
         "sweep.vary.controller.K_Pu draws controller.K_Pu, and in an environment the controller",
     ),
     "limits of one axis": ({}, {"limits": 8.0}, r"limits are 8\.0; give .* as in limits=\(8"),
     "limits below 0": ({}, {"limits": (8.0, -2.5)}, r"limits are \(8\.0, -2\.5\); give"),
     "limits in words": ({}, {"limits": "ab"}, "limits are 'ab'; give"),
     "a path without a timetable": (
-        {"path": {"kind": "legs", "points": [[0, 0], [20, 0], [20, 20]]}}, {},
-        "runs of this scenario do not gather 'iae' .* take e_ct_integral"),
+        {"path": {"kind": "legs", "points": [[0, 0], [20, 0], [20, 20]]}},
+        {},
+        "runs of this scenario do not gather 'iae' .* take e_ct_integral",
+    ),
     "no period": ({"control.period": 0.0}, {}, "for how long does a demand hold"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("make", [podusv.gym.Env, podusv.gym.VectorEnv])
@@ -278,9 +285,10 @@ def test_a_run_that_ends_with_a_reward_beyond_all_numbers_is_terminated():
     """The square of a demand of 1e200 is infinite; those of other runs are not."""
     free = {"actuator": {"kind": "ideal"}, "vessel": {"preset": "paper"}}
     given: dict[str, Any] = {"reward": "effort_u", "limits": (1e300, 1e300)}
-    one, many = podusv.gym.Env(SCENARIO, free, **given), podusv.gym.VectorEnv(
-        SCENARIO, free, count=2, **given
-    )  # fmt: skip
+    one, many = (
+        podusv.gym.Env(SCENARIO, free, **given),
+        podusv.gym.VectorEnv(SCENARIO, free, count=2, **given),
+    )
     one.reset(seed=0)
     many.reset(seed=0)
     assert one.step((1e200, 1e200))[1:4] == (-math.inf, True, False)
@@ -442,9 +450,10 @@ def test_a_terminated_run_gives_its_last_numbers_to_functions_of_one_s_own():
         "limits": (1e300, 1e300),
         "reward": lambda a, b: b.state[0] - a.state[0],
     }
-    one, many = podusv.gym.Env(SCENARIO, free, **given), podusv.gym.VectorEnv(
-        SCENARIO, free, count=1, **given
-    )  # fmt: skip
+    one, many = (
+        podusv.gym.Env(SCENARIO, free, **given),
+        podusv.gym.VectorEnv(SCENARIO, free, count=1, **given),
+    )
     before, _ = one.reset(seed=0)
     many.reset(seed=0)
     seen, reward, dead, *_ = one.step((1e200, 1e200))
@@ -463,7 +472,7 @@ OWN: dict[str, tuple[dict[str, Any], str]] = {
     "no list": ({"observe": lambda now: 3.0}, "observe gave 3.0; give a list of numbers"),
     "an empty list": ({"observe": lambda now: []}, r"observe gave \[\]; give a list"),
     "a list of words": ({"observe": lambda now: ["a"]}, "observe gave 'a' at 0 s; give finite"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("make", [podusv.gym.Env, podusv.gym.VectorEnv])
@@ -559,9 +568,10 @@ def test_a_reward_is_what_the_metric_grows_by_in_the_interval_of_its_action(peri
     changes = {"control.period": period, "simulation.duration": duration, "log.every": 1}
     for reward in ("iae", "peak_tau_u"):
         given: dict[str, Any] = {"reward": reward}
-        env, many = podusv.gym.Env(SCENARIO, changes, **given), podusv.gym.VectorEnv(
-            SCENARIO, changes, **given
-        )  # fmt: skip
+        env, many = (
+            podusv.gym.Env(SCENARIO, changes, **given),
+            podusv.gym.VectorEnv(SCENARIO, changes, **given),
+        )
         env.reset(seed=2)
         many.reset(seed=[2, *range(7)])
         random, gained, over = np.random.default_rng(1), [], False

@@ -201,9 +201,12 @@ BEHIND_PODS = load(ROOT / "configs/pod/kept.yaml").scenario.actuator
 )
 def test_behind_pods_a_longer_hand_point_is_needed(law, least, most):
     loop = corrected(
-        controller=law, actuator=BEHIND_PODS, disturbance=STEADY, path=PATHS[1],
+        controller=law,
+        actuator=BEHIND_PODS,
+        disturbance=STEADY,
+        path=PATHS[1],
         start=(15.67, 0.0, np.pi / 2, 0.5, 0.0, 0.0),
-    )  # fmt: skip
+    )
     assert least < within(run(loop, 200.0, step=0.02), "z_e", 140).max() < most
 
 

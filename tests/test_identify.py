@@ -31,12 +31,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Identification
-from podusv_cli.identify.fit.estimate import (
-    OPEN,
-    SILENT,
-    HullEstimate,
-    directions,
-)
+from podusv_cli.identify.fit.estimate import OPEN, SILENT, HullEstimate, directions
 from podusv_cli.identify.fit.march import (
     APART,
     COMMANDS,
@@ -76,10 +71,14 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
     filter_ = ExtendedKalmanFilter(sigma_p=0.03, sigma_u=0.05, sigma_v=0.06, q_u=0.1, q_b=0.2)
     current, delay = (0.2, -0.1), 0.07
     constants = {
-        **HULL.constants(), **filter_.constants(), "thrust": 0.9, "delay": delay,
+        **HULL.constants(),
+        **filter_.constants(),
+        "thrust": 0.9,
+        "delay": delay,
         **dict.fromkeys(("Y_rv", "Y_vr", "N_rv", "N_vr"), 0.0),  # whose slopes are means
-        "current_x": current[0], "current_y": current[1],
-    }  # fmt: skip
+        "current_x": current[0],
+        "current_y": current[1],
+    }
     rows[:, COMMANDS:] = rng.normal(0.0, 1.0, (12, 9))
     size, moving = 9, np.array([0.9, 0.4, 0.5])
     x = rng.normal(0.0, 0.3, size)
@@ -103,9 +102,13 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
 def filtered(rows, x, P, k, filter_, current):
     """An extended Kalman filter with slopes by differences, and its covariance by solve_ivp."""
     sigma = (
-        filter_.sigma_p, filter_.sigma_p, filter_.sigma_psi,
-        filter_.sigma_u, filter_.sigma_v, filter_.sigma_r,
-    )  # fmt: skip
+        filter_.sigma_p,
+        filter_.sigma_p,
+        filter_.sigma_psi,
+        filter_.sigma_u,
+        filter_.sigma_v,
+        filter_.sigma_r,
+    )
     walks = (filter_.q_u, filter_.q_v, filter_.q_r, filter_.q_b, filter_.q_b, filter_.q_b_psi)
     Q = np.diag([0.0, 0.0, 0.0, *np.square(walks)])
     found, since = [], 0.0
@@ -131,9 +134,10 @@ def filtered(rows, x, P, k, filter_, current):
         earlier, now, later = line[COMMANDS:].reshape(3, 3).T
         part = k.delay / APART
         tau = 0.9 * (
-            0.5 * part * (part - 1.0) * earlier + (1.0 - part**2) * now
+            0.5 * part * (part - 1.0) * earlier
+            + (1.0 - part**2) * now
             + 0.5 * part * (part + 1.0) * later
-        )  # fmt: skip
+        )
         rate = slope(k, tau)
 
         def whole(t, s):
@@ -451,10 +455,13 @@ def test_a_log_becomes_rows_of_which_none_is_lost():
     pose = np.where(np.arange(count) % 5 == 0, 1.0, np.nan)
     rng = np.random.default_rng(2)
     columns = {
-        "x": pose * rng.normal(size=count), "y": pose * rng.normal(size=count),
-        "psi": pose * 0.1 * rng.normal(size=count), "r": rng.normal(size=count),
-        "tau_u": np.linspace(0.0, 1.0, count), "tau_r": np.zeros(count),
-    }  # fmt: skip
+        "x": pose * rng.normal(size=count),
+        "y": pose * rng.normal(size=count),
+        "psi": pose * 0.1 * rng.normal(size=count),
+        "r": rng.normal(size=count),
+        "tau_u": np.linspace(0.0, 1.0, count),
+        "tau_r": np.zeros(count),
+    }
     log = log_of(LogTable("a", times, columns), Ideal(), 0.1)
     assert log.counts.tolist() == [count // 5] * 3 + [0, 0, count]
     rows = log.record.rows
@@ -497,8 +504,12 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
     numbers = pd.read_csv(tmp_path / "hull/parameters.csv", index_col="name")
     assert numbers.unit.notna().all()
     assert numbers.unit[["m11", "m33", "N_r", "q_b", "delay"]].tolist() == [
-        "kg", "kg m2", "kg m2/s", "N/sqrt(s)", "s"
-    ]  # fmt: skip
+        "kg",
+        "kg m2",
+        "kg m2/s",
+        "N/sqrt(s)",
+        "s",
+    ]
     forces = pd.read_csv(tmp_path / "hull/forces.csv", index_col="force")
     assert {*forces.loc[["N(r)"], "unit of at"]} == {"rad/s"}
     files = pd.read_csv(tmp_path / "hull/judged.csv")
@@ -513,9 +524,11 @@ def test_the_command_writes_a_hull_that_a_scenario_takes(tmp_path, boat):
 def test_the_mass_matrix_stays_symmetric_where_it_was(boat):
     skewed = HULL.changed({"Y_rdot": HULL.Y_rdot - 0.3})
     for hull, free, names in (
-        (HULL, ("m23",), ["m23"]), (HULL, ("m32",), ["m23"]), (HULL, ("m32", "m23"), ["m23"]),
+        (HULL, ("m23",), ["m23"]),
+        (HULL, ("m32",), ["m23"]),
+        (HULL, ("m32", "m23"), ["m23"]),
         (skewed, ("m32",), ["m32"]),
-    ):  # fmt: skip
+    ):
         given = problem(boat[2:], hull, free=free)
         assert [number.name for number in given.hull] == names
         up = given.vessel(np.ones(1))

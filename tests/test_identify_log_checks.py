@@ -21,12 +21,14 @@ HEADINGS = {
 }
 STRAIGHT = {"short zigzag": 0.4 + 0.35 * np.sin(0.07 * TIMES)}
 SWAYED = {
-    "calm": (1.0, 0.0, 0.0), "drift": (1.0, 0.3, 0.0), "crab": (1.0, 0.0, 0.6),
+    "calm": (1.0, 0.0, 0.0),
+    "drift": (1.0, 0.3, 0.0),
+    "crab": (1.0, 0.0, 0.6),
     "half its speed against it": (1.0, -0.6 * np.exp(0.4j), 0.0),
     "a current beyond its speed": (1.0, 0.5 + 1.5j, -0.2),
     "astern now and then": (np.where(np.sin(0.09 * TIMES) > 0.3, -0.5, 1.0), 0.1j, 0.0),
     "a spin on the spot": (np.where((TIMES > 40.0) & (TIMES < 70.0), 0.0, 1.0), 0.0, 0.0),
-}  # fmt: skip
+}
 
 
 def sailed(heading, swayed, noise=0.02):

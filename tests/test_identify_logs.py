@@ -103,14 +103,17 @@ def test_a_gap_parts_a_log(sailed):
 DEG = 180.0 / math.pi
 MISTAKES = {
     "heading in degrees": (
-        {"psi": lambda c: c["psi"] * DEG % 360.0}, r'write psi: "COLUMN \[deg\]"'
+        {"psi": lambda c: c["psi"] * DEG % 360.0},
+        r'write psi: "COLUMN \[deg\]"',
     ),
     "heading to port": ({"psi": lambda c: -c["psi"]}, r'write psi: "-COLUMN"'),
     "heading from the east": (
-        {"psi": lambda c: math.pi / 2 - c["psi"]}, "psi is counted from the east"
+        {"psi": lambda c: math.pi / 2 - c["psi"]},
+        "psi is counted from the east",
     ),
     "ENU for NED, with a compass": (
-        {"x": lambda c: c["y"], "y": lambda c: c["x"]}, "exchange x and y under identify.columns"
+        {"x": lambda c: c["y"], "y": lambda c: c["x"]},
+        "exchange x and y under identify.columns",
     ),
     "yaw rate in deg/s": ({"r": lambda c: c["r"] * DEG}, r'write r: "COLUMN \[deg/s\]"'),
     "yaw rate to port": ({"r": lambda c: -c["r"]}, r'r is -1 .*write r: "-COLUMN"'),
@@ -118,7 +121,7 @@ MISTAKES = {
     "sway to port": ({"v": lambda c: -c["v"]}, r'write v: "-COLUMN"'),
     "a compass that stands": ({"psi": lambda c: 0 * c["psi"] + 0.7}, "psi is 0.7 throughout"),
     "a compass of zeros": ({"psi": lambda c: 0 * c["psi"]}, "psi is 0 throughout while"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)
@@ -143,9 +146,11 @@ def test_a_boat_that_yaws_in_waves_on_a_straight_track_is_no_mistake():
     times = np.arange(0.0, 120.0, 0.1)
     noise = 0.01 * np.random.default_rng(2).standard_normal((2, len(times)))
     columns = {
-        "x": 1.5 * times + noise[0], "y": 0.1 * times + noise[1],
-        "psi": 0.4 * np.sin(1.3 * times), "tau_u": np.sin(times),
-    }  # fmt: skip
+        "x": 1.5 * times + noise[0],
+        "y": 0.1 * times + noise[1],
+        "psi": 0.4 * np.sin(1.3 * times),
+        "tau_u": np.sin(times),
+    }
     assert check_log(LogTable("waves.csv", times, columns), Ideal()) == []
 
 
@@ -154,9 +159,12 @@ def test_a_yaw_rate_agrees_however_fast_the_boat_weaves():
     times = np.arange(0.0, 120.0, 0.1)
     psi = 0.3 * np.sin(1.8 * times)
     columns = {
-        "x": 1.5 * times, "y": 0.01 * times, "psi": psi, "r": 0.54 * np.cos(1.8 * times),
+        "x": 1.5 * times,
+        "y": 0.01 * times,
+        "psi": psi,
+        "r": 0.54 * np.cos(1.8 * times),
         "tau_u": np.sin(times),
-    }  # fmt: skip
+    }
     assert check_log(LogTable("weaves.csv", times, columns), Ideal()) == []
     with pytest.raises(LogFault, match=r'write r: "COLUMN \[deg/s\]"'):
         check_log(LogTable("weaves.csv", times, {**columns, "r": DEG * columns["r"]}), Ideal())
@@ -331,15 +339,17 @@ def test_rows_that_are_long_beside_a_lag_are_doubted(tmp_path, sailed, every, co
     columns = {n: np.interp(times, sailed.times, c) for n, c in sailed.columns.items()}
     columns |= {"n_1": 10.0 + np.sin(times), "n_2": 10.0 - np.sin(times)}
     del columns["tau_u"], columns["tau_r"]
-    path = written(tmp_path / "a.csv", {"time": times, **columns, "delta_1": 0 * times,
-                                        "delta_2": 0 * times})  # fmt: skip
+    path = written(
+        tmp_path / "a.csv", {"time": times, **columns, "delta_1": 0 * times, "delta_2": 0 * times}
+    )
     pods = load(
         "podusv:trials/base.yaml",
         [
-            "vessel={preset: cybership2}", "actuator={kind: pod, preset: cybership2_pod}",
+            "vessel={preset: cybership2}",
+            "actuator={kind: pod, preset: cybership2_pod}",
             "controller={kind: pid}",
         ],
-    ).scenario.model_copy(update={"identify": Identify(logs=LOGS)})  # fmt: skip
+    ).scenario.model_copy(update={"identify": Identify(logs=LOGS)})
     (log,) = logs_of(path, LogFile(file="a.csv", delay=0.0), pods)
     said = [line for line in log.warnings if "s apart, and the actuator's shortest lag is" in line]
     assert len(said) == count
@@ -471,13 +481,15 @@ WRONG_HEADINGS = {
 }
 OTHER_UNITS = {
     "hundredths of a degree": (
-        lambda psi: np.round(100.0 * DEG * psi) % 36000.0, r'psi: "COLUMN \[1e-2 deg\]"'
+        lambda psi: np.round(100.0 * DEG * psi) % 36000.0,
+        r'psi: "COLUMN \[1e-2 deg\]"',
     ),
     "hundredths of a degree as degrees": (
-        lambda psi: np.round(100.0 * DEG * psi) % 36000.0 / DEG, r'psi: "COLUMN \[1e-2 deg\]"'
+        lambda psi: np.round(100.0 * DEG * psi) % 36000.0 / DEG,
+        r'psi: "COLUMN \[1e-2 deg\]"',
     ),
     "radians as degrees": (lambda psi: psi / DEG, r'write psi: "COLUMN \[rad\]"'),
-}  # fmt: skip
+}
 
 
 def pose_alone(log):

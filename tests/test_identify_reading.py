@@ -35,10 +35,12 @@ def test_a_ros_bag_gives_its_topics_by_their_stamps(tmp_path):
 def test_odometry_of_ros_comes_in_podusvs_frame_and_at_the_times_of_every_topic(tmp_path):
     odometry = "boat/odom.pose.pose"
     names = {
-        "x": f"{odometry}.position.x", "y": f"{odometry}.position.y",
-        "psi": f"{odometry}.orientation.yaw", "v": "boat/odom.twist.twist.linear.y",
+        "x": f"{odometry}.position.x",
+        "y": f"{odometry}.position.y",
+        "psi": f"{odometry}.orientation.yaw",
+        "v": "boat/odom.twist.twist.linear.y",
         "tau_u": "left.data [kN]",
-    }  # fmt: skip
+    }
     log = read(write_bag(tmp_path / "bag"), names, "enu")
     assert log.times[:4] == pytest.approx([-0.005, 0.0, 0.095, 0.195])
     assert len(log.times) == 25 + 10
@@ -141,9 +143,7 @@ def test_the_local_plane_is_that_of_the_ellipsoid():
     d = centred(lat + 4e-5, lon + 6e-5) - centred(lat, lon)
     sin, cos, e, f = math.sin(lat), math.cos(lat), math.sin(lon), math.cos(lon)
     north, east = np.array([-sin * f, -sin * e, cos]) @ d, np.array([-e, f, 0.0]) @ d
-    places = {
-        "lat": np.degrees([lat, lat + 4e-5]), "lon": np.degrees([lon, lon + 6e-5])
-    }  # fmt: skip
+    places = {"lat": np.degrees([lat, lat + 4e-5]), "lon": np.degrees([lon, lon + 6e-5])}
     flat, _ = local_plane(places)
     # 255 m north meridians are nearer to each other: 13 mm of the 192 m east.
     nearer = across_at(lat) * sin * 4e-5 * 6e-5
@@ -178,10 +178,15 @@ def test_sensors_of_rates_that_do_not_divide_deliver_what_they_measured(tmp_path
     clocks = {"gps": np.arange(0, 30, 1 / 3), "imu": np.arange(0, 30, 1 / 7)}
     commands = np.arange(0, 30, 0.1)
     columns = {
-        "gps.time": clocks["gps"], "gps.x": clocks["gps"], "gps.y": -clocks["gps"],
-        "imu.time": clocks["imu"], "imu.psi": np.sin(clocks["imu"]),
-        "time": commands, "tau_u": np.floor(commands), "tau_r": 0 * commands,
-    }  # fmt: skip
+        "gps.time": clocks["gps"],
+        "gps.x": clocks["gps"],
+        "gps.y": -clocks["gps"],
+        "imu.time": clocks["imu"],
+        "imu.psi": np.sin(clocks["imu"]),
+        "time": commands,
+        "tau_u": np.floor(commands),
+        "tau_r": 0 * commands,
+    }
     longest = max(map(len, columns.values()))
     full = {n: np.append(v, np.full(longest - len(v), np.nan)) for n, v in columns.items()}
     path = written(tmp_path / "log.csv", full)
@@ -196,18 +201,29 @@ def test_sensors_of_rates_that_do_not_divide_deliver_what_they_measured(tmp_path
 def test_columns_are_listed_with_rate_range_and_a_guess(tmp_path):
     times = np.arange(0.0, 20.0, 0.1)
     columns = {
-        "TimeUS": 1e6 * times, "Lat": 59.0 + 1e-6 * times, "Lng": 10.0 + 0 * times,
-        "Heading": (10.0 * times + 300.0) % 360.0, "gyro_z_dps": 10.0 + 0 * times,
-        "rpm_left": 900.0 + times, "rpm_right": 800.0 + times, "rudder": 20.0 * np.sin(times),
+        "TimeUS": 1e6 * times,
+        "Lat": 59.0 + 1e-6 * times,
+        "Lng": 10.0 + 0 * times,
+        "Heading": (10.0 * times + 300.0) % 360.0,
+        "gyro_z_dps": 10.0 + 0 * times,
+        "rpm_left": 900.0 + times,
+        "rpm_right": 800.0 + times,
+        "rudder": 20.0 * np.sin(times),
         "battery": np.where(times < 5.0, np.nan, 12.0 + 0.001 * times),
-    }  # fmt: skip
+    }
     found = listing(written(tmp_path / "log.csv", columns))
     guesses = {listed.name: listed.guess for listed in found.columns}
     assert guesses == {
-        "TimeUS": "time [us]", "Lat": "lat", "Lng": "lon", "Heading": "psi [deg]",
-        "gyro_z_dps": "r [deg/s]", "rpm_left": "n_1 [rpm]", "rpm_right": "n_2 [rpm]",
-        "rudder": "delta_1 [deg]", "battery": "",
-    }  # fmt: skip
+        "TimeUS": "time [us]",
+        "Lat": "lat",
+        "Lng": "lon",
+        "Heading": "psi [deg]",
+        "gyro_z_dps": "r [deg/s]",
+        "rpm_left": "n_1 [rpm]",
+        "rpm_right": "n_2 [rpm]",
+        "rudder": "delta_1 [deg]",
+        "battery": "",
+    }
     heading, battery = found.columns[3], found.columns[-1]
     assert heading.rate == pytest.approx(200 / 19.9)
     assert (heading.least, heading.most) == (columns["Heading"].min(), columns["Heading"].max())
@@ -219,18 +235,28 @@ def test_columns_are_listed_with_rate_range_and_a_guess(tmp_path):
 @pytest.mark.parametrize(
     "sides",
     [
-        ("n left [rpm]", "n right [rpm]"), ("port [rpm]", "starboard [rpm]"), ("left", "right"),
-        ("thruster left [rpm]", "thruster right [rpm]"), ("n_port", "n_stbd"),
+        ("n left [rpm]", "n right [rpm]"),
+        ("port [rpm]", "starboard [rpm]"),
+        ("left", "right"),
+        ("thruster left [rpm]", "thruster right [rpm]"),
+        ("n_port", "n_stbd"),
     ],
-)  # fmt: skip
+)
 def test_sides_and_blanks_are_guessed(tmp_path, sides):
     """As another simulator writes them; a rudder's side is no propeller."""
     ramp = np.arange(0.0, 2.0, 0.1)
     names = ("time", "north", "east", "heading [deg]", "yaw rate [deg/s]", *sides, "rudder left")
     found = listing(written(tmp_path / "log.csv", dict.fromkeys(names, ramp)))
     assert [own.quantity for own in found.columns] == [
-        "time", "x", "y", "psi", "r", "n_1", "n_2", "delta_1"
-    ]  # fmt: skip
+        "time",
+        "x",
+        "y",
+        "psi",
+        "r",
+        "n_1",
+        "n_2",
+        "delta_1",
+    ]
     assert not any("#" in line for line in found.mapping())
 
 

@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from podusv_cli.identify.fit.estimate import (
-    HullSearch,
-    Scored,
-    covariance,
-    estimate_hull,
-)
+from podusv_cli.identify.fit.estimate import HullSearch, Scored, covariance, estimate_hull
 
 
 def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():

@@ -75,9 +75,14 @@ def test_shipped_files_name_each_other_relative_to_themselves():
 
 def test_the_advice_of_a_comparison_names_a_shipped_scenario(podusv):
     said = podusv(
-        "compare", "podusv:theory/sign.yaml", "--no-figures", "--set", "simulation.duration=1",
-        "--out", "x",
-    )  # fmt: skip
+        "compare",
+        "podusv:theory/sign.yaml",
+        "--no-figures",
+        "--set",
+        "simulation.duration=1",
+        "--out",
+        "x",
+    )
     assert said.code == 0
     assert "podusv verify podusv:theory/sign.yaml --set simulation.duration=1" in said.err
 
@@ -105,9 +110,14 @@ def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     others = {name[7:-5] for name in shipped.names()} - set(points)
     layers = {name for name in others if name.startswith(("bench/", "bench_legs/", "bench_boats/"))}
     assert others - layers == {
-        "fossen_2003/base", "lefeber_2003/base", "mu_2017/base", "mu_2017/claims",
-        "mu_2017/ablation_laws", "theory/base", "trials/base",
-    }  # fmt: skip
+        "fossen_2003/base",
+        "lefeber_2003/base",
+        "mu_2017/base",
+        "mu_2017/claims",
+        "mu_2017/ablation_laws",
+        "theory/base",
+        "trials/base",
+    }
     assert list(points)[: len(FIRST)] == [*FIRST]
     assert list(points)[len(FIRST) :] == sorted(set(points) - set(FIRST))
     first, rest = podusv("init").out.split("\n", 1)
@@ -164,8 +174,10 @@ def test_a_copy_anywhere_is_the_same_scenario(podusv, name):
     assert (copy.parent / schema).read_text() == schema_text(tuple(finding_kinds()))
     scenario = load(copy).scenario
     made_for = {
-        "sweep run": scenario.sweep, "identify": scenario.identify, "compare": scenario.controllers,
-    }  # fmt: skip
+        "sweep run": scenario.sweep,
+        "identify": scenario.identify,
+        "compare": scenario.controllers,
+    }
     command = next((words for words, section in made_for.items() if section), "run")
     for log in scenario.identify.logs if scenario.identify else ():
         assert f"wrote {copy.with_name(log.file)}" in said.out.splitlines()

@@ -136,7 +136,7 @@ def test_changes_are_what_set_is_on_the_command_line():
         ({**SHORT, "start": {"x": "5"}}, "scenario: start.x: must be a number [m], found '5'; "),
         ({**SHORT, "extends": "podusv:x.yaml"}, "scenario: extends: 'podusv:x.yaml' cannot be"),
     ],
-)  # fmt: skip
+)
 def test_a_faulty_dictionary_is_a_line_without_a_place(sections, text):
     for make in (podusv.Scenario, podusv.load):
         with pytest.raises(ScenarioError, match=re.escape(text)):

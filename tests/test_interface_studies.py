@@ -26,16 +26,16 @@ def test_a_study_is_a_table_with_a_row_a_run_and_a_dataset_over_law_and_draw(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     study = podusv.sweep(SHORT, {"sweep": SWEEP}, out="s", figures=False)
-    assert list(study.table.columns[:6]) == [
-        "law", "cell", "draw", "start.x", "status", "success",
-    ]  # fmt: skip
+    assert list(study.table.columns[:6]) == ["law", "cell", "draw", "start.x", "status", "success"]
     assert study.table.shape[0] == study.data["iae"].size == 8
     assert study.data["iae"].dims == ("law", "draw")
     for row in study.table.to_dict("records"):
         there = study.data.sel(law=row["law"], draw=row["draw"])
         assert (there["iae"], there["start.x"], there["status"]) == (
-            row["iae"], row["start.x"], "finished",
-        )  # fmt: skip
+            row["iae"],
+            row["start.x"],
+            "finished",
+        )
     alone = podusv.load(podusv.load(SHORT).singles()["soft"], {"start.x": row["start.x"]})
     assert podusv.simulate(alone).metrics["iae"] == row["iae"]
     assert commanded(monkeypatch, capsys)("sweep", "export", "s").code == 0
@@ -67,10 +67,14 @@ def test_a_study_is_opened_and_continued_from_its_folder() -> None:
 def test_a_search_gives_gains_by_law_and_ranks() -> None:
     pytest.importorskip("optuna")
     search = {
-        "budget": 8, "batch": 2, "train": 2, "repeats": 1, "validate": 4,
+        "budget": 8,
+        "batch": 2,
+        "train": 2,
+        "repeats": 1,
+        "validate": 4,
         "objective": "median(iae)",
         "space": {"around": 2.0},
-    }  # fmt: skip
+    }
     found = podusv.tune(SHORT, {"sweep": SWEEP, "tune": search}, out="t", figures=False)
     assert list(found.laws["law"]) == list(found.gains.columns) == ["stiff", "soft"]
     assert 100.0 <= found.gains.loc["K_Pu", "stiff"] <= 400.0

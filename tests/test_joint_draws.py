@@ -167,7 +167,7 @@ INDEFINITE = "row 2 of 2: vessel: the mass matrix is not positive definite"
         (("1", "2"), [[1, 2], [2, 3]], "`rows` has no first line that names the columns"),
         (("X_u", "X_u"), [[-1, -2], [-2, -3]], "line 1 of `rows` names 'X_u' twice"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_the_hulls_is_one_sentence(names, hulls, says):
     found(names, hulls)
     with pytest.raises(ScenarioError) as caught:

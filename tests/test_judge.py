@@ -41,8 +41,10 @@ def test_a_gain_of_the_scenario_becomes_what_each_search_found(judge):
     law = Pid(K_Pu=40.0, K_Du=5.0)
     found = gains(("pid", "K_Pu", 40.0, "12.34 40.0"), ("pid", "K_Du", 5.0, "0.5 7.0"))
     assert judge.sets_of_gains(found, law) == [
-        {}, {"K_Pu": 12.34, "K_Du": 0.5}, {"K_Pu": 40.0, "K_Du": 7.0},
-    ]  # fmt: skip
+        {},
+        {"K_Pu": 12.34, "K_Du": 0.5},
+        {"K_Pu": 40.0, "K_Du": 7.0},
+    ]
 
 
 def test_another_gain_of_the_scenario_is_changed_by_the_same_factor(judge):
@@ -74,10 +76,12 @@ def told(judge, runs):
     random = np.random.default_rng(1)
     spread = random.uniform(0.9, 1.1, 40)  # draws that all laws share
     outcomes = {
-        law: [Outcomes({"iae": size * spread * random.uniform(0.97, 1.03, 40)}, np.zeros(40, bool))
-              for size in sizes]
+        law: [
+            Outcomes({"iae": size * spread * random.uniform(0.97, 1.03, 40)}, np.zeros(40, bool))
+            for size in sizes
+        ]
         for law, sizes in runs.items()
-    }  # fmt: skip
+    }
     sweep = SimpleNamespace(level=0.95, seed=3)
     plan = SimpleNamespace(
         tune=SimpleNamespace(training_sets=1),

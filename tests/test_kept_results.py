@@ -69,9 +69,12 @@ def checkout(tmp_path):
 
 def step(checkout: Path, name: str, code: int) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        ["./step.sh", "compare", "mu_2017", name, str(code)], cwd=checkout, text=True,
-        capture_output=True, env={**os.environ, "PODUSV": "./podusv"},
-    )  # fmt: skip
+        ["./step.sh", "compare", "mu_2017", name, str(code)],
+        cwd=checkout,
+        text=True,
+        capture_output=True,
+        env={**os.environ, "PODUSV": "./podusv"},
+    )
 
 
 def test_a_step_is_a_line_with_its_time_and_the_rest_is_in_a_file(checkout):

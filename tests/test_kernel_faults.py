@@ -88,9 +88,12 @@ def test_every_index_from_the_end_of_a_vector_is_found(body: str) -> None:
 
 def test_an_index_from_the_end_of_a_vector_is_named() -> None:
     assert found("y = x[0]\ny = x[-1]") == [
-        (3, "x[-1] counts from the end, and a kernel does not know where a vector ends; count from "
-         "the front"),
-    ]  # fmt: skip
+        (
+            3,
+            "x[-1] counts from the end, and a kernel does not know where a vector ends; count from "
+            "the front",
+        )
+    ]
 
 
 def shipped() -> Iterator[Any]:

@@ -20,17 +20,22 @@ STILL = "start: {u: 1.0}\npath: {kind: line, speed: 0.0}\ndisturbance: {kind: no
 LEGS = "path: {kind: legs, points: [[0, 0], [6, 0], [6, 6]]}\n"
 # What a scenario of each kind has.
 KINDS = {
-    "trial": OTTER + STILL + SHORT
+    "trial": OTTER
+    + STILL
+    + SHORT
     + "controller: {kind: zigzag, thrust: 78.0, lever: 0.5, execute: 0.2}\n",
-    "legs": HULL + TASK.replace("path: {kind: line}\n", LEGS) + SHORT
+    "legs": HULL
+    + TASK.replace("path: {kind: line}\n", LEGS)
+    + SHORT
     + "controller: {kind: los_pid}\n",
-    "policy": HULL + TASK + SHORT
+    "policy": HULL
+    + TASK
+    + SHORT
     + f"controller: {{kind: policy, content: '{content(symmetric())}'}}\n",
     "pods": OTTER + STILL.replace("speed: 0.0", "speed: 1.0") + SHORT + PID,
-    "sensors": HULL + TASK + SHORT + PID
-    + "measurement: {kind: sensors}\nestimator: {kind: ekf}\n",
+    "sensors": HULL + TASK + SHORT + PID + "measurement: {kind: sensors}\nestimator: {kind: ekf}\n",
     "plug-in": HULL + TASK + SHORT + "plugins: [law.py]\ncontroller: {kind: cross_track}\n",
-}  # fmt: skip
+}
 STUDY = (
     "sweep: {draws: 2, vary: {vessel.m: {times: {uniform: [0.9, 1.1]}}}}\n"
     "tune: {budget: 16, train: 2, validate: 2, repeats: 1, objective: median(effort_u), batch: 8}\n"
@@ -48,8 +53,10 @@ def bench(podusv: Command, kind: str) -> Said:
     own = text.replace(law[0], "").replace("law.py", "../law.py")
     for name, layer in {
         "laws.yaml": own + law[0].replace("controller: ", "controllers: {mine: ").rstrip() + "}\n",
-        "tasks/one.yaml": "{}\n", "vessels/one.yaml": "{}\n", "conditions/one.yaml": "{}\n",
-    }.items():  # fmt: skip
+        "tasks/one.yaml": "{}\n",
+        "vessels/one.yaml": "{}\n",
+        "conditions/one.yaml": "{}\n",
+    }.items():
         Path("bench", name).parent.mkdir(parents=True, exist_ok=True)
         Path("bench", name).write_text(layer)
     return podusv("bench", "bench", "--no-figures", "--out", "benched")
@@ -140,10 +147,11 @@ REFUSED = {
 SLOW = {
     *((kind, "export") for kind in KINDS if kind != "plug-in"),
     *((kind, "tune") for kind in ("pods", "sensors", "legs", "plug-in")),
-    ("policy", "margins"), ("plug-in", "margins"),
+    ("policy", "margins"),
+    ("plug-in", "margins"),
     *((kind, "doubt") for kind in KINDS if kind != "plug-in"),
     *((kind, "identify") for kind in ("legs", "policy", "pods")),
-}  # fmt: skip
+}
 
 
 @pytest.fixture
@@ -157,8 +165,9 @@ def cells() -> list[Any]:
     """Every kind with every command."""
     return [
         pytest.param(kind, command, marks=[pytest.mark.slow] * ((kind, command) in SLOW))
-        for kind in KINDS for command in COMMANDS
-    ]  # fmt: skip
+        for kind in KINDS
+        for command in COMMANDS
+    ]
 
 
 @pytest.mark.parametrize(("kind", "command"), cells())

@@ -33,8 +33,16 @@ TESTED = (
     "full_backstepping",
 )  # by `test_lanes`, with its actuators
 QUICK = ("zigzag", "schedule")  # samples, and a table; the compiler takes seconds for others
-SCENARIOS = ("sea/delay", "sea/dead_zone", "sea/sensors", "sea/state_4", "sea/pods",
-             "sea/thruster_failure", "pod/kept", "pod/single")  # fmt: skip
+SCENARIOS = (
+    "sea/delay",
+    "sea/dead_zone",
+    "sea/sensors",
+    "sea/state_4",
+    "sea/pods",
+    "sea/thruster_failure",
+    "pod/kept",
+    "pod/single",
+)
 
 
 def but_quick(names: Iterable[str], quick: Collection[str]) -> list[Any]:
@@ -70,8 +78,10 @@ def test_every_path_disturbance_and_actuator_can_march_side_by_side(part: str) -
     """Each beside the others as they are."""
     base = loop("zigzag")
     rooms: dict[str, type[Component]] = {
-        "path": Path, "disturbance": Disturbance, "actuator": Actuator,
-    }  # fmt: skip
+        "path": Path,
+        "disturbance": Disturbance,
+        "actuator": Actuator,
+    }
     for name, kind in kinds(f"podusv_cli.components.{part}s", rooms[part]).items():
         changed = replace(base, **{part: made(kind)})
         assert (name, why_alone(Plan.with_probe(changed, GRID, Probe()))) == (name, "")

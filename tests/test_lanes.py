@@ -152,19 +152,28 @@ def test_runs_of_another_choice_march_beside_their_like() -> None:
 # the tables of a list of loads begin, which nothing else tells of two currents.
 OTHERS: list[tuple[str, list[Any]]] = [
     ("actuator", [Saturated(command=Command(delay=d)) for d in (0.03, 0.11, 0.0)]),
-    ("measurement", [
-        Sensors(position=Sensor(period=p, delay=d, noise=0.1))
-        for p, d in ((0.07, 0.02), (0.03, 0.0))
-    ]),
-    ("disturbance", [
-        Total(parts=(Waves(height=0.2, period=1.5, components=n), HarmonicDisturbance()))
-        for n in (8, 40)
-    ]),
-    ("disturbance", [
-        Total(parts=(Current(speed_std=0.1, interval=i), Waves(height=0.2, period=1.5)))
-        for i in (0.1, 0.2)
-    ]),
-]  # fmt: skip
+    (
+        "measurement",
+        [
+            Sensors(position=Sensor(period=p, delay=d, noise=0.1))
+            for p, d in ((0.07, 0.02), (0.03, 0.0))
+        ],
+    ),
+    (
+        "disturbance",
+        [
+            Total(parts=(Waves(height=0.2, period=1.5, components=n), HarmonicDisturbance()))
+            for n in (8, 40)
+        ],
+    ),
+    (
+        "disturbance",
+        [
+            Total(parts=(Current(speed_std=0.1, interval=i), Waves(height=0.2, period=1.5)))
+            for i in (0.1, 0.2)
+        ],
+    ),
+]
 
 
 @pytest.mark.parametrize(("part", "others"), OTHERS)

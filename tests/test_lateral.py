@@ -96,8 +96,12 @@ def test_momentum_vector_s_polynomial_is_that_of_its_equations():
     chi_e = (-k_b * (y - x_n * psi) - V * psi - eta * v) / V
     h = k_b * x_n / V
     known = [
-        1, S + d, Q * (1 - h - eta * p) + S * d, Q * (d * (1 - h) + k_b * (1 - p)), Q * k_b * d,
-    ]  # fmt: skip
+        1,
+        S + d,
+        Q * (1 - h - eta * p) + S * d,
+        Q * (d * (1 - h) + k_b * (1 - p)),
+        Q * k_b * d,
+    ]
     derived = polynomial(Q * chi_e - S * r)
     assert all(sp.expand(a - b) == 0 for a, b in zip(derived, known, strict=True))
 
@@ -113,9 +117,11 @@ def test_momentum_vector_s_polynomial_is_a_part_of_the_real_loop_and_stable(hull
 
 
 @given(
-    told=st.floats(-0.5, 8.0), damping=st.floats(1e-3, 10.0), more=st.floats(0.0, 1.0),
+    told=st.floats(-0.5, 8.0),
+    damping=st.floats(1e-3, 10.0),
+    more=st.floats(0.0, 1.0),
     trust=st.floats(1.0, 3.0),
-)  # fmt: skip
+)
 def test_its_gains_bear_every_p_up_to_trust_times_the_told_one(told, damping, more, trust):
     law = MomentumVector(trust=trust)
     k = bundle(law.constants_with(NONLINEAR))

@@ -24,10 +24,20 @@ from podusv_cli.core.kernel import Vector, bundle
 
 POLAR = (AdaptiveNeural, DynamicSurface, FullBackstepping)
 UNEQUAL = {
-    "k_ue": 3.0, "k_re": 30.0, "Gamma_u": 90.0, "Gamma_r": 80.0, "sigma_u": 0.2, "sigma_r": 0.3,
-    "gamma_u": 700.0, "gamma_r": 600.0, "sigma_bu": 0.02, "sigma_br": 0.03, "b_hat_u0": 0.1,
-    "b_hat_r0": 0.2, "partial": 0.15,
-}  # fmt: skip
+    "k_ue": 3.0,
+    "k_re": 30.0,
+    "Gamma_u": 90.0,
+    "Gamma_r": 80.0,
+    "sigma_u": 0.2,
+    "sigma_r": 0.3,
+    "gamma_u": 700.0,
+    "gamma_r": 600.0,
+    "sigma_bu": 0.02,
+    "sigma_br": 0.03,
+    "b_hat_u0": 0.1,
+    "b_hat_r0": 0.2,
+    "partial": 0.15,
+}
 TURNED = {"AdaptiveNeural": {"A_u": 4.0, "A_r": 6.0}, "DynamicSurface": {"T_u": 0.3, "T_r": 0.1}}
 number = st.floats(-100, 100)
 

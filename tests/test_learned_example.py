@@ -32,9 +32,14 @@ def demand(law: Policy, x: Vector, target: Vector) -> Vector:
 
 def actor(random: np.random.Generator) -> dict[str, Any]:
     """Arrays as PPO's `policy.state_dict()` names them, those of the critic among them."""
-    sizes = {"mlp_extractor.policy_net.0": (8, 32), "mlp_extractor.policy_net.2": (32, 32),
-             "mlp_extractor.value_net.0": (8, 32), "mlp_extractor.value_net.2": (32, 32),
-             "action_net": (32, 2), "value_net": (32, 1)}  # fmt: skip
+    sizes = {
+        "mlp_extractor.policy_net.0": (8, 32),
+        "mlp_extractor.policy_net.2": (32, 32),
+        "mlp_extractor.value_net.0": (8, 32),
+        "mlp_extractor.value_net.2": (32, 32),
+        "action_net": (32, 2),
+        "value_net": (32, 1),
+    }
     arrays = {"log_std": np.zeros(2)}
     for name, (before, after) in sizes.items():
         arrays[f"{name}.weight"] = random.normal(0.0, before**-0.5, (after, before))
@@ -87,8 +92,11 @@ def test_a_model_that_was_trained_asks_for_what_its_law_does(tmp_path: Any) -> N
     model, envs = ppo.trained(1, ppo.ENVIRONMENTS * ppo.EPISODE)
     file = tmp_path / "policy.safetensors"
     ppo.save(model, envs, str(file))
-    config = {"controllers": None, "control.period": ppo.PERIOD, "controller": {
-        "kind": "policy", "weights": str(file), "squash": "clip"}}  # fmt: skip
+    config = {
+        "controllers": None,
+        "control.period": ppo.PERIOD,
+        "controller": {"kind": "policy", "weights": str(file), "squash": "clip"},
+    }
     law, random = podusv.load(ppo.TASK, config).controller, np.random.default_rng(0)
     for _ in range(20):
         x, target, seen = random.normal(size=6), random.normal(0.0, 3.0, 6), np.zeros(INPUTS)

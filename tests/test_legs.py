@@ -73,9 +73,11 @@ def test_laws_see_the_point_beside_them_or_their_standoff_ahead() -> None:
 
 def test_there_is_no_distance_to_a_target_anywhere(tmp_path: Any) -> None:
     log = package.run(
-        "podusv:mu_2017/corrected.yaml", SCENARIO | {"simulation.duration": 20.0},
-        out=tmp_path / "r", figures=False,
-    )  # fmt: skip
+        "podusv:mu_2017/corrected.yaml",
+        SCENARIO | {"simulation.duration": 20.0},
+        out=tmp_path / "r",
+        figures=False,
+    )
     assert not {"z_e", "x_e"} & set(log.log)
     about = {"iae", "z_e_steady", "settling_time", "e_steady", "cross_track_rms"}
     assert not about & set(log.metrics.index)

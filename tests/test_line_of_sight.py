@@ -258,10 +258,12 @@ def test_learning_the_crab_angle_is_worth_several_times_the_error_on_the_line(la
 # t, beta_hat and psi_ref by MSS's ALOSpsi (commit 736a3d1, GNU Octave 7.3; D = 10 m, gamma = 0.002,
 # steps of 1 ms) on a path of course atan(1/2), at y_e = 30 exp(-t/20) - 2 sin(0.1 t).
 ALOS = (
-    (0.0, 0.0, -0.785398163397), (5.0, 0.0932481991685, -0.780602897992),
-    (20.0, 0.336015113389, -0.617085644118), (40.0, 0.558025598331, -0.602859149292),
+    (0.0, 0.0, -0.785398163397),
+    (5.0, 0.0932481991685, -0.780602897992),
+    (20.0, 0.336015113389, -0.617085644118),
+    (40.0, 0.558025598331, -0.602859149292),
     (60.0, 0.710534667291, -0.449320095803),
-)  # fmt: skip
+)
 
 
 def test_alos_as_published_is_that_of_its_author_from_far_off_the_path():
@@ -272,9 +274,13 @@ def test_alos_as_published_is_that_of_its_author_from_far_off_the_path():
         return 30.0 * math.exp(-t / 20.0) - 2.0 * math.sin(0.1 * t)
 
     found = solve_ivp(
-        lambda t, crab: [learning(across(t), crab[0], 0.0, k)[0]], (0.0, 60.0), [0.0],
-        t_eval=[t for t, *_ in ALOS], rtol=1e-10, atol=1e-12,
-    )  # fmt: skip
+        lambda t, crab: [learning(across(t), crab[0], 0.0, k)[0]],
+        (0.0, 60.0),
+        [0.0],
+        t_eval=[t for t, *_ in ALOS],
+        rtol=1e-10,
+        atol=1e-12,
+    )
     assert found.y[0] == pytest.approx([beta for _, beta, _ in ALOS], abs=2e-5)
     for t, beta, psi in ALOS:
         memory = np.zeros(8)

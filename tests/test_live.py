@@ -28,11 +28,14 @@ OWN = "podusv:own_vessel.yaml"
 SHORT = ("simulation.duration=20.0",)
 # Of every part, at numbers that nobody chose; a hull's also change what the law is told.
 MOVED: list[dict[str, float | str]] = [
-    {"controller.K_Pu": 77.7}, {"vessel.m": 51.3, "vessel.X_u": -13.7}, {"start.psi": -2.13},
-    {"path.speed": 0.613, "path.course": 1.9}, {"actuator.surge_limit": 31.7},
+    {"controller.K_Pu": 77.7},
+    {"vessel.m": 51.3, "vessel.X_u": -13.7},
+    {"start.psi": -2.13},
+    {"path.speed": 0.613, "path.course": 1.9},
+    {"actuator.surge_limit": 31.7},
     {"path.kind": "circle", "path.radius": 7.3},
     {"control.period": 0.1125, "simulation.step": 0.0125},
-]  # fmt: skip
+]
 
 
 def framed(live: Live, moved: Mapping[str, float | str], *, rest: bool) -> dict[str, Any]:
@@ -98,11 +101,15 @@ def test_a_name_that_is_none_writes_nothing(live: Live, name: str, podusv) -> No
 @pytest.mark.parametrize(
     "moved",
     [
-        {"plugins.x.py": "evil.py"}, {"extends": "evil.yaml"}, {"name": "x"},
-        {"path.kind": "../x"}, {"controller.K_Pu": "{evil}"}, {"controller.K_Pu": [1.0]},
+        {"plugins.x.py": "evil.py"},
+        {"extends": "evil.yaml"},
+        {"name": "x"},
+        {"path.kind": "../x"},
+        {"controller.K_Pu": "{evil}"},
+        {"controller.K_Pu": [1.0]},
         {"disturbance.file": "secret.csv"},
     ],
-)  # fmt: skip
+)
 def test_only_what_was_offered_may_move(live: Live, moved: dict[str, Any]) -> None:
     (refused,) = live.answer(
         "frame", {"moved": moved, "signals": [], "rest": True, "controls": False}
@@ -213,7 +220,7 @@ QUESTIONS = {  # method, path behind the token, length that is said, body, code
     "no text": ("POST", "x", None, b"\xff", 400),
     "no number in the answer": ("POST", "x", None, b'{"a": NaN}', 500),
     "no value in the answer": ("POST", "set", None, b"{}", 500),
-}  # fmt: skip
+}
 
 
 def answered(

@@ -32,8 +32,9 @@ def contents(tmp_path, text, encoding="utf-8"):
 def test_a_comma_at_the_end_of_each_row_is_no_column(tmp_path):
     read = contents(tmp_path, "t,x\n0,1.5,\n1,2.5,\n2,3.5,\n")
     assert {name: values.tolist() for name, values in read.columns.items()} == {
-        "t": [0.0, 1.0, 2.0], "x": [1.5, 2.5, 3.5],
-    }  # fmt: skip
+        "t": [0.0, 1.0, 2.0],
+        "x": [1.5, 2.5, 3.5],
+    }
     assert read.warnings == ()
     assert read.doubts == {}
 
@@ -148,9 +149,13 @@ def test_two_columns_that_may_be_one_quantity_are_named(tmp_path):
 
 def test_every_unit_of_the_table_is_read_in_a_log(tmp_path):
     of_logs = {
-        "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "deg": 1.0, "rad/s": 0.5 / math.pi,
-        "1e-2 deg": math.pi / 18000.0, "1e-6 deg": 1e-6,
-    }  # fmt: skip
+        "rad": 180.0 / math.pi,
+        "1e-7 deg": 1e-7,
+        "deg": 1.0,
+        "rad/s": 0.5 / math.pi,
+        "1e-2 deg": math.pi / 18000.0,
+        "1e-6 deg": 1e-6,
+    }
     read_ones = 0
     for unit, others in UNITS.items():
         for name in others.keys() - {unit}:
@@ -214,10 +219,12 @@ def test_rows_of_one_time_fill_each_other_s_empty_cells(tmp_path):
     path = written(
         tmp_path / "log.csv",
         {
-            "time": [0, 1, 1, 2, 2, 3], "x": [0, 1, nan, nan, 2, 3], "y": [0, nan, 5, 6, 6, 7],
+            "time": [0, 1, 1, 2, 2, 3],
+            "x": [0, 1, nan, nan, 2, 3],
+            "y": [0, nan, 5, 6, 6, 7],
             "psi": [0, 1, 1, nan, nan, 0],
         },
-    )  # fmt: skip
+    )
     log = read(path)
     assert log.times.tolist() == [0.0, 1.0, 2.0, 3.0]
     assert log.columns["x"].tolist() == [0.0, 1.0, 2.0, 3.0]
@@ -355,10 +362,15 @@ def test_a_single_longitude_beyond_180_elsewhere_is_left_out(tmp_path):
     ],
 )
 def test_units_of_places_are_proposed_where_they_are_sure(tmp_path, lat, lon, proposed, says):
-    path = written(tmp_path / "log.csv", {
-        "time": range(30), "lat": [lat + (i if lat > 1e4 else 1e-4 * i) for i in range(30)],
-        "lon": [lon + (i if lon > 1e4 else 1e-4 * i) for i in range(30)], "psi": [0.1] * 30,
-    })  # fmt: skip
+    path = written(
+        tmp_path / "log.csv",
+        {
+            "time": range(30),
+            "lat": [lat + (i if lat > 1e4 else 1e-4 * i) for i in range(30)],
+            "lon": [lon + (i if lon > 1e4 else 1e-4 * i) for i in range(30)],
+            "psi": [0.1] * 30,
+        },
+    )
     found = listing(path)
     lines = [line.strip() for line in found.mapping()]
     unit = {"plain": "", "": None}.get(proposed, f" {proposed}")
@@ -387,8 +399,9 @@ def test_a_clock_without_numbers_is_listed_without_a_warning_of_numpy(tmp_path):
 def test_what_stands_above_the_names_is_skipped(tmp_path, above):
     read = contents(tmp_path, f"{above}t;x\n0;1.5\n1;2.5\n")
     assert {name: values.tolist() for name, values in read.columns.items()} == {
-        "t": [0.0, 1.0], "x": [1.5, 2.5],
-    }  # fmt: skip
+        "t": [0.0, 1.0],
+        "x": [1.5, 2.5],
+    }
     read = contents(tmp_path, "sep=,\nt,x;y\n0,1.5\n1,2.5\n")
     assert [*read.columns] == ["t", "x;y"]
 

@@ -20,9 +20,10 @@ from podusv_cli.storage.files import disk_array
 from podusv_cli.workflows.execute import HELD, RunTask, execute
 
 GIVEN = {
-    "schedule": ', rows: "0, 1, 0\\n200, 2, 0.5\\n"', "zigzag": ", check_every: 0.05",
+    "schedule": ', rows: "0, 1, 0\\n200, 2, 0.5\\n"',
+    "zigzag": ", check_every: 0.05",
     "policy": f", content: {REQUIRED['policy']['content']}",
-}  # fmt: skip
+}
 LAWS = {f"{kind} {period}": (kind, period) for kind in kinds("controllers") for period in (0, 0.05)}
 SCENARIO = """
 vessel: {{preset: paper_nonlinear}}

@@ -28,9 +28,17 @@ PAGE = (RESULTS / "fossen_2003.md").read_text()
 C, K, LENGTH, SPEED, W = 0.75, np.diag([25.0, 10.0, 2.5]), 1.255, 0.1, 0.9
 N = np.array([[2.0, 0, 0], [0, 7.0, 0.1], [0, 0.1, 0.5]])
 POINTS = np.array(
-    [(0.372, -0.181), (-0.628, 1.320), (0.372, 2.820), (1.872, 3.320),
-     (6.872, -0.681), (8.372, -0.181), (9.372, 1.320), (8.372, 2.820)]
-)  # fmt: skip
+    [
+        (0.372, -0.181),
+        (-0.628, 1.320),
+        (0.372, 2.820),
+        (1.872, 3.320),
+        (6.872, -0.681),
+        (8.372, -0.181),
+        (9.372, 1.320),
+        (8.372, 2.820),
+    ]
+)
 START = {"x": -0.69, "y": -1.25, "psi": 1.78, "u": 0.1}
 
 
@@ -61,9 +69,16 @@ def asked(x: Any, target: Any, memory: Any) -> tuple[Any, Any]:
     law, hull = LosBackstepping(), VESSELS["cybership2_linear"]
     tau, rate, k = np.zeros(2), np.zeros(4), bundle(law.constants_with(hull))
     call(
-        law.law, x=np.array(x), memory=np.array(memory), target=np.array(target), k=k, tau=tau,
-        rate=rate, signals=np.zeros(5), work=np.zeros(law.workspace()),
-    )  # fmt: skip
+        law.law,
+        x=np.array(x),
+        memory=np.array(memory),
+        target=np.array(target),
+        k=k,
+        tau=tau,
+        rate=rate,
+        signals=np.zeros(5),
+        work=np.zeros(law.workspace()),
+    )
     return tau, rate
 
 
@@ -142,9 +157,12 @@ def by_hand(n: float, load: float, coriolis: float) -> tuple[Any, list[float]]:
         (surge, yaw), memory = controls(s, leg, n)
         u, v, r = nu
         turning = coriolis * np.array(
-            [-(M[1, 1] * v + M[1, 2] * r) * r, M[0, 0] * u * r,
-             (M[1, 1] * v + M[1, 2] * r) * u - M[0, 0] * u * v]
-        )  # fmt: skip
+            [
+                -(M[1, 1] * v + M[1, 2] * r) * r,
+                M[0, 0] * u * r,
+                (M[1, 1] * v + M[1, 2] * r) * u - M[0, 0] * u * v,
+            ]
+        )
         force = surge * L[0] + load * L[1] + yaw * L[2] - N @ nu - turning
         way = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
         return [*way, *np.linalg.solve(M, force), *memory]
@@ -156,8 +174,9 @@ def by_hand(n: float, load: float, coriolis: float) -> tuple[Any, list[float]]:
             return float(np.hypot(*(s[:2] - POINTS[leg + 1])) - LENGTH)
 
         near.terminal = True  # type: ignore[attr-defined]
-        part = solve_ivp(rates, (t, 400), s, args=(leg,), events=near, rtol=1e-9, atol=1e-11,
-                         max_step=0.1)  # fmt: skip
+        part = solve_ivp(
+            rates, (t, 400), s, args=(leg,), events=near, rtol=1e-9, atol=1e-11, max_step=0.1
+        )
         s, t = part.y[:, -1], part.t[-1]
         ends.append(t)
         rows.append(np.vstack([part.t, part.y]))
@@ -262,9 +281,12 @@ def test_a_row_of_the_table_of_what_could_not_be_read(name: str) -> None:
     one, two = (run.metrics for run in runs)
     left = "; ".join(f"{1000 * at_leg_four(run):.0f}" for run in runs)
     assert row.split(" | ") == [
-        f"{one.path_time:.0f}; {two.path_time:.0f}", f"{one.e_ct_max:.2f}", left,
-        f"{one.peak_tau_u:.2f}", f"{one.peak_tau_r:.2f}; {two.peak_tau_r:.2f}",
-    ]  # fmt: skip
+        f"{one.path_time:.0f}; {two.path_time:.0f}",
+        f"{one.e_ct_max:.2f}",
+        left,
+        f"{one.peak_tau_u:.2f}",
+        f"{one.peak_tau_r:.2f}; {two.peak_tau_r:.2f}",
+    ]
 
 
 @pytest.mark.papers
@@ -299,18 +321,25 @@ def test_the_table_of_starts_is_that_of_the_study() -> None:
         failed = [f"{500 * share:.0f}" for share in cells.failed]
         errors_of = cells.q50.to_numpy()[1::2]
         assert told == [
-            "; ".join(failed[:2]), "; ".join(failed[2:]), "; ".join(f"{e:.2f}" for e in errors_of)
-        ]  # fmt: skip
+            "; ".join(failed[:2]),
+            "; ".join(failed[2:]),
+            "; ".join(f"{e:.2f}" for e in errors_of),
+        ]
 
 
 @pytest.mark.papers
 @pytest.mark.parametrize(
     ("n", "acceptance", "w", "done"),
     [
-        (2, 1.0, 0.9, False), (2, 0.8, 1.8, False), (2, 1.0, 0.45, False), (1, 1.0, 0.9, True),
-        (1, 1.0, 1.8, True), (1, 0.8, 0.9, False), (1, 1.0, 0.45, False),
+        (2, 1.0, 0.9, False),
+        (2, 0.8, 1.8, False),
+        (2, 1.0, 0.45, False),
+        (1, 1.0, 0.9, True),
+        (1, 1.0, 1.8, True),
+        (1, 0.8, 0.9, False),
+        (1, 1.0, 0.45, False),
     ],
-)  # fmt: skip
+)
 def test_waypoints_on_cybership_ii_hang_on_what_could_not_be_read(
     n: int, acceptance: float, w: float, done: bool
 ) -> None:

@@ -144,9 +144,9 @@ def test_a_loop_that_never_reaches_one_has_no_limit_and_an_unstable_one_no_margi
 def test_loops_that_do_not_touch_have_the_shorter_delay_together():
     one, other = fed_back(2.0, [1.0], [1.0, 0.0]), fed_back(5.0, [1.0], [1.0, 0.0])
     zeros = np.zeros((1, 1))
-    both = Cut(*(
-        np.block([[getattr(one, k), zeros], [zeros, getattr(other, k)]]) for k in ("A", "B", "C")
-    ))  # fmt: skip
+    both = Cut(
+        *(np.block([[getattr(one, k), zeros], [zeros, getattr(other, k)]]) for k in ("A", "B", "C"))
+    )
     assert delay_margin(both) == pytest.approx(math.pi / 2 / 5.0)
 
 
@@ -259,7 +259,7 @@ def growth(law: Controller, delay: float, step: float, duration: float, signal: 
         (Pid(standoff=0.5), 2.5e-4, 6.0, "tau_u_cmd"),
         (AdaptiveNeural(standoff=0.5, anti_windup="auxiliary"), 1e-3, 20.0, "tau_r_cmd"),
     ],
-)  # fmt: skip
+)
 def test_a_simulated_command_may_be_late_by_the_delay_margin(law, step, duration, signal):
     margin = of(law).delay_margin
     shorter, longer = (step * round(part * margin / step) for part in (0.96, 1.04))
@@ -303,9 +303,11 @@ def test_a_law_that_is_told_the_loads_bears_more_delay_before_the_actuator_than_
 def test_on_a_circle_small_deviations_go_as_the_linearised_loop_says():
     """Against the loop's own equation with a target that moves, for a law with a heading in it."""
     loop = corrected(
-        controller=Adrc(), path=Circle(radius=8.0), disturbance=STEADY,
+        controller=Adrc(),
+        path=Circle(radius=8.0),
+        disturbance=STEADY,
         start=(8.0, 0.0, np.pi / 2, 0.5, 0.0, 0.0625),
-    )  # fmt: skip
+    )
     linear = loop_margins(loop, TimeGrid(0.01, 10_000)).linear
     assert linear.course.turn == pytest.approx(0.5 / 8.0)
     slope, _ = continuous(loop, 200.0)
@@ -335,9 +337,10 @@ def test_a_delay_sensors_and_sampling_are_left_out_and_told():
     )
     measured = loop_margins(delayed, TimeGrid(0.01, 3000, hold_every=5))
     assert measured.left_out == (
-        "measurement and estimator", "the sampling of the law every 0.05 s",
+        "measurement and estimator",
+        "the sampling of the law every 0.05 s",
         "the command's delay of 0.1 s",
-    )  # fmt: skip
+    )
     assert measured.numbers() == pytest.approx(of(Pid(standoff=0.5)).numbers(), rel=1e-6)
 
 
@@ -378,7 +381,7 @@ def test_a_law_that_stays_near_and_never_rests_is_told_with_its_distance(monkeyp
         "path": {"kind": "line", "x": float(run["x_d"][-1])},
         "disturbance": {"kind": "step", **{b: float(run[b][-1]) for b in LOADS[3:]}},
         "simulation.duration": math.ceil(seconds),
-    }  # fmt: skip
+    }
     left = podusv.simulate(law, held).recording
     late = left["z_e"][(left["time"] >= seconds / 2) & (left["time"] <= seconds)]
     assert (near, far) == (pytest.approx(late.min(), rel=0.02), pytest.approx(late.max(), rel=0.02))
@@ -465,8 +468,11 @@ def test_claims_compare_margins(podusv):
     told = json.loads(podusv("compare", "a.yaml", "--no-figures", "--json", "--out", "c").out)
     verdicts = {claim["claim"]: claim["verdict"] for claim in told["claims"]}
     assert verdicts == {
-        "yes": "reproduced", "no": "not reproduced", "never": "reproduced", "unknown": "cannot tell"
-    }  # fmt: skip
+        "yes": "reproduced",
+        "no": "not reproduced",
+        "never": "reproduced",
+        "unknown": "cannot tell",
+    }
     assert told["comparison"]["phase_margin_u"]["one"] > 0.5
     assert "peak_T_u" not in told["comparison"]
     (why,) = told["missing"]

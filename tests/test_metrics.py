@@ -141,9 +141,11 @@ def test_a_position_that_is_held_is_off_by_a_sawtooth_whatever_the_step():
     undamped = dict.fromkeys(("X_u", "X_uu", "X_uuu"), 0.0)
     exact = dict.fromkeys(("position", "heading", "velocity", "yaw_rate"), Sensor(period=0.5))
     loop = adrift(
-        vessel=NONLINEAR.model_copy(update=undamped), estimator=NoEstimator(),
-        measurement=Sensors(**exact), start=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
-    )  # fmt: skip
+        vessel=NONLINEAR.model_copy(update=undamped),
+        estimator=NoEstimator(),
+        measurement=Sensors(**exact),
+        start=(0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
+    )
     for n in (2, 5, 10):
         grid = TimeGrid(0.5 / n, 400 * n)
         probe = metrics_probe(Plan(loop, grid), steady_fraction=0.25, settling_radius=2.0)
@@ -216,9 +218,17 @@ class Ending(Constant):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """The demand."""
         tau[0] = 1.0 if t <= k.last else math.nan
         tau[1] = 0.0

@@ -108,9 +108,13 @@ def test_port_and_starboard_are_alike():
 )
 def test_constant_loads_leave_no_offset(path, hull, told):
     loop = corrected(
-        controller=LAW, vessel=hull, nominal=told, actuator=Saturated(), disturbance=STEADY,
+        controller=LAW,
+        vessel=hull,
+        nominal=told,
+        actuator=Saturated(),
+        disturbance=STEADY,
         path=path,
-    )  # fmt: skip
+    )
     assert last(run(loop, 300.0, step=0.02), 1.0).max() < 1e-8
 
 
@@ -132,9 +136,14 @@ MORE = 7.0 / NONLINEAR.m22  # m/s
 def untold(law: MomentumVector, **parts: Any) -> Recording:
     """A hull that slides, told the paper's, from beside a line in calm water."""
     loop = corrected(
-        controller=law, vessel=SLIDES, nominal=NONLINEAR, disturbance=Calm(),
-        path=Line(speed=0.5), start=(-1.0, 0.5, 0.0, 0.5, 0.0, 0.0), **parts,
-    )  # fmt: skip
+        controller=law,
+        vessel=SLIDES,
+        nominal=NONLINEAR,
+        disturbance=Calm(),
+        path=Line(speed=0.5),
+        start=(-1.0, 0.5, 0.0, 0.5, 0.0, 0.0),
+        **parts,
+    )
     return run(loop, 300.0, log_every=5)
 
 
@@ -196,9 +205,13 @@ def test_the_period_that_its_loops_carry_is_the_one_that_the_run_carries(period,
 def test_a_hull_whose_sway_answers_yaw_comes_to_the_line_in_calm_water(speed):
     """CyberShip II from a metre behind; velocity_vector swings by decimetres there."""
     loop = corrected(
-        controller=LAW, vessel=CYBERSHIP, actuator=Saturated(), disturbance=Calm(),
-        path=Line(speed=speed), start=(-1.0, 0.5, 0.0, speed, 0.0, 0.0),
-    )  # fmt: skip
+        controller=LAW,
+        vessel=CYBERSHIP,
+        actuator=Saturated(),
+        disturbance=Calm(),
+        path=Line(speed=speed),
+        start=(-1.0, 0.5, 0.0, speed, 0.0, 0.0),
+    )
     out = run(loop, 900.0 if speed < 0.2 else 300.0, step=0.02, log_every=5)
     settled = out["time"] > 0.9 * out["time"][-1]
     assert out["z_e"][settled].max() < 0.01
@@ -211,9 +224,12 @@ def test_a_hull_whose_sway_answers_yaw_comes_to_the_line_in_calm_water(speed):
 def test_at_a_target_that_stops_it_does_not_circle(sea, worst):
     stops = Waypoints(points=((0.0, 0.0), (20.0, 0.0)), legs="straight", after="stop")
     loop = corrected(
-        controller=LAW, actuator=Saturated(), disturbance=sea, path=stops,
+        controller=LAW,
+        actuator=Saturated(),
+        disturbance=sea,
+        path=stops,
         start=(-3.0, 1.0, 0.0, 0.0, 0.0, 0.0),
-    )  # fmt: skip
+    )
     out = run(loop, 300.0, step=0.02, log_every=5)
     assert last(out, 50.0).max() < worst
     assert abs(out["r"][out["time"] > 250]).max() < 0.02

@@ -22,15 +22,23 @@ def pytest_of(test: str) -> str:
     """What pytest says of a test file in this folder, from outside the repository."""
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test],
-        capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
     return done.stdout + done.stderr
 
 
 PASSED = {
-    "law": 5, "path": 5, "disturbance": 5, "measurement": 8, "estimator": 9, "metric": 2,
+    "law": 5,
+    "path": 5,
+    "disturbance": 5,
+    "measurement": 8,
+    "estimator": 9,
+    "metric": 2,
     "figure": 2,
-}  # fmt: skip
+}
 
 SLOW = [pytest.param(what, marks=pytest.mark.slow) for what in list(PASSED)[1:]]
 
@@ -136,11 +144,9 @@ def test_nothing_is_replaced_and_names_are_checked(podusv):
 
 WRONG = {
     "rate[0] = signals[0]": ("pass", "it leaves the rate of drift unwritten"),
-    "signals[0] = target[1] - x[1]": (
-        "signals[0] = math.sqrt(-1.0 - x[0] * x[0])", "math domain"
-    ),
+    "signals[0] = target[1] - x[1]": ("signals[0] = math.sqrt(-1.0 - x[0] * x[0])", "math domain"),
     "tau[0], tau[1] = push(k)": ("tau[0], tau[1] = push.calls(k)", "no attribute"),
-}  # fmt: skip
+}
 
 
 def failures(law: str) -> list[str]:
@@ -202,10 +208,13 @@ def place(tmp_path_factory):
 def podusv(place: Path, *words: str, code: int = 0) -> str:
     """What a command prints where the package is installed."""
     done = subprocess.run(
-        [sys.executable, "-m", "podusv_cli", *words], cwd=place, capture_output=True, text=True,
+        [sys.executable, "-m", "podusv_cli", *words],
+        cwd=place,
+        capture_output=True,
+        text=True,
         env={**os.environ, "PYTHONPATH": f"{place / 'site'}:{ROOT}", "COLUMNS": "100"},
         timeout=300,
-    )  # fmt: skip
+    )
     assert done.returncode == code, done.stdout + done.stderr
     return done.stdout + done.stderr
 

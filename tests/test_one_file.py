@@ -184,9 +184,13 @@ def place(tmp_path_factory):
 def podusv(place: Path, *words: str, code: int = 0) -> str:
     """What a command of the extended package prints."""
     done = subprocess.run(
-        [sys.executable, "-m", "podusv_cli", *words], cwd=place, capture_output=True, text=True,
-        env={**os.environ, "PYTHONPATH": str(place), "COLUMNS": "100"}, timeout=300,
-    )  # fmt: skip
+        [sys.executable, "-m", "podusv_cli", *words],
+        cwd=place,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(place), "COLUMNS": "100"},
+        timeout=300,
+    )
     assert done.returncode == code, done.stderr
     return done.stdout + done.stderr
 

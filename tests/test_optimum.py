@@ -365,12 +365,14 @@ def test_of_two_optima_the_lower_counts(podusv):
 @pytest.mark.parametrize(
     ("change", "what"),
     [
-        ("start.x=-4", "start"), ("actuator.surge_limit=9", "actuator"),
-        ("vessel.X_u=-1", "vessel"), ("path.speed=0.4", "path"),
+        ("start.x=-4", "start"),
+        ("actuator.surge_limit=9", "actuator"),
+        ("vessel.X_u=-1", "vessel"),
+        ("path.speed=0.4", "path"),
         ("disturbance.kind=harmonic", "disturbance"),
         ("simulation.duration=0.9", "simulation.duration"),
     ],
-)  # fmt: skip
+)
 def test_a_run_of_another_task_is_not_related_and_a_sentence_says_why(podusv, change, what):
     made(podusv, "best", BEST)
     made(podusv, "other", BASE, "--set", change)

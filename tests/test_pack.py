@@ -357,23 +357,27 @@ UNSAFE = {
     "no manifest": (without("manifest.json"), "it has no manifest.json"),
     "manifest leads out": (
         other("manifest.json", lambda c: c.replace(b'"metrics.csv"', b'"../metrics.csv"')),
-        "'../metrics.csv' is no file of this folder"),
+        "'../metrics.csv' is no file of this folder",
+    ),
     "manifest is no JSON": (other("manifest.json", lambda _: b"no"), "not valid JSON"),
-    "provenance is no JSON": (
-        other("provenance.json", lambda c: b" " * len(c)), "not valid JSON"),
+    "provenance is no JSON": (other("provenance.json", lambda c: b" " * len(c)), "not valid JSON"),
     **{
         f"provenance of {told!r}": (
-            retold(told), f"provenance.json: damaged, not as podusv wrote it ({place}")
+            retold(told),
+            f"provenance.json: damaged, not as podusv wrote it ({place}",
+        )
         for told, place in {
-            b'{"plugins": 3}': "plugins: ", b'{"plugins": ["x"]}': "plugins.0: ",
+            b'{"plugins": 3}': "plugins: ",
+            b'{"plugins": ["x"]}': "plugins.0: ",
             b'{"plugins": [{"package": ["x"]}]}': "plugins.0.package: ",
             b'{"plugins": [{"package": "x", "version": {}}]}': "plugins.0.version: ",
-            b'{"sittings": 3}': "sittings: ", b'{"sittings": [1]}': "sittings.0: ",
+            b'{"sittings": 3}': "sittings: ",
+            b'{"sittings": [1]}': "sittings.0: ",
         }.items()
     },
     "compressed otherwise": (lzma, "compressed in a way that podusv does not"),
     "empty": (lambda listed: listed.clear(), "it has files of 0 folders"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", UNSAFE)

@@ -40,8 +40,10 @@ def test_the_commands_of_the_description_exist(podusv: Command) -> None:
 
 def test_the_recipe_asks_for_what_the_package_needs() -> None:
     recipe = yaml.safe_load((ROOT / "recipe/recipe.yaml").read_text())
-    needed = [re.sub(r"^[\w-]+", lambda name: CONDA.get(name[0], name[0]), one).replace(">=", " >=")
-              for one in PROJECT["dependencies"]]  # fmt: skip
+    needed = [
+        re.sub(r"^[\w-]+", lambda name: CONDA.get(name[0], name[0]), one).replace(">=", " >=")
+        for one in PROJECT["dependencies"]
+    ]
     assert recipe["requirements"]["run"] == [
         "__linux",
         f"python {PROJECT['requires-python']}",
@@ -69,7 +71,9 @@ def test_every_file_of_a_package_is_packed(package: str) -> None:
     needed = {
         path
         for path in home.rglob("*")
-        if path.is_file() and path.suffix not in {".py", ".pyc"} and links.count(path) == 0
+        if path.is_file()
+        and path.suffix not in {".py", ".pyc"}
+        and links.count(path) == 0
         and not any(link in path.parents for link in links)
-    }  # fmt: skip
+    }
     assert needed - packed <= {ROOT / PROJECT["readme"]}

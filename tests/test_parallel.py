@@ -130,9 +130,10 @@ def test_an_interrupted_caller_leaves_no_process(tmp_path):
 
 def test_an_interrupt_while_figures_are_drawn_is_one_and_no_bug(monkeypatch):
     monkeypatch.setattr(
-        drawing, "run_shares",
+        drawing,
+        "run_shares",
         lambda jobs, *rest: [Outcome(failure=INTERRUPTED, interrupted=True)] * 2,
-    )  # fmt: skip
+    )
     with pytest.raises(KeyboardInterrupt):
         drawing.draw_in_parallel([], [*drawing.FIGURES.values()][:2], ["png"], Extras())
 

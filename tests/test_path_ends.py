@@ -29,8 +29,10 @@ controller: {kind: los_pid}
 simulation: {step: 0.02, duration: 90.0}
 """
 SENSED: dict[str, Any] = {
-    "measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}, "control.period": 0.1,
-}  # fmt: skip
+    "measurement": {"kind": "sensors"},
+    "estimator": {"kind": "ekf"},
+    "control.period": 0.1,
+}
 DURATIONS = (91.0, 133.3, 260.0)
 MEASURED_ANEW = {"law_ns", "law_ns_low", "law_ns_high", "law_operations"}
 
@@ -145,9 +147,10 @@ def test_in_pieces_and_as_a_reward_metrics_end_where_the_path_does(
     """One leg of 9.7 m to the north, pushed along it for 0.34 s at a time."""
     changes = {
         "path": {"kind": "legs", "points": [[0.0, 0.0], [9.7, 0.0]], "switch": "passed"},
-        "start": {"x": 0.3, "y": 0.4, "psi": 0.0, "u": 0.2}, "disturbance": {"kind": "none"},
+        "start": {"x": 0.3, "y": 0.4, "psi": 0.0, "u": 0.2},
+        "disturbance": {"kind": "none"},
         "simulation.duration": 34.0,
-    }  # fmt: skip
+    }
     session = podusv.open_session(scenario, changes, period=0.34)
     env = gym.Env(str(scenario), changes, period=0.34, reward="e_ct_integral", limits=(50.0, 1.0))
     env.reset(seed=0)

@@ -110,8 +110,10 @@ def test_the_velocity_reading_is_the_printed_terms_integrated():
 
 def test_only_the_sine_reading_keeps_the_speed_along_x():
     times = np.linspace(0, 309, 200)
-    speeds = {reading: {round(target_at(LineCircle(reading=reading), t)[2], 12) for t in times}
-              for reading in ("literal", "velocity", "sine")}  # fmt: skip
+    speeds = {
+        reading: {round(target_at(LineCircle(reading=reading), t)[2], 12) for t in times}
+        for reading in ("literal", "velocity", "sine")
+    }
     assert speeds["sine"] == {0.5}
     assert len(speeds["literal"]) > 2
     assert len(speeds["velocity"]) > 2

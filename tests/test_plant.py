@@ -22,9 +22,11 @@ velocities = st.tuples(speed, speed, speed).map(np.array)
 DAMPING = [name for name in Vessel.model_fields if name[0] in "XYN" and "dot" not in name]
 # No two of its numbers alike, and no symmetry of the added mass: each must stand in its place.
 UNLIKE = Vessel(
-    **VESSELS["cybership2"].model_dump() | {"Y_rdot": -0.4, "N_vdot": -0.7, "x_g": 0.03}
-    | {"coriolis": 0.3} | {name: -0.1 - 0.17 * place for place, name in enumerate(DAMPING)}
-)  # fmt: skip
+    **VESSELS["cybership2"].model_dump()
+    | {"Y_rdot": -0.4, "N_vdot": -0.7, "x_g": 0.03}
+    | {"coriolis": 0.3}
+    | {name: -0.1 - 0.17 * place for place, name in enumerate(DAMPING)}
+)
 every_vessel = pytest.mark.parametrize("vessel", VESSELS.values(), ids=VESSELS.keys())
 
 
@@ -37,11 +39,13 @@ def accelerations(vessel: Vessel, nu: Any, load: Any = (0.0, 0.0, 0.0)) -> Any:
 
 def inertia(p: Vessel) -> Any:
     """(5), with the added masses that symmetry does not make equal kept apart."""
-    return np.array([
-        [p.m - p.X_udot, 0, 0],
-        [0, p.m - p.Y_vdot, p.m * p.x_g - p.Y_rdot],
-        [0, p.m * p.x_g - p.N_vdot, p.I_z - p.N_rdot],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [p.m - p.X_udot, 0, 0],
+            [0, p.m - p.Y_vdot, p.m * p.x_g - p.Y_rdot],
+            [0, p.m * p.x_g - p.N_vdot, p.I_z - p.N_rdot],
+        ]
+    )
 
 
 def coriolis(p: Vessel, nu: Any) -> Any:
@@ -56,11 +60,13 @@ def damping(p: Vessel, nu: Any) -> Any:
     """(7), positive where it brakes, with the nonlinear derivatives."""
     u, v, r = nu
     V, R = abs(v), abs(r)
-    return -np.array([
-        [p.X_u + p.X_uu * abs(u) + p.X_uuu * u**2, 0, 0],
-        [0, p.Y_v + p.Y_vv * V + p.Y_rv * R, p.Y_r + p.Y_vr * V + p.Y_rr * R],
-        [0, p.N_v + p.N_vv * V + p.N_rv * R, p.N_r + p.N_vr * V + p.N_rr * R],
-    ])  # fmt: skip
+    return -np.array(
+        [
+            [p.X_u + p.X_uu * abs(u) + p.X_uuu * u**2, 0, 0],
+            [0, p.Y_v + p.Y_vv * V + p.Y_rv * R, p.Y_r + p.Y_vr * V + p.Y_rr * R],
+            [0, p.N_v + p.N_vv * V + p.N_rv * R, p.N_r + p.N_vr * V + p.N_rr * R],
+        ]
+    )
 
 
 def balance(p: Vessel, nu: Any, load: Any) -> Any:

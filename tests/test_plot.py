@@ -305,9 +305,13 @@ def test_the_style_of_a_paper_has_serif_type_of_eight_points(one, tmp_path, monk
 
 @pytest.mark.parametrize(
     ("size", "style", "told"),
-    [("3y", "podusv", "--size '3y': must be WIDTH"), ("0.5", "podusv", "from 1 to 40"),
-     ("5x90", "podusv", "from 1 to 40"), ("", "papr", "did you mean 'paper'")],
-)  # fmt: skip
+    [
+        ("3y", "podusv", "--size '3y': must be WIDTH"),
+        ("0.5", "podusv", "from 1 to 40"),
+        ("5x90", "podusv", "from 1 to 40"),
+        ("", "papr", "did you mean 'paper'"),
+    ],
+)
 def test_a_size_or_style_that_there_is_not_is_refused(size, style, told):
     with pytest.raises(UsageError, match=told):
         plotting.look_of(2, size, style)

@@ -140,9 +140,10 @@ def test_a_finished_run_is_looked_at_without_reading_its_file(podusv):
 
 
 LOOKS = {
-    "plot": ("plot", "--figure", "trajectory", "--out", "looked"), "diff": ("diff",),
+    "plot": ("plot", "--figure", "trajectory", "--out", "looked"),
+    "diff": ("diff",),
     "compare": ("compare", "--figure", "errors", "--out", "looked"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("words", LOOKS.values(), ids=LOOKS)
@@ -420,8 +421,10 @@ broken = Metric("broken", "m", "none", of_log=lambda log: log["nothing"].max())
 
 
 def test_a_metric_may_be_a_function_of_the_log(podusv: Command) -> None:
-    text = SCENARIO + CLAIM.replace("min(cross_track.gap) < 0 and cross_track.largest_east > 1",
-                                    "cross_track.eastmost == max(cross_track.y)")  # fmt: skip
+    text = SCENARIO + CLAIM.replace(
+        "min(cross_track.gap) < 0 and cross_track.largest_east > 1",
+        "cross_track.eastmost == max(cross_track.y)",
+    )
     scenario = put(text, LAW + OF_LOG)
     said = podusv("compare", scenario, "--out", "c", "--no-figures", "--metric", "eastmost")
     assert "C1  reproduced" in said.out

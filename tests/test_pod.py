@@ -64,10 +64,13 @@ NORMAL = partial(st.floats, allow_subnormal=False)  # 1e-323 N is beyond a root'
 
 
 @given(
-    T=NORMAL(-8, 8), u=st.floats(-1, 1), v=st.floats(-1, 1), T_nV=NORMAL(0, 0.5),
+    T=NORMAL(-8, 8),
+    u=st.floats(-1, 1),
+    v=st.floats(-1, 1),
+    T_nV=NORMAL(0, 0.5),
     astern=st.none() | NORMAL(0, 0.5),
     form=st.sampled_from(["physical", "printed"]),
-)  # fmt: skip
+)
 def test_the_inverse_gives_the_thrust_back(T, u, v, T_nV, astern, form):
     actuator = pods({"T_nV": T_nV, "T_nV_astern": astern}, thrust_form=form)
     k, table, x = bundle(actuator.constants()), actuator.table(), np.array([0, 0, 0, u, v, 0.1])

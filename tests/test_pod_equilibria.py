@@ -110,11 +110,16 @@ def test_a_steady_turn_is_the_root_of_the_published_equations_of_motion():
         m22v = 33.8 * v + 1.0948 * r
         return [
             2.0 + m22v * r - (0.72253 + 1.32742 * abs(u) + 5.86643 * u * u) * u,
-            0.4 / X_P - 25.8 * u * r - (0.88965 + 36.47287 * abs(v) + 0.805 * abs(r)) * v
+            0.4 / X_P
+            - 25.8 * u * r
+            - (0.88965 + 36.47287 * abs(v) + 0.805 * abs(r)) * v
             - (7.25 + 0.845 * abs(v) + 3.45 * abs(r)) * r,
-            0.4 - m22v * u + 25.8 * u * v + (0.0313 + 3.95645 * abs(v) + 0.13 * abs(r)) * v
+            0.4
+            - m22v * u
+            + 25.8 * u * v
+            + (0.0313 + 3.95645 * abs(v) + 0.13 * abs(r)) * v
             - (1.9 - 0.08 * abs(v) + 0.75 * abs(r)) * r,
-        ]  # fmt: skip
+        ]
 
     law = Constant(surge=2.0, yaw=0.4)
     log = run(adrift(actuator=pods(), controller=law, vessel=vessel("cybership2")), 400.0, 0.02)

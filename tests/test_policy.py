@@ -73,9 +73,7 @@ def test_a_network_is_what_numpy_makes_of_its_layers(activation, squash, sizes):
     """
     random = np.random.default_rng(1)
     given = drawn(sizes) | {"mean": random.normal(size=8), "scale": random.uniform(0.5, 4.0, 8)}
-    law = Policy(
-        content=content(given), activation=activation, squash=squash, surge=5.0, yaw=3.0
-    )  # fmt: skip
+    law = Policy(content=content(given), activation=activation, squash=squash, surge=5.0, yaw=3.0)
     between = np.tanh if activation == "tanh" else lambda h: np.maximum(h, 0.0)
     last = np.tanh if squash == "tanh" else lambda h: np.clip(h, -1.0, 1.0)
     layers = len(sizes) - 1
@@ -110,8 +108,7 @@ def test_a_file_of_the_format_s_own_library_is_read():
 def test_layers_of_a_module_with_a_name_are_read():
     given = {f"actor.{name}": tensor for name, tensor in drawn([8, 4, 2]).items()}
     np.testing.assert_array_equal(
-        demand(Policy(content=content(given))),
-        demand(Policy(content=content(drawn([8, 4, 2])))),
+        demand(Policy(content=content(given))), demand(Policy(content=content(drawn([8, 4, 2]))))
     )
 
 
@@ -201,35 +198,58 @@ BAD = {
     "header beyond its end": (bytes([3]) + bytes(7) + b"{}", "is no safetensors file"),
     "numbers of no tensor": (layers() + b"  ", "its header does not fit its numbers; save it aga"),
     "numbers of two tensors": (
-        raw({name: {"dtype": "F64", "shape": [2], "data_offsets": [0, 16]} for name in "ab"},
-            bytes(16)), "its header does not fit its numbers"),
+        raw(
+            {name: {"dtype": "F64", "shape": [2], "data_offsets": [0, 16]} for name in "ab"},
+            bytes(16),
+        ),
+        "its header does not fit its numbers",
+    ),
     "cut off": (layers()[:-8], "the file ends within 2.bias"),
     "not finite": (layers(**{"2_bias": np.array([1.0, np.nan])}), "2.bias has a number that is n"),
-    "other input": (layers(**{"0_weight": np.ones((4, 6))}), r"0.weight has shape \(4, 6\), must "
-                    r"be \(any, 8\): the observation \(target ahead \[m\]"),
-    "layers that do not fit": (layers(**{"2_weight": np.ones((2, 5))}), r"2.weight has shape "
-                               r"\(2, 5\), must be \(any, 4\): 0 has 4 numbers"),
+    "other input": (
+        layers(**{"0_weight": np.ones((4, 6))}),
+        r"0.weight has shape \(4, 6\), must "
+        r"be \(any, 8\): the observation \(target ahead \[m\]",
+    ),
+    "layers that do not fit": (
+        layers(**{"2_weight": np.ones((2, 5))}),
+        r"2.weight has shape "
+        r"\(2, 5\), must be \(any, 4\): 0 has 4 numbers",
+    ),
     "bias": (layers(**{"2_bias": np.ones(3)}), r"2.bias has shape \(3,\), must be \(2,\)"),
     "three outputs": (packed(drawn([8, 4, 3])), "2 has 3 outputs, must have 2: shares of surge"),
     "scale": (packed(drawn([8, 2]) | {"scale": np.zeros(8)}), "scale has a number that is not abo"),
     "mean": (packed(drawn([8, 2]) | {"mean": np.zeros(7)}), r"mean has shape \(7,\), must be \(8,"),
     "half a layer": (packed({"0.weight": np.ones((2, 8))}), "0.bias is missing"),
     "no layers": (packed({"mean": np.ones(8)}), "must have the layers of one network, found none"),
-    "nothing between": (layers(**{"0_weight": np.zeros((0, 8))}),
-                        r"0.weight has shape \(0, 8\), which has no num"),
+    "nothing between": (
+        layers(**{"0_weight": np.zeros((0, 8))}),
+        r"0.weight has shape \(0, 8\), which has no num",
+    ),
     "no numbers, and huge": (
         raw({"0.weight": {"dtype": "F32", "shape": [2**70, 0], "data_offsets": [0, 0]}}),
-        "0.weight has shape .* which has no numbers"),
+        "0.weight has shape .* which has no numbers",
+    ),
     "one number in two ways": (layers(**{"00_bias": np.ones(4)}), "'00.bias' is no tensor of a po"),
     "a number of 5000 digits": (layers(**{5000 * "1" + "_bias": np.ones(4)}), "is no tensor of a"),
-    "two networks": (packed({f"{part}.{name}": tensor for part in ("pi", "vf")
-                             for name, tensor in drawn([8, 2]).items()}), "found 'pi.' and 'vf.'"),
-    "a period in words": (packed(drawn([8, 2]), **{"control.period": "0.2 s"}),
-                          "its remark control.period is '0.2 s'; write how long"),
+    "two networks": (
+        packed(
+            {
+                f"{part}.{name}": tensor
+                for part in ("pi", "vf")
+                for name, tensor in drawn([8, 2]).items()
+            }
+        ),
+        "found 'pi.' and 'vf.'",
+    ),
+    "a period in words": (
+        packed(drawn([8, 2]), **{"control.period": "0.2 s"}),
+        "its remark control.period is '0.2 s'; write how long",
+    ),
     "no period": (packed(drawn([8, 2]), **{"control.period": "nan"}), "its remark control.period"),
     "something else": (layers(log_std=np.ones(2)), "'log.std' is no tensor of a policy"),
     "whole numbers": (layers(**{"2_bias": np.array([1, 2])}), "2.bias has numbers I64; save it as"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", BAD)

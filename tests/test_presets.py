@@ -78,9 +78,14 @@ def test_the_printed_bound_does_not_recover_the_peaks(tmp_path):
 def test_a_run_folder_has_what_is_promised(runs):
     folder = runs["corrected"].folder
     promised = {
-        "scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
-        "provenance.json", "manifest.json",
-    }  # fmt: skip
+        "scenario.yaml",
+        "resolved.yaml",
+        "log.h5",
+        "metrics.json",
+        "metrics.csv",
+        "provenance.json",
+        "manifest.json",
+    }
     assert promised <= {path.name for path in folder.iterdir()}
     assert (folder / "scenario.yaml").read_text() == (
         CONFIGS / "mu_2017/corrected.yaml"

@@ -22,9 +22,13 @@ from podusv_cli.engine.running import thread as march
 from podusv_cli.storage.run_folder import open_run
 
 PAGES = (
-    "README.md", "docs/tutorial.md", "docs/write_your_law.md", "docs/vessel.md", "docs/start.md",
+    "README.md",
+    "docs/tutorial.md",
+    "docs/write_your_law.md",
+    "docs/vessel.md",
+    "docs/start.md",
     "docs/papers.md",
-)  # fmt: skip
+)
 LONG = [
     pytest.param(page, marks=pytest.mark.slow)
     for page in (

@@ -15,23 +15,52 @@ from podusv_cli.scenario.load import load, load_stored
 from podusv_cli.scenario.resolved import resolved_yaml
 
 HULL = {
-    "m": 41.3, "I_z": 7.9, "X_udot": -3.7, "Y_vdot": -29.1, "N_rdot": -4.3, "X_u": -6.1,
-    "Y_v": -23.7, "N_r": -9.7,
-}  # fmt: skip
+    "m": 41.3,
+    "I_z": 7.9,
+    "X_udot": -3.7,
+    "Y_vdot": -29.1,
+    "N_rdot": -4.3,
+    "X_u": -6.1,
+    "Y_v": -23.7,
+    "N_r": -9.7,
+}
 PODS = (
-    {"x": -0.83, "y": 0.11, "T_nn": 0.041, "T_nn_astern": 0.023, "T_nV": 0.013, "n_max": 17.3,
-     "n_max_astern": 9.1, "n_rate": 21.0, "n_lag": 0.37, "angle_limit": 0.61, "angle_rate": 0.43,
-     "angle_lag": 0.29},
-    {"x": -0.79, "y": -0.31, "T_nn": 0.037, "T_nn_astern": 0.031, "T_nV": 0.009, "n_max": 13.7,
-     "n_max_astern": 11.9, "n_rate": 19.0, "n_lag": 0.53, "angle_limit": 0.0},
-)  # fmt: skip
+    {
+        "x": -0.83,
+        "y": 0.11,
+        "T_nn": 0.041,
+        "T_nn_astern": 0.023,
+        "T_nV": 0.013,
+        "n_max": 17.3,
+        "n_max_astern": 9.1,
+        "n_rate": 21.0,
+        "n_lag": 0.37,
+        "angle_limit": 0.61,
+        "angle_rate": 0.43,
+        "angle_lag": 0.29,
+    },
+    {
+        "x": -0.79,
+        "y": -0.31,
+        "T_nn": 0.037,
+        "T_nn_astern": 0.031,
+        "T_nV": 0.009,
+        "n_max": 13.7,
+        "n_max_astern": 11.9,
+        "n_rate": 19.0,
+        "n_lag": 0.53,
+        "angle_limit": 0.0,
+    },
+)
 # The second is faster than it can be at the third row, and the first turned further.
 ROWS = np.array(
     [
-        [0.37, 11.3, 4.1, 0.23], [1.91, -7.7, 9.3, -0.41], [3.23, 5.9, 15.1, 0.77],
+        [0.37, 11.3, 4.1, 0.23],
+        [1.91, -7.7, 9.3, -0.41],
+        [3.23, 5.9, 15.1, 0.77],
         [5.3, 8.3, 2.9, 0.1],
     ]
-)  # fmt: skip
+)
 COMMANDS = ("t [s]", "n_1", "n_2 [1/s]", "delta_1")
 STEP, DURATION = 0.01, 6.5
 
@@ -88,10 +117,16 @@ def rates(t: float, s: list[float], between: str) -> list[float]:
     swung = min(max((angles[0] - pods[2]) / 0.29, -0.43), 0.43)
     m11, m22, m33 = 41.3 + 3.7, 41.3 + 29.1, 7.9 + 4.3
     return [
-        u * math.cos(psi) - v * math.sin(psi), u * math.sin(psi) + v * math.cos(psi), r,
-        (tau[0] + m22 * v * r - 6.1 * u) / m11, (tau[1] - m11 * u * r - 23.7 * v) / m22,
-        (tau[2] - (m22 - m11) * u * v - 9.7 * r) / m33, *turned, swung, 0.0,
-    ]  # fmt: skip
+        u * math.cos(psi) - v * math.sin(psi),
+        u * math.sin(psi) + v * math.cos(psi),
+        r,
+        (tau[0] + m22 * v * r - 6.1 * u) / m11,
+        (tau[1] - m11 * u * r - 23.7 * v) / m22,
+        (tau[2] - (m22 - m11) * u * v - 9.7 * r) / m33,
+        *turned,
+        swung,
+        0.0,
+    ]
 
 
 def marched(between: str) -> np.ndarray:

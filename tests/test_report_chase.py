@@ -41,10 +41,18 @@ IntersectionObserver = class {
 };
 </script>"""
 QUIET = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--enable-logging=stderr", "--window-size=1500,3000", "--virtual-time-budget=6000",
-)  # fmt: skip
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-logging=stderr",
+    "--window-size=1500,3000",
+    "--virtual-time-budget=6000",
+)
 
 
 def diverged(end=40.0):
@@ -196,9 +204,8 @@ def browsed(tmp_path, html, *options, probe=PROBE):
     path.write_text(f"<!doctype html><body>{probe}{frames}</body>")
     own = (*options, f"--user-data-dir={tmp_path}/browser", "--dump-dom", path.as_uri())
     made = subprocess.run(
-        [str(BROWSER), *QUIET, *own],
-        capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
+        [str(BROWSER), *QUIET, *own], capture_output=True, text=True, timeout=120, check=True
+    )
     said = re.search(r'<output id="said">(.*?)</output>', made.stdout, re.DOTALL)
     assert said, made.stderr[-2000:]
     console = [line for line in made.stderr.splitlines() if "CONSOLE" in line]
@@ -222,11 +229,14 @@ def seen(tmp_path_factory):
     every = {label: FRAME.of(label) for label in FRAME.columns}
     wide = table.table(every | {f"a_long_label_of_a_run_{i}": FRAME.of("a") for i in range(8)})
     html = page(
-        chase=chase.chase(runs()), theories={"a": theory(2.5, True)},
-        table=wide, figures=[ERRORS._replace(file=picture(), phone=picture(300))] * 4,
-        provenance={"argv": ["podusv", "x" * 300]}, title="long" * 60,
+        chase=chase.chase(runs()),
+        theories={"a": theory(2.5, True)},
+        table=wide,
+        figures=[ERRORS._replace(file=picture(), phone=picture(300))] * 4,
+        provenance={"argv": ["podusv", "x" * 300]},
+        title="long" * 60,
         abouts={"a": about("description=" + "word/" * 90)},
-    )  # fmt: skip
+    )
     return browsed(tmp_path_factory.mktemp("browser"), html)
 
 

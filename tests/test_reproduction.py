@@ -184,9 +184,17 @@ PAPER = ROOT / "results/mu_2017"
 CLAIM = (ROOT / "results/claim.md").read_text()
 ABLATIONS = {"F": "ablation_figures", "S": "ablation_standoff", "C": "ablation"}
 LAWS = (
-    "adaptive_neural", "one_node", "nodes_8", "nodes_125", "no_bounds", "no_network", "neither",
-    "high_gain", "equal_gain_1", "equal_gain_27",
-)  # fmt: skip
+    "adaptive_neural",
+    "one_node",
+    "nodes_8",
+    "nodes_125",
+    "no_bounds",
+    "no_network",
+    "neither",
+    "high_gain",
+    "equal_gain_1",
+    "equal_gain_27",
+)
 
 
 def module() -> object:
@@ -361,15 +369,24 @@ LAWS_PAGE = COMPARED.partition("\n## ")[0]
 STUDY = ROOT / "results" / "studies" / "rivals"
 SUMMARY = pd.read_csv(STUDY / "summary.csv").set_index(["law", "metric"])
 ROWS = {
-    "`velocity_vector`": "velocity_vector", "`momentum_vector`": "momentum_vector",
-    "`adrc`": "adrc", "`hand_position`": "hand_position",
-    "`sliding_mode`": "sliding_mode", "`sliding_mode`, `super_twisting`": "super_twisting",
-    "`alos`": "alos", "`alos`, `integral`": "ilos", "`los_pid`": "los_pid", "`pid`": "pid",
-    "`adaptive_neural`": "adaptive_neural", "`dsc`": "dsc", "`full_backstepping`": FULL,
+    "`velocity_vector`": "velocity_vector",
+    "`momentum_vector`": "momentum_vector",
+    "`adrc`": "adrc",
+    "`hand_position`": "hand_position",
+    "`sliding_mode`": "sliding_mode",
+    "`sliding_mode`, `super_twisting`": "super_twisting",
+    "`alos`": "alos",
+    "`alos`, `integral`": "ilos",
+    "`los_pid`": "los_pid",
+    "`pid`": "pid",
+    "`adaptive_neural`": "adaptive_neural",
+    "`dsc`": "dsc",
+    "`full_backstepping`": FULL,
     "`adaptive_neural` as published": "adaptive_neural_published",
-    "`pid` as published": "pid_published", "`adaptive_neural`, `crab`": "adaptive_crab",
+    "`pid` as published": "pid_published",
+    "`adaptive_neural`, `crab`": "adaptive_crab",
     "`adaptive_neural`, `crab`, `k_ze` 0.2, `k_psie` 0.5": "adaptive_crab_tuned",
-}  # fmt: skip
+}
 
 
 def millimetres(number):
@@ -430,8 +447,9 @@ def test_the_front_page_counts_what_is_robust(paper, scenario):
     words = [word for where, word in found if not scenario or where == scenario]
     (row,) = re.findall(
         rf"^\|[^|]*results/{paper}\.md[^|]*(?:\|[^|]*){{4}}\| (\d+) of (\d+) \|",
-        (ROOT / "README.md").read_text(), re.M,
-    )  # fmt: skip
+        (ROOT / "README.md").read_text(),
+        re.M,
+    )
     assert row == (str(words.count("robust")), str(len(words)))
 
 

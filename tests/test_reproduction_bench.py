@@ -95,10 +95,12 @@ def test_ranks_by_vessel_and_condition_are_those_of_the_runs():
 @pytest.mark.parametrize(
     ("law", "condition", "told"),
     [
-        ("hand_position", "calm", "5.6"), ("hand_position", "hull_light", "8.0"),
-        ("sliding_mode", "calm", "3.9"), ("sliding_mode", "hull_light", "5.2"),
+        ("hand_position", "calm", "5.6"),
+        ("hand_position", "hull_light", "8.0"),
+        ("sliding_mode", "calm", "3.9"),
+        ("sliding_mode", "hull_light", "5.2"),
     ],
-)  # fmt: skip
+)
 def test_the_ranks_by_condition_are_those_of_the_runs(law, condition, told):
     ranks = RUNS[(RUNS.law == law) & (RUNS.condition == condition)]["rank"]
     assert f"{ranks.mean():.1f}" == told
@@ -210,8 +212,12 @@ def test_the_sentences_about_other_hulls_are_those_of_the_runs():
         "draws of these hulls, and at most {:.0f} % off the others".format(*taken)
     ) in " ".join(TUNING.split())
     assert set(otter[otter.ratio_high < 1.0].index) == {
-        "adaptive_crab", "dsc", "adaptive_neural", "los_pid", "hand_position",
-    }  # fmt: skip
+        "adaptive_crab",
+        "dsc",
+        "adaptive_neural",
+        "los_pid",
+        "hand_position",
+    }
     lost = 100 * other.failed_after_high
     told = dict(re.findall(r"(\d+) %(?: of the draws)? \((`[^)]*)\)", words))
     assert {law: share for share, laws in told.items() for law in re.findall(r"`(\w+)`", laws)} == {
@@ -250,20 +256,27 @@ def test_the_pairs_that_are_apart_are_those_of_the_runs():
     pid = {("velocity_vector", "pid"), ("momentum_vector", "pid"), ("adaptive_crab", "pid")}
     steered = {(law, "los_pid") for law in ("velocity_vector", "momentum_vector", "adaptive_crab")}
     assert searched == {
-        *pid, *steered, ("velocity_vector", "alos"), ("velocity_vector", "ilos"),
-        ("dsc", "pid"), ("full_backstepping", "pid"),
-    }  # fmt: skip
+        *pid,
+        *steered,
+        ("velocity_vector", "alos"),
+        ("velocity_vector", "ilos"),
+        ("dsc", "pid"),
+        ("full_backstepping", "pid"),
+    }
     assert apart(judged("fresh", "searches")) == pid | {("adaptive_crab", "dsc")}
     otter = apart(judged("otter", "searches"))
     assert len(otter) == 7
     assert [b for _, b in otter].count("pid") == 6
     behind = {"hand_position", "los_pid"}
     assert apart(judged("cybership2", "searches")) == {
-        *((a, b) for a in ("adaptive_crab", "dsc", "full_backstepping", "momentum_vector")
-          for b in behind | {"alos", "ilos", "pid"}),
+        *(
+            (a, b)
+            for a in ("adaptive_crab", "dsc", "full_backstepping", "momentum_vector")
+            for b in behind | {"alos", "ilos", "pid"}
+        ),
         *(("adaptive_neural", b) for b in behind | {"pid"}),
         *(("velocity_vector", b) for b in behind),
-    }  # fmt: skip
+    }
 
 
 def test_sets_that_keep_a_law_faster_than_its_target_fail_on_the_otter():
@@ -339,9 +352,12 @@ def test_the_sentences_about_told_hulls_are_those_of_the_study():
     text = " ".join(TOLD.split())
     verdicts = json.loads((RESULTS / "studies/unknown_dynamics/claims.json").read_text())["claims"]
     assert {verdict["claim"]: verdict["verdict"] for verdict in verdicts} == {
-        "U1": "reproduced", "U2": "not reproduced", "U3": "reproduced", "U4": "reproduced",
+        "U1": "reproduced",
+        "U2": "not reproduced",
+        "U3": "reproduced",
+        "U4": "reproduced",
         "U5": "not reproduced",
-    }  # fmt: skip
+    }
     pairs = table("pairs.csv", "unknown_dynamics").query("metric == 'iae'").set_index(["a", "b"])
     adapted, li, pid = (
         pairs.loc["adaptive_neural", law] for law in ("no_adaptation", "full_backstepping", "pid")
@@ -484,9 +500,11 @@ def test_found_gains_of_the_paper_s_family_live_on_the_limit(law, keys, low, hig
     ]
     controllers = [keys | {"kind": "adaptive_neural", "anti_windup": "none"} | one for one in sets]
     free = {
-        "actuator": {"kind": "ideal"}, "disturbance": {"kind": "none"},
-        "path": {"kind": "line", "speed": 0.5}, "simulation.duration": 0.5,
-    }  # fmt: skip
+        "actuator": {"kind": "ideal"},
+        "disturbance": {"kind": "none"},
+        "path": {"kind": "line", "speed": 0.5},
+        "simulation.duration": 0.5,
+    }
     source = "podusv:mu_2017/corrected.yaml"
     ends = [
         podusv.simulate(source, free | {"controller": controller}).status

@@ -17,9 +17,13 @@ PAGE = (ROOT / "results" / "sea.md").read_text()
 WORDS = " ".join(PAGE.split())
 PERIODS = ("0.1", "0.5", "2.0")
 LAWS = (
-    "velocity_vector", "adaptive_neural", "dsc", "full_backstepping",
-    "adaptive_neural_anti_windup", "pid",
-)  # fmt: skip
+    "velocity_vector",
+    "adaptive_neural",
+    "dsc",
+    "full_backstepping",
+    "adaptive_neural_anti_windup",
+    "pid",
+)
 NAMED = ("sea_state_4", "sea_state_6", "sea_untold")
 PLACES = [(study, period) for study in NAMED for period in PERIODS]
 

@@ -7,15 +7,7 @@ from typing import Any
 
 import pytest
 from command_samples import commanded
-from rerun_samples import (
-    SCENARIO,
-    copied,
-    flip,
-    made,
-    relogged,
-    replaced,
-    told_otherwise,
-)  # fmt: skip
+from rerun_samples import SCENARIO, copied, flip, made, relogged, replaced, told_otherwise
 from storage_samples import beside, files
 
 from podusv_cli.storage import manifest

@@ -15,17 +15,37 @@ from podusv_cli.core.kernel import bundle, call
 from podusv_cli.scenario.load import load
 
 PROPELLER = {
-    "x": -0.6, "T_nn": 0.02, "T_nn_astern": 0.011, "T_nV": 0.03, "n_max": 20.0,
-    "n_max_astern": 10.0, "n_rate": 40.0, "n_lag": 0.2, "angle_limit": 0.7, "angle_rate": 1.0,
+    "x": -0.6,
+    "T_nn": 0.02,
+    "T_nn_astern": 0.011,
+    "T_nV": 0.03,
+    "n_max": 20.0,
+    "n_max_astern": 10.0,
+    "n_rate": 40.0,
+    "n_lag": 0.2,
+    "angle_limit": 0.7,
+    "angle_rate": 1.0,
     "angle_lag": 0.1,
-}  # fmt: skip
+}
 LIFT, STALL = 0.013, 0.4
 RUDDER = {**PROPELLER, "rudder": {"lift": LIFT, "stall": STALL}}
 HULL = {
-    "length": 1.4, "beam": 0.3, "m": 25.0, "I_z": 2.1, "X_udot": -2.0, "Y_vdot": -11.0,
-    "N_rdot": -1.3, "X_u": -1.1, "X_uu": -2.2, "Y_v": -5.0, "Y_vv": -30.0, "N_r": -1.9,
-    "N_rr": -0.6, "Y_r": 0.2, "N_v": -0.1,
-}  # fmt: skip
+    "length": 1.4,
+    "beam": 0.3,
+    "m": 25.0,
+    "I_z": 2.1,
+    "X_udot": -2.0,
+    "Y_vdot": -11.0,
+    "N_rdot": -1.3,
+    "X_u": -1.1,
+    "X_uu": -2.2,
+    "Y_v": -5.0,
+    "Y_vv": -30.0,
+    "N_r": -1.9,
+    "N_rr": -0.6,
+    "Y_r": 0.2,
+    "N_v": -0.1,
+}
 
 
 def actuator(**changes):
@@ -35,19 +55,28 @@ def actuator(**changes):
 def loads(n, delta, u=0.0, v=0.0, r=0.0):
     own, tau = actuator(), np.zeros(3)
     call(
-        own.replay, x=np.array([0.0, 0.0, 0.0, u, v, r]), demand=np.array([n, delta]),
-        k=bundle(own.constants()), table=own.table(), tau=tau,
-    )  # fmt: skip
+        own.replay,
+        x=np.array([0.0, 0.0, 0.0, u, v, r]),
+        demand=np.array([n, delta]),
+        k=bundle(own.constants()),
+        table=own.table(),
+        tau=tau,
+    )
     return tau
 
 
 @pytest.mark.parametrize(
     ("n", "delta", "normal"),
     [
-        (10.0, 0.0, 0.0), (10.0, 0.3, 1.3 * 0.3), (10.0, -0.3, -1.3 * 0.3),
-        (10.0, 0.6, 1.3 * 0.4), (20.0, -0.7, -5.2 * 0.4), (-10.0, 0.3, 0.0), (0.0, 0.3, 0.0),
+        (10.0, 0.0, 0.0),
+        (10.0, 0.3, 1.3 * 0.3),
+        (10.0, -0.3, -1.3 * 0.3),
+        (10.0, 0.6, 1.3 * 0.4),
+        (20.0, -0.7, -5.2 * 0.4),
+        (-10.0, 0.3, 0.0),
+        (0.0, 0.3, 0.0),
     ],
-)  # fmt: skip
+)
 def test_the_force_is_normal_to_the_rudder_and_grows_up_to_the_stall(n, delta, normal):
     """Ahead 0.02 n^2 less what the water's speed of 0.5 m/s takes, astern 0.011 n^2 more."""
     thrust = (0.02 if n > 0.0 else 0.011) * abs(n) * n - 0.03 * abs(n) * 0.5
@@ -68,17 +97,25 @@ def test_demands_in_reach_are_made_with_thrust_for_the_drag(u):
 def test_what_a_rudder_cannot_make_is_said():
     own = actuator()
     tried = (
-        (0.0, (3.0, 0.2), 0.0), (0.0, (-1.0, 0.2), 1.0), (0.0, (3.0, 9.0), 1.0),
+        (0.0, (3.0, 0.2), 0.0),
+        (0.0, (-1.0, 0.2), 1.0),
+        (0.0, (3.0, 9.0), 1.0),
         (0.0, (1.0, 0.153), 0.0),
         (-0.6, (1.0, 0.153), 1.0),  # going astern, when a slower stream makes the thrust
-    )  # fmt: skip
+    )
     for u, demand, saturated in tried:
         signals, x = np.zeros(len(own.signals)), np.array([0.0, 0.0, 0.0, u, 0.0, 0.0])
         call(
-            own.drive, x=x, state=np.array([12.0, 0.0]), demand=np.array(demand),
-            k=bundle(own.constants()), table=own.table(), tau=np.zeros(3), rate=np.zeros(2),
+            own.drive,
+            x=x,
+            state=np.array([12.0, 0.0]),
+            demand=np.array(demand),
+            k=bundle(own.constants()),
+            table=own.table(),
+            tau=np.zeros(3),
+            rate=np.zeros(2),
             signals=signals,
-        )  # fmt: skip
+        )
         assert signals[0] == saturated
     assert own.settled(np.zeros(6), np.array([-1.0, 0.2])) == pytest.approx(
         [-1.0, 0.0, 0.0], abs=0.1
@@ -97,20 +134,30 @@ def turning(t, s):
     yaw = -0.6 * side - (m22 - m11) * u * v + (h["N_r"] + h["N_rr"] * abs(r)) * r + h["N_v"] * v
     c, i = math.cos(psi), math.sin(psi)
     return [
-        c * u - i * v, i * u + c * v, r, surge / m11, sway / m22, yaw / m33,
-        min(max((9.0 - n) / 0.2, -40.0), 40.0), min(max((-0.5 - delta) / 0.1, -1.0), 1.0),
-    ]  # fmt: skip
+        c * u - i * v,
+        i * u + c * v,
+        r,
+        surge / m11,
+        sway / m22,
+        yaw / m33,
+        min(max((9.0 - n) / 0.2, -40.0), 40.0),
+        min(max((-0.5 - delta) / 0.1, -1.0), 1.0),
+    ]
 
 
 def test_a_circle_in_open_water_is_that_of_the_equations_by_hand():
     run = podusv.run(
         {
-            "name": "circle", "vessel": HULL, "actuator": {"kind": "pod", "pods": [RUDDER]},
-            "path": {"kind": "line"}, "disturbance": {"kind": "none"}, "start": {"u": 0.4},
+            "name": "circle",
+            "vessel": HULL,
+            "actuator": {"kind": "pod", "pods": [RUDDER]},
+            "path": {"kind": "line"},
+            "disturbance": {"kind": "none"},
+            "start": {"u": 0.4},
             "controller": {"kind": "schedule", "rows": "t,n_1,delta_1\n0,9,-0.5\n1,9,-0.5\n"},
             "simulation": {"duration": 40.0, "step": 0.01},
         }
-    )  # fmt: skip
+    )
     start = [0.0, 0.0, 0.0, 0.4, 0.0, 0.0, 0.0, 0.0]
     ended = solve_ivp(turning, (0.0, 40.0), start, rtol=1e-10, atol=1e-12, max_step=0.05)
     last = [run[name][-1] for name in ("x", "y", "u", "v", "r")]

@@ -106,8 +106,11 @@ def test_it_keeps_the_same_whichever_way_the_kind_is_changed(tmp_path):
     found = [*several_ways(tmp_path)]
     assert all(law == found[0] for law in found)
     assert (found[0].kind, found[0].U, found[0].N_m, found[0].T_v) == (
-        "momentum_vector", 2.5, 370.0, 1.7,
-    )  # fmt: skip
+        "momentum_vector",
+        2.5,
+        370.0,
+        1.7,
+    )
     # A file with every value has the old law's gains by rule as numbers of its own.
     whole = load_text(resolved_yaml(load("boat.yaml").scenario), "all.yaml", [TO]).scenario
     assert (whole.controller.U, whole.controller.N_m, whole.controller.T_v) == (2.5, 370.0, 1.7)
@@ -342,7 +345,7 @@ def test_the_last_of_two_equal_keys_wins():
             "simulation.duration: 1e-09 s is no whole number of steps of 0.01 s; try 0.01",
         ),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_override_is_told_as_given(override, says):
     assert told(SOUND, [override]) == [f"--set {override}: {says}"]
 

@@ -116,8 +116,14 @@ def test_a_kind_is_explained_key_by_key():
     head, *rest = explain("path.circle")
     assert head.meaning == "About (x, y), from `angle` on, to starboard where `turn` is starboard."
     assert [row.key for row in rest] == [
-        "path.kind", "path.x", "path.y", "path.radius", "path.speed", "path.angle", "path.turn",
-    ]  # fmt: skip
+        "path.kind",
+        "path.x",
+        "path.y",
+        "path.radius",
+        "path.speed",
+        "path.angle",
+        "path.turn",
+    ]
 
 
 @pytest.mark.parametrize("asked", ["actuator.pod", "actuator.pods", "actuator.pod.pods", "pods"])
@@ -177,8 +183,12 @@ def test_a_key_says_everything_that_its_field_says():
 def test_kinds_in_which_a_key_is_the_same_share_a_row():
     rows = explain("path.speed")
     assert [row.kinds for row in rows] == [
-        ("circle", "line"), ("legs",), ("line_circle",), ("sinusoid",), ("waypoints",)
-    ]  # fmt: skip
+        ("circle", "line"),
+        ("legs",),
+        ("line_circle",),
+        ("sinusoid",),
+        ("waypoints",),
+    ]
 
 
 def test_a_default_is_what_the_section_has_when_it_is_left_out():
@@ -242,11 +252,30 @@ def test_the_unit_of_a_sensor_s_errors_is_that_of_what_it_measures():
 SCHEMA = json_schema(tuple(finding_kinds()))
 # Every word of draft-07 that the models need; a new one wants a look at how it is converted.
 WORDS = {
-    "$schema", "title", "definitions", "description", "default", "type", "properties", "items",
-    "additionalItems", "additionalProperties", "minItems", "maxItems", "minimum",
-    "exclusiveMinimum", "maximum", "exclusiveMaximum", "pattern", "enum", "const", "anyOf",
-    "allOf", "$ref", "required",
-}  # fmt: skip
+    "$schema",
+    "title",
+    "definitions",
+    "description",
+    "default",
+    "type",
+    "properties",
+    "items",
+    "additionalItems",
+    "additionalProperties",
+    "minItems",
+    "maxItems",
+    "minimum",
+    "exclusiveMinimum",
+    "maximum",
+    "exclusiveMaximum",
+    "pattern",
+    "enum",
+    "const",
+    "anyOf",
+    "allOf",
+    "$ref",
+    "required",
+}
 
 
 def schemas(schema: Any) -> Iterator[dict[str, Any]]:

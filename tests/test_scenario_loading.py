@@ -121,11 +121,14 @@ def test_a_misspelled_section_is_told_before_what_it_leaves_missing():
 @pytest.mark.parametrize(
     ("name", "meant"),
     [
-        ("base", "base.yaml"), ("bsae.yaml", "base.yaml"), ("sub/mine", "sub/mine.yml"),
+        ("base", "base.yaml"),
+        ("bsae.yaml", "base.yaml"),
+        ("sub/mine", "sub/mine.yml"),
         ("mu_2017/corrected", "podusv:mu_2017/corrected.yaml"),
-        ("mu_2017/corrected.yaml", "podusv:mu_2017/corrected.yaml"), ("zzz/q", ""),
+        ("mu_2017/corrected.yaml", "podusv:mu_2017/corrected.yaml"),
+        ("zzz/q", ""),
     ],
-)  # fmt: skip
+)
 def test_a_file_of_nearly_that_name_is_proposed(tmp_path, monkeypatch, name, meant):
     monkeypatch.chdir(tmp_path)
     Path("sub").mkdir()

@@ -245,24 +245,30 @@ def test_the_header_of_a_route_says_which_column_is_which():
     ("rows", "says"),
     [
         ("0,0\n1;1\n", ["route.csv:2:1: must be two numbers x,y [m], found 1 between commas"]),
-        ("0,0\n1,1,1\n2\n", [
-            "route.csv:2:1: must be two numbers x,y [m], found 3 between commas",
-            "route.csv:3:1: must be two numbers x,y [m], found 1 between commas",
-        ]),
+        (
+            "0,0\n1,1,1\n2\n",
+            [
+                "route.csv:2:1: must be two numbers x,y [m], found 3 between commas",
+                "route.csv:3:1: must be two numbers x,y [m], found 1 between commas",
+            ],
+        ),
         ("nan,0\n1,1\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
         ("0,0\n017,1\n", ["route.csv:2:1: must be two numbers x,y [m]; the first is no number"]),
         ("0,0\n1,\n", ["route.csv:2:1: must be two numbers x,y [m]; the second is no number"]),
         ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number [m], found 1e999"]),
         ("O,5\n1,1\n2,2\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
-        ("lat,lon\n0,0\n1,1\n", [
-            "route.csv:1:1: line 1 of the file names columns that are not x [m], y [m] (in any "
-            "order, units may be left out): column 1 is none of these",
-        ]),
+        (
+            "lat,lon\n0,0\n1,1\n",
+            [
+                "route.csv:1:1: line 1 of the file names columns that are not x [m], y [m] (in any "
+                "order, units may be left out): column 1 is none of these"
+            ],
+        ),
         ("x,y\n0,0\n", ["a.yaml:2:7: path: needs at least two points, has 1"]),
         ("0,0\n0,0\n", ["a.yaml:2:7: path: two neighbouring points are the same"]),
         ("", ["a.yaml:2:7: path: needs at least two points, has 0"]),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_row_is_told_at_its_line(rows, says):
     write("route.csv", rows)
     write("a.yaml", with_route())

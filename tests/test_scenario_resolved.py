@@ -46,17 +46,20 @@ TUNE = {
 DOUBT = {"printed": ("path",), "vary": {"start.y": {"plus": {"uniform": (-1, 0.25)}}}}
 IDENTIFY = {
     "logs": ({"file": "a.csv", "span": (0, 1e3)}, {"file": "b.csv", "role": "judge"}),
-    "columns": {"psi": "heading [deg]"}, "priors": {"m11": 1e-3},
-}  # fmt: skip
+    "columns": {"psi": "heading [deg]"},
+    "priors": {"m11": 1e-3},
+}
 # Sections of which hardly any mixture of values is possible.
 SAMPLES = {Sweep: SWEEP, Tune: TUNE, Doubt: DOUBT, Identify: IDENTIFY}
 
 
 def numbers(found: dict[str, Any]) -> st.SearchStrategy[float]:
     return st.floats(
-        found.get("gt", found.get("ge", -LARGEST)), found.get("lt", found.get("le", LARGEST)),
-        exclude_min="gt" in found, exclude_max="lt" in found,
-    )  # fmt: skip
+        found.get("gt", found.get("ge", -LARGEST)),
+        found.get("lt", found.get("le", LARGEST)),
+        exclude_min="gt" in found,
+        exclude_max="lt" in found,
+    )
 
 
 def contents(annotation: Any, found: dict[str, Any]) -> st.SearchStrategy[Any]:
@@ -109,12 +112,16 @@ SCENARIOS = components(
     Scenario,
     simulation=st.builds(
         lambda step, steps, compiled: {
-            "step": step, "duration": steps * step, "compiled": compiled,
+            "step": step,
+            "duration": steps * step,
+            "compiled": compiled,
         },
-        st.sampled_from([0.01, 0.001, 1 / 3]), st.integers(1, 10**6), st.booleans(),
+        st.sampled_from([0.01, 0.001, 1 / 3]),
+        st.integers(1, 10**6),
+        st.booleans(),
     ),
     control=st.just({"period": 0.0}),
-)  # fmt: skip
+)
 
 
 def possible(data: dict[str, Any]) -> Scenario:
@@ -199,9 +206,32 @@ def test_a_float_reads_back_whatever_its_notation(number):
 
 @pytest.mark.parametrize(
     "text",
-    ["no", "null", "017", "1e-3", "1:30", "~", "# x", "a: b", "'", '"', " x ", "x\n\ny\t",
-     "\u2028", "💥", "é\u0301", "- a", "[1]", "true", "0x1F", "2026-11-20", "<<", "=", "\ufeffa"],
-)  # fmt: skip
+    [
+        "no",
+        "null",
+        "017",
+        "1e-3",
+        "1:30",
+        "~",
+        "# x",
+        "a: b",
+        "'",
+        '"',
+        " x ",
+        "x\n\ny\t",
+        "\u2028",
+        "💥",
+        "é\u0301",
+        "- a",
+        "[1]",
+        "true",
+        "0x1F",
+        "2026-11-20",
+        "<<",
+        "=",
+        "\ufeffa",
+    ],
+)
 def test_a_text_reads_back_whatever_it_looks_like(text):
     scenario = loaded(SOUND).scenario.model_copy(update={"description": text})
     assert load_text(resolved_yaml(scenario), "a.yaml").scenario == scenario
@@ -247,9 +277,18 @@ def test_a_scenario_of_several_long_files_is_read_back(of_two_files):
 @pytest.mark.slow
 def test_the_manifest_of_many_runs_is_read_back(tmp_path):
     entry = manifest.FileEntry(sha256="a" * 64, bytes=10**9)
-    names = ("scenario.yaml", "resolved.yaml", "log.h5", "metrics.json", "metrics.csv",
-             "theory.json", "figures/controls.png", "provenance.json", "manifest.json",
-             "missing.json")  # fmt: skip
+    names = (
+        "scenario.yaml",
+        "resolved.yaml",
+        "log.h5",
+        "metrics.json",
+        "metrics.csv",
+        "theory.json",
+        "figures/controls.png",
+        "provenance.json",
+        "manifest.json",
+        "missing.json",
+    )
     files = {f"a_rather_long_name_of_law_{i:04}/{n}": entry for i in range(3000) for n in names}
     whole = manifest.Manifest(podusv_format=manifest.FORMAT, status="finished", files=files)
     (tmp_path / "manifest.json").write_bytes(json_text.encode(whole.model_dump()))

@@ -56,11 +56,15 @@ def rows(*lines):
 @pytest.mark.parametrize(
     ("t", "linear", "held"),
     [
-        (-1.0, (1, -1), (1, -1)), (0.0, (1, -1), (1, -1)), (0.5, (1.5, -1.25), (1, -1)),
-        (2.0, (3, -2), (3, -2)), (2.5, (3, 1.5), (3, -2)), (3.0, (3, 5), (3, 5)),
+        (-1.0, (1, -1), (1, -1)),
+        (0.0, (1, -1), (1, -1)),
+        (0.5, (1.5, -1.25), (1, -1)),
+        (2.0, (3, -2), (3, -2)),
+        (2.5, (3, 1.5), (3, -2)),
+        (3.0, (3, 5), (3, 5)),
         (99.0, (3, 5), (3, 5)),
     ],
-)  # fmt: skip
+)
 def test_the_demand_is_a_straight_line_or_held_between_rows_and_the_nearest_row_beyond(
     t, linear, held
 ):
@@ -137,16 +141,21 @@ def test_one_of_several_laws_may_have_a_schedule():
     [
         ("", "the schedule needs at least two lines, has 0"),
         ("0,1,1\n", "the schedule needs at least two lines, has 1"),
-        ("0,1,1\n1,2\n", "line 2 of the schedule has 2; every line must have 3 (t, tau_u, tau_r) "
-         "or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r)"),
+        (
+            "0,1,1\n1,2\n",
+            "line 2 of the schedule has 2; every line must have 3 (t, tau_u, tau_r) "
+            "or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r)",
+        ),
         ("t,tau_u,tau_r\n0,1,1\n1,s3cret,2\n", "line 3, column 2 of the schedule is no number"),
         ("0,1,1\n1,nan,2\n", "line 2, column 2 of the schedule is not a finite number"),
         ("0,1,1\n0,1,2\n", "line 2 of the schedule: its time is not after that of the line before"),
-        ("t,tau_r,s3cret\n0,1,1\n1,1,2\n", "line 1 of the schedule names columns that are not t "
-         "[s], tau_u [N], tau_r [N m] (in any order, units may be left out): column 3 is none of "
-         "these"),
+        (
+            "t,tau_r,s3cret\n0,1,1\n1,1,2\n",
+            "line 1 of the schedule names columns that are not t [s], tau_u [N], tau_r [N m] "
+            "(in any order, units may be left out): column 3 is none of these",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_schedule_is_told_in_a_sentence_that_repeats_none_of_it(text, says):
     write("demand.csv", text)
     write("a.yaml", with_schedule())

@@ -204,7 +204,7 @@ MISFITS = (
         {"measurement": sensors(yaw_rate=None), "estimator": NoEstimator()},
         "estimator: needs r measured",
     ),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(("wrong", "said"), MISFITS)

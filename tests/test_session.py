@@ -16,9 +16,12 @@ PERIOD = 0.1  # s
 # A hull whose surge is m u' = tau_u - X_u u for motion straight on
 SURGE: dict[str, Any] = {
     "vessel": {"preset": "paper_nonlinear", "X_uu": 0.0, "X_uuu": 0.0},
-    "path": {"kind": "line"}, "disturbance": {"kind": "none"}, "actuator": {"kind": "ideal"},
-    "controller": {"kind": "pid"}, "simulation": {"duration": 5.0},
-}  # fmt: skip
+    "path": {"kind": "line"},
+    "disturbance": {"kind": "none"},
+    "actuator": {"kind": "ideal"},
+    "controller": {"kind": "pid"},
+    "simulation": {"duration": 5.0},
+}
 SCENARIOS = {
     "loads of time": ("podusv:mu_2017/corrected.yaml", {}),
     "sensors, filter and sea": ("podusv:sea/sensors.yaml", {}),

@@ -73,9 +73,15 @@ def test_a_damaged_or_foreign_file_gives_no_kernels(file: Path) -> None:
     flipped = bytearray(whole)
     flipped[len(whole) // 2] ^= 1
     damaged = [
-        whole[:-1], whole[: len(whole) // 2], bytes(flipped), b"", b"kernels", lzma.compress(body),
-        lzma.compress(newer), lzma.compress(others),
-    ]  # fmt: skip
+        whole[:-1],
+        whole[: len(whole) // 2],
+        bytes(flipped),
+        b"",
+        b"kernels",
+        lzma.compress(body),
+        lzma.compress(newer),
+        lzma.compress(others),
+    ]
     assert [found(file, content) for content in damaged] == [0] * len(damaged)
     file.unlink()
     assert found(file, None) == 0
@@ -185,9 +191,13 @@ def log_digest(folder: Path, cache: Path, *, numba: bool, law: str = "") -> str:
     options = [law or SCENARIO, "--no-figures", "--out", str(folder)]
     short = ["--set", "simulation.duration=5.0"]
     done = subprocess.run(
-        [sys.executable, "-c", code, *options, *short], capture_output=True, text=True, check=False,
-        env=os.environ | {"PODUSV_CACHE": str(cache)}, timeout=300,
-    )  # fmt: skip
+        [sys.executable, "-c", code, *options, *short],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PODUSV_CACHE": str(cache)},
+        timeout=300,
+    )
     if done.returncode:
         return done.stderr
     return hashlib.sha256((folder / "log.h5").read_bytes()).hexdigest()

@@ -29,11 +29,20 @@ from podusv_cli.scenario.presets import preset_names, with_presets
 from podusv_cli.scenario.shipped import file_of
 
 LOOKED_AT = (
-    "docs/index", "docs/reference/gallery", "README", "docs/tutorial", "docs/metrics", "docs/model",
-    "results/README", "docs/reference/scenario", "docs/reference/controllers",
-    "docs/reference/signals", "docs/reference/figures", "docs/reference/python",
+    "docs/index",
+    "docs/reference/gallery",
+    "README",
+    "docs/tutorial",
+    "docs/metrics",
+    "docs/model",
+    "results/README",
+    "docs/reference/scenario",
+    "docs/reference/controllers",
+    "docs/reference/signals",
+    "docs/reference/figures",
+    "docs/reference/python",
     "docs/reference/commands",
-)  # fmt: skip
+)
 
 
 @pytest.fixture(scope="module")
@@ -118,8 +127,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     build = ["sphinx", "--fail-on-warning", "--keep-going", "--quiet", "-c", "docs"]
     done = subprocess.run(
         [sys.executable, "-m", *build, "-d", f"{place}/trees", ".", f"{place}/html"],
-        cwd=ROOT, capture_output=True, text=True,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     assert (done.returncode, done.stderr) == (0, "")
     return place / "html"
 

@@ -34,9 +34,17 @@ from podusv_cli.studies.tuning.space import gains
 
 LAWS = [kind for kind in kinds("controllers").values() if kind.rules]
 THRUSTER = {
-    "x": -2.3, "T_nn": 200.0, "T_nn_astern": 200.0, "n_max": 1.0, "n_max_astern": 0.9,
-    "n_rate": 4.0, "n_lag": 0.3, "angle_limit": 0.0, "angle_rate": 1.0, "angle_lag": 1.0,
-}  # fmt: skip
+    "x": -2.3,
+    "T_nn": 200.0,
+    "T_nn_astern": 200.0,
+    "n_max": 1.0,
+    "n_max_astern": 0.9,
+    "n_rate": 4.0,
+    "n_lag": 0.3,
+    "angle_limit": 0.0,
+    "angle_rate": 1.0,
+    "angle_lag": 1.0,
+}
 CATAMARAN = f"""
 name: catamaran
 vessel: {{preset: wamv}}
@@ -99,7 +107,7 @@ def test_thrust_that_falls_with_the_speed_lowers_the_speed():
         ("measurement={kind: sensors, heading: {period: 0.14, delay: 0.3}}", 0.37),
         ("actuator.pods[0].angle_limit=0.5", 0.25),
     ],
-)  # fmt: skip
+)
 def test_every_delay_of_the_loop_counts(override, later):
     if override.startswith("actuator.pods"):
         turning = CATAMARAN.replace("angle_limit: 0.0", "angle_limit: 0.5")
@@ -213,10 +221,12 @@ def test_draws_of_the_true_vessel_do_not_reach_the_law():
 @pytest.mark.parametrize(
     ("key", "numbers"),
     [
-        ("nominal.m", [120.0, 200.0, 240.0]), ("nominal.X_uu", [-300.0, -200.0, -80.0]),
-        ("measurement.heading.delay", [0.1, 0.2, 0.3]), ("actuator.command.delay", [0.1, 0.2]),
+        ("nominal.m", [120.0, 200.0, 240.0]),
+        ("nominal.X_uu", [-300.0, -200.0, -80.0]),
+        ("measurement.heading.delay", [0.1, 0.2, 0.3]),
+        ("actuator.command.delay", [0.1, 0.2]),
     ],
-)  # fmt: skip
+)
 def test_a_draw_of_what_the_law_is_told_is_as_if_it_were_loaded(key, numbers):
     others = ["measurement={kind: sensors}", "estimator={kind: ekf}", "actuator.command={}"]
     own, *rest = each(f"{key}: {{choice: {numbers}}}", *others)
@@ -250,10 +260,7 @@ def test_runs_side_by_side_have_the_bits_that_they_have_alone():
     _, *others = each("nominal.m: {uniform: [120.0, 240.0]}", "simulation.duration=4.0")
     grid = others[0].time_grid()
     done = simulate_many(
-        [other.closed_loop() for other in others],
-        grid,
-        probe=others[0].probe(),
-        side_by_side=True,
+        [other.closed_loop() for other in others], grid, probe=others[0].probe(), side_by_side=True
     )
     for place, other in enumerate(others):
         alone = simulate_many([other.closed_loop()], grid, probe=other.probe())

@@ -20,13 +20,37 @@ MODEL = ("--length", "1.255", "--beam", "0.29", "--mass", "23.8", "--thrusters",
 BOATS = {
     "catamaran": (*BOAT, "--hulls", "2"),
     "model ship": MODEL,
-    "one azimuth": ("--length", "3", "--beam", "0.72", "--mass", "257", "--thrusters", "1x64N@0",
-                    "--turn", "35deg"),
-    "with units": ("--length", "24ft", "--beam", "2.6", "--mass", "2.1t", "--thrusters",
-                   "2x3kN@50cm", "--turn", "0.5", "--speed", "20kn"),
-    "otter": ("--preset", "otter"), "milliampere": ("--preset", "milliampere"),
-    "revolt": ("--preset", "revolt"), "wamv": ("--preset", "wamv"),
-}  # fmt: skip
+    "one azimuth": (
+        "--length",
+        "3",
+        "--beam",
+        "0.72",
+        "--mass",
+        "257",
+        "--thrusters",
+        "1x64N@0",
+        "--turn",
+        "35deg",
+    ),
+    "with units": (
+        "--length",
+        "24ft",
+        "--beam",
+        "2.6",
+        "--mass",
+        "2.1t",
+        "--thrusters",
+        "2x3kN@50cm",
+        "--turn",
+        "0.5",
+        "--speed",
+        "20kn",
+    ),
+    "otter": ("--preset", "otter"),
+    "milliampere": ("--preset", "milliampere"),
+    "revolt": ("--preset", "revolt"),
+    "wamv": ("--preset", "wamv"),
+}
 
 
 @pytest.fixture
@@ -211,39 +235,68 @@ def test_units_are_those_of_scenarios(podusv):
     ("words", "says"),
     [
         (BOAT[:-2], "give --thrusters, or --preset"),
-        ((*BOAT[:-1], "two"), "--thrusters two: write them as 2x180N@1.0: two of 180 N each, 1.0 m "
-         "beside the centre line"),
-        ((*BOAT[:-1], "2x180kg@1"), "--thrusters 180kg: is no number in N; kg does not fit; did "
-         "you mean 'kgf'? (units here: N, kN, kgf, lbf)"),
-        ((*BOAT[:-1], "1x180N@0"), "a single thruster that does not turn cannot steer: give --turn "
-         "35deg"),
+        (
+            (*BOAT[:-1], "two"),
+            "--thrusters two: write them as 2x180N@1.0: two of 180 N each, 1.0 m "
+            "beside the centre line",
+        ),
+        (
+            (*BOAT[:-1], "2x180kg@1"),
+            "--thrusters 180kg: is no number in N; kg does not fit; did "
+            "you mean 'kgf'? (units here: N, kN, kgf, lbf)",
+        ),
+        (
+            (*BOAT[:-1], "1x180N@0"),
+            "a single thruster that does not turn cannot steer: give --turn 35deg",
+        ),
         ((*BOAT, "--length", "-3"), "--length -3: must be above 0 [m]"),
-        ((*BOAT, "--mass", "18 tons"), "--mass 18 tons: is no number in kg; tons does not fit "
-         "(units here: kg, g, t, lb)"),
-        ((*BOAT, "--mass", "18t"), "under 18000 kg hulls of 4.9 m by 2.4 m would lie 3.06 m "
-         "deep, deeper than they are wide; check length, beam and mass"),
-        ((*BOAT, "--hulls", "2", "--hull-beam", "1.5"), "two hulls of 1.5 m (--hull-beam 1.5) do "
-         "not fit into a beam of 2.4 m; check --length 4.9 and --beam 2.4, or give a smaller "
-         "--hull-beam or --hulls 1"),
-        ((*BOAT, "--hulls", "2", "--length", "320"), "two hulls of 32 m (a tenth of the length "
-         "each) do not fit into a beam of 2.4 m; check --length 320 and --beam 2.4, or give "
-         "--hull-beam or --hulls 1"),
-        ((*BOAT, "--length", "3,2"), "--length 3,2: is no number in m; write a point before "
-         "decimals (3.2), nothing between thousands"),
+        (
+            (*BOAT, "--mass", "18 tons"),
+            "--mass 18 tons: is no number in kg; tons does not fit (units here: kg, g, t, lb)",
+        ),
+        (
+            (*BOAT, "--mass", "18t"),
+            "under 18000 kg hulls of 4.9 m by 2.4 m would lie 3.06 m "
+            "deep, deeper than they are wide; check length, beam and mass",
+        ),
+        (
+            (*BOAT, "--hulls", "2", "--hull-beam", "1.5"),
+            "two hulls of 1.5 m (--hull-beam 1.5) do "
+            "not fit into a beam of 2.4 m; check --length 4.9 and --beam 2.4, or give a smaller "
+            "--hull-beam or --hulls 1",
+        ),
+        (
+            (*BOAT, "--hulls", "2", "--length", "320"),
+            "two hulls of 32 m (a tenth of the length "
+            "each) do not fit into a beam of 2.4 m; check --length 320 and --beam 2.4, or give "
+            "--hull-beam or --hulls 1",
+        ),
+        (
+            (*BOAT, "--length", "3,2"),
+            "--length 3,2: is no number in m; write a point before "
+            "decimals (3.2), nothing between thousands",
+        ),
         ((*BOAT, "--turn", "35"), "--turn 35: more than 90 deg to either side; write 35deg"),
         ((*BOAT, "--turn", "100"), "--turn 100: more than 90 deg to either side"),
         ((*BOAT, "--turn", "91deg"), "--turn 91deg: more than 90 deg to either side"),
-        (("--preset", "oter"), "unknown boat 'oter'; did you mean 'otter'? (allowed: milliampere, "
-         "otter, revolt, wamv)"),
+        (
+            ("--preset", "oter"),
+            "unknown boat 'oter'; did you mean 'otter'? (allowed: milliampere, "
+            "otter, revolt, wamv)",
+        ),
         *(
-            (("--preset", "otter", *more), "--preset has hull and thrusters; leave the dimensions "
-             "out")
+            (
+                ("--preset", "otter", *more),
+                "--preset has hull and thrusters; leave the dimensions out",
+            )
             for more in (("--mass", "3"), ("--speed", "5kn"), ("--turn", "35deg"), ("--hulls", "2"))
         ),
-        ((*BOAT, "--hull-beam", "0.3"), "--hull-beam is that of one hull of a catamaran; add "
-         "--hulls 2"),
+        (
+            (*BOAT, "--hull-beam", "0.3"),
+            "--hull-beam is that of one hull of a catamaran; add --hulls 2",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_is_one_sentence(podusv, words, says):
     said = podusv("start", "boat", *words)
     assert (said.code, said.err) == (2, f"{says}\n")

@@ -167,18 +167,24 @@ def test_a_manifest_that_is_no_json_object_is_refused(folder, content, words):
 
 def test_json_keeps_the_order_and_has_null_for_what_is_no_number(tmp_path):
     content = {
-        "z": 1.5, "a": math.nan, "m": [math.inf, -math.inf, (1, True)], "ψ": None,
+        "z": 1.5,
+        "a": math.nan,
+        "m": [math.inf, -math.inf, (1, True)],
+        "ψ": None,
         "numpy": {"f": np.float64(0.1), "n": np.float32("nan"), "i": np.int64(3), "v": np.ones(2)},
-    }  # fmt: skip
+    }
     text = json_text.encode(content)
     assert text.decode().splitlines()[:3] == ["{", '  "z": 1.5,', '  "a": null,']
     assert text.endswith(b"}\n")
     path = tmp_path / "a.json"
     path.write_bytes(text)
     assert json_files.read(path) == {
-        "z": 1.5, "a": None, "m": [None, None, [1, True]], "ψ": None,
+        "z": 1.5,
+        "a": None,
+        "m": [None, None, [1, True]],
+        "ψ": None,
         "numpy": {"f": 0.1, "n": None, "i": 3, "v": [1.0, 1.0]},
-    }  # fmt: skip
+    }
     assert list(json_files.read(path)) == list(content)
 
 
@@ -204,9 +210,12 @@ def test_versions_platform_command_and_times():
     assert origin["podusv"] == podusv_cli.__version__
     assert origin["python"] == ".".join(map(str, sys.version_info[:3]))
     assert origin["packages"] == {
-        "numpy": np.__version__, "scipy": scipy.__version__, "numba": numba.__version__,
-        "h5py": h5py.__version__, "pydantic": pydantic.VERSION,
-    }  # fmt: skip
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+        "h5py": h5py.__version__,
+        "pydantic": pydantic.VERSION,
+    }
     system = os.uname()
     expected = {"system": system.sysname, "release": system.release, "machine": system.machine}
     assert expected.items() <= origin["platform"].items()

@@ -118,7 +118,7 @@ WRONG = {
     "later format": (described("podusv_format", np.int32(3)), "format 3; this .* reads format 2$"),
     "unknown status": (described("status", np.bytes_("asleep")), "unknown status 'asleep'"),
     "no text": (described("controller", np.bytes_(b"\xff")), "utf-8"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -199,10 +199,16 @@ def test_the_size_that_is_allowed_is_for_the_caller_to_say(path):
 # --- as others see it
 
 DIMENSIONS = {
-    "time": ("time",), "x": ("time",), "tau_u_cmd": ("time",), "z_e": ("time",),
-    "W_hat_u": ("time", "node"), "rbf_center": ("node", "input"), "rbf_width": ("input",),
-    "node": ("node",), "input": ("input",),
-}  # fmt: skip
+    "time": ("time",),
+    "x": ("time",),
+    "tau_u_cmd": ("time",),
+    "z_e": ("time",),
+    "W_hat_u": ("time", "node"),
+    "rbf_center": ("node", "input"),
+    "rbf_width": ("input",),
+    "node": ("node",),
+    "input": ("input",),
+}
 # Attributes that HDF5 itself keeps for dimension scales; they refer to other objects by nature.
 SCALES = {"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"}
 
@@ -231,9 +237,11 @@ def test_xarray_reads_every_signal_with_its_axes_and_units(written, engine):
             assert_array_equal(dataset[name].to_numpy(), array, err_msg=name)
             signal = recorded.about[name]
             assert dataset[name].attrs == {
-                "units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol,
+                "units": signal.unit,
+                "long_name": signal.meaning,
+                "symbol": signal.symbol,
                 "axes": " ".join(DIMENSIONS[name]),
-            }  # fmt: skip
+            }
         assert "time" in dataset.x.coords
         assert_array_equal(dataset.node, np.arange(8))
 
@@ -249,10 +257,14 @@ def test_every_axis_has_its_scale_by_name():
 def test_attributes_of_the_file(written, engine):
     with xr.open_dataset(written, engine=engine) as dataset:
         assert dataset.attrs == {
-            "podusv_format": 2, "podusv_version": "1.2.3", "Conventions": "CF-1.11",
-            "title": TEXTS["title"], "source": TEXTS["source"], "status": "finished",
+            "podusv_format": 2,
+            "podusv_version": "1.2.3",
+            "Conventions": "CF-1.11",
+            "title": TEXTS["title"],
+            "source": TEXTS["source"],
+            "status": "finished",
             "controller": "pid",
-        }  # fmt: skip
+        }
 
 
 @pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])

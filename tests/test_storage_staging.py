@@ -205,8 +205,10 @@ def test_what_a_live_run_is_making_is_left_alone(final):
     )
     with subprocess.Popen(
         [PYTHON, "-c", code, str(final)],
-        env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    ) as live:  # fmt: skip
+        env=ENVIRONMENT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as live:
         assert live.stdout is not None
         assert live.stdout.readline() == b"ready\n"
         write(final.with_name("other"), NEW)

@@ -50,9 +50,13 @@ def test_a_layer_above_replaces_distributions_and_takes_out_quantities() -> None
     below = vary(
         "vessel.m: {times: {uniform: [1, 2]}}, start.x: {angle: all}, start.y: {seed: true}"
     )
-    layers = ["sweep.vary.vessel.m.times.normal={sigma: 0.1}", "sweep.vary.start.x=null",
-              "sweep.vary={start.y: {uniform: [0, 1]}}", "sweep.draws=7",
-              "sweep.grid.disturbance.scale=[0.5, 2]"]  # fmt: skip
+    layers = [
+        "sweep.vary.vessel.m.times.normal={sigma: 0.1}",
+        "sweep.vary.start.x=null",
+        "sweep.vary={start.y: {uniform: [0, 1]}}",
+        "sweep.draws=7",
+        "sweep.grid.disturbance.scale=[0.5, 2]",
+    ]
     sweep = swept(below, layers).scenario.sweep
     assert sweep is not None
     assert list(sweep.vary) == ["vessel.m", "start.y"]

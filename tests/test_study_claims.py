@@ -141,9 +141,13 @@ def test_a_run_that_finished_without_success_is_failed_and_the_worst() -> None:
     poor = np.arange(20) < 4
     runs = Made({"a": {"iae": np.ones(20)}, "b": {"iae": np.full(20, 2.0)}}, poor={"a": poor})
     for text, expected in {
-        "failures(a)": 0.2, "share(finished(a))": 1.0, "share(success(a))": 0.8,
-        "share(a.iae < b.iae)": 0.8, "quantile(a.iae, 0.9)": inf, "quantile(a.iae, 0.8)": 1.0,
-    }.items():  # fmt: skip
+        "failures(a)": 0.2,
+        "share(finished(a))": 1.0,
+        "share(success(a))": 0.8,
+        "share(a.iae < b.iae)": 0.8,
+        "quantile(a.iae, 0.9)": inf,
+        "quantile(a.iae, 0.8)": 1.0,
+    }.items():
         assert judged(runs, f"{text} >= 0.5").parts[0].estimate == expected, text
 
 
@@ -153,10 +157,12 @@ def test_a_failed_run_has_the_least_of_what_more_is_better_of() -> None:
     iae = {"iae": np.ones(20)}
     laws = {"a": {"path_done": np.ones(20), **iae}, "b": {"path_done": np.full(20, 0.5), **iae}}
     for text, expected in {
-        "share(a.path_done > b.path_done)": 0.8, "share(a.path_done < b.path_done)": 0.2,
-        "share(a.path_done >= 1)": 0.8, "quantile(a.path_done, 0.1)": -inf,
+        "share(a.path_done > b.path_done)": 0.8,
+        "share(a.path_done < b.path_done)": 0.2,
+        "share(a.path_done >= 1)": 0.8,
+        "quantile(a.path_done, 0.1)": -inf,
         "quantile(a.path_done, 0.3)": 1.0,
-    }.items():  # fmt: skip
+    }.items():
         assert judged(Made(laws, poor=poor), f"{text} >= 0.5").parts[0].estimate == expected, text
     both = Made(laws, poor={law: np.arange(20) < 4 for law in laws})
     assert judged(both, "share(a.path_done > b.path_done) >= 0.5").parts[0].estimate == 0.8
@@ -182,9 +188,11 @@ def test_a_planted_winner_is_found_and_its_opposite_refuted() -> None:
         pid=hard * np.exp(0.2 + 0.1 * random.normal(size=400)),
     )
     found, refuted, ratio = judged(
-        runs, "share(proposed.iae < pid.iae) >= 0.85", "share(pid.iae < proposed.iae) >= 0.15",
+        runs,
+        "share(proposed.iae < pid.iae) >= 0.85",
+        "share(pid.iae < proposed.iae) >= 0.15",
         "median(proposed.iae / pid.iae) <= 0.9",
-    )  # fmt: skip
+    )
     assert (found.verdict, refuted.verdict) == ("reproduced", "not reproduced")
     assert ratio.verdict == "reproduced"
     assert found.as_json()["needed"] is None

@@ -59,9 +59,18 @@ def test_dask_as_a_user_starts_it_and_an_interrupt(distributed, tmp_path):
     with ExitStack() as stack:
         place = tmp_path / "scheduler.json"
         stack.enter_context(
-            background(*DASK, "scheduler", "--host", "127.0.0.1", "--port", "0",
-                       "--no-dashboard", "--scheduler-file", place)
-        )  # fmt: skip
+            background(
+                *DASK,
+                "scheduler",
+                "--host",
+                "127.0.0.1",
+                "--port",
+                "0",
+                "--no-dashboard",
+                "--scheduler-file",
+                place,
+            )
+        )
         until(place.exists)
         address = json.loads(place.read_text())["address"]
         for threads in ("1", "2"):

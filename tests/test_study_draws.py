@@ -144,15 +144,21 @@ def test_sobol_points_are_scipy_s_with_the_digits_of_each_quantity_shifted() -> 
 def test_a_draw_changes_what_it_names_and_nothing_else() -> None:
     one, vary = scenario(), swept().vary
     draw = {
-        "vessel.m": 1.25, "damping": 0.5, "start.y": 2.0, "start.psi": -1.0,
-        "path.points[1][0]": -0.5, "controller.network.nodes[1]": 4,
+        "vessel.m": 1.25,
+        "damping": 0.5,
+        "start.y": 2.0,
+        "start.psi": -1.0,
+        "path.points[1][0]": -0.5,
+        "controller.network.nodes[1]": 4,
         "controller.coupling": "printed",
-    }  # fmt: skip
+    }
     made = draw_scenario(one, vary, draw)
     before, after = one.model_dump(), made.model_dump()
     assert after["vessel"] == before["vessel"] | {
-        "m": 1.25 * one.vessel.m, "X_u": 0.5 * one.vessel.X_u, "X_uu": 0.5 * one.vessel.X_uu
-    }  # fmt: skip
+        "m": 1.25 * one.vessel.m,
+        "X_u": 0.5 * one.vessel.X_u,
+        "X_uu": 0.5 * one.vessel.X_uu,
+    }
     assert after["start"] == before["start"] | {"y": 2.0, "psi": -1.0}
     assert after["path"]["points"] == ((0.0, 0.0), (9.5, 0.0), (20.0, 5.0))
     assert after["controller"]["network"]["nodes"] == (3, 4, 3)
@@ -210,8 +216,14 @@ def test_a_table_of_many_draws_takes_few_calls() -> None:
     assert many == few  # no Python for each draw
 
 
-AROUND = {"disturbances": "disturbance", "measurements": "measurement", "estimators": "estimator",
-          "actuators": "actuator", "paths": "path", "controllers": "controller"}  # fmt: skip
+AROUND = {
+    "disturbances": "disturbance",
+    "measurements": "measurement",
+    "estimators": "estimator",
+    "actuators": "actuator",
+    "paths": "path",
+    "controllers": "controller",
+}
 FAILED = {"time": 3.0, "pod": 0}
 
 

@@ -66,10 +66,15 @@ def altered(folder, to, metric="iae", machine="another processor"):
     result.metrics[metric] = numbers
     store.write(result)
     told = {
-        "platform": {"processor": machine, "libc": "glibc 2.0"}, "python": "3.11", "podusv": "0.1",
-        "packages": {"numpy": "2.0", "numba": "0.61"}, "runs": 2,
-        "started": "2026-03-01", "finished": None, "duration_s": None,
-    }  # fmt: skip
+        "platform": {"processor": machine, "libc": "glibc 2.0"},
+        "python": "3.11",
+        "podusv": "0.1",
+        "packages": {"numpy": "2.0", "numba": "0.61"},
+        "runs": 2,
+        "started": "2026-03-01",
+        "finished": None,
+        "duration_s": None,
+    }
     (to / "provenance.json").write_text(json.dumps({"sittings": [told, told]}))
     return to
 

@@ -49,8 +49,9 @@ def test_an_unfinished_study_compares_laws_on_the_draws_that_all_have(podusv, tm
     table = podusv("sweep", "export", store.folder).out.strip()
     assert len(Path(table).read_text().splitlines()) == 41
     assert {law: int(mask.sum()) for (law, _), mask in store.covered_draws().items()} == {
-        "pid": 20, "li": 20,
-    }  # fmt: skip
+        "pid": 20,
+        "li": 20,
+    }
 
 
 def test_laws_without_a_common_draw_are_not_compared(tmp_path):

@@ -99,9 +99,18 @@ def test_workers_of_dask_in_another_folder(config, tmp_path):
     elsewhere.mkdir()
     with ExitStack() as stack:
         stack.enter_context(
-            background(*DASK, "scheduler", "--host", "127.0.0.1", "--port", "0",
-                       "--no-dashboard", "--scheduler-file", place)
-        )  # fmt: skip
+            background(
+                *DASK,
+                "scheduler",
+                "--host",
+                "127.0.0.1",
+                "--port",
+                "0",
+                "--no-dashboard",
+                "--scheduler-file",
+                place,
+            )
+        )
         until(place.exists)
         address = json.loads(place.read_text())["address"]
         stack.enter_context(

@@ -57,8 +57,13 @@ def section(told, name):
 @pytest.mark.slow
 def test_the_answer_comes_first(whole, told):
     assert [part.attributes["id"] for part in told.all("section")] == [
-        "answer", "claims", "failures", "numbers", "varied", "provenance",
-    ]  # fmt: skip
+        "answer",
+        "claims",
+        "failures",
+        "numbers",
+        "varied",
+        "provenance",
+    ]
     answer = section(told, "answer")
     (verdict,) = whole.results.verdicts
     (counts,) = answer.all("div", kind="counts")
@@ -161,8 +166,9 @@ def test_of_a_draw_the_values_are_listed_that_go_together_most_with_success(draw
     (row, *_) = report.runs_that(results, results.runs.failed).first
     sizes = {
         r["quantity"]: abs(r["correlation"])
-        for r in rows if (r["law"], r["metric"]) == (row.law, "iae")
-    }  # fmt: skip
+        for r in rows
+        if (r["law"], r["metric"]) == (row.law, "iae")
+    }
     most = sorted(sizes, key=sizes.__getitem__, reverse=True)[: report.DECISIVE]
     told = [f"{name} {results.runs.drawn[name][row.draw]:.3g}" for name in most]
     assert told
@@ -183,9 +189,15 @@ def test_what_was_varied_is_told_in_words(told):
 def test_figures_are_files_and_pictures(drawn):
     names = {path.stem for path in (drawn.folder / "figures").iterdir()}
     assert names == {
-        "distribution-iae", "distribution-z_e_steady", "failures-iae", "funnel", "ratios-iae",
-        "ratios-z_e_steady", "sensitivity-iae", "sensitivity-z_e_steady",
-    }  # fmt: skip
+        "distribution-iae",
+        "distribution-z_e_steady",
+        "failures-iae",
+        "funnel",
+        "ratios-iae",
+        "ratios-z_e_steady",
+        "sensitivity-iae",
+        "sensitivity-z_e_steady",
+    }
     told = tree((drawn.folder / "report.html").read_text())
     captions = [caption.text for caption in told.all("figcaption")]
     assert [c.partition(".")[0] for c in captions] == [f"Figure {i + 1}" for i in range(len(names))]

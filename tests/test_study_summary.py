@@ -53,10 +53,13 @@ def test_the_summary_counts_only_runs_that_are_there_and_broken_ones_as_failed()
 
 def test_metrics_that_a_law_lacks_are_left_out_and_missing_numbers_are_counted():
     numbers = np.r_[nan, np.ones(19)]
-    runs = Made({
-        "a": {"iae": np.ones(20), "energy": numbers, "settling_time": numbers},
-        "b": {"iae": np.ones(20), "settling_time": np.ones(20)}, "dead": {"iae": np.full(20, inf)},
-    })  # fmt: skip
+    runs = Made(
+        {
+            "a": {"iae": np.ones(20), "energy": numbers, "settling_time": numbers},
+            "b": {"iae": np.ones(20), "settling_time": np.ones(20)},
+            "dead": {"iae": np.full(20, inf)},
+        }
+    )
     frame = summary(runs)
     assert set(frame.metric[frame.law == "b"]) == {"iae", "settling_time"}
     assert row(frame, law="a", metric="energy").unknown == 1

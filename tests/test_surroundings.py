@@ -20,9 +20,14 @@ OWN = "podusv:own_vessel.yaml"
 def told(folder, *words, options=(), **settings):
     """The command line in a process of its own, with these settings."""
     return subprocess.run(
-        [sys.executable, *options, "-m", "podusv_cli", *words], cwd=folder, text=True,
-        capture_output=True, timeout=PATIENCE, env={**os.environ, **settings}, check=False,
-    )  # fmt: skip
+        [sys.executable, *options, "-m", "podusv_cli", *words],
+        cwd=folder,
+        text=True,
+        capture_output=True,
+        timeout=PATIENCE,
+        env={**os.environ, **settings},
+        check=False,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +63,14 @@ def test_python_draws_where_a_notebook_s_backend_is_not_installed(place):
         pytest.skip("matplotlib_inline is installed")
     settings = {**os.environ, "MPLBACKEND": INLINE}
     done = subprocess.run(
-        [sys.executable, "-c", DRAWN], cwd=place, env=settings, text=True, capture_output=True,
-        timeout=PATIENCE, check=False,
-    )  # fmt: skip
+        [sys.executable, "-c", DRAWN],
+        cwd=place,
+        env=settings,
+        text=True,
+        capture_output=True,
+        timeout=PATIENCE,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -342,7 +342,7 @@ TIMES = {
     "controller.execute: {choice: [0.3, 0.35]}": "controller.execute: 0.35 s is no whole number",
     "actuator.command.delay: {choice: [0.1, 0.13]}": "delay: 0.13 s is no whole number of steps",
     "measurement.position.period: {choice: [0.1, 0.25]}": "position.period: 0.25 s is no whole",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("drawn", TIMES)

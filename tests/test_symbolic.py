@@ -82,15 +82,27 @@ def rate_of_V() -> Any:
 def terms_of_rate() -> Any:
     """V' of the corrected law, term by term, as docs/theory.md has it."""
     return (
-        -k_ze * z_e**2 - k_psie * psi_e**2 - k_ue * u_e**2 - k_re * r_e**2
-        - A_u * y_u**2 - A_r * y_r**2
-        - z_e * y_u * sp.cos(psi_e) - psi_e * y_r  # which the paper leaves out
-        - y_u * X_u - y_r * X_r
-        + u_e * m11 * eps_u + r_e * m33 * eps_r
-        + u_e * b_u - b_max_u * u_e * phi(u_e) + r_e * b_r - b_max_r * r_e * phi(r_e)
-        - sigma_u * Wt_u.dot(Wt_u + W_u) - sigma_r * Wt_r.dot(Wt_r + W_r)
-        - sigma_bu * bt_u * (bt_u + b_max_u - b_0u) - sigma_br * bt_r * (bt_r + b_max_r - b_0r)
-    )  # fmt: skip
+        -k_ze * z_e**2
+        - k_psie * psi_e**2
+        - k_ue * u_e**2
+        - k_re * r_e**2
+        - A_u * y_u**2
+        - A_r * y_r**2
+        - z_e * y_u * sp.cos(psi_e)
+        - psi_e * y_r  # which the paper leaves out
+        - y_u * X_u
+        - y_r * X_r
+        + u_e * m11 * eps_u
+        + r_e * m33 * eps_r
+        + u_e * b_u
+        - b_max_u * u_e * phi(u_e)
+        + r_e * b_r
+        - b_max_r * r_e * phi(r_e)
+        - sigma_u * Wt_u.dot(Wt_u + W_u)
+        - sigma_r * Wt_r.dot(Wt_r + W_r)
+        - sigma_bu * bt_u * (bt_u + b_max_u - b_0u)
+        - sigma_br * bt_r * (bt_r + b_max_r - b_0r)
+    )
 
 
 def test_rate_of_V_of_the_corrected_law_is_the_sum_of_its_terms():
@@ -116,9 +128,16 @@ def flipped(law: AdaptiveNeural, sign: str) -> AdaptiveNeural:
 
     @kernel
     def wrong(
-        x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
-        rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         turned = 1.0 - k.coupling if sign == "coupling" else -getattr(k, sign)
         k = k._replace(**{sign: turned})
         AdaptiveNeural.law(x, memory, target, k, table, tau, rate, signals, work)
@@ -147,21 +166,41 @@ def rate_from_kernels(law: AdaptiveNeural, at: Situation, weights: Vector) -> di
     tilde = at.memory[WEIGHTS : WEIGHTS + 2 * n].reshape(2, n) - weights
     b_tilde = at.memory[[B_HAT_U, B_HAT_R]] - [0.9, 0.7]
     V_dot = (
-        e.z_e * z_dot + e.psi_e * (e.exact_w - at.x[5])
-        + PAPER.m11 * u * (ds[3] - beta_dot[0]) + PAPER.m33 * r * (ds[5] - beta_dot[1])
+        e.z_e * z_dot
+        + e.psi_e * (e.exact_w - at.x[5])
+        + PAPER.m11 * u * (ds[3] - beta_dot[0])
+        + PAPER.m33 * r * (ds[5] - beta_dot[1])
         + y @ (beta_dot - alpha_dot)
         + np.sum(tilde * said.rate[WEIGHTS : WEIGHTS + 2 * n].reshape(2, n)) / law.Gamma_u
         + b_tilde @ said.rate[[B_HAT_U, B_HAT_R]] / law.gamma_u
-    )  # fmt: skip
+    )
     decay = law.A_u + np.abs([e.alpha_u, e.alpha_r])
     left = np.array([free[3], free[5]]) - weights @ nodes
     return {
-        "V_dot": float(V_dot), "tilde": tilde, "weights": weights,
-        z_e: e.z_e, psi_e: e.psi_e, u_e: u, r_e: r, y_u: y[0], y_r: y[1],
-        A_u: decay[0], A_r: decay[1], X_u: alpha_dot[0], X_r: alpha_dot[1],
-        eps_u: left[0], eps_r: left[1], b_u: b[0], b_r: b[2], b_max_u: 0.9, b_max_r: 0.7,
-        bt_u: b_tilde[0], bt_r: b_tilde[1], b_0u: 0.0, b_0r: 0.0,
-    }  # fmt: skip
+        "V_dot": float(V_dot),
+        "tilde": tilde,
+        "weights": weights,
+        z_e: e.z_e,
+        psi_e: e.psi_e,
+        u_e: u,
+        r_e: r,
+        y_u: y[0],
+        y_r: y[1],
+        A_u: decay[0],
+        A_r: decay[1],
+        X_u: alpha_dot[0],
+        X_r: alpha_dot[1],
+        eps_u: left[0],
+        eps_r: left[1],
+        b_u: b[0],
+        b_r: b[2],
+        b_max_u: 0.9,
+        b_max_r: 0.7,
+        bt_u: b_tilde[0],
+        bt_r: b_tilde[1],
+        b_0u: 0.0,
+        b_0r: 0.0,
+    }
 
 
 def worst_gap(law: AdaptiveNeural, count: int = 20) -> float:
@@ -174,9 +213,28 @@ def worst_gap(law: AdaptiveNeural, count: int = 20) -> float:
     U, R = sp.symbols("U R")
     expression = terms_of_rate().subs(dict.fromkeys((*Wt_u, *Wt_r), 0)) - sigma_u * U - sigma_r * R
     names = [
-        *gains, z_e, psi_e, u_e, r_e, y_u, y_r, A_u, A_r, X_u, X_r, eps_u, eps_r,
-        b_u, b_r, b_max_u, b_max_r, bt_u, bt_r, b_0u, b_0r,
-    ]  # fmt: skip
+        *gains,
+        z_e,
+        psi_e,
+        u_e,
+        r_e,
+        y_u,
+        y_r,
+        A_u,
+        A_r,
+        X_u,
+        X_r,
+        eps_u,
+        eps_r,
+        b_u,
+        b_r,
+        b_max_u,
+        b_max_r,
+        bt_u,
+        bt_r,
+        b_0u,
+        b_0r,
+    ]
     terms = sp.lambdify([*names, U, R], expression)
     random, worst = np.random.default_rng(3), 0.0
     for at in situations(law, count):
@@ -260,8 +318,10 @@ def test_the_plant_is_that_model(seed):
     x, tau, b, ds = random.normal(size=6), random.normal(size=3), random.normal(size=3), np.zeros(6)
     tau[1] = 0.0
     plant(x, tau, b, bundle(vessel.constants()), ds)
-    p = {name: getattr(vessel, str(name)) for name in
-         (m, I_z, x_g, X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot, Xu, Yv, Yr, Nv, Nr)}  # fmt: skip
+    p = {
+        name: getattr(vessel, str(name))
+        for name in (m, I_z, x_g, X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot, Xu, Yv, Yr, Nv, Nr)
+    }
     now = dict(zip((u, v, r), x[3:], strict=True)) | {tau_u: tau[0], tau_r: tau[2]}
     expected = kinetics().subs(p | now | {bu: b[0], bv: b[1], br: b[2]})
     np.testing.assert_allclose(ds[3:], np.array(expected, dtype=float).ravel(), rtol=1e-12)

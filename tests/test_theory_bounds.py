@@ -31,9 +31,13 @@ from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import run
 
 SEEN = Observed(
-    b=Pair(0.9, 0.7), W=Pair(0.7, 0.4), alpha_dot=Pair(0.2, 0.03), drift=Pair(0.3, 0.05),
-    epsilon=Pair(0.1, 0.2), rest=Pair(2.6, 0.6),
-)  # fmt: skip
+    b=Pair(0.9, 0.7),
+    W=Pair(0.7, 0.4),
+    alpha_dot=Pair(0.2, 0.03),
+    drift=Pair(0.3, 0.05),
+    epsilon=Pair(0.1, 0.2),
+    rest=Pair(2.6, 0.6),
+)
 
 DERIVED = derived_with(())
 
@@ -49,15 +53,22 @@ def lowest_by_search(law: PolarBackstepping, seen: Observed, coupled: bool) -> f
     best = math.inf
     half = 0.5 if coupled else 0.0
     others = [
-        (law.k_ue - 0.5) / m11, (law.k_re - 0.5) / m33, law.Gamma_u * law.sigma_u / 2,
-        law.Gamma_r * law.sigma_r / 2, law.gamma_u * law.sigma_bu / 2,
+        (law.k_ue - 0.5) / m11,
+        (law.k_re - 0.5) / m33,
+        law.Gamma_u * law.sigma_u / 2,
+        law.Gamma_r * law.sigma_r / 2,
+        law.gamma_u * law.sigma_bu / 2,
         law.gamma_r * law.sigma_br / 2,
-    ]  # fmt: skip
+    ]
     fixed = (
-        law.sigma_u * seen.W.u**2 / 2 + law.sigma_r * seen.W.r**2 / 2
-        + law.sigma_bu * seen.b.u**2 / 2 + law.sigma_br * seen.b.r**2 / 2
-        + law.partial * (seen.b.u + seen.b.r) + seen.rest.u**2 / 2 + seen.rest.r**2 / 2
-    )  # fmt: skip
+        law.sigma_u * seen.W.u**2 / 2
+        + law.sigma_r * seen.W.r**2 / 2
+        + law.sigma_bu * seen.b.u**2 / 2
+        + law.sigma_br * seen.b.r**2 / 2
+        + law.partial * (seen.b.u + seen.b.r)
+        + seen.rest.u**2 / 2
+        + seen.rest.r**2 / 2
+    )
     for s_u in np.geomspace(1e-3, 2 * A_u, 150):
         slow_u = np.linalg.eigvalsh([[law.k_ze, half], [half, A_u - s_u / 2]])[0]
         for s_r in np.geomspace(1e-3, 2 * A_r, 150):
@@ -223,8 +234,13 @@ def test_everything_that_the_proof_assumes_holds_here(found):
 )
 def test_an_assumption_that_fails_is_named(change, words, tmp_path):
     turned = ("start.psi=-2.0",) if words == "folded alone" else ()
-    gentle = ("controller.Gamma_u=1.0", "controller.Gamma_r=1.0", "controller.gamma_u=10.0",
-              "controller.gamma_r=10.0", "simulation.duration=2")  # fmt: skip
+    gentle = (
+        "controller.Gamma_u=1.0",
+        "controller.Gamma_r=1.0",
+        "controller.gamma_u=10.0",
+        "controller.gamma_r=10.0",
+        "simulation.duration=2",
+    )
     request = Request((*gentle, change, *turned), tmp_path / "run", figures=False)
     done = run(CONFIGS / "theory/base.yaml", request).folder
     assumptions = json.loads((done / "theory.json").read_text())["assumptions"]

@@ -107,9 +107,14 @@ def test_unloaded_accelerations_are_those_of_the_hull_left_alone(name):
 
 
 FOLDS = [
-    {"fold": "joint"}, {"fold": "printed"}, {"fold": "none"}, {"hold_below": 9.0},
-    {"standoff": 0.0, "k_ze": 0.3}, {"rate": "difference"}, {"coupling": "printed"},
-]  # fmt: skip
+    {"fold": "joint"},
+    {"fold": "printed"},
+    {"fold": "none"},
+    {"hold_below": 9.0},
+    {"standoff": 0.0, "k_ze": 0.3},
+    {"rate": "difference"},
+    {"coupling": "printed"},
+]
 
 
 @pytest.mark.parametrize("options", FOLDS, ids=str)
@@ -121,9 +126,16 @@ def test_rates_of_errors_are_derivatives_along_the_flow(law, options):
         rows = moving(loop, law, at.x, at.memory)
         now = rates_replay(Plan(loop, TimeGrid(0.01, 1)), compiled=False)(rows)
         e = error_rates(rows, now, law)
-        pairs = {"z_e": e.z_e, "psi_e": e.psi_e, "u_e": e.u_e, "r_e": e.r_e, "y_u": e.y_u,
-                 "y_r": e.y_r, "alpha_u": now.signals["alpha_u"],
-                 "alpha_r": now.signals["alpha_r"]}  # fmt: skip
+        pairs = {
+            "z_e": e.z_e,
+            "psi_e": e.psi_e,
+            "u_e": e.u_e,
+            "r_e": e.r_e,
+            "y_u": e.y_u,
+            "y_r": e.y_r,
+            "alpha_u": now.signals["alpha_u"],
+            "alpha_r": now.signals["alpha_r"],
+        }
         if isinstance(law, FullBackstepping):  # whose u_e is of alpha itself
             assert e.y_u[1] == e.y_u_dot[1] == 0.0
         for name, along in pairs.items():
@@ -164,16 +176,27 @@ def sum_of_terms(loop: ClosedLoop, monitor: Monitored) -> Vector:
     W_u, W_r = log["W_hat_u"] - log["W_star_u"], log["W_hat_r"] - log["W_star_r"]
     m11, m33, start = loop.vessel.m11, loop.vessel.m33, law.network.initial_weight
     return (
-        -law.k_ze * z_e**2 - law.k_psie * psi_e**2 - law.k_ue * u_e**2 - law.k_re * r_e**2
-        - z_e * y_u * np.cos(psi_e) - psi_e * y_r
-        - A_u * y_u**2 - y_u * trace["alpha_u_dot"] - A_r * y_r**2 - y_r * trace["alpha_r_dot"]
-        + u_e * m11 * trace["epsilon_u"] + u_e * log["b_u"] - b_u * phi * u_e**2
-        + r_e * m33 * trace["epsilon_r"] + r_e * log["b_r"] - b_r * phi * r_e**2
+        -law.k_ze * z_e**2
+        - law.k_psie * psi_e**2
+        - law.k_ue * u_e**2
+        - law.k_re * r_e**2
+        - z_e * y_u * np.cos(psi_e)
+        - psi_e * y_r
+        - A_u * y_u**2
+        - y_u * trace["alpha_u_dot"]
+        - A_r * y_r**2
+        - y_r * trace["alpha_r_dot"]
+        + u_e * m11 * trace["epsilon_u"]
+        + u_e * log["b_u"]
+        - b_u * phi * u_e**2
+        + r_e * m33 * trace["epsilon_r"]
+        + r_e * log["b_r"]
+        - b_r * phi * r_e**2
         - law.sigma_u * np.sum(W_u * (log["W_hat_u"] - start), axis=1)
         - law.sigma_r * np.sum(W_r * (log["W_hat_r"] - start), axis=1)
         - law.sigma_bu * (log["b_hat_u"] - b_u) * (log["b_hat_u"] - law.b_hat_u0)
         - law.sigma_br * (log["b_hat_r"] - b_r) * (log["b_hat_r"] - law.b_hat_r0)
-    )  # fmt: skip
+    )
 
 
 def mismatch(loop: ClosedLoop, monitor: Monitored) -> float:
@@ -195,9 +218,16 @@ FAULTS = ["coupling", "k_ue", "k_re", "Gamma_u", "Gamma_r", "gamma_u", "gamma_r"
 def test_a_wrong_sign_planted_in_the_law_is_caught(sign):
     @kernel
     def wrong(
-        x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector,
-        rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         turned = 1.0 - k.coupling if sign == "coupling" else -getattr(k, sign)
         k = k._replace(**{sign: turned})
         AdaptiveNeural.law(x, memory, target, k, table, tau, rate, signals, work)
@@ -272,8 +302,14 @@ def test_sampled_control_has_V_but_no_rate():
 
 
 def test_a_run_that_diverges_is_monitored_as_far_as_it_went():
-    law = AdaptiveNeural(coupling="printed", rate="difference", first_difference="from_zero",
-                         filter_start="zero", fold="printed", standoff=0.0)  # fmt: skip
+    law = AdaptiveNeural(
+        coupling="printed",
+        rate="difference",
+        first_difference="from_zero",
+        filter_start="zero",
+        fold="printed",
+        standoff=0.0,
+    )
     loop = corrected(controller=law, vessel=PAPER)
     recording = run(loop, 5.0)
     assert recording.status == "diverged"

@@ -17,9 +17,17 @@ from podusv_cli.workflows.execute import Stopwatch, simulate_case, summary
 
 LEVER, EXECUTE = 0.499, 20.0
 OF_TRIALS = (
-    "advance", "transfer", "tactical_diameter", "turning_diameter", "overshoot_1", "overshoot_2",
-    "initial_turning", "track_reach", "head_reach", "stopping_time",
-)  # fmt: skip
+    "advance",
+    "transfer",
+    "tactical_diameter",
+    "turning_diameter",
+    "overshoot_1",
+    "overshoot_2",
+    "initial_turning",
+    "track_reach",
+    "head_reach",
+    "stopping_time",
+)
 IDEAL = ["actuator={kind: ideal}", f"controller.execute={EXECUTE}", "simulation.duration=80"]
 OTTER = ["vessel.preset=otter", "controller.thrust=60"]
 # A hull that is unstable on a straight course, in place of the shipped trials' Otter.
@@ -114,9 +122,14 @@ def test_overshoots_of_a_zigzag_are_those_of_an_independent_integration():
         np.degrees(overshoots), abs=6e-5
     )
     first = solve_ivp(
-        slope(scenario, degrees), (0.0, 60.0), begun, events=crossing(begun, degrees),
-        rtol=1e-10, atol=1e-12, max_step=1e-3,
-    )  # fmt: skip
+        slope(scenario, degrees),
+        (0.0, 60.0),
+        begun,
+        events=crossing(begun, degrees),
+        rtol=1e-10,
+        atol=1e-12,
+        max_step=1e-3,
+    )
     way = np.trapezoid(np.hypot(first.y[3], first.y[4]), first.t)
     off = 5e-5  # the heading bends within a step: U (r'/r) h^2 / 8
     assert numbers["initial_turning"] == pytest.approx(way, abs=off)

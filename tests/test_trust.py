@@ -53,11 +53,14 @@ def in_a_subfolder():
 
 
 def in_the_second_of_two():
-    gift({
-        "scenario.yaml": f"extends: [sub/one.yaml, sub/two.yaml]\n{WHOLE}",
-        "sub/one.yaml": "{}\n", "sub/two.yaml": "extends: deep/base.yaml\n",
-        "sub/deep/base.yaml": PLUGGED,
-    })  # fmt: skip
+    gift(
+        {
+            "scenario.yaml": f"extends: [sub/one.yaml, sub/two.yaml]\n{WHOLE}",
+            "sub/one.yaml": "{}\n",
+            "sub/two.yaml": "extends: deep/base.yaml\n",
+            "sub/deep/base.yaml": PLUGGED,
+        }
+    )
     return "gift/scenario.yaml"
 
 
@@ -141,20 +144,51 @@ def of_a_search():
 TRAPS = {
     trap.__name__: trap
     for trap in (
-        in_a_subfolder, in_the_second_of_two, of_a_member, of_a_run_in_a_run,
-        of_a_folder_elsewhere, behind_two_dots, that_one_s_own_extends, that_leads_out_again,
-        behind_a_link, behind_a_link_to_a_file, behind_a_link_out_of_the_folder,
-        of_an_absolute_name, moved_elsewhere, of_a_search,
+        in_a_subfolder,
+        in_the_second_of_two,
+        of_a_member,
+        of_a_run_in_a_run,
+        of_a_folder_elsewhere,
+        behind_two_dots,
+        that_one_s_own_extends,
+        that_leads_out_again,
+        behind_a_link,
+        behind_a_link_to_a_file,
+        behind_a_link_out_of_the_folder,
+        of_an_absolute_name,
+        moved_elsewhere,
+        of_a_search,
     )
-}  # fmt: skip
+}
 COMMANDS = (
-    "run", "compare", "validate", "validate -v", "verify", "margins", "optimum", "export", "tune",
-    "sweep run", "doubt", "identify", "live --no-open", "compare --doubt",
-)  # fmt: skip
+    "run",
+    "compare",
+    "validate",
+    "validate -v",
+    "verify",
+    "margins",
+    "optimum",
+    "export",
+    "tune",
+    "sweep run",
+    "doubt",
+    "identify",
+    "live --no-open",
+    "compare --doubt",
+)
 FUNCTIONS = (
-    python.load, python.simulate, python.run, python.compare, python.sweep, python.tune,
-    python.verify, python.doubt, python.optimum, python.open_session, python.identify,
-)  # fmt: skip
+    python.load,
+    python.simulate,
+    python.run,
+    python.compare,
+    python.sweep,
+    python.tune,
+    python.verify,
+    python.doubt,
+    python.optimum,
+    python.open_session,
+    python.identify,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -262,10 +296,13 @@ def test_an_unpacked_archive_is_such_a_folder(podusv):
 def as_if_installed():
     """A folder of somebody's that looks like an installed package to a Python that begins there."""
     text = WHOLE.replace("kind: pid", "kind: evil")
-    gift({
-        "scenario.yaml": text, "evil-1.0.dist-info/METADATA": "Name: evil\nVersion: 1.0\n",
-        "evil-1.0.dist-info/entry_points.txt": "[podusv.controllers]\nevil = evil:Evil\n",
-    })  # fmt: skip
+    gift(
+        {
+            "scenario.yaml": text,
+            "evil-1.0.dist-info/METADATA": "Name: evil\nVersion: 1.0\n",
+            "evil-1.0.dist-info/entry_points.txt": "[podusv.controllers]\nevil = evil:Evil\n",
+        }
+    )
     shutil.copy("gift/evil.py", "gift/yaml.py")
     shutil.copy("gift/evil.py", "gift/signal.py")
 
@@ -273,9 +310,14 @@ def as_if_installed():
 def begun(*words, cwd, python=sys.executable, path=ROOT):
     """What a Python says that begins in a folder, where it looks for packages, too."""
     return subprocess.run(
-        [python, *words], cwd=cwd, env=os.environ | {"PYTHONPATH": str(path)},
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+        [python, *words],
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": str(path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
 
 
 @pytest.mark.parametrize("module", ["podusv_cli", "podusv"])
@@ -298,9 +340,7 @@ def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place
     for name in ("yaml.py", "signal.py"):  # which Python itself would take
         Path("gift", name).unlink()
     code = (
-        "import sys; sys.path.insert(0, '..')\n"
-        "from podusv_cli.core.plugins import installed_plugins; print([p.name for p in installed_plugins()])\n"
-        "import podusv; podusv.load('scenario.yaml')"
+        f"import sys; sys.path.insert(0, '..')\n{NAMES}import podusv; podusv.load('scenario.yaml')"
     )
     Path("gift/evil-1.0.dist-info/scenario.yaml").write_text(Path("gift/scenario.yaml").read_text())
     said = begun("-c", code, cwd=place)
@@ -309,7 +349,10 @@ def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place
     assert "ScenarioError" in said.stderr
 
 
-NAMES = "from podusv_cli.core.plugins import installed_plugins; print([p.name for p in installed_plugins()])"
+NAMES = (
+    "from podusv_cli.core.plugins import installed_plugins\n"
+    "print([p.name for p in installed_plugins()])\n"
+)
 
 
 def test_a_package_in_one_s_own_folder_is_still_found():
@@ -331,6 +374,11 @@ def test_a_package_of_an_environment_is_found_wherever_that_lies(is_editable):
         (packages / "my_lab").rename("project/src/my_lab")
         (packages / "my_lab.pth").write_text(os.path.abspath("project/src"))
     libraries = os.pathsep.join([str(ROOT), *filter(None, sys.path)])
-    said = begun("-c", NAMES, cwd="project", python=os.path.abspath("project/.venv/bin/python"),
-                 path=libraries)  # fmt: skip
+    said = begun(
+        "-c",
+        NAMES,
+        cwd="project",
+        python=os.path.abspath("project/.venv/bin/python"),
+        path=libraries,
+    )
     assert said.stdout == "['my-lab']\n", said.stderr

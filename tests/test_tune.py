@@ -220,9 +220,16 @@ def test_a_search_in_which_everything_fails_ends_and_says_so(optuna, tmp_path):
 @pytest.mark.slow
 def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
     code, out, err = podusv(
-        "tune", str(toy(tmp_path)), "--set", "tune.budget=32", "--set", "tune.repeats=1",
-        "--out", str(tmp_path / "out"), "--no-figures",
-    )  # fmt: skip
+        "tune",
+        str(toy(tmp_path)),
+        "--set",
+        "tune.budget=32",
+        "--set",
+        "tune.repeats=1",
+        "--out",
+        str(tmp_path / "out"),
+        "--no-figures",
+    )
     assert code == 0
     assert "search: 32 (budget 32" in err.splitlines()[0]
     assert "median(effort_u) on 12 fresh draws:" in out
@@ -256,9 +263,12 @@ def made_up(number, value, *, excess=0.0, status=FINISHED):
 
 def test_the_best_trial_holds_inequalities_first_and_is_finished():
     found = [
-        made_up(0, 5.0), made_up(1, 1.0, excess=0.1), made_up(2, 0.5, status=PRUNED),
-        made_up(3, 4.0), made_up(4, 4.0),
-    ]  # fmt: skip
+        made_up(0, 5.0),
+        made_up(1, 1.0, excess=0.1),
+        made_up(2, 0.5, status=PRUNED),
+        made_up(3, 4.0),
+        made_up(4, 4.0),
+    ]
     assert best(found).number == 3
     assert best(found[1:2]).number == 1, "where none holds them, the nearest"
 

@@ -83,7 +83,7 @@ def test_a_gain_that_is_a_time_has_to_fit_the_steps():
         ("sweep.grid={vessel.m: [20, 30]}", "needs a study without a grid"),
         ("sweep=null", "needs the key sweep"),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_is_told_once_at_its_place(change, told):
     sentences = faults(TUNED, change)
     assert len(sentences) == 1 or change.startswith("tune.space.hold_below"), sentences

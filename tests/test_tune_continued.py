@@ -72,9 +72,7 @@ def test_a_search_opens_again_wherever_it_was_killed(tmp_path, monkeypatch):
         at_every_call(lambda plan=plan, text=text: opened(out, plan, text))
         opened(out, plan, text)
         assert (out / place.SCENARIO).read_text() == text[place.SCENARIO]
-        assert {path.name for path in out.iterdir()} == {
-            place.TUNE, place.SCENARIO, trials.FOLDER
-        }  # fmt: skip
+        assert {path.name for path in out.iterdir()} == {place.TUNE, place.SCENARIO, trials.FOLDER}
 
 
 def test_a_folder_without_its_scenario_says_how_to_go_on(tmp_path, monkeypatch):
@@ -228,10 +226,16 @@ def test_trials_of_other_gains_than_are_asked_for_are_not_thrown_away(optuna, tm
 
 TRIAL = GainTrial(0, 0, {"gain": 2.0}, 4, FINISHED, 0.5, (0.1, float("inf")), float("inf"), 0.25)
 SHAPES = {
-    "gains": (None, 3, "x", [1]), "runs": (None, "4", [], -1, 1.5), "status": ("done", None),
-    "value": ("x", []), "excesses": (None, "ab", {}, [None, "x"]), "first": ({},), "number": (-1,),
-    "failures": (None,), "batch": ("0", True),
-}  # fmt: skip
+    "gains": (None, 3, "x", [1]),
+    "runs": (None, "4", [], -1, 1.5),
+    "status": ("done", None),
+    "value": ("x", []),
+    "excesses": (None, "ab", {}, [None, "x"]),
+    "first": ({},),
+    "number": (-1,),
+    "failures": (None,),
+    "batch": ("0", True),
+}
 
 
 @pytest.mark.parametrize(("key", "shapes"), SHAPES.items())

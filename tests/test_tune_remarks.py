@@ -26,13 +26,17 @@ def pairs(ratio, low, high):
 )
 def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(ratio, ends, says):
     results = SimpleNamespace(
-        laws=pd.DataFrame({
-            "law": ["li", "pid", "dsc", "lost"], "repeats_median": [3.0, 2.0, 9.0, 1.0],
-            "rank_after": [2, 1, 3, None],
-        }),
-        searches=pairs(ratio, *ends), shown=["iae"],
+        laws=pd.DataFrame(
+            {
+                "law": ["li", "pid", "dsc", "lost"],
+                "repeats_median": [3.0, 2.0, 9.0, 1.0],
+                "rank_after": [2, 1, 3, None],
+            }
+        ),
+        searches=pairs(ratio, *ends),
+        shown=["iae"],
         plan=SimpleNamespace(tune=SimpleNamespace(objective="median(iae)"), metrics=METRICS),
-    )  # fmt: skip
+    )
     (unranked,) = remarks._remark_unsettled(results)
     assert unranked.endswith(": lost")
     (text,) = remarks._answer(results)
@@ -51,9 +55,10 @@ def test_a_repeat_that_is_better_on_fresh_draws_than_the_one_taken_is_told():
 def test_a_search_with_fewer_than_ten_whole_trials_for_each_gain_is_told():
     trials = [SimpleNamespace(status=status) for status in (*[FINISHED] * 20, *[CUT] * 20)]
     results = SimpleNamespace(
-        winners={"pid": [], "li": []}, trials={"pid": [trials], "li": [trials]},
+        winners={"pid": [], "li": []},
+        trials={"pid": [trials], "li": [trials]},
         plan=SimpleNamespace(gains={"pid": (1, 2, 3), "li": (1, 2)}),
-    )  # fmt: skip
+    )
     (text,) = remarks._few(results)
     assert ": pid 20 for 3 gains; give a larger tune.budget" in text
 

@@ -40,8 +40,12 @@ def test_searches_that_fail_in_draws_of_their_own_do_not_make_a_law_that_never_f
 
 def test_places_are_the_ranks_that_the_intervals_leave_open():
     spread = np.exp(np.linspace(-0.1, 0.1, 6))[:, None]
-    runs = {"best": 0.5 * BASE[None], "one": spread * BASE, "other": spread[::-1] * 1.01 * BASE,
-            "last": 3.0 * BASE[None]}  # fmt: skip
+    runs = {
+        "best": 0.5 * BASE[None],
+        "one": spread * BASE,
+        "other": spread[::-1] * 1.01 * BASE,
+        "last": 3.0 * BASE[None],
+    }
     places = searches.places(searches.ratios(runs, 0.95, 1), list(runs))
     assert places == {"best": (1, 1), "one": (2, 3), "other": (2, 3), "last": (4, 4)}
 

@@ -60,10 +60,20 @@ def test_number_with_a_unit(text, unit, number):
 @pytest.mark.parametrize(
     "text",
     [
-        "", "5", "fast", "21/s", "0x5 m", "017 deg", "nan deg", "5 m 3", "1e999 m", "deg 5",
-        "1e308 km", "-1e308 nmi",
+        "",
+        "5",
+        "fast",
+        "21/s",
+        "0x5 m",
+        "017 deg",
+        "nan deg",
+        "5 m 3",
+        "1e999 m",
+        "deg 5",
+        "1e308 km",
+        "-1e308 nmi",
     ],
-)  # fmt: skip
+)
 def test_text_that_is_no_number_in_metres(text):
     assert units.number(text, "m") is None
 
@@ -81,14 +91,41 @@ def test_every_unit_of_the_table_is_exact():
 
 # What one of each is in podusv's unit, from the definitions: the yard of 1959, the pound, the knot.
 WORTH = {
-    "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "mm": 1e-3, "cm": 1e-2,
-    "km": 1e3, "ft": 0.3048, "nmi": 1852.0, "cm2": 1e-4, "ft2": 0.09290304,
-    "deg": 0.017453292519943295, "cm/s": 1e-2, "mm/s": 1e-3, "ft/s": 0.3048,
-    "km/h": 0.2777777777777778, "kn": 0.5144444444444445, "cm/s2": 1e-2,
-    "deg/s": 0.017453292519943295, "g": 1e-3, "t": 1e3, "lb": 0.45359237, "g/cm3": 1e3, "kN": 1e3,
-    "kgf": 9.80665, "kN m": 1e3, "rpm": 1.0 / 60.0, "rpm/s": 1.0 / 60.0, "mHz": 1e-3, "%": 1e-2,
-    "mrad": 1e-3, "mph": 0.44704, "lbf": 4.4482216152605,
-}  # fmt: skip
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+    "h": 3600.0,
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "km": 1e3,
+    "ft": 0.3048,
+    "nmi": 1852.0,
+    "cm2": 1e-4,
+    "ft2": 0.09290304,
+    "deg": 0.017453292519943295,
+    "cm/s": 1e-2,
+    "mm/s": 1e-3,
+    "ft/s": 0.3048,
+    "km/h": 0.2777777777777778,
+    "kn": 0.5144444444444445,
+    "cm/s2": 1e-2,
+    "deg/s": 0.017453292519943295,
+    "g": 1e-3,
+    "t": 1e3,
+    "lb": 0.45359237,
+    "g/cm3": 1e3,
+    "kN": 1e3,
+    "kgf": 9.80665,
+    "kN m": 1e3,
+    "rpm": 1.0 / 60.0,
+    "rpm/s": 1.0 / 60.0,
+    "mHz": 1e-3,
+    "%": 1e-2,
+    "mrad": 1e-3,
+    "mph": 0.44704,
+    "lbf": 4.4482216152605,
+}
 
 
 def test_every_unit_of_the_table_is_worth_what_its_definition_says():
@@ -176,17 +213,28 @@ def test_text_stays_text():
 @pytest.mark.parametrize(
     ("override", "says"),
     [
-        ("start.u=5 kg", "a number [m/s], found '5 kg'; kg does not fit (units here: m/s, cm/s, "
-         "mm/s, ft/s, km/h, kn, mph)"),
+        (
+            "start.u=5 kg",
+            "a number [m/s], found '5 kg'; kg does not fit (units here: m/s, cm/s, "
+            "mm/s, ft/s, km/h, kn, mph)",
+        ),
         ("simulation.step=-5 ms", "a number above 0 [s], found -5 ms"),
-        ("sweep.vary.start.psi.plus.uniform[1]=3 dge", "a number [rad], found '3 dge'; dge does "
-         "not fit; did you mean 'deg'? (units here: rad, deg, mrad)"),
-        ("metrics.steady_fraction=0.5 m", "a number above 0 and not above 1, found '0.5 m'; it has "
-         "no unit here: write 0.5"),
-        ("sweep.draws=5 runs", "a whole number not below 1 and not above 1e+09, found '5 runs'; it "
-         "has no unit here: write 5"),
+        (
+            "sweep.vary.start.psi.plus.uniform[1]=3 dge",
+            "a number [rad], found '3 dge'; dge does "
+            "not fit; did you mean 'deg'? (units here: rad, deg, mrad)",
+        ),
+        (
+            "metrics.steady_fraction=0.5 m",
+            "a number above 0 and not above 1, found '0.5 m'; it has no unit here: write 0.5",
+        ),
+        (
+            "sweep.draws=5 runs",
+            "a whole number not below 1 and not above 1e+09, found '5 runs'; it "
+            "has no unit here: write 5",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_unit_that_does_not_fit_is_one_sentence(override, says):
     below = SOUND + "sweep: {vary: {start.psi: {plus: {uniform: [0, 1]}}}}"
     assert told(below, [override]) == [
@@ -200,9 +248,16 @@ def test_a_unit_that_does_not_fit_is_one_sentence(override, says):
 def test_functions_of_python_take_units():
     source = podusv.load("podusv:own_vessel.yaml", {"simulation.duration": "0.1 min"})
     assert source.simulation.duration == 6.0
-    assert podusv.Scenario(vessel={"preset": "paper"}, path={"kind": "line", "course": "90 deg"},
-                           disturbance={"kind": "none"}, actuator={"kind": "ideal"},
-                           controller={"kind": "pid"}).path.course == math.pi / 2  # fmt: skip
+    assert (
+        podusv.Scenario(
+            vessel={"preset": "paper"},
+            path={"kind": "line", "course": "90 deg"},
+            disturbance={"kind": "none"},
+            actuator={"kind": "ideal"},
+            controller={"kind": "pid"},
+        ).path.course
+        == math.pi / 2
+    )
 
 
 def test_a_batch_takes_units_and_says_which_do_not_fit():

@@ -84,14 +84,22 @@ def test_the_wanted_velocity_and_its_rate_are_those_of_the_derivation():
 
 
 @given(
-    distance=st.floats(0, 1e4), bearing=st.floats(-4, 4), speed=st.floats(0, 1.1),
+    distance=st.floats(0, 1e4),
+    bearing=st.floats(-4, 4),
+    speed=st.floats(0, 1.1),
     course=st.floats(-4, 4),
-)  # fmt: skip
+)
 def test_no_speed_above_U_is_wanted_of_a_slower_target(distance, bearing, speed, course):
-    target = np.array([
-        distance * np.cos(bearing), distance * np.sin(bearing),
-        speed * np.cos(course), speed * np.sin(course), 0.0, 0.0,
-    ])  # fmt: skip
+    target = np.array(
+        [
+            distance * np.cos(bearing),
+            distance * np.sin(bearing),
+            speed * np.cos(course),
+            speed * np.sin(course),
+            0.0,
+            0.0,
+        ]
+    )
     wanted = guidance(np.zeros(6), target, K)
     assert np.hypot(wanted.a, wanted.b) <= LAW.U * (1 + 1e-12)
 
@@ -225,13 +233,14 @@ def test_ahead_of_the_target_it_backs_up_instead_of_turning_twice(ahead, heading
     turned, backed = (
         run(
             corrected(
-                controller=VelocityVector(astern=choice), actuator=Saturated(),
+                controller=VelocityVector(astern=choice),
+                actuator=Saturated(),
                 start=(ahead, -1.0, heading, 0.0, 0.0, 0.0),
             ),
             60.0,
         )
         for choice in ("never", "shorter")
-    )  # fmt: skip
+    )
     assert abs(turned["psi"]).max() > np.pi / 2 > abs(backed["psi"]).max()
     assert backed["u"].min() < -0.3
     iae = [np.trapezoid(out["z_e"], out["time"]) for out in (turned, backed)]

@@ -126,10 +126,11 @@ def test_dop853_starts_anew_where_the_path_jumps():
     jumping, smooth = (
         scene(
             f"path={{kind: line_circle, reading: literal, switch: {switch}}}",
-            "start={x: -4, y: 0, u: 0.5}", "simulation={step: 0.005, duration: 6}",
+            "start={x: -4, y: 0, u: 0.5}",
+            "simulation={step: 0.005, duration: 6}",
         )
         for switch in (3.005, 50)
-    )  # fmt: skip
+    )
     other = integrate(jumping)
     # The engine's step across the jump has its first stage before it: order one, and no more.
     gaps = [math.dist(run_level(jumping, n).position, other.position) for n in (1, 3)]
@@ -242,7 +243,7 @@ def test_the_command_shows_tables_and_rankings_and_leaves_nothing(podusv):
     assert lines[1].split() == [
         *("number", "unit", "0.0025", "s", "0.00125", "s", "0.000625", "s"),
         *("order", "rel.", "error", "verdict"),
-    ]  # fmt: skip
+    ]
     assert "slow:" in lines
     assert "quick, slow; the same at all steps" in said.out
     assert lines[-1] == "converged within 0.01 relative"

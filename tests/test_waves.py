@@ -94,8 +94,13 @@ def test_both_kernels_agree_on_waves_of_one_direction():
 
 
 def test_the_table_has_the_waves_of_the_spectrum():
-    sea = Waves(height=0.8, period=4.0, period_is="zero_crossing", spectrum="ittc",
-                amplitudes="deterministic")  # fmt: skip
+    sea = Waves(
+        height=0.8,
+        period=4.0,
+        period_is="zero_crossing",
+        spectrum="ittc",
+        amplitudes="deterministic",
+    )
     turns, _, number, a, c, s = rows(sea)[:6, :100]
     rate = 2.0 * math.pi * turns
     assert 4.0 * math.sqrt(np.sum(a**2) / 2.0) == pytest.approx(0.8, rel=5e-3)
@@ -251,14 +256,24 @@ def test_regular_waves_push_with_a_constant_force():
 # Mean drift force over the squared amplitude [N/m2], at wave length over hull length: head and beam
 # sea, by VERES. C/S Arctic Drillship from MCSimPython 0.1.6, vessel_data/CSAD/vessel_json.json.
 STRIP_THEORY = {
-    8.0: (0.64, 0.76), 5.0: (2.9, 3.2), 4.0: (6.7, 6.8), 3.0: (22, 19), 2.0: (142, 90),
-    1.5: (468, 281), 1.0: (1579, 1769), 0.7: (2322, 6057),
-}  # fmt: skip
+    8.0: (0.64, 0.76),
+    5.0: (2.9, 3.2),
+    4.0: (6.7, 6.8),
+    3.0: (22, 19),
+    2.0: (142, 90),
+    1.5: (468, 281),
+    1.0: (1579, 1769),
+    0.7: (2322, 6057),
+}
 # R/V Gunnerus from vessel_data/gunnerus/vessel.json.
 AT_SEA = {
-    8.395: (12.21, 48.05), 5.078: (88.07, 321.1), 2.948: (838.8, 2314.3), 1.946: (4761.7, 9479.3),
-    1.151: (27605, 48474), 0.737: (29566, 118305),
-}  # fmt: skip
+    8.395: (12.21, 48.05),
+    5.078: (88.07, 321.1),
+    2.948: (838.8, 2314.3),
+    1.946: (4761.7, 9479.3),
+    1.151: (27605, 48474),
+    0.737: (29566, 118305),
+}
 SHIPS = {(2.578, 0.444): STRIP_THEORY, (33.9, 9.6): AT_SEA}
 
 

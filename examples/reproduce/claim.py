@@ -47,10 +47,23 @@ SCALED = {
     "mass": ("m", "X_udot", "Y_vdot"),
     "inertia": ("I_z", "N_rdot"),
     "damping": (
-        "X_u", "X_uu", "X_uuu", "Y_v", "Y_vv", "Y_rv", "Y_r", "Y_vr", "Y_rr",
-        "N_v", "N_vv", "N_rv", "N_r", "N_vr", "N_rr",
+        "X_u",
+        "X_uu",
+        "X_uuu",
+        "Y_v",
+        "Y_vv",
+        "Y_rv",
+        "Y_r",
+        "Y_vr",
+        "Y_rr",
+        "N_v",
+        "N_vv",
+        "N_rv",
+        "N_r",
+        "N_vr",
+        "N_rr",
     ),
-}  # fmt: skip
+}
 SCALED["all of it"] = tuple(key for keys in SCALED.values() for key in keys)
 FACTORS = (0.7, 0.85, 1.15, 1.3, 1.5)
 STEP = 0.0005  # s, of the sampled runs
@@ -137,10 +150,14 @@ def sampled(config: str, count: int, update: str) -> dict[str, Scenario]:
     period = count * STEP
     difference = math.ceil(DIFFERENCE / period - 1e-9) * period if count else DIFFERENCE
     return laws(
-        config, f"simulation.step={STEP}", f"control.period={period:.9g}",
-        f"controller.difference_step={difference:.9g}", f"control.update={update}",
-        "log.every=10", "log.monitor=false",
-    )  # fmt: skip
+        config,
+        f"simulation.step={STEP}",
+        f"control.period={period:.9g}",
+        f"controller.difference_step={difference:.9g}",
+        f"control.update={update}",
+        "log.every=10",
+        "log.monitor=false",
+    )
 
 
 def cycle(scenario: Scenario) -> dict[str, float]:
@@ -160,9 +177,10 @@ def predicted(scenario: Scenario) -> float:
     counts = range(1, LONGEST + 1)
     first = scenario.time_grid().update_first
     unstable = (
-        n for n in counts
+        n
+        for n in counts
         if any(sampled_growth(loop, STEP, n, update_first=first) > GROWS for loop in found)
-    )  # fmt: skip
+    )
     return (next(unstable, LONGEST + 1) - 1) * STEP
 
 
@@ -194,8 +212,10 @@ def limits() -> pd.DataFrame:
     """The longest stable period [s], found by bisection and predicted by the linearised loops."""
     cases = [
         (reading, label, update)
-        for reading, config in READINGS.items() for label in laws(config) for update in UPDATES
-    ]  # fmt: skip
+        for reading, config in READINGS.items()
+        for label in laws(config)
+        for update in UPDATES
+    ]
 
     def both(case: tuple[str, str, str]) -> dict[str, float]:
         reading, label, update = case
@@ -293,9 +313,11 @@ def velocity_errors(scenario: Scenario) -> dict[str, float]:
     if log.status != "finished":
         return dict.fromkeys(("iae_e", "e_steady", "rms_u_e", "rms_r_e"), np.nan)
     return {
-        "iae_e": metrics["iae_e"], "e_steady": metrics["e_steady"],
-        "rms_u_e": settled_rms(log["u_e"]), "rms_r_e": settled_rms(log["r_e"]),
-    }  # fmt: skip
+        "iae_e": metrics["iae_e"],
+        "e_steady": metrics["e_steady"],
+        "rms_u_e": settled_rms(log["u_e"]),
+        "rms_r_e": settled_rms(log["r_e"]),
+    }
 
 
 def settled_rms(signal: Vector) -> float:
@@ -304,9 +326,13 @@ def settled_rms(signal: Vector) -> float:
 
 
 TABLES: Mapping[str, Callable[[], pd.DataFrame]] = {
-    "unknown": unknown, "discrete": discrete, "limits": limits, "learnt": learnt, "gains": gains,
+    "unknown": unknown,
+    "discrete": discrete,
+    "limits": limits,
+    "learnt": learnt,
+    "gains": gains,
     "networks": networks,
-}  # fmt: skip
+}
 
 if __name__ == "__main__":
     TABLES[sys.argv[1]]().to_csv(sys.stdout, float_format="%.6g", lineterminator="\n")

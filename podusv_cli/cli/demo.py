@@ -60,11 +60,12 @@ def demo(
         echo(part.sentence_with_trace, err=True)
     _open(done.folder / "report.html", browser)
     echo(
-        "", "Three commands to try next:",
+        "",
+        "Three commands to try next:",
         "  podusv init demo        copy the scenario; change it, then: podusv compare demo.yaml",
         "  podusv list laws        which other laws there are",
         "  podusv docs tutorial    from an empty folder to a comparison of your own",
-    )  # fmt: skip
+    )
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 

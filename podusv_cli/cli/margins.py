@@ -21,9 +21,16 @@ SOME_FAILED = 3
 STILL = 1e-12  # m/s, rad/s; what is slower is rounding
 FLAT = 1e-6  # of a pole's magnitude; an imaginary part up to this is rounding
 HEAD = [
-    "law", "loop", "crossover [rad/s]", "phase [rad]", "gain", "reduction", "delay [s]",
-    "peak |S|", "peak |T|",
-]  # fmt: skip
+    "law",
+    "loop",
+    "crossover [rad/s]",
+    "phase [rad]",
+    "gain",
+    "reduction",
+    "delay [s]",
+    "peak |S|",
+    "peak |T|",
+]
 
 
 def margins(
@@ -32,7 +39,9 @@ def margins(
     at: Annotated[
         float | None,
         typer.Option(
-            metavar="SECONDS", min=0.0, help="When the steady motion begins.",
+            metavar="SECONDS",
+            min=0.0,
+            help="When the steady motion begins.",
             show_default="the last time on a straight line, or on a circle",
         ),
     ] = None,
@@ -50,7 +59,7 @@ def margins(
     as_json: options.AsJson = False,
     trust: options.Trust = False,
     plugin: options.Plugins = None,
-) -> None:  # fmt: skip
+) -> None:
     """Tell how much phase, gain and delay the loops of a scenario's laws can take.
 
     The closed loop is linearised about its steady motion on the path, and opened at the plant's

@@ -49,10 +49,13 @@ def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
     began = time.monotonic()
     # No thread refreshes the bars, since threads do not survive the forks of a comparison.
     bars = Progress(
-        TextColumn("{task.description}", markup=False), BarColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
-        console=Console(stderr=True), transient=True, auto_refresh=False,
-    )  # fmt: skip
+        console=Console(stderr=True),
+        transient=True,
+        auto_refresh=False,
+    )
     tasks: dict[str, TaskID] = {}
     with ExitStack() as stack:
 
@@ -112,10 +115,12 @@ class StudyLine:
         """Show runs done, rate, time left and failures so far."""
         if time.monotonic() - self._last > PERIOD:
             self._show(
-                f"{tally.made} of {tally.wanted} runs", *_left(tally),
-                f"{tally.failed} did not finish", f"{tally.rate:.3g} a second",
+                f"{tally.made} of {tally.wanted} runs",
+                *_left(tally),
+                f"{tally.failed} did not finish",
+                f"{tally.rate:.3g} a second",
                 "Ctrl-C keeps what is done",
-            )  # fmt: skip
+            )
 
     def advance(self, tally: StudyTally, text: str) -> None:
         """Show runs done, time left, and what is told of them."""

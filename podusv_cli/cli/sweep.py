@@ -42,8 +42,7 @@ def run(
     ],
     assign: options.Assignments = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the study.", show_default="results/<name>-sweep"),
+        Path | None, typer.Option(help="Folder of the study.", show_default="results/<name>-sweep")
     ] = None,
     draws: Annotated[
         int, typer.Option(min=0, help="How many draws.", show_default="the scenario's")
@@ -178,9 +177,11 @@ def status(study: Study, as_json: options.AsJson = False) -> None:
 
 @command
 def report(
-    study: Study, figures: options.Figures = True, as_json: options.AsJson = False,
+    study: Study,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
     quiet: options.Quiet = False,
-) -> None:  # fmt: skip
+) -> None:
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
     from podusv_cli.workflows.request import Request

@@ -20,8 +20,7 @@ def tune(
     config: options.Config,
     assign: options.Assignments = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the search.", show_default="results/<name>-tune"),
+        Path | None, typer.Option(help="Folder of the search.", show_default="results/<name>-tune")
     ] = None,
     workers: options.Workers = 0,
     scheduler: options.Scheduler = "",
@@ -70,12 +69,18 @@ def _report(done: Tuned) -> None:
 
     results = done.results
     rows = [
-        [row["law"], count_change(row, "rank"), count_change(row, "better_than"),
-         intervals(row, "before"), intervals(row, "after"),
-         ratio(row) if row["runs"] else "-",
-         f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}", spread(row)]
+        [
+            row["law"],
+            count_change(row, "rank"),
+            count_change(row, "better_than"),
+            intervals(row, "before"),
+            intervals(row, "after"),
+            ratio(row) if row["runs"] else "-",
+            f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}",
+            spread(row),
+        ]
         for row in results.laws.sort_values("rank_after").to_dict("records")
-    ]  # fmt: skip
+    ]
     ratios = "ratio, after / before"
     head = ["law", "rank", "better than", "before", "after", ratios, "failed", "searches"]
     echo(f"{results.plan.tune.objective} on {results.plan.tune.validate} fresh draws:")

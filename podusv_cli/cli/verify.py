@@ -50,9 +50,16 @@ def verify(
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         try:
             done = verifying.verify(
-                Path(config), assign or (), tolerance, out, progress, force=force,
-                plugins=plugin or (), trust=trust, warn=Warnings(quiet),
-            )  # fmt: skip
+                Path(config),
+                assign or (),
+                tolerance,
+                out,
+                progress,
+                force=force,
+                plugins=plugin or (),
+                trust=trust,
+                warn=Warnings(quiet),
+            )
         except KeyboardInterrupt:
             text = f"{config}: interrupted before all steps were simulated; nothing was written"
             raise KeyboardInterrupt(text) from None

@@ -47,9 +47,11 @@ NORMS = {
 
 
 def parse(
-    text: str, runs: Collection[str], signals: Mapping[str, Signal],
+    text: str,
+    runs: Collection[str],
+    signals: Mapping[str, Signal],
     metrics: Mapping[str, MetricAbout] = METRICS,
-) -> ast.expr:  # fmt: skip
+) -> ast.expr:
     """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
     It is checked by evaluating it for runs that have all of these. Raises ExpressionError.

@@ -139,9 +139,14 @@ class LogDifference:
 
 def _as_json(d: Deviation) -> dict[str, Any]:
     return {
-        "signal": d.signal, "time": d.time, "values": [d.one, d.other], "difference": d.gap,
-        "ulps": d.ulps, "relative": d.relative, "relative_to_peak": d.relative_to_peak,
-    }  # fmt: skip
+        "signal": d.signal,
+        "time": d.time,
+        "values": [d.one, d.other],
+        "difference": d.gap,
+        "ulps": d.ulps,
+        "relative": d.relative,
+        "relative_to_peak": d.relative_to_peak,
+    }
 
 
 @dataclass(frozen=True)
@@ -235,7 +240,9 @@ def _deviation(pair: _Pair, place: Place) -> Deviation:
     return Deviation(
         signal=f"{pair.name}{index}",
         time=None if pair.times is None else float(pair.times[place[0]]),
-        one=float(pair.one[place]), other=float(pair.other[place]),
-        peak=float(both[np.isfinite(both)].max(initial=0.0)), period=pair.period,
+        one=float(pair.one[place]),
+        other=float(pair.other[place]),
+        peak=float(both[np.isfinite(both)].max(initial=0.0)),
+        period=pair.period,
         unit=pair.about.unit,
-    )  # fmt: skip
+    )

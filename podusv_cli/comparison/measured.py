@@ -93,12 +93,17 @@ class Track:
         said = {**run.said, "controller": NO_LAW}
         return run.model_copy(
             update={
-                "duration": float(self.times[-1]), "settings": (), "law": (), "said": said,
+                "duration": float(self.times[-1]),
+                "settings": (),
+                "law": (),
+                "said": said,
                 "values": {**run.values, "controller": {"kind": NO_LAW}},
-                "polar": False, "optimum_of": "", "path_steady": {},
+                "polar": False,
+                "optimum_of": "",
+                "path_steady": {},
                 "path_end": {"time": counts_to} if math.isfinite(counts_to) else {},
             }
-        )  # fmt: skip
+        )
 
     def beside(self, run: Recording, label: str, about: RunAbout) -> PastRun:
         """It as a run, with the target of another one; `about` as the method has it."""

@@ -25,9 +25,20 @@ TIMING = "timing.json"
 IN_REPORT = "png"  # the format of figures in report.html
 # Names that no run may have: files of the comparison's folder and columns of its table.
 RESERVED = (
-    TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
-    "manifest.json", "metric", "missing.json", "provenance.json", "report.html", TIMING, "unit",
-)  # fmt: skip
+    TABLE,
+    "comparison.md",
+    "comparison.tex",
+    "claims.json",
+    "claims.md",
+    "figures",
+    "manifest.json",
+    "metric",
+    "missing.json",
+    "provenance.json",
+    "report.html",
+    TIMING,
+    "unit",
+)
 
 
 @dataclass(frozen=True)
@@ -108,9 +119,13 @@ def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], by
 
 
 def draw_comparison(
-    result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
-    names: Sequence[str] = (), formats: Sequence[str] = ("png",), workers: int = 0,
-) -> dict[str, bytes]:  # fmt: skip
+    result: Result,
+    extras: Extras,
+    progress: Callable[[str, float], None] | None = None,
+    names: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    workers: int = 0,
+) -> dict[str, bytes]:
     """The figures of all runs together by file name: as asked, and as PNGs for the report.
 
     `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
@@ -127,9 +142,12 @@ def draw_comparison(
 
 
 def as_report(
-    result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any],
+    result: Result,
+    title: str,
+    figures: Mapping[str, bytes],
+    provenance: Mapping[str, Any],
     missing: Iterable[object] = (),
-) -> str:  # fmt: skip
+) -> str:
     """The HTML report; `figures` as `drawn` gives them."""
     pictures: list[Picture] = []
     if figures:
@@ -150,13 +168,22 @@ def as_report(
         ]
     shown = dress_runs(result.runs)
     story = report.Story(
-        title=title, abouts=result.abouts, meanings=result.meanings,
-        endings=result.endings, missing=[str(part) for part in missing],
+        title=title,
+        abouts=result.abouts,
+        meanings=result.meanings,
+        endings=result.endings,
+        missing=[str(part) for part in missing],
         differences=result.differences,
-        noticed=merge_findings(result.warnings), table=result.table, verdicts=result.verdicts,
+        noticed=merge_findings(result.warnings),
+        table=result.table,
+        verdicts=result.verdicts,
         theories={run.label: run.theory for run in result.runs if run.theory},
-        figures=pictures, provenance=provenance, chase=chase.chase(shown),
-        traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled_runs,
+        figures=pictures,
+        provenance=provenance,
+        chase=chase.chase(shown),
+        traces=traces.traces(shown),
+        metrics=result.metrics,
+        unsettled=result.unsettled_runs,
         doubts=result.doubts,
-    )  # fmt: skip
+    )
     return report.page(story)

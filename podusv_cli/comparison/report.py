@@ -60,36 +60,40 @@ def page(story: Story) -> str:
     table = rows(story.table, story.metrics, story.unsettled)
     first = [row for row in table if row.metric.headline] or table
     standings = _standings(story, first)
-    return environment("podusv_cli.comparison").get_template("report.html.j2").render(
-        title=story.title,
-        story=story,
-        scenario=about.values,
-        seas=[about.section(at)["kind"] for at in about.said if at.startswith("disturbance")],
-        bad={label: ending for label, ending in story.endings.items() if ending},
-        differing=as_text(story.differences),
-        answers=by_answer(story.verdicts),
-        standings=standings,
-        window=window(story.table),
-        ranked=any(standing.names or standing.more for standing in standings.values()),
-        noticed=_by_code(story),
-        metrics={row.metric.name: row.metric for row in table},
-        many=MANY,
-        few=FEW,
-        single=len(story.table.columns) == 1,
-        headlines=first,
-        others=table[len(first) :],
-        stability=(stability.HEAD, [*stability.rows(story.theories)]),
-        beside=figures[:BESIDE],
-        figures=figures,
-        changed=about.settings,
-        laws=laws([about.law for about in story.abouts.values()]),
-        parts=parts,
-        cited=any(EQUATION.search(said) for _, said, _ in parts),
-        provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
-        chase_json=Markup(chase.as_json(dict(story.chase))),
-        traces_json=Markup(chase.as_json(dict(story.traces))),
-        pieces=PIECES,
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.comparison")
+        .get_template("report.html.j2")
+        .render(
+            title=story.title,
+            story=story,
+            scenario=about.values,
+            seas=[about.section(at)["kind"] for at in about.said if at.startswith("disturbance")],
+            bad={label: ending for label, ending in story.endings.items() if ending},
+            differing=as_text(story.differences),
+            answers=by_answer(story.verdicts),
+            standings=standings,
+            window=window(story.table),
+            ranked=any(standing.names or standing.more for standing in standings.values()),
+            noticed=_by_code(story),
+            metrics={row.metric.name: row.metric for row in table},
+            many=MANY,
+            few=FEW,
+            single=len(story.table.columns) == 1,
+            headlines=first,
+            others=table[len(first) :],
+            stability=(stability.HEAD, [*stability.rows(story.theories)]),
+            beside=figures[:BESIDE],
+            figures=figures,
+            changed=about.settings,
+            laws=laws([about.law for about in story.abouts.values()]),
+            parts=parts,
+            cited=any(EQUATION.search(said) for _, said, _ in parts),
+            provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
+            chase_json=Markup(chase.as_json(dict(story.chase))),
+            traces_json=Markup(chase.as_json(dict(story.traces))),
+            pieces=PIECES,
+        )
+    )
 
 
 class Standing(NamedTuple):

@@ -159,9 +159,14 @@ def note(frame: MetricTable) -> str:
 
 
 def rows(
-    frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, chosen: Sequence[str] = (), brief: bool = False, ratios: bool = True,
-) -> list[MetricRow]:  # fmt: skip
+    frame: MetricTable,
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+    brief: bool = False,
+    ratios: bool = True,
+) -> list[MetricRow]:
     """The rows of the metrics `chosen`, in this order; best numbers marked with *.
 
     None chosen: all, those that a reader sees first before the others. `unsettled` are the runs
@@ -176,23 +181,30 @@ def rows(
         best = min(ranked, default=math.nan) if name not in unranked and is_ranked else math.nan
         first, metric = numbers[0], known[name]
         texts = [
-            metric.undefined_word if metric.happens and finished[i] and math.isnan(number) else
-            "no limit" if metric.margin and math.isinf(number) else
-            _cell(
-                number, first if i and ratios else math.nan, math.nan if out[i] else best,
+            metric.undefined_word
+            if metric.happens and finished[i] and math.isnan(number)
+            else "no limit"
+            if metric.margin and math.isinf(number)
+            else _cell(
+                number,
+                first if i and ratios else math.nan,
+                math.nan if out[i] else best,
                 FEW if brief else DIGITS,
             )
             for i, number in enumerate(numbers)
-        ]  # fmt: skip
+        ]
         of_metrics[name] = MetricRow(metric, texts)
     first_read = sorted(of_metrics, key=lambda name: not known[name].headline)
     return [of_metrics[name] for name in chosen or first_read if name in of_metrics]
 
 
 def cells(
-    frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, chosen: Sequence[str] = (),
-) -> list[list[str]]:  # fmt: skip
+    frame: MetricTable,
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+) -> list[list[str]]:
     """The `rows` as text: what the metric is, unit, a text a run, and the metric's name."""
     return [
         [metric.row, metric.unit, *texts, metric.name]
@@ -259,9 +271,13 @@ def _cell(number: float, first: float, best: float, digits: int) -> str:
 
 
 def as_markdown(
-    frame: MetricTable, endings: Mapping[str, str], known: Mapping[str, MetricAbout] = METRICS,
-    unsettled: Names = (), *, chosen: Sequence[str] = (),
-) -> str:  # fmt: skip
+    frame: MetricTable,
+    endings: Mapping[str, str],
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+) -> str:
     """The table in Markdown, followed by the reasons why runs did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
     failures = [
@@ -283,9 +299,13 @@ def as_markdown(
 
 
 def as_latex(
-    frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, chosen: Sequence[str] = (), ratios: bool = False,
-) -> str:  # fmt: skip
+    frame: MetricTable,
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+    ratios: bool = False,
+) -> str:
     """The table in LaTeX, as wide as the column, or in `table*` the page.
 
     Symbols or words, numbers of FEW digits with their decimal points aligned, the best of a row in

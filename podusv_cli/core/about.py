@@ -72,9 +72,11 @@ class Claim(Component):
 
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(
-        "ours", "", "where it was published: section, figure, equation; what begins with `ours` "
+        "ours",
+        "",
+        "where it was published: section, figure, equation; what begins with `ours` "
         "was not published: it holds or fails, where a published claim is reproduced or not",
-    )  # fmt: skip
+    )
     expect: str = value(..., "", "the claim as an expression over runs; see podusv docs claims")
     given: str = value(
         "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
@@ -83,9 +85,11 @@ class Claim(Component):
         0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
     )
     untestable: str = value(
-        "", "", "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
+        "",
+        "",
+        "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
         "show of `expect` stands beside it",
-    )  # fmt: skip
+    )
     remark: str = value("", "", "choices made where the source is silent")
 
 
@@ -94,9 +98,11 @@ class StudyClaim(Component):
 
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(
-        "ours", "", "where it was published; what begins with `ours` was not published: it holds "
+        "ours",
+        "",
+        "where it was published; what begins with `ours` was not published: it holds "
         "or fails, where a published claim is reproduced or not",
-    )  # fmt: skip
+    )
     expect: str = value(
         ..., "", "the claim as an expression over all draws; see podusv docs study_claims"
     )

@@ -24,7 +24,7 @@ CHECKS: dict[str, Callable[[RunAbout, Status], bool | None]] = {
 }
 
 
-class Log(Protocol):
+class LogOnDisk(Protocol):
     """A log that is read when it is first asked for, and kept."""
 
     @property
@@ -45,7 +45,7 @@ class PastRun:
 
     label: str
     about: RunAbout
-    log: Recording | Log
+    log: Recording | LogOnDisk
     metrics: Mapping[str, float] = field(default_factory=dict)
     cost: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()

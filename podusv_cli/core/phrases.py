@@ -59,9 +59,14 @@ def without_case(word: str) -> str:
 
 # Words that others use, and the keys that podusv has for them.
 SYNONYMS = {
-    "gnss": "position", "gps": "position", "compass": "heading", "gyro": "yaw_rate",
-    "speed_log": "velocity", "rate": "period", "frequency": "period",
-}  # fmt: skip
+    "gnss": "position",
+    "gps": "position",
+    "compass": "heading",
+    "gyro": "yaw_rate",
+    "speed_log": "velocity",
+    "rate": "period",
+    "frequency": "period",
+}
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:

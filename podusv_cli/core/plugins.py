@@ -26,9 +26,17 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.foreign import in_folder
 
 ROOMS = (
-    "controllers", "paths", "disturbances", "actuators", "measurements", "estimators", "vessels",
-    "metrics", "figures", "findings",
-)  # fmt: skip
+    "controllers",
+    "paths",
+    "disturbances",
+    "actuators",
+    "measurements",
+    "estimators",
+    "vessels",
+    "metrics",
+    "figures",
+    "findings",
+)
 GROUPS = tuple(f"podusv.{room}" for room in ROOMS)
 TEXT = "__text__"  # where a module of a file keeps its text; the file may be edited or gone
 MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d

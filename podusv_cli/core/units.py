@@ -18,18 +18,27 @@ PURE = "1"  # stands for no unit
 # They are exact: 57 cm are 0.57 m, and 180 deg are math.pi to the last digit.
 UNITS: dict[str, dict[str, Fraction]] = {
     "s": {
-        "ms": Fraction(1, 10**3), "us": Fraction(1, 10**6), "ns": Fraction(1, 10**9),
-        "min": Fraction(60), "h": Fraction(3600),
+        "ms": Fraction(1, 10**3),
+        "us": Fraction(1, 10**6),
+        "ns": Fraction(1, 10**9),
+        "min": Fraction(60),
+        "h": Fraction(3600),
     },
     "m": {
-        "mm": Fraction(1, 1000), "cm": Fraction(1, 100), "km": Fraction(1000),
-        "ft": Fraction(3048, 10000), "nmi": Fraction(1852),
+        "mm": Fraction(1, 1000),
+        "cm": Fraction(1, 100),
+        "km": Fraction(1000),
+        "ft": Fraction(3048, 10000),
+        "nmi": Fraction(1852),
     },
     "m2": {"cm2": Fraction(1, 10**4), "ft2": Fraction(3048, 10000) ** 2},
     "rad": {"deg": PI / 180, "mrad": Fraction(1, 1000)},
     "m/s": {
-        "cm/s": Fraction(1, 100), "mm/s": Fraction(1, 1000), "ft/s": Fraction(3048, 10000),
-        "km/h": Fraction(1000, 3600), "kn": Fraction(1852, 3600),
+        "cm/s": Fraction(1, 100),
+        "mm/s": Fraction(1, 1000),
+        "ft/s": Fraction(3048, 10000),
+        "km/h": Fraction(1000, 3600),
+        "kn": Fraction(1852, 3600),
         "mph": Fraction(1609344, 3600 * 10**3),
     },
     "m/s2": {"cm/s2": Fraction(1, 100)},
@@ -37,7 +46,8 @@ UNITS: dict[str, dict[str, Fraction]] = {
     "kg": {"g": Fraction(1, 1000), "t": Fraction(1000), "lb": Fraction(45359237, 10**8)},
     "kg/m3": {"g/cm3": Fraction(1000)},
     "N": {
-        "kN": Fraction(1000), "kgf": Fraction(980665, 10**5),
+        "kN": Fraction(1000),
+        "kgf": Fraction(980665, 10**5),
         "lbf": Fraction(45359237 * 980665, 10**13),
     },
     "N m": {"kN m": Fraction(1000)},
@@ -46,14 +56,34 @@ UNITS: dict[str, dict[str, Fraction]] = {
     "1/s2": {"rpm/s": Fraction(1, 60)},
     "Hz": {"mHz": Fraction(1, 1000)},
     PURE: {"%": Fraction(1, 100)},
-}  # fmt: skip
+}
 SPELLINGS = {
-    "degree": "deg", "degrees": "deg", "dps": "deg/s", "kt": "kn", "kts": "kn", "knot": "kn",
-    "knots": "kn", "kmh": "km/h", "kph": "km/h", "sec": "s", "second": "s", "seconds": "s",
-    "minute": "min", "minutes": "min", "hr": "h", "hour": "h", "hours": "h", "Nm": "N m",
-    "kNm": "kN m", "rev/min": "rpm", "rps": "1/s", "1/min": "rpm", "metre": "m", "metres": "m",
+    "degree": "deg",
+    "degrees": "deg",
+    "dps": "deg/s",
+    "kt": "kn",
+    "kts": "kn",
+    "knot": "kn",
+    "knots": "kn",
+    "kmh": "km/h",
+    "kph": "km/h",
+    "sec": "s",
+    "second": "s",
+    "seconds": "s",
+    "minute": "min",
+    "minutes": "min",
+    "hr": "h",
+    "hour": "h",
+    "hours": "h",
+    "Nm": "N m",
+    "kNm": "kN m",
+    "rev/min": "rpm",
+    "rps": "1/s",
+    "1/min": "rpm",
+    "metre": "m",
+    "metres": "m",
     "mi/h": "mph",
-}  # fmt: skip
+}
 SIGNS = str.maketrans({"°": "deg", "º": "deg", "·": " ", "*": " ", "^": "", "²": "2", "³": "3"})
 WITH_UNIT = re.compile(rf"({NUMBER.pattern})(?:\s*(?=[^\W\d_]|[°º%])|\s+(?=1/))(\S.*)")
 

@@ -102,9 +102,10 @@ class TriedChoice:
         own = self.choice.own
         first = min(turned, key=lambda t: abs(t.value - own))
         inside = [
-            value for value in holding
+            value
+            for value in holding
             if (value > own) == (first.value > own) and abs(value - own) < abs(first.value - own)
-        ]  # fmt: skip
+        ]
         held = max(inside, key=lambda value: abs(value - own), default=own)
         return Turn(self.choice, first.value, held, abs(first.value - own))
 
@@ -120,8 +121,10 @@ def explore_choice(
     sides = [_Side(choice, end, judge, base) for end in ends(choice)]
     acting = any(
         _acts(side.judge_at(share * side.whole), claim, base)
-        for side in sides for share in SHOWING for claim in base.answers
-    )  # fmt: skip
+        for side in sides
+        for share in SHOWING
+        for claim in base.answers
+    )
     for side in sides if acting else ():
         places = side.tried_between()
         for claim in base.answers:

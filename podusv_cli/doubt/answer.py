@@ -20,9 +20,13 @@ from podusv_cli.scenario.model import Scenario
 KNIFE, FRAGILE = 1e-3, 0.1  # of a choice's scale, within which a verdict turns
 LEVEL = 0.95  # of the bound on the share of draws that turn a verdict where none does
 WORDS = (
-    "knife's edge", "fragile", "under conditions", "in combination only",
-    "robust where it can tell", "robust",
-)  # fmt: skip
+    "knife's edge",
+    "fragile",
+    "under conditions",
+    "in combination only",
+    "robust where it can tell",
+    "robust",
+)
 
 
 @dataclass(frozen=True)
@@ -128,9 +132,10 @@ def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
     claim, base, worlds = verdict.name, tried.base, tried.worlds
     labels = labels_of(verdict.claim)
     moved = [
-        alone for alone in tried.alone
+        alone
+        for alone in tried.alone
         if alone.possible and alone.choice.labels & labels and not alone.choice.is_contrast(labels)
-    ]  # fmt: skip
+    ]
     turns = sorted(
         (t for alone in moved for t in alone.turns(claim, base)), key=lambda turn: turn.share
     )
@@ -139,14 +144,21 @@ def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
     failed = sum(bool(world.failed) for world in worlds)
     number, spread = _nearest(verdict, base, worlds)
     return DoubtAnswer(
-        verdict, tuple(t for t in turns if not t.choice.task),
+        verdict,
+        tuple(t for t in turns if not t.choice.task),
         tuple(t for t in turns if t.choice.task),
         tuple(explain_turns(tried.draws, turned, known, acting)),
-        int((known & ~turned).sum()), int(turned.sum()), int((~known).sum()) - failed, failed,
-        len(moved), sum(acting[alone.choice.name] for alone in moved),
-        sum(alone.silences(claim) for alone in moved if not alone.choice.task), base.numbers[claim],
-        number, spread,
-    )  # fmt: skip
+        int((known & ~turned).sum()),
+        int(turned.sum()),
+        int((~known).sum()) - failed,
+        failed,
+        len(moved),
+        sum(acting[alone.choice.name] for alone in moved),
+        sum(alone.silences(claim) for alone in moved if not alone.choice.task),
+        base.numbers[claim],
+        number,
+        spread,
+    )
 
 
 def _nearest(
@@ -179,7 +191,8 @@ def describe_turn(turn: Turn) -> str:
 def as_json(answer: DoubtAnswer) -> dict[str, Any]:
     """An answer as plain data."""
     return {
-        **answer.verdict.as_json(), "word": answer.word,
+        **answer.verdict.as_json(),
+        "word": answer.word,
         "word_for_neighbours": answer.word_for_neighbours,
         "draws": {n: getattr(answer, n) for n in ("kept", "turned", "unknown", "failed")},
         "choices": {"moved": answer.tried, "acted": answer.acted, "silent": answer.silent},
@@ -188,15 +201,22 @@ def as_json(answer: DoubtAnswer) -> dict[str, Any]:
             {"key": e.choice.name, "part": e.part, "inside": e.inside, "outside": e.outside}
             for e in answer.explained
         ],
-        "number": answer.number.text, "edges": list(answer.number.edges), "spread": answer.spread,
+        "number": answer.number.text,
+        "edges": list(answer.number.edges),
+        "spread": answer.spread,
         "event": answer.event and answer.event._asdict(),
-    }  # fmt: skip
+    }
 
 
 def turn_as_json(turn: Turn) -> dict[str, Any]:
     """A turn as plain data; a share of None where there is no distance."""
     return {
-        "key": turn.choice.name, "own": turn.choice.own, "turns_at": turn.value, "held": turn.held,
-        "unit": turn.choice.unit, "distance": turn.distance,
-        "share": turn.share if math.isfinite(turn.share) else None, "task": turn.choice.task,
-    }  # fmt: skip
+        "key": turn.choice.name,
+        "own": turn.choice.own,
+        "turns_at": turn.value,
+        "held": turn.held,
+        "unit": turn.choice.unit,
+        "distance": turn.distance,
+        "share": turn.share if math.isfinite(turn.share) else None,
+        "task": turn.choice.task,
+    }

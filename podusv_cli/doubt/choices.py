@@ -209,9 +209,10 @@ def with_loads(singles: Singles) -> Singles:
     calm, steady = Calm(), Step()
     return {
         label: single.model_copy(update={"disturbance": steady})
-        if single.disturbance == calm else single
+        if single.disturbance == calm
+        else single
         for label, single in singles.items()
-    }  # fmt: skip
+    }
 
 
 def _choice_from_vary(name: str, quantity: Quantity, singles: Singles) -> Choice:
@@ -233,9 +234,10 @@ def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
     """Where laws know the same of the hull, which moves with it."""
     hull = [(label, at, ("nominal", *at[1:])) for label, at in places if at[0] == "vessel"]
     return [
-        (label, known) for label, at, known in hull
+        (label, known)
+        for label, at, known in hull
         if content(singles[label], at) == content(singles[label], known)
-    ]  # fmt: skip
+    ]
 
 
 def _values(key: Key, own: Any) -> tuple[Any, ...]:

@@ -74,9 +74,10 @@ def compared_numbers(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
 
 # What the right side is times where a comparison turns, for a tolerance.
 SIDES: dict[type[ast.cmpop], Callable[[float], tuple[float, ...]]] = {
-    ast.Eq: lambda t: (1.0 - t, 1.0 + t), ast.LtE: lambda t: (1.0 + t,),
+    ast.Eq: lambda t: (1.0 - t, 1.0 + t),
+    ast.LtE: lambda t: (1.0 + t,),
     ast.GtE: lambda t: (1.0 - t,),
-}  # fmt: skip
+}
 
 
 def _strictly(tolerance: float) -> tuple[float, ...]:

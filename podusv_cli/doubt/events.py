@@ -47,9 +47,11 @@ def nearest_event(claim: ParsedClaim, runs: Mapping[str, PastRun]) -> Event | No
     """The event nearest to an edge of a window; None where no window or nothing changes."""
     events = (
         Event(label, *event, edge)
-        for label, edges in _windows(claim) if label in runs
-        for event in _events(runs[label]) for edge in edges
-    )  # fmt: skip
+        for label, edges in _windows(claim)
+        if label in runs
+        for event in _events(runs[label])
+        for edge in edges
+    )
     return min(events, key=lambda event: event.gap, default=None)
 
 

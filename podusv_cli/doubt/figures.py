@@ -130,13 +130,24 @@ def ranges(report: DoubtReport, answer: DoubtAnswer, rows: Sequence[TriedChoice]
             if turn:
                 for span in turned_spans(shown, end, answer.verdict.name, report.tried.base):
                     axes.plot(
-                        span, [row, row], "|-", color=TURNED, lw=3.0, solid_capstyle="butt",
-                        ms=4.0, mew=1.2,
-                    )  # fmt: skip
+                        span,
+                        [row, row],
+                        "|-",
+                        color=TURNED,
+                        lw=3.0,
+                        solid_capstyle="butt",
+                        ms=4.0,
+                        mew=1.2,
+                    )
                 axes.annotate(
-                    escaping.figure(describe_turn(turn)), (side, row), (0, 3), fontsize=SMALL,
-                    textcoords="offset points", va="bottom", ha="right" if side > 0 else "left",
-                )  # fmt: skip
+                    escaping.figure(describe_turn(turn)),
+                    (side, row),
+                    (0, 3),
+                    fontsize=SMALL,
+                    textcoords="offset points",
+                    va="bottom",
+                    ha="right" if side > 0 else "left",
+                )
     axes.axvline(0.0, color="black", lw=0.8)
     words = [(c.name, f"{c.own:.3g} {c.unit}".rstrip()) for c in (row.choice for row in rows)]
     names = ["\n".join(map(escaping.figure, lines)) for lines in words]

@@ -35,10 +35,12 @@ class Doubted:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "status": self.status, "folder": str(self.folder),
+            "format": 1,
+            "status": self.status,
+            "folder": str(self.folder),
             "claims": [as_json(answer) for answer in self.answers],
             "missing": [str(part) for part in self.missing],
-        }  # fmt: skip
+        }
 
 
 def in_words(answer: DoubtAnswer) -> str:
@@ -71,9 +73,10 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
         writer.add(name, text.encode())
     writer.add_json("doubt.json", {"claims": [as_json(answer) for answer in report.answers]})
     for name, rows in {
-        "doubt.csv": table(report.answers), "turns.csv": _turns(report),
+        "doubt.csv": table(report.answers),
+        "turns.csv": _turns(report),
         "draws.csv": _draws(report),
-    }.items():  # fmt: skip
+    }.items():
         writer.add(name, csv_files.lines(rows).encode())
     pictures = _pictures(report, writer.extras) if figures else []
     for picture in pictures:
@@ -85,17 +88,38 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
 def table(answers: Sequence[DoubtAnswer]) -> Iterator[Sequence[Any]]:
     """A head, and a row a claim."""
     yield (
-        "claim", "verdict", "word", "word_for_neighbours", "kept", "turned", "unknown", "failed",
-        "moved", "acted", "silent", "nearest", "turns_at", "nearest_share",
-    )  # fmt: skip
+        "claim",
+        "verdict",
+        "word",
+        "word_for_neighbours",
+        "kept",
+        "turned",
+        "unknown",
+        "failed",
+        "moved",
+        "acted",
+        "silent",
+        "nearest",
+        "turns_at",
+        "nearest_share",
+    )
     for answer in answers:
         first = answer.turns[0] if answer.turns else None
         nearest = (first.choice.name, first.value, first.share) if first else ("", "", "")
         yield (
-            answer.verdict.name, answer.verdict.verdict, answer.word, answer.word_for_neighbours,
-            answer.kept, answer.turned, answer.unknown, answer.failed, answer.tried, answer.acted,
-            answer.silent, *nearest,
-        )  # fmt: skip
+            answer.verdict.name,
+            answer.verdict.verdict,
+            answer.word,
+            answer.word_for_neighbours,
+            answer.kept,
+            answer.turned,
+            answer.unknown,
+            answer.failed,
+            answer.tried,
+            answer.acted,
+            answer.silent,
+            *nearest,
+        )
 
 
 def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
@@ -103,17 +127,27 @@ def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
     for answer in report.answers:
         for turn in (*answer.turns, *answer.neighbours):
             yield (
-                answer.verdict.name, turn.choice.name, turn.choice.own, turn.value, turn.held,
-                turn.choice.unit, turn.distance, turn.share, turn.choice.task,
-            )  # fmt: skip
+                answer.verdict.name,
+                turn.choice.name,
+                turn.choice.own,
+                turn.value,
+                turn.held,
+                turn.choice.unit,
+                turn.distance,
+                turn.share,
+                turn.choice.task,
+            )
 
 
 def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
     names = [(claim, text) for claim, own in report.tried.base.numbers.items() for text in own]
     yield (
-        "draw", *(choice.name for choice in report.tried.draws.choices), *report.tried.base.answers,
-        *(f"{claim}: {text}" for claim, text in names), "failed",
-    )  # fmt: skip
+        "draw",
+        *(choice.name for choice in report.tried.draws.choices),
+        *report.tried.base.answers,
+        *(f"{claim}: {text}" for claim, text in names),
+        "failed",
+    )
     for i, world in enumerate(report.tried.worlds):
         answers = (world.answers.get(claim) for claim in report.tried.base.answers)
         numbers = (world.numbers.get(claim, {}).get(text, math.nan) for claim, text in names)
@@ -135,17 +169,26 @@ def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, 
         ]
         for answer in report.answers
     }
-    return environment("podusv_cli.doubt").get_template("doubt.html.j2").render(
-        title=f"What the verdicts of {report.scenario.name} hang on",
-        scenario=report.scenario, answers=report.answers, head=HEAD,
-        rows={answer.verdict.name: row(answer) for answer in report.answers},
-        place=place, in_words=in_words, pictures=by_claim, draws=len(report.tried.worlds),
-        moved=[
-            (c.name, value_text(c.own), _moves(c), c.task)
-            for c in (alone.choice for alone in report.tried.alone)
-        ],
-        provenance=[(key, value_text(value)) for key, value in flat(origin)],
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.doubt")
+        .get_template("doubt.html.j2")
+        .render(
+            title=f"What the verdicts of {report.scenario.name} hang on",
+            scenario=report.scenario,
+            answers=report.answers,
+            head=HEAD,
+            rows={answer.verdict.name: row(answer) for answer in report.answers},
+            place=place,
+            in_words=in_words,
+            pictures=by_claim,
+            draws=len(report.tried.worlds),
+            moved=[
+                (c.name, value_text(c.own), _moves(c), c.task)
+                for c in (alone.choice for alone in report.tried.alone)
+            ],
+            provenance=[(key, value_text(value)) for key, value in flat(origin)],
+        )
+    )
 
 
 def _moves(choice: Choice) -> str:

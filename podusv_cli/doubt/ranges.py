@@ -124,20 +124,18 @@ RANGES: dict[str, dict[str, Way]] = {
     "vessel": {"": _times(1.5, 1.1)},
     "nominal": {"": _times(1.5, 1.1)},
     "start": {
-        "m": _plus(_length, 5.0, 0.5), "rad": _plus(_radian, math.pi, 0.2),
-        "m/s": _plus(_speed, 1.0, 0.1), "rad/s": _plus(_turning, 1.0, 0.1),
+        "m": _plus(_length, 5.0, 0.5),
+        "rad": _plus(_radian, math.pi, 0.2),
+        "m/s": _plus(_speed, 1.0, 0.1),
+        "rad/s": _plus(_turning, 1.0, 0.1),
     },
-    "path": {
-        "m": _place, "rad": _plus(_radian, math.pi, 0.2), "": _times(2.0, 1.05),
-    },
-    "disturbance": {
-        "rad": _plus(_radian, math.pi, math.pi), "N": _load, "N m": _load, "": LOAD,
-    },
+    "path": {"m": _place, "rad": _plus(_radian, math.pi, 0.2), "": _times(2.0, 1.05)},
+    "disturbance": {"rad": _plus(_radian, math.pi, math.pi), "N": _load, "N m": _load, "": LOAD},
     "actuator": {"N": LIMIT, "N m": LIMIT, "": _times(2.0, 1.25)},
     "measurement": {"": _times(3.0, 1.25)},
     "estimator": {"": _times(3.0, 1.25)},
     "controller": {"": _times(3.0, 1.25)},
-}  # fmt: skip
+}
 
 
 def _whole(own: float) -> tuple[float, ...]:
@@ -151,5 +149,6 @@ TRIED: dict[str, Callable[[Any], tuple[Any, ...]]] = {
     "simulation.step": lambda own: (own / 2.0,),
     "simulation.duration": lambda own: (own / 2.0, own * 1.5),
     "control.period": lambda own: (own / 2.0, own * 2.0) if own else (SAMPLED,),
-    "vessel.coriolis": _whole, "nominal.coriolis": _whole,
-}  # fmt: skip
+    "vessel.coriolis": _whole,
+    "nominal.coriolis": _whole,
+}

@@ -22,9 +22,13 @@ BATCH = 10  # draws that a process makes before it tells
 
 
 def search(
-    claims: Mapping[str, Claim], moving: Sequence[Choice], judge: Judge, doubt: Doubt,
-    workers: int = 0, progress: Callable[[str, float], None] | None = None,
-) -> Tried:  # fmt: skip
+    claims: Mapping[str, Claim],
+    moving: Sequence[Choice],
+    judge: Judge,
+    doubt: Doubt,
+    workers: int = 0,
+    progress: Callable[[str, float], None] | None = None,
+) -> Tried:
     """Try every choice alone, and draw all at once; shorter after an interrupt.
 
     `judge` says what the claims answer in a world. `workers` is the number of processes, 0 for as

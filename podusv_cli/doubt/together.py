@@ -63,9 +63,11 @@ def _values(choice: Choice, shares: Vector) -> list[Any]:
 
 
 def explain_turns(
-    draws: Draws, turned: npt.NDArray[np.bool_], known: npt.NDArray[np.bool_],
+    draws: Draws,
+    turned: npt.NDArray[np.bool_],
+    known: npt.NDArray[np.bool_],
     acting: Mapping[str, bool],
-) -> list[Explained]:  # fmt: skip
+) -> list[Explained]:
     """The parts of choices in which more draws turn than chance has it, the clearest first.
 
     Of the draws in which the claim's answer is known. The band is that of the clearest of all

@@ -26,9 +26,14 @@ if TYPE_CHECKING:
 IN_A_LINE = 4
 # Vectors of the loop that a law by itself has, as the C file calls them
 VECTORS = {
-    "law": "(double *)constants", "law_table": "(double *)table", "s": "law->state", "row": "row",
-    "stages": "law->stages", "held": "law->held", "work": "law->work",
-}  # fmt: skip
+    "law": "(double *)constants",
+    "law_table": "(double *)table",
+    "s": "law->state",
+    "row": "row",
+    "stages": "law->stages",
+    "held": "law->held",
+    "work": "law->work",
+}
 ASSUMED = {
     "saturated": "the demand before, cut at {0} N and {1} N m, acts",
     "demand": "the demand before acts",
@@ -51,10 +56,13 @@ def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
 
     return Environment(
-        loader=PackageLoader("podusv_cli.export"), undefined=StrictUndefined,
+        loader=PackageLoader("podusv_cli.export"),
+        undefined=StrictUndefined,
         autoescape=lambda template: template is not None and ".xml" in template,
-        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
-    )  # fmt: skip
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
 
 
 def template_values(law: ExportedLaw) -> dict[str, Any]:
@@ -63,19 +71,30 @@ def template_values(law: ExportedLaw) -> dict[str, Any]:
     of_path = ("path", "path_table") if layout.shown else ()  # which shows the law another target
     shown = {name: f"(double *){name}" for name in of_path}
     return {
-        "label": law.loop.controller.label, "name": _comment(law.scenario.name),
-        "version": __version__, "period": f"{law.period:.15g}", "signals": law.signals,
-        "memory": law.memory, "layout": layout, "texts": _texts(law), "parts": list(PARTS.values()),
-        "step": STEP, "h": literal(law.grid.step), "every": layout.hold_every, "tau": layout.tau,
-        "demand": layout.demand, "assumed": _assumed_loads(law),
+        "label": law.loop.controller.label,
+        "name": _comment(law.scenario.name),
+        "version": __version__,
+        "period": f"{law.period:.15g}",
+        "signals": law.signals,
+        "memory": law.memory,
+        "layout": layout,
+        "texts": _texts(law),
+        "parts": list(PARTS.values()),
+        "step": STEP,
+        "h": literal(law.grid.step),
+        "every": layout.hold_every,
+        "tau": layout.tau,
+        "demand": layout.demand,
+        "assumed": _assumed_loads(law),
         "sizes": {name: len(getattr(vectors, name)) for name in ("stages", "held", "work")},
         "vectors": [VECTORS.get(name, shown.get(name, "&unused")) for name in vectors._fields],
         "arrays": {
-            "constants": _lines(vectors.law), "table": _lines(vectors.law_table),
+            "constants": _lines(vectors.law),
+            "table": _lines(vectors.law_table),
             "start": _lines(vectors.s),
             **{name: _lines(getattr(vectors, name)) for name in shown},
         },
-    }  # fmt: skip
+    }
 
 
 def literal(number: float) -> str:
@@ -106,12 +125,14 @@ def _texts(law: ExportedLaw) -> Mapping[str, str]:
     cut = any(map(math.isfinite, law.limits))
     assumed = ASSUMED["saturated" if cut else "demand"]
     return {
-        "state": _list(STATE_NUMBERS), "target": _list(TARGET_NUMBERS),
-        "loads": _list(LOAD_NUMBERS), "demand": _list(DEMAND_NUMBERS),
+        "state": _list(STATE_NUMBERS),
+        "target": _list(TARGET_NUMBERS),
+        "loads": _list(LOAD_NUMBERS),
+        "demand": _list(DEMAND_NUMBERS),
         "signals": f"What the law says beside: {_list(law.signals) or 'nothing'}",
         "memory": f"What it remembers: {_list(law.memory) or 'nothing'}",
         "assumed": assumed.format(*(f"{x:g}" for x in law.limits)),
-    }  # fmt: skip
+    }
 
 
 def _list(numbers: Sequence[ExportedNumber]) -> str:

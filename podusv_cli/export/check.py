@@ -183,9 +183,11 @@ def _fmu(path: Path, place: Path, about: About) -> Step:
     if not (place / "binaries" / this_machine()).is_dir():
         raise UsageError(f"{path} has no library for this machine")
     slave = FMU2Slave(
-        guid=description.guid, unzipDirectory=str(place),
-        modelIdentifier=description.coSimulation.modelIdentifier, instanceName="law",
-    )  # fmt: skip
+        guid=description.guid,
+        unzipDirectory=str(place),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="law",
+    )
     slave.instantiate()
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()

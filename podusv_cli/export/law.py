@@ -30,14 +30,20 @@ from podusv_cli.scenario.model import Scenario
 
 # What a part of the loop is called in the object file
 PARTS = {
-    "path": "podusv_target", "law": "podusv_law_rates", "sample": "podusv_law_sample",
+    "path": "podusv_target",
+    "law": "podusv_law_rates",
+    "sample": "podusv_law_sample",
     "after_saturation": "podusv_law_loads",
-}  # fmt: skip
+}
 STEP = "podusv_law_demand"
 PROTOTYPE = CFUNCTYPE(
-    None, *(signatures.PROTOTYPES[part] for part in PARTS),
-    signatures.WHOLE, signatures.NUMBER, POINTER(signatures.VECTOR), POINTER(signatures.WHOLE),
-)  # fmt: skip
+    None,
+    *(signatures.PROTOTYPES[part] for part in PARTS),
+    signatures.WHOLE,
+    signatures.NUMBER,
+    POINTER(signatures.VECTOR),
+    POINTER(signatures.WHOLE),
+)
 NOT_SAMPLED = (
     "the law acts continuously in this scenario, and a computer on a boat takes samples; set "
     "control.period to the time between two of them, as --set control.period=0.1 [s]"
@@ -68,10 +74,12 @@ DEMAND_NUMBERS = tuple(_LOGGED[name] for name in DEMAND)
 LOAD_NUMBERS = tuple(
     ExportedNumber(name, unit, f"{what} that acted since the sample before")
     for name, unit, what in zip(
-        ("tau_u", "tau_v", "tau_r"), ("N", "N", "N m"),
-        ("surge force", "sway force", "yaw moment"), strict=True,
+        ("tau_u", "tau_v", "tau_r"),
+        ("N", "N", "N m"),
+        ("surge force", "sway force", "yaw moment"),
+        strict=True,
     )
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,17 +109,24 @@ class ExportedLaw:
         first = len(TARGET) + 1
         end = first + signals + len(DEMAND) + len(LOAD_NUMBERS)
         layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
-            states=len(STATE) + memory, memory=len(STATE), place=len(STATE) + memory,
-            signals=first, demand=first + signals, tau=first + signals + len(DEMAND),
-            columns=end + len(plan.row["shown"]), shown=end if whole.shown else 0,
+            states=len(STATE) + memory,
+            memory=len(STATE),
+            place=len(STATE) + memory,
+            signals=first,
+            demand=first + signals,
+            tau=first + signals + len(DEMAND),
+            columns=end + len(plan.row["shown"]),
+            shown=end if whole.shown else 0,
             hold_every=whole.hold_every,
-            sample_every=whole.sample_every, update_first=whole.update_first,
+            sample_every=whole.sample_every,
+            update_first=whole.update_first,
             wants_loads=whole.wants_loads,
-        )  # fmt: skip
+        )
         vectors = plan.vectors()._replace(
             s=np.concatenate([np.zeros(len(STATE)), plan.first_memory]),
-            row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
-        )  # fmt: skip
+            row=np.zeros(layout.columns),
+            stages=np.zeros(5 * layout.states),
+        )
         return cls(scenario, plan, layout, vectors)
 
     @property
@@ -189,14 +204,20 @@ class ExportedLaw:
     def as_json(self, platforms: Sequence[str], library: Sequence[str]) -> dict[str, Any]:
         """What law.json says; `library` are functions that the law calls of another library."""
         about = {
-            "inputs": (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS), "demand": DEMAND_NUMBERS,
-            "signals": self.signals, "memory": self.memory,
-        }  # fmt: skip
+            "inputs": (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS),
+            "demand": DEMAND_NUMBERS,
+            "signals": self.signals,
+            "memory": self.memory,
+        }
         return {
-            "format": 1, "law": self.loop.controller.label, "scenario": self.scenario.name,
-            "period": self.period, "platforms": list(platforms), "library": list(library),
+            "format": 1,
+            "law": self.loop.controller.label,
+            "scenario": self.scenario.name,
+            "period": self.period,
+            "platforms": list(platforms),
+            "library": list(library),
             **{name: [number._asdict() for number in numbers] for name, numbers in about.items()},
-        }  # fmt: skip
+        }
 
     def samples(self, log: Recording) -> Vector:
         """A row for each sample of a run: time, inputs, demand, signals, memory.

@@ -23,11 +23,20 @@ FOREIGN = re.compile(r"(?<![\w.])(?:0[xobXOB]\w+|[0-9.]*[0-9](?:\.?[eE][+-]?[0-9
 # The functions of each language, by the section of a scenario that it is for.
 FUNCTIONS = {
     "claims": (
-        "max", "min", "mean", "final", "variation", "integral", "rms_above", "decay", "abs",
-        "hypot", "rate",
+        "max",
+        "min",
+        "mean",
+        "final",
+        "variation",
+        "integral",
+        "rms_above",
+        "decay",
+        "abs",
+        "hypot",
+        "rate",
     ),
     "sweep.claims": ("share", "failures", "quantile", "median"),
-}  # fmt: skip
+}
 
 
 class ExpressionError(ValueError):

@@ -26,11 +26,14 @@ HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in column
 
 
 @figure(
-    "controls", place=3, signals=("tau_u", "tau_r"), source="the paper's figures 5 to 7",
+    "controls",
+    place=3,
+    signals=("tau_u", "tau_r"),
+    source="the paper's figures 5 to 7",
     caption="surge force and yaw moment: what acts on the hull, with the actuator's limits, and in "
     "panels of their own what the law demands where the actuator limits it; the first moments, the "
     "whole run, the settled part" + PEAKS,
-)  # fmt: skip
+)
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
     """Surge force and yaw moment on the hull, and what the law demands where this differs."""
     spans = _spans(runs)

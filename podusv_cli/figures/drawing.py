@@ -72,9 +72,14 @@ def draw(
 
 
 def draw_in_parallel(
-    runs: Sequence[Shown], sheets: Iterable[Sheet], formats: Sequence[str], extras: Extras,
-    look: Look = SCREEN, progress: Progress = lambda fraction: None, workers: int = 0,
-) -> dict[str, bytes]:  # fmt: skip
+    runs: Sequence[Shown],
+    sheets: Iterable[Sheet],
+    formats: Sequence[str],
+    extras: Extras,
+    look: Look = SCREEN,
+    progress: Progress = lambda fraction: None,
+    workers: int = 0,
+) -> dict[str, bytes]:
     """The same as `draw`, in processes of their own, each of which draws several figures.
 
     A figure that fails is missing among the `extras`. `progress` is called with the fraction of

@@ -30,12 +30,14 @@ OUTAGE: dict[str, Any] = {"color": "#444444", "alpha": 0.15, "linewidth": 0.0, "
 
 
 @figure(
-    "estimates", place=8, signals=tuple(f"{state.name}_est" for state in STATE),
+    "estimates",
+    place=8,
+    signals=tuple(f"{state.name}_est" for state in STATE),
     caption="what the law is given in place of the true state: dots what the sensors deliver, "
     "curves the estimate; of a run alone both beside the truth, broad and pale, and how far they "
     "are from it; of several runs how far, each in its own column on common axes; shaded, the "
     "outages of the sensor",
-)  # fmt: skip
+)
 def estimates(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each quantity of the state: values and errors of one run, errors of several."""
     having = [run for run in runs if run.has("x_est")]
@@ -71,8 +73,9 @@ def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
         for place, state in enumerate(STATE):
             axes = figure.add_subplot(
                 cells[block * len(STATE) + place, column],
-                sharex=first.get(0), sharey=first.get(place),
-            )  # fmt: skip
+                sharex=first.get(0),
+                sharey=first.get(place),
+            )
             first.setdefault(place, axes)
             _draw(axes, run, state.name, fitted=run in fitted, error=True)
             _shade([axes], [run], place)

@@ -107,9 +107,14 @@ class Page(Figure):
         taken = (-(-len(names) // count) * ROW * size + GAP) * POINT
         edge = EDGE / self.get_figheight()
         self.legend(
-            handles, names, ncols=count, loc="lower center" if below else "upper center",
-            bbox_to_anchor=(0.5, edge if below else 1.0 - edge), borderaxespad=0.0, borderpad=0.0,
-        )  # fmt: skip
+            handles,
+            names,
+            ncols=count,
+            loc="lower center" if below else "upper center",
+            bbox_to_anchor=(0.5, edge if below else 1.0 - edge),
+            borderaxespad=0.0,
+            borderpad=0.0,
+        )
         self.keys.append((handles, names, below))
         self.foot, self.head = (taken, self.head) if below else (self.foot, taken)
 
@@ -141,8 +146,10 @@ class Page(Figure):
             high = tops[row.start], bottoms[row.stop - 1]
             axes.set_position((0.1, 1.0 - high[1] / height, 0.8, (high[1] - high[0]) / height))
         beside = [_numbers(axes, MOST * width) for axes in panels]
-        labels = [max(n, SIDE) + _lines(axes.yaxis.label, axes.get_ylabel())
-                  for axes, n in zip(panels, beside, strict=True)]  # fmt: skip
+        labels = [
+            max(n, SIDE) + _lines(axes.yaxis.label, axes.get_ylabel())
+            for axes, n in zip(panels, beside, strict=True)
+        ]
         left, right = _most(columns, labels, [SIDE] * len(panels), grid.ncols)
         starts, ends = _spread(
             width, np.asarray(grid.get_width_ratios()), (EDGE, EDGE), left, right
@@ -170,9 +177,12 @@ def _most(
 
 
 def _spread(
-    size: float, ratios: Vector, edges: tuple[float, float], before: Sequence[float],
+    size: float,
+    ratios: Vector,
+    edges: tuple[float, float],
+    before: Sequence[float],
     after: Sequence[float],
-) -> tuple[Vector, Vector]:  # fmt: skip
+) -> tuple[Vector, Vector]:
     """Where rows or columns of these ratios begin and end [inches]."""
     free = max(size - sum(edges) - sum(before) - sum(after), 0.2 * size)
     own = free * ratios / np.sum(ratios)
@@ -277,8 +287,11 @@ class Panel(Axes):
     def _init_axis(self) -> None:  # where matplotlib has projections give their axes
         self.xaxis, self.yaxis = Across(self, clear=False), Up(self, clear=False)
         for place, axis in (
-            ("bottom", self.xaxis), ("top", self.xaxis), ("left", self.yaxis), ("right", self.yaxis)
-        ):  # fmt: skip
+            ("bottom", self.xaxis),
+            ("top", self.xaxis),
+            ("left", self.yaxis),
+            ("right", self.yaxis),
+        ):
             self.spines[place].register_axis(axis)
 
 
@@ -401,5 +414,6 @@ class PlainPowers(_PlainTicks, LogFormatterSciNotation):
 
 
 PLAIN: dict[type, type[Formatter]] = {
-    ScalarFormatter: PlainNumbers, LogFormatterSciNotation: PlainPowers,
-}  # fmt: skip
+    ScalarFormatter: PlainNumbers,
+    LogFormatterSciNotation: PlainPowers,
+}

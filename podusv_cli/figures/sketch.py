@@ -59,9 +59,7 @@ def render_sketches(
 
 def _images(sketch: Sketch, tell: Callable[[float], None]) -> tuple[bytes, bytes]:
     """The figure as a PNG, and as one for a phone where its panels fit there."""
-    with (
-        interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
-    ):  # fmt: skip
+    with interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         figure = sketch.draw()
         whole = image(figure, "png")

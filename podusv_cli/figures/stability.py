@@ -26,10 +26,17 @@ from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
 FAR = 100.0  # a bound this many times above all of V is left out of the picture and told in words
 LAYERS = {
-    "z_e": "#0072B2", r"\psi_e": "#56B4E9", "u_e": "#D55E00", "r_e": "#E69F00", "y_u": "#009E73",
-    "y_r": "#8FD1BA", r"\tilde W_u": "#CC79A7", r"\tilde W_r": "#E6B8D2", r"\tilde b_u": "#555555",
+    "z_e": "#0072B2",
+    r"\psi_e": "#56B4E9",
+    "u_e": "#D55E00",
+    "r_e": "#E69F00",
+    "y_u": "#009E73",
+    "y_r": "#8FD1BA",
+    r"\tilde W_u": "#CC79A7",
+    r"\tilde W_r": "#E6B8D2",
+    r"\tilde b_u": "#555555",
     r"\tilde b_r": "#AAAAAA",
-}  # fmt: skip
+}
 SUM = "SI"  # V adds numbers of different units, as (46) has it
 MIXED = f"${V.symbol}$ [{SUM}]"
 THIN = 0.6  # points: bounds, each in its run's line style
@@ -38,11 +45,13 @@ SIDE_TICKS = 4  # at most, on either side of 0
 
 
 @figure(
-    "stability", place=8, signals=("V",),
+    "stability",
+    place=8,
+    signals=("V",),
     caption="Lyapunov function (46): its value with the ultimate bound, its rate with what (49) "
     "says it stays below, and its terms as parts of it, stacked; of a single run the value is "
     "stacked, too; the terms have different units, and (46) adds their numbers in SI units",
-)  # fmt: skip
+)
 def stability(runs: Sequence[Shown], columns: int) -> Figure:
     """V with its ultimate bound, V' with what it should stay below, and V's terms, run by run.
 

@@ -26,8 +26,8 @@ NEXT = ("x_e", "y_e")  # which follow from the log
 def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
     """The scalar signals that a run has, with meaning, symbol, unit and scale; {} where is none.
 
-    Every curve is over the whole run, thinned by `thin_trace` and encoded by `encode_trace`; null where a
-    run lacks the signal. `first` is how many signals readers look at first.
+    Every curve is over the whole run, thinned by `thin_trace` and encoded by `encode_trace`; null
+    where a run lacks the signal. `first` is how many signals readers look at first.
     """
     runs = [run for run in runs if len(run.recording["time"])]
     shown = names or _scalar(runs)[: max(MOST, CURVES // max(1, len(runs)))]
@@ -46,12 +46,13 @@ def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
                 "counts": run.counts_to,
                 "whole": run.whole,
                 "curves": [
-                    encode_trace(*thin_trace(run.signal(name))) if run.has(name) else None for name in shown
+                    encode_trace(*thin_trace(run.signal(name))) if run.has(name) else None
+                    for name in shown
                 ],
             }
             for run in runs
         ],
-    }  # fmt: skip
+    }
 
 
 def _scalar(runs: Sequence[Shown]) -> list[str]:
@@ -64,9 +65,11 @@ def _scalar(runs: Sequence[Shown]) -> list[str]:
 def _describe_signal(runs: Sequence[Shown], name: str) -> dict[str, Any]:
     signal = about(runs, name)
     return {
-        "name": name, "meaning": NUMBERED.sub("", signal.meaning), "unit": raise_powers_markup(signal.unit),
+        "name": name,
+        "meaning": NUMBERED.sub("", signal.meaning),
+        "unit": raise_powers_markup(signal.unit),
         "symbol": letters_of_symbol(signal.symbol),
-    } | _scale([run for run in runs if run.has(name)], name)  # fmt: skip
+    } | _scale([run for run in runs if run.has(name)], name)
 
 
 def _scale(runs: Sequence[Shown], name: str) -> dict[str, Any]:

@@ -68,14 +68,17 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 
 
 @figure(
-    "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
+    "trajectory",
+    place=1,
+    signals=("x", "y"),
+    source="the paper's figure 3",
     caption="tracks and target or path, on a map, with hulls enlarged where its title says so, and "
     "close up, with hulls to scale: on a path where a run is farthest from the path once it has "
     "come to a leg, else at the end and, where runs were farther apart before, at their largest "
     "gap; curves are the distance of each run from the path, of a run alone from the target, else "
     "from the first run at the same time; of tracks that coincide, the first is the broadest; x "
     "marks where a run ended early",
-)  # fmt: skip
+)
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
     east, north = bounds(runs)
@@ -112,9 +115,11 @@ def _sheet(
         figure = new_figure(columns, HIGH_MAP + 0.9)
         rest = (WIDTHS[columns] - width - 0.6) / asides
         cells = figure.add_gridspec(
-            1 + distances, 1 + asides, width_ratios=(width, *[rest] * asides),
+            1 + distances,
+            1 + asides,
+            width_ratios=(width, *[rest] * asides),
             height_ratios=(1.5, 1.0)[: 1 + distances],
-        )  # fmt: skip
+        )
         places = [cells[:, 0], *(cells[0, 1 + place] for place in range(asides))]
         last = cells[1, 1:] if distances else None
     else:
@@ -123,9 +128,11 @@ def _sheet(
         rows = [height, 1.6, 1.1] if distances and not beside else [height, 1.6]
         figure = new_figure(columns, sum(rows) + 0.6 * len(rows))
         cells = figure.add_gridspec(
-            len(rows), asides + beside, height_ratios=rows,
+            len(rows),
+            asides + beside,
+            height_ratios=rows,
             width_ratios=[1.0] * asides + [2.0] * beside,
-        )  # fmt: skip
+        )
         places = [cells[0, :], *(cells[1, place] for place in range(asides))]
         last = (cells[1, asides] if beside else cells[2, :]) if distances else None
     whole, *others = (figure.add_subplot(place) for place in places)

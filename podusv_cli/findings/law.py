@@ -75,18 +75,23 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
 def _stiff(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
-        f"stiff-{cause}", about="simulation.step", meaning=f"{what} too fast for RK4's step",
-        condition=f"RK4 makes {loop} grow", remedy=f"take a shorter step, or smaller {gains}",
-    )(partial(_too_fast, cause=cause))  # fmt: skip
+        f"stiff-{cause}",
+        about="simulation.step",
+        meaning=f"{what} too fast for RK4's step",
+        condition=f"RK4 makes {loop} grow",
+        remedy=f"take a shorter step, or smaller {gains}",
+    )(partial(_too_fast, cause=cause))
 
 
 def _sampling_finding(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
-        f"sampled-{cause}", about="control.period", meaning=f"{what} too fast for the period",
+        f"sampled-{cause}",
+        about="control.period",
+        meaning=f"{what} too fast for the period",
         condition=f"{loop} grows over one period",
         remedy=f"take a shorter period, or smaller {gains}",
-    )(partial(_sampled_too_fast, cause=cause))  # fmt: skip
+    )(partial(_sampled_too_fast, cause=cause))
 
 
 stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
@@ -104,11 +109,13 @@ def _margin(case: Case) -> float:
 
 
 @warn_before_run(
-    "delayed-loop", about="actuator.command", meaning="a velocity loop too fast for the delay",
+    "delayed-loop",
+    about="actuator.command",
+    meaning="a velocity loop too fast for the delay",
     condition="the delay exceeds the delay margin of both demands (podusv margins); without a "
     "steady motion, a velocity loop that is stable without the delay grows with it",
     remedy="take a shorter delay, or smaller gains",
-)  # fmt: skip
+)
 def delayed_loop(case: Case) -> Sentences:
     """The delay of the actuator's command makes the law's loop unstable.
 
@@ -135,10 +142,12 @@ def delayed_loop(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "stiff-start", about="simulation.step", meaning="start error makes the bound too stiff",
+    "stiff-start",
+    about="simulation.step",
+    meaning="start error makes the bound too stiff",
     condition="RK4 makes the error, marched from t = 0 with its bound, grow",
     remedy="take a shorter step, a smaller bound gain, or a start nearer to the target's velocity",
-)  # fmt: skip
+)
 def stiff_start(case: Case) -> Sentences:
     """The start error drives the estimated bound so high that RK4 becomes unstable.
 

@@ -20,11 +20,13 @@ SPREAD = 2  # harmonics to either side of a line that Hann's window and a broken
 
 
 @warn_after_run(
-    "limit-cycle", about="controller", meaning="the vessel swings about its target for ever",
+    "limit-cycle",
+    about="controller",
+    meaning="the vessel swings about its target for ever",
     condition=f"{PERIODS} periods or more of a swing above {VISIBLE:.0%} of a hull length in the "
     "steady window, which neither dies away nor follows a load or the target",
     remedy="take smaller gains; see whether a delay, a limit or the hull's sway drives it",
-)  # fmt: skip
+)
 def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     """The distance along or across the target's course swings at one frequency, and goes on."""
     late = steady_rows(scenario, log)

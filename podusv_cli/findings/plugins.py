@@ -12,11 +12,12 @@ from podusv_cli.scenario.case import Case
 
 
 @warn_before_run(
-    "unkept-module", about="plugins",
+    "unkept-module",
+    about="plugins",
     meaning="a plug-in file imports a module that the run folder does not keep",
     condition="an imported module lies in the folder of the plug-in's file, or below it",
     remedy="write what is imported into the plug-in's file, or install it as a package",
-)  # fmt: skip
+)
 def unkept_module(case: Case) -> Sentences:
     """A module beside a plug-in's file, which `rerun` and others who get the folder lack."""
     for plugin in case.scenario.plugged:

@@ -44,9 +44,12 @@ RANGES = (
 
 
 @warn_before_run(
-    "other-unit", about="vessel", meaning="a value fits the others in another unit only",
-    condition=RANGES, remedy="give the value in podusv's unit",
-)  # fmt: skip
+    "other-unit",
+    about="vessel",
+    meaning="a value fits the others in another unit only",
+    condition=RANGES,
+    remedy="give the value in podusv's unit",
+)
 def other_unit(case: Case) -> Sentences:
     """Ratios of values of hull, sensors, path and start that no boat has."""
     scenario = case.scenario

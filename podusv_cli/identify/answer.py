@@ -79,9 +79,10 @@ class DampingAxis:
 
 
 AXES = (
-    DampingAxis("X(u)", "N", "u", "m/s", surge_force), DampingAxis("Y(v)", "N", "v", "m/s", sway_force),
+    DampingAxis("X(u)", "N", "u", "m/s", surge_force),
+    DampingAxis("Y(v)", "N", "v", "m/s", sway_force),
     DampingAxis("N(r)", "N m", "r", "rad/s", yaw_moment),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)
@@ -150,10 +151,11 @@ class Identification:
         speed = np.quantile(np.hypot(u, v), OUTERMOST)
         drift = np.where(np.hypot(u, v) > 0.1 * speed, np.arctan2(np.abs(v), np.abs(u)), 0.0)
         return Envelope(
-            source="the logs", speed=float(max(speed, 1e-6)),
+            source="the logs",
+            speed=float(max(speed, 1e-6)),
             drift=float(max(np.quantile(drift, OUTERMOST), 1e-3)),
             yaw_rate=float(max(np.quantile(np.abs(r), OUTERMOST), 1e-6)),
-        )  # fmt: skip
+        )
 
     @cached_property
     def parameters(self) -> list[Parameter]:

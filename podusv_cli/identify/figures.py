@@ -64,9 +64,11 @@ def free_run(run: FreeRun) -> Figure:
         colour = nth_style(i)[0]
         near = np.max(np.abs(pose[:, :2] - middle_of_track), axis=1) <= reach
         track.plot(
-            np.where(near, pose[:, 1], np.nan), np.where(near, pose[:, 0], np.nan),
-            color=colour, label=escaping.figure(who),
-        )  # fmt: skip
+            np.where(near, pose[:, 1], np.nan),
+            np.where(near, pose[:, 0], np.nan),
+            color=colour,
+            label=escaping.figure(who),
+        )
         heading.plot(since, np.degrees(pose[:, 2]), color=colour)
     middle, side = np.degrees(np.median(psi)), np.degrees(np.ptp(psi))
     heading.set_ylim(middle - side - 10.0, middle + side + 10.0)

@@ -103,8 +103,9 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
     track = problem.follow(cut, points, currents).track[first:]
     measured = np.where(
         log.record.rows[first:, DELIVERED : DELIVERED + 3] != 0.0,
-        log.record.rows[first:, VALUES : VALUES + 3], np.nan,
-    )  # fmt: skip
+        log.record.rows[first:, VALUES : VALUES + 3],
+        np.nan,
+    )
     times = log.times[first:]
     drift = (times - times[0])[:, None] * np.array([*currents[0], 0.0])
     still = _turning(times, track[0, :, 0]) + drift

@@ -33,11 +33,18 @@ DIGITS = "%.9g"
 AXIS = {axis.name: axis for axis in AXES}
 # Units of numbers that neither vessel nor filter has as a key.
 OTHERS = {
-    "m11": "kg", "m22": "kg", "m33": "kg m2", THRUST: "1", DELAY: "s",
+    "m11": "kg",
+    "m22": "kg",
+    "m33": "kg m2",
+    THRUST: "1",
+    DELAY: "s",
     **dict.fromkeys(CURRENT, "m/s"),
-    "first u": "m/s", "first v": "m/s", "first load_x": "N", "first load_y": "N",
+    "first u": "m/s",
+    "first v": "m/s",
+    "first load_x": "N",
+    "first load_y": "N",
     "first load_psi": "N m",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -53,15 +60,19 @@ class Identified:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "status": self.status, "folder": str(self.folder),
+            "format": 1,
+            "status": self.status,
+            "folder": str(self.folder),
             "settled": self.answer.estimate.settled,
-            "known": self.answer.directions.determined_count, "of": len(self.answer.problem.hull),
+            "known": self.answer.directions.determined_count,
+            "of": len(self.answer.problem.hull),
             "parameters": [asdict(p) for p in self.answer.parameters],
             "forces": [asdict(f) for f in self.answer.forces],
             "scores": [asdict(s) for s in self.answer.scores],
-            "open": open_words(self.answer), "warnings": list(self.warnings),
+            "open": open_words(self.answer),
+            "warnings": list(self.warnings),
             "missing": [str(part) for part in self.missing],
-        }  # fmt: skip
+        }
 
 
 def write(
@@ -123,18 +134,26 @@ def force_record(force: Force) -> dict[str, Any]:
     """A force as forces.csv has it: with the units of it and of the speed at which it is."""
     axis = AXIS[force.force]
     return {
-        "force": force.force, "unit": axis.unit, "at": force.at, "unit of at": axis.speed_unit,
-        **asdict(force), "width": force.width,
-    }  # fmt: skip
+        "force": force.force,
+        "unit": axis.unit,
+        "at": force.at,
+        "unit of at": axis.speed_unit,
+        **asdict(force),
+        "width": force.width,
+    }
 
 
 def score_record(score: Score) -> dict[str, Any]:
     """Errors as judged.csv has them, the heading's in degrees as on the page."""
     return {
-        "log": score.log, "role": score.role, "horizon [s]": score.horizon, "who": score.who,
-        "runs": score.runs, "position [m]": score.position,
+        "log": score.log,
+        "role": score.role,
+        "horizon [s]": score.horizon,
+        "who": score.who,
+        "runs": score.runs,
+        "position [m]": score.position,
         "heading [deg]": math.degrees(score.heading),
-    }  # fmt: skip
+    }
 
 
 def parameter_rows(answer: Identification) -> Iterator[list[str]]:
@@ -142,9 +161,14 @@ def parameter_rows(answer: Identification) -> Iterator[list[str]]:
     for p in answer.parameters:
         determined = "yes" if p.width <= OPEN else "little" if p.width < SILENT else "no"
         yield [
-            p.name, unit(answer, p.name), f"{p.prior:.4g}", f"{p.value:.4g}",
-            f"{p.low:.4g} to {p.high:.4g}", f"{p.width:.2g}", determined,
-        ]  # fmt: skip
+            p.name,
+            unit(answer, p.name),
+            f"{p.prior:.4g}",
+            f"{p.value:.4g}",
+            f"{p.low:.4g} to {p.high:.4g}",
+            f"{p.width:.2g}",
+            determined,
+        ]
 
 
 def force_rows(answer: Identification) -> Iterator[list[str]]:
@@ -152,9 +176,13 @@ def force_rows(answer: Identification) -> Iterator[list[str]]:
     for f in answer.forces:
         axis = AXIS[f.force]
         yield [
-            f.force, f"{f.at:.3g} {axis.speed_unit}", f"{f.value:.4g} {axis.unit}",
-            f"{f.low:.4g} to {f.high:.4g}", f"{f.width:.2g}", "yes" if f.width <= OPEN else "no",
-        ]  # fmt: skip
+            f.force,
+            f"{f.at:.3g} {axis.speed_unit}",
+            f"{f.value:.4g} {axis.unit}",
+            f"{f.low:.4g} to {f.high:.4g}",
+            f"{f.width:.2g}",
+            "yes" if f.width <= OPEN else "no",
+        ]
 
 
 def score_rows(scores: Sequence[Score]) -> Iterator[list[str]]:
@@ -187,13 +215,24 @@ def page(
 ) -> str:
     """The page."""
     scenario = answer.problem.scenario
-    return environment("podusv_cli.identify").get_template("identify.html.j2").render(
-        title=f"The hull of {scenario.name} from its logs",
-        scenario=scenario, summary=summary(answer), open=open_words(answer), warnings=warnings,
-        parameters=(PARAMETERS, [*parameter_rows(answer)]), forces=(FORCES, [*force_rows(answer)]),
-        scores=(SCORES, [*score_rows(answer.scores)]), whiteness=answer.whiteness,
-        widths=[f"{width:.2g}" for width in answer.directions.widths],
-        known=answer.directions.determined_count, least=OPEN, little=SILENT,
-        pictures=list(enumerate(pictures, 1)),
-        provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.identify")
+        .get_template("identify.html.j2")
+        .render(
+            title=f"The hull of {scenario.name} from its logs",
+            scenario=scenario,
+            summary=summary(answer),
+            open=open_words(answer),
+            warnings=warnings,
+            parameters=(PARAMETERS, [*parameter_rows(answer)]),
+            forces=(FORCES, [*force_rows(answer)]),
+            scores=(SCORES, [*score_rows(answer.scores)]),
+            whiteness=answer.whiteness,
+            widths=[f"{width:.2g}" for width in answer.directions.widths],
+            known=answer.directions.determined_count,
+            least=OPEN,
+            little=SILENT,
+            pictures=list(enumerate(pictures, 1)),
+            provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
+        )
+    )

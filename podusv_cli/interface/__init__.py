@@ -26,7 +26,27 @@ tune, bench = with_short_traceback(studies.tune), with_short_traceback(studies.b
 doubt, identify = with_short_traceback(functions.doubt), with_short_traceback(functions.identify)
 
 __all__ = [
-    "Bench", "Comparison", "IdentifiedHull", "PodusvError", "Run", "Scenario", "Study", "Tuning",
-    "bench", "compare", "doubt", "identify", "load", "open_run", "open_session", "open_study",
-    "optimum", "run", "simulate", "simulate_many", "sweep", "tune", "verify",
-]  # fmt: skip
+    "Bench",
+    "Comparison",
+    "IdentifiedHull",
+    "PodusvError",
+    "Run",
+    "Scenario",
+    "Study",
+    "Tuning",
+    "bench",
+    "compare",
+    "doubt",
+    "identify",
+    "load",
+    "open_run",
+    "open_session",
+    "open_study",
+    "optimum",
+    "run",
+    "simulate",
+    "simulate_many",
+    "sweep",
+    "tune",
+    "verify",
+]

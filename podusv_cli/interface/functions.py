@@ -74,9 +74,13 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
 
 
 def run(
-    source: Source, changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
-) -> Run:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
+) -> Run:
     """Simulate a scenario into a run folder, as `podusv run` does it.
 
     `out` is the folder, by default `results/<name>/<time>-<digest>`; a finished one is replaced
@@ -110,10 +114,14 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
 
 
 def compare(
-    sources: Source | Run | Iterable[Source | Run], changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+    sources: Source | Run | Iterable[Source | Run],
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
     align: Literal["", "start", "place"] = "",
-) -> Comparison:  # fmt: skip
+) -> Comparison:
     """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
 
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
@@ -145,10 +153,15 @@ def compare(
 
 
 def optimum(
-    source: Source, changes: Changes | None = None, *, minimise: Literal["iae", "ise"] = "iae",
-    step: float = 0.1, out: str | os.PathLike[str] | None = None, force: bool = False,
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    minimise: Literal["iae", "ise"] = "iae",
+    step: float = 0.1,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
     figures: bool = True,
-) -> Run:  # fmt: skip
+) -> Run:
     """The motion of least error, found with everything known beforehand, repeated as a run.
 
     `step` [s] is that of the finest of three grids. Needs CasADi (podusv[optimum]). Raises
@@ -170,9 +183,12 @@ def optimum(
 
 
 def simulate_many(
-    source: Source, parameters: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *,
-    workers: int = 0, side_by_side: bool | None = None,
-) -> pd.DataFrame:  # fmt: skip
+    source: Source,
+    parameters: Mapping[str, Sequence[Any] | npt.NDArray[Any]],
+    *,
+    workers: int = 0,
+    side_by_side: bool | None = None,
+) -> pd.DataFrame:
     """Simulate a scenario once for each entry of the parameters; a row a run.
 
     `parameters` are dotted keys of numbers or words, each with one value a run; `vessel.m` changes
@@ -246,10 +262,14 @@ def verify(
 
 
 def doubt(
-    source: Source, changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
     workers: int = 0,
-) -> pd.DataFrame:  # fmt: skip
+) -> pd.DataFrame:
     """What the verdicts on a scenario's claims hang on, as `podusv doubt` finds it.
 
     A row a claim: `verdict`, the `word` for what it hangs on, how many draws `kept` or `turned` it,
@@ -270,9 +290,13 @@ def doubt(
 
 
 def identify(
-    source: Source, changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
-) -> IdentifiedHull:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
+) -> IdentifiedHull:
     """The hull of a boat from the logs that a scenario names, as `podusv identify` finds it.
 
     Raises UsageError without logs and for logs that cannot be used, ScenarioError, StorageError.

@@ -89,9 +89,15 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium's own class
 
     def __init__(
-        self, source: Source, changes: Changes | None = None, *, period: float | None = None,
-        reward: Reward = "iae", observe: Observe | None = None, limits: Limits | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        source: Source,
+        changes: Changes | None = None,
+        *,
+        period: float | None = None,
+        reward: Reward = "iae",
+        observe: Observe | None = None,
+        limits: Limits | None = None,
+    ) -> None:
         """No episode has begun."""
         terms = Terms(period, reward, observe, limits)
         self._task = task = EpisodeTask(source, changes, terms)
@@ -112,9 +118,7 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         return self._session
 
     @with_short_traceback
-    def reset(
-        self, *, seed: int | None = None, options: Info | None = None
-    ) -> tuple[Vector, Info]:  # fmt: skip
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
         """Begin a run; see the class. `options` change nothing."""
         seed = None if seed is None else self._task.seed(seed)
         super().reset(seed=seed)
@@ -164,10 +168,16 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
-        self, source: Source, changes: Changes | None = None, *, count: int = LANES,
-        period: float | None = None, reward: Reward = "iae", observe: Observe | None = None,
+        self,
+        source: Source,
+        changes: Changes | None = None,
+        *,
+        count: int = LANES,
+        period: float | None = None,
+        reward: Reward = "iae",
+        observe: Observe | None = None,
         limits: Limits | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """No episode has begun."""
         if whole(changes) >= 0:
             raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")

@@ -220,7 +220,7 @@ class EpisodeTask:
 
 def _finite(
     given: Any, shape: tuple[int, ...], whose: str, time: Any, idle: Flags | bool = False
-) -> Vector:  # fmt: skip
+) -> Vector:
     """Numbers of a user's function in this shape, also where they are the same for all runs.
 
     Those of `idle` runs may be none, and are 0 then.

@@ -115,8 +115,8 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
         check_law(plan)
         if plan.structure != first.structure:
             raise ParameterError(
-                f"row {row}: {_describe_columns(words, own)} changes how the loop is put together, and row 0 "
-                f"has {_describe_columns(words, rows[0][1])}; make a batch for each"
+                f"row {row}: {_describe_columns(words, own)} changes how the loop is put together, "
+                f"and row 0 has {_describe_columns(words, rows[0][1])}; make a batch for each"
             )
 
 

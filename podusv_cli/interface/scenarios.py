@@ -52,9 +52,7 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
     return load_scenario({**(sections or {}), **more}).scenario
 
 
-def load(
-    source: Source, changes: Changes | None = None, *, trust: bool = False
-) -> model.Scenario:  # fmt: skip
+def load(source: Source, changes: Changes | None = None, *, trust: bool = False) -> model.Scenario:
     """The scenario of a file, a dictionary or another scenario, with some values changed.
 
     `source` may name a scenario of podusv (`podusv:mu_2017/corrected.yaml`). `changes` are what
@@ -77,9 +75,13 @@ CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 
 def load_scenario(
-    source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS,
-    *, silent: bool = False, trust: bool = False,
-) -> Loaded:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    checks: Sequence[Check] = CHECKS,
+    *,
+    silent: bool = False,
+    trust: bool = False,
+) -> Loaded:
     """A scenario with its text and the origin of each value, see `load`. Raises ScenarioError.
 
     Unless it is `silent`, a UserWarning names values that a section loses with its kind.
@@ -123,8 +125,10 @@ def _(
 @_load_source.register
 def _(
     source: Mapping,  # type: ignore[type-arg]
-    overrides: list[str], checks: Sequence[Check], plugged: Plugged,
-) -> Loaded:  # fmt: skip
+    overrides: list[str],
+    checks: Sequence[Check],
+    plugged: Plugged,
+) -> Loaded:
     text = yaml_text(_plain(source))
     return load_text(text, IN_PYTHON, overrides, checks, plugged=plugged, placed=False)
 

@@ -211,9 +211,12 @@ class Session:
 
     @with_short_traceback
     def close(
-        self, out: str | os.PathLike[str] | None = None, *, force: bool = False,
+        self,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        force: bool = False,
         figures: bool = True,
-    ) -> Run:  # fmt: skip
+    ) -> Run:
         """Write the run as far as it went into a folder, as `podusv run` does it.
 
         The scenario in it has the demands as a law `schedule`, so `podusv rerun` repeats it. Raises

@@ -131,9 +131,14 @@ def _metric(runs: Any, name: str, law: str) -> Any:
 
 
 def sweep(
-    source: Source, changes: Changes | None = None, *, out: Place | None = None, workers: int = 0,
-    figures: bool = True, trust: bool = False,
-) -> Study:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: Place | None = None,
+    workers: int = 0,
+    figures: bool = True,
+    trust: bool = False,
+) -> Study:
     """Simulate all draws of a scenario with the key `sweep`, as `podusv sweep run` does it.
 
     `source` may be the folder of a study, which is continued; `trust` executes the plug-in files in
@@ -202,9 +207,14 @@ class Tuning(Folder):
 
 
 def tune(
-    source: Source, changes: Changes | None = None, *, out: Place | None = None, workers: int = 0,
-    figures: bool = True, trust: bool = False,
-) -> Tuning:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: Place | None = None,
+    workers: int = 0,
+    figures: bool = True,
+    trust: bool = False,
+) -> Tuning:
     """Search gains for every law with equal budgets, as `podusv tune` does it.
 
     `source` has the keys `sweep` and `tune`, or is the folder of a search, which is continued.
@@ -222,9 +232,11 @@ def tune(
     done = searching.tune(config, request, lambda tally, text: None)
     answer = done.as_json()
     return Tuning(
-        done.folder, done.results.laws, pd.DataFrame(answer["gains"]).rename_axis("gain"),
+        done.folder,
+        done.results.laws,
+        pd.DataFrame(answer["gains"]).rename_axis("gain"),
         tuple(answer["remarks"]),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -247,11 +259,19 @@ class Bench(Folder):
 
 
 def bench(
-    folder: Place | None = None, changes: Changes | None = None, *, laws: Sequence[Place] = (),
-    tasks: Sequence[str] = (), vessels: Sequence[str] = (), conditions: Sequence[str] = (),
-    out: Place = "results/bench", force: bool = False, workers: int = 0, figures: bool = True,
+    folder: Place | None = None,
+    changes: Changes | None = None,
+    *,
+    laws: Sequence[Place] = (),
+    tasks: Sequence[str] = (),
+    vessels: Sequence[str] = (),
+    conditions: Sequence[str] = (),
+    out: Place = "results/bench",
+    force: bool = False,
+    workers: int = 0,
+    figures: bool = True,
     optimum: bool = False,
-) -> Bench:  # fmt: skip
+) -> Bench:
     """Run every law over every task, vessel and condition, as `podusv bench` does it.
 
     `folder` is podusv's bench by default; `laws` are scenarios with further `controllers`; `tasks`,

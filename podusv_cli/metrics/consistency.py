@@ -89,9 +89,7 @@ def _size(layout: Measured) -> int:
 
 def _constants(layout: Measured) -> dict[str, float]:
     at, order = layout.loop.estimator.covariance
-    return {
-        "estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order),
-    }  # fmt: skip
+    return {"estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order)}
 
 
 def _nis(seen: Vector, step: float) -> float:
@@ -101,12 +99,21 @@ def _nis(seen: Vector, step: float) -> float:
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 nees = Metric(
-    "nees", "1", "mean squared error of the estimate over its covariance, steady window; 6 where "
-    "the filter is consistent", OF, ratio(SQUARE, TIME), place=7,
+    "nees",
+    "1",
+    "mean squared error of the estimate over its covariance, steady window; 6 where "
+    "the filter is consistent",
+    OF,
+    ratio(SQUARE, TIME),
+    place=7,
     words="consistency of the estimate (NEES)",
-)  # fmt: skip
+)
 nis = Metric(
-    "nis", "1", "mean squared innovation over its variance, steady window; 1 where the filter is "
-    "consistent", OF, _nis, place=7,
+    "nis",
+    "1",
+    "mean squared innovation over its variance, steady window; 1 where the filter is consistent",
+    OF,
+    _nis,
+    place=7,
     words="consistency of the innovation (NIS)",
-)  # fmt: skip
+)

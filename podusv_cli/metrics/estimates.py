@@ -52,10 +52,15 @@ def _rms(position: int) -> Result:
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 position = Metric(
-    "estimate_position_rms", "m", "rms distance between estimated and true position", OF,
-    _rms(POSITION), place=7,
-    words="error of the estimated position, rms", headline=True,
-)  # fmt: skip
+    "estimate_position_rms",
+    "m",
+    "rms distance between estimated and true position",
+    OF,
+    _rms(POSITION),
+    place=7,
+    words="error of the estimated position, rms",
+    headline=True,
+)
 heading = Metric(
     "estimate_heading_rms",
     "rad",
@@ -66,10 +71,14 @@ heading = Metric(
     words="error of the estimated heading, rms",
 )
 velocity = Metric(
-    "estimate_velocity_rms", "m/s", "rms error of the estimated velocity, surge and sway together",
-    OF, _rms(VELOCITY), place=7,
+    "estimate_velocity_rms",
+    "m/s",
+    "rms error of the estimated velocity, surge and sway together",
+    OF,
+    _rms(VELOCITY),
+    place=7,
     words="error of the estimated velocity, rms",
-)  # fmt: skip
+)
 yaw_rate = Metric(
     "estimate_yaw_rate_rms",
     "rad/s",

@@ -24,10 +24,12 @@ from podusv_cli.metrics.metric import Metric
 ENDS = (1, 1 + len(TARGET), 1 + len(TARGET) + len(STATE))
 
 law_operations = Metric(
-    "law_operations", "1", "floating-point operations of one evaluation of the law",
+    "law_operations",
+    "1",
+    "floating-point operations of one evaluation of the law",
     place=200,
     words="operations of one evaluation of the law",
-)  # fmt: skip
+)
 
 
 @dataclass
@@ -122,11 +124,15 @@ def operations(plan: Plan, recording: Recording) -> dict[str, float]:
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
     constants = plan.law_constants
     vectors = {
-        "x": state, "memory": memory, "target": target, "table": plan.law_table,
+        "x": state,
+        "memory": memory,
+        "target": target,
+        "table": plan.law_table,
         "tau": np.zeros(len(DEMAND)),
-        "rate": np.zeros(len(memory)), "signals": np.zeros(len(law.signals)),
+        "rate": np.zeros(len(memory)),
+        "signals": np.zeros(len(law.signals)),
         "work": np.zeros(law.workspace()),
-    }  # fmt: skip
+    }
     counted = {name: tally.vector(vector) for name, vector in vectors.items()}
     k: Any = {name: tally.number(number) for name, number in constants.items()}
     call(tally.kernel(law.law), t=tally.number(t[0]), k=bundle(k), **counted)

@@ -202,9 +202,12 @@ def _fault(metric: Metric, error: Exception) -> LawError:
 
 
 def metrics_probe(
-    plan: Plan, *, steady_fraction: float, settling_radius: float,
+    plan: Plan,
+    *,
+    steady_fraction: float,
+    settling_radius: float,
     known: Mapping[str, Metric] = METRICS,
-) -> Metrics:  # fmt: skip
+) -> Metrics:
     """The probe of those of the known metrics that this loop has.
 
     It serves all loops of the same structure: each has constants of its own. Raises LawError for a
@@ -221,9 +224,15 @@ def metrics_probe(
     has_end = "over_at" in _asked_span(layout)
     ahead = spans.AHEAD if has_end else 0
     metrics = Metrics(
-        _within_span(parts, has_end), ahead + sum(size for _, size in parts), differing,
-        parts=parts, step=plan.grid.step, known=known, layout=layout, ahead=ahead,
-    )  # fmt: skip
+        _within_span(parts, has_end),
+        ahead + sum(size for _, size in parts),
+        differing,
+        parts=parts,
+        step=plan.grid.step,
+        known=known,
+        layout=layout,
+        ahead=ahead,
+    )
     metrics.constants_for(plan.loop)
     return metrics
 

@@ -126,13 +126,19 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 def _number(
     of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
-) -> Metric:  # fmt: skip
+) -> Metric:
     """A gathered number, first in tables; NaN where the trial did not get so far."""
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
-        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan,
-        place=0, headline=True, **words,
-    )  # fmt: skip
+        name,
+        unit,
+        meaning,
+        of,
+        lambda seen, step: per * float(seen[position]) or math.nan,
+        place=0,
+        headline=True,
+        **words,
+    )
 
 
 OF_TURN = Accumulator(watch_turn, _sizes("turning circle", TURNED), _constants)

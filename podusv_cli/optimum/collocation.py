@@ -32,8 +32,9 @@ SMOOTHED = {"iae": (0.3, 0.03, 1e-3, 1e-4), "ise": (0.0,)}
 BARRIER = 1e-4  # IPOPT's parameter where it starts from an optimum of another grid or smoothing
 WARM = {
     "ipopt.warm_start_init_point": "yes",
-    "ipopt.warm_start_bound_push": 1e-6, "ipopt.warm_start_mult_bound_push": 1e-6,
-}  # fmt: skip
+    "ipopt.warm_start_bound_push": 1e-6,
+    "ipopt.warm_start_mult_bound_push": 1e-6,
+}
 STATES, UNKNOWNS = 6, 8
 Tell = Callable[[str, float], None]
 
@@ -134,9 +135,12 @@ class _Program:
     """The nonlinear program of one grid of `n` equal steps."""
 
     def __init__(
-        self, problem: OptimumProblem, n: int, told: Callable[[int], None],
+        self,
+        problem: OptimumProblem,
+        n: int,
+        told: Callable[[int], None],
         warm: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:  # fmt: skip
+    ) -> None:
         ca = casadi()
         self.step = problem.duration / n
         self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
@@ -149,9 +153,12 @@ class _Program:
         w, eps = ca.MX.sym("w", UNKNOWNS * (n + 1)), ca.MX.sym("eps")
         every = ca.reshape(w, UNKNOWNS, n + 1)
         gaps, cost, _ = self._segment.map(n)(
-            every[:, :-1], every[:, 1:], *_thirds(*self._loads), *_thirds(*self._places),
+            every[:, :-1],
+            every[:, 1:],
+            *_thirds(*self._loads),
+            *_thirds(*self._places),
             ca.repmat(eps, 1, n),
-        )  # fmt: skip
+        )
         self._nlp = {"x": w, "p": eps, "f": ca.sum2(cost), "g": ca.vec(gaps)}
         self._multipliers: dict[str, Any] = {}
 
@@ -167,9 +174,14 @@ class _Program:
             solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
             start = np.hstack([guess.states, guess.demands]).clip(low, high).ravel()
             solution = solver(
-                x0=start, p=eps, lbx=low.ravel(), ubx=high.ravel(), lbg=0.0, ubg=0.0,
+                x0=start,
+                p=eps,
+                lbx=low.ravel(),
+                ubx=high.ravel(),
+                lbg=0.0,
+                ubg=0.0,
                 **self._multipliers,
-            )  # fmt: skip
+            )
         stats = solver.stats()
         self.iterations = int(stats["iter_count"])
         if not stats["success"]:

@@ -47,12 +47,20 @@ def environment(package: str) -> Environment:
 
     loader = ChoiceLoader([PackageLoader(package), PackageLoader("podusv_cli.pages")])
     made = Environment(
-        loader=loader, autoescape=True, finalize=_show_value, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=loader,
+        autoescape=True,
+        finalize=_show_value,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.filters |= {
-        "png": _png, "sentence": sentence, "raised": raise_powers_markup, "number": _number, "label": _label
-    }  # fmt: skip
+        "png": _png,
+        "sentence": sentence,
+        "raised": raise_powers_markup,
+        "number": _number,
+        "label": _label,
+    }
     return made
 
 

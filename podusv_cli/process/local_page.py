@@ -22,12 +22,15 @@ GLANCE = 0.2  # s between two looks at signals
 MOST = 65536  # bytes of a question
 TEXT = "text/plain; charset=utf-8"
 HEADERS = {
-    "Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY",
-    "X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src "
     "'unsafe-inline'; connect-src 'self'; img-src data:; form-action 'none'; base-uri 'none'; "
     "frame-ancestors 'none'",
-}  # fmt: skip
+}
 Answer = Callable[[str, Mapping[str, Any]], Mapping[str, Any]]  # of the question's name, and it
 _Told = tuple[int, bytes, str]  # code, content, type
 _Job = tuple[str, Mapping[str, Any], "SimpleQueue[_Told]"]

@@ -23,9 +23,11 @@ def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other; plans no loop."""
     parts = [*_defaults(scenario), *_conflicts_of_laws(scenario), *_summands(scenario)]
     return parts or [
-        *_conflicts_of_commands(scenario), *of_numbers(scenario), *_names(scenario),
+        *_conflicts_of_commands(scenario),
+        *of_numbers(scenario),
+        *_names(scenario),
         *scenario.metrics.conflicts(),
-    ]  # fmt: skip
+    ]
 
 
 def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
@@ -60,9 +62,12 @@ def _of_times(scenario: Scenario) -> Conflicts:
 def _defaults(scenario: Scenario) -> Conflicts:
     """Parts whose classes have a default that they do not allow themselves."""
     others = {
-        "path": scenario.path, "actuator": scenario.actuator, "measurement": scenario.measurement,
-        "estimator": scenario.estimator, **scenario.disturbances(),
-    }  # fmt: skip
+        "path": scenario.path,
+        "actuator": scenario.actuator,
+        "measurement": scenario.measurement,
+        "estimator": scenario.estimator,
+        **scenario.disturbances(),
+    }
     for key, part in {**others, **scenario.laws()}.items():
         if fault := wrong_default(part):
             yield key, f"{describe(part)}: {fault}"

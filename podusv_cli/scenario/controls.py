@@ -20,9 +20,16 @@ WIDE = 3.0  # a linear one so many times the number's size
 # The size of a number that is 0 and has no default, by its unit; in metres the hull's length.
 SIZES = {"m/s": 1.0, "rad": math.pi, "rad/s": 1.0, "s": 1.0, "N": 10.0, "N m": 10.0}
 AFTER = (
-    "vessel", "actuator", "disturbance", "path", "start", "measurement", "estimator", "control",
+    "vessel",
+    "actuator",
+    "disturbance",
+    "path",
+    "start",
+    "measurement",
+    "estimator",
+    "control",
     "simulation",
-)  # fmt: skip
+)
 TIMES = ("control.period", "simulation.duration")  # whole numbers of steps
 
 
@@ -83,11 +90,15 @@ def _control(
 ) -> dict[str, Any] | None:
     place, default = dotted_key(at), key.default
     words = {
-        "key": place, "part": part, "name": key.name, "value": content, "unit": key.unit,
+        "key": place,
+        "part": part,
+        "name": key.name,
+        "value": content,
+        "unit": key.unit,
         "range": key.range,
         "meaning": (key.field and key.field.description) or f"which {part.partition('.')[0]} it is",
         "default": "" if default is NO_DEFAULT else as_yaml(default),
-    }  # fmt: skip
+    }
     choices = choices_of(key) or (("true", "false") if bool in key.types else ())
     if choices and key.name != "preset":
         shown = str(content).lower() if isinstance(content, bool) else content
@@ -121,5 +132,7 @@ def _span(key: Key, now: float, usual: float, length: float) -> dict[str, Any]:
         return {"low": ends[0], "high": ends[1], "log": True}
     if key.path[0] == "vessel" and key.unit == "m":
         size /= 2.0 * WIDE  # of a point within the hull
-    return {"low": max(now - WIDE * size, low if low is not None else -math.inf),
-            "high": min(now + WIDE * size, high if high is not None else math.inf)}  # fmt: skip
+    return {
+        "low": max(now - WIDE * size, low if low is not None else -math.inf),
+        "high": min(now + WIDE * size, high if high is not None else math.inf),
+    }

@@ -103,8 +103,8 @@ def _sized_for_another(base: Node, own: Node, key: Key, at: Route) -> list[str]:
     if not sized:
         return []
     return [
-        f"{_describe_change(own, at)} keeps {_join_names(sized)}, which may have been defaults of {old.kind}; "
-        f"null takes those of {new.kind}"
+        f"{_describe_change(own, at)} keeps {_join_names(sized)}, which may have been defaults "
+        f"of {old.kind}; null takes those of {new.kind}"
     ]
 
 

@@ -106,9 +106,13 @@ def extended_files(node: Node) -> tuple[Node, ...]:
 
 
 def _mapping(
-    text: str, source: str, faults: list[Fault], placed: bool = True, most: int = MAX_NODES,
+    text: str,
+    source: str,
+    faults: list[Fault],
+    placed: bool = True,
+    most: int = MAX_NODES,
     above: tuple[str, ...] = (),
-) -> Node | None:  # fmt: skip
+) -> Node | None:
     node = read(text, source, faults, placed=placed, most=most, above=above)
     if node and not isinstance(node.content, dict):
         # The text is not shown: the file may be one that the user may not read.

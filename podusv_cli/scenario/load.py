@@ -148,9 +148,12 @@ CLASHES: Check = attrgetter("clashes")
 
 
 def load(
-    path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str] = (), plugged: Plugged = plugins.load_plugins,
-) -> Loaded:  # fmt: skip
+    path: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    files: Sequence[str] = (),
+    plugged: Plugged = plugins.load_plugins,
+) -> Loaded:
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
     `checks` are made after the scenario's own; `files` are plug-ins beside the scenario's, and
@@ -166,9 +169,15 @@ def load(
 
 
 def load_text(
-    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str | Plugin] = (), plugged: Plugged = plugins.load_plugins, *, placed: bool = True,
-) -> Loaded:  # fmt: skip
+    text: str,
+    source: str,
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    files: Sequence[str | Plugin] = (),
+    plugged: Plugged = plugins.load_plugins,
+    *,
+    placed: bool = True,
+) -> Loaded:
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
     Messages give lines of the text only where `placed`. Raises ScenarioError with everything that
@@ -185,9 +194,13 @@ def load_text(
 
 
 def load_stored(
-    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str | Plugin] = (), plugged: Plugged = LOOKED_AT,
-) -> Loaded:  # fmt: skip
+    text: str,
+    source: str,
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    files: Sequence[str | Plugin] = (),
+    plugged: Plugged = LOOKED_AT,
+) -> Loaded:
     """The scenario in the folder of a run, study or search: it refers to no file but its plug-ins.
 
     Unless `plugged` loads these, components are those of podusv and of installed packages. Raises

@@ -13,14 +13,7 @@ from podusv_cli.core.component import Component
 from podusv_cli.core.timed_rows import TextLine, columns, lines_of
 from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.scenario.yaml_text import (
-    MAX_NODES,
-    read,
-    read_bytes,
-    read_text,
-    resolve,
-    text_node,
-)
+from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_bytes, read_text, resolve, text_node
 from podusv_cli.scenario.yaml_tree import (
     Fault,
     Mark,
@@ -64,7 +57,7 @@ def with_contents(root: Node, top: Key, faults: list[Fault], fill: Fill | None =
 
 def _fill_section(
     node: Node, key: Key, at: Route, fill: Fill, faults: list[Fault], usual: str = ""
-) -> Node:  # fmt: skip
+) -> Node:
     """A section with what files hold, the sections in it first; `usual` is a kind not given."""
     section = key.kinds.get(node.word("kind") or usual, key)
     if isinstance(node.content, tuple):
@@ -100,9 +93,7 @@ def _read(given: Node, section: str, model: type[Component], faults: list[Fault]
     return _over_file(given, section, model, faults)
 
 
-def _in_folder(
-    name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
-) -> str | None:  # fmt: skip
+def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
     """The text of a file in a folder that podusv finished."""
     manifest = os.path.join(folder, "manifest.json")
     if not os.path.isfile(manifest) or not os.path.isfile(os.path.join(folder, name)):
@@ -155,7 +146,7 @@ def _with_source(whole: Node, base: Node, given: Node) -> Node:
 
 def _read_in(
     given: Node, section: str, key: str, taker: str, read: Read, form: Form, faults: list[Fault]
-) -> Node:  # fmt: skip
+) -> Node:
     """The content of the file that one key names, under the key `taker` in place of the name."""
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):

@@ -109,8 +109,9 @@ def of_folder(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugin
 def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
     """What takes in none of the plug-ins that a tree names, but these."""
     return lambda root, faults: (
-        replace(root, content={k: e for k, e in root.mapping.items() if k != KEY}), known
-    )  # fmt: skip
+        replace(root, content={k: e for k, e in root.mapping.items() if k != KEY}),
+        known,
+    )
 
 
 def _is_foreign(mark: Mark) -> bool:

@@ -25,10 +25,17 @@ from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted_key, merge,
 # Sections whose entries have names of the user's. An entry that is null takes out an inherited one,
 # and a section that is null all of them.
 NAMED: tuple[Route, ...] = (
-    ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
-    ("tune", "space"), ("doubt", "vary"), ("identify", "columns"), ("identify", "priors"),
+    ("controllers",),
+    ("claims",),
+    ("sweep", "vary"),
+    ("sweep", "grid"),
+    ("sweep", "claims"),
+    ("tune", "space"),
+    ("doubt", "vary"),
+    ("identify", "columns"),
+    ("identify", "priors"),
     ("identify", "noise"),
-)  # fmt: skip
+)
 EMPTIED: tuple[Route, ...] = (*NAMED, ("sweep", "keep"))  # null is a section with nothing in it
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
 

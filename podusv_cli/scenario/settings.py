@@ -17,9 +17,18 @@ from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
 
 SECTIONS = (
-    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
-    "simulation", "control", "metrics",
-)  # fmt: skip
+    "vessel",
+    "nominal",
+    "start",
+    "path",
+    "disturbance",
+    "actuator",
+    "measurement",
+    "estimator",
+    "simulation",
+    "control",
+    "metrics",
+)
 WHICH = ("kind", "preset")  # are told although they equal the default or preset
 
 
@@ -90,10 +99,13 @@ def _settings(
             meaning = summary(type(part)) if name == "kind" else field.description or ""
             other = content != default and f".{name}" not in PROSE
             yield SettingAbout(
-                key=f"{prefix}{name}", value=value_text(content), unit=unit_of(field, unit),
+                key=f"{prefix}{name}",
+                value=value_text(content),
+                unit=unit_of(field, unit),
                 default=value_text(None if field.is_required() and not base else default),
-                meaning=meaning, changed=other or (name in WHICH and bool(content)),
-            )  # fmt: skip
+                meaning=meaning,
+                changed=other or (name in WHICH and bool(content)),
+            )
 
 
 def _inside(content: Any) -> dict[str, Component]:

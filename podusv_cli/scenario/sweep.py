@@ -32,13 +32,17 @@ class Quantity(Distribution):
     plus: Distribution | None = value(None, OF_SECTION, "a summand to the scenario's own value")
     seed: bool = value(False, "", "true: a whole number from 0 to 2^53 - 1, as seed of something")
     identified: str | None = value(
-        None, "", "folder of `podusv identify`, beside the scenario; the hulls that its logs leave "
+        None,
+        "",
+        "folder of `podusv identify`, beside the scenario; the hulls that its logs leave "
         "possible (posterior.csv) are read into `rows`",
-    )  # fmt: skip
+    )
     rows: str = value(
-        "", "", "lines of numbers with commas, the first of names: a draw takes one line, and each "
+        "",
+        "",
+        "lines of numbers with commas, the first of names: a draw takes one line, and each "
         "key below the quantity (or below each of `keys`) its number there",
-    )  # fmt: skip
+    )
 
     @field_validator("keys")
     @classmethod

@@ -69,9 +69,7 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
             500, "", "other draws, on which found gains are reported", ge=1, le=10**7
         )
         objective: str = value(
-            "median(iae)",
-            "",
-            "what is to be small, as an expression over draws",
+            "median(iae)", "", "what is to be small, as an expression over draws"
         )
         subject_to: tuple[str, ...] = value((), "", "inequalities over draws that have to hold")
         space: dict[str, float | Range] = value(
@@ -89,9 +87,12 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
         )
 
         training_sets: int = value(
-            1, "", "sets of `train` draws; every law is searched `repeats` times on each", ge=1,
+            1,
+            "",
+            "sets of `train` draws; every law is searched `repeats` times on each",
+            ge=1,
             le=100,
-        )  # fmt: skip
+        )
 
         @property
         def searches(self) -> int:

@@ -160,9 +160,14 @@ def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: 
 
 
 def read(
-    text: str, source: str, faults: list[Fault], *, placed: bool = True, most: int = MAX_NODES,
+    text: str,
+    source: str,
+    faults: list[Fault],
+    *,
+    placed: bool = True,
+    most: int = MAX_NODES,
     above: tuple[str, ...] = (),
-) -> Node | None:  # fmt: skip
+) -> Node | None:
     """The tree of a single YAML document of at most `most` values; None if that is not possible.
 
     Every fault is appended to `faults`. Marks have lines only where `placed`, and then the files
@@ -202,9 +207,14 @@ class _Reader:
     """Reads one document from the parser's events."""
 
     def __init__(
-        self, text: str, source: str, faults: list[Fault], placed: bool, most: int,
+        self,
+        text: str,
+        source: str,
+        faults: list[Fault],
+        placed: bool,
+        most: int,
         above: tuple[str, ...],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._text, self._source, self._placed, self._most = text, source, placed, most
         self._above = above
         self._events = _events(text)

@@ -11,9 +11,21 @@ LONGEST_PLACE = 9  # digits of a place in a list; Python refuses to read thousan
 Route = tuple[str | int, ...]
 # The keys of a quantity that a study draws, and those of them that say how it is drawn.
 QUANTITY = {
-    "uniform", "log_uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle",
-    "times", "plus", "seed", "identified", "rows", "keys",
-}  # fmt: skip
+    "uniform",
+    "log_uniform",
+    "normal",
+    "lognormal",
+    "triangular",
+    "choice",
+    "integers",
+    "angle",
+    "times",
+    "plus",
+    "seed",
+    "identified",
+    "rows",
+    "keys",
+}
 NAMED_BY_KEYS = (
     ("sweep", "vary"),
     ("sweep", "grid"),

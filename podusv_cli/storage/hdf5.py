@@ -13,9 +13,15 @@ from podusv_cli.storage import files
 
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 DAMAGE = (
-    OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, MemoryError,
+    OSError,
+    RuntimeError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    MemoryError,
     OverflowError,
-)  # fmt: skip
+)
 
 
 @contextmanager

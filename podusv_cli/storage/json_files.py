@@ -26,9 +26,12 @@ def parse_json(text: str, path: Path) -> dict[str, Any]:
     """As `read`, of the text of the file at `path`."""
     try:
         content = json.loads(
-            text, object_pairs_hook=_object,
-            parse_float=_finite, parse_int=_whole, parse_constant=_finite,
-        )  # fmt: skip
+            text,
+            object_pairs_hook=_object,
+            parse_float=_finite,
+            parse_int=_whole,
+            parse_constant=_finite,
+        )
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise StorageError(f"cannot read {path}: not valid JSON ({reason})") from error

@@ -72,9 +72,14 @@ class RunWriter:
     """
 
     def __init__(
-        self, final: Path, *, force: bool = False, named: bool = True, needed: float = 0.0,
+        self,
+        final: Path,
+        *,
+        force: bool = False,
+        named: bool = True,
+        needed: float = 0.0,
         argv: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
         self.final, self._force, self._named = final, force and named, named
         self._argv, self._began, self.extras = argv, datetime.now(UTC), Extras()
@@ -256,9 +261,8 @@ class RunFolder:
         """The run in it under a label; `about` may be made of the scenario, see `about`."""
         numbers = {n: math.nan if x is None else float(x) for n, x in self.metrics.items()}
         return PastRun(
-            label, about, self.log, numbers, plugins=plugins, folder=self.path,
-            theory=self.theory,
-        )  # fmt: skip
+            label, about, self.log, numbers, plugins=plugins, folder=self.path, theory=self.theory
+        )
 
 
 def open_run(folder: Path, *, optional: str = "") -> RunFolder:

@@ -26,9 +26,11 @@ WITHOUT_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP)  # what such a file 
 
 @contextmanager
 def sole_writer(
-    folder: Path, what: str = RUNS, patience: float = 0.0,
+    folder: Path,
+    what: str = RUNS,
+    patience: float = 0.0,
     warn: Callable[[str], None] = lambda text: None,
-) -> Iterator[None]:  # fmt: skip
+) -> Iterator[None]:
     """Make the folder, and keep other processes from writing into it during the block.
 
     The lock is one of the operating system, which ends with its process. `warn` is told where

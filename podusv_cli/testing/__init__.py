@@ -149,9 +149,12 @@ def repeats_itself(component: Component) -> None:
 
 
 CHECKS: tuple[Check, ...] = (
-    keeps_its_declaration, is_finite, remembers_nothing, runs_alike_compiled_and_plain,
+    keeps_its_declaration,
+    is_finite,
+    remembers_nothing,
+    runs_alike_compiled_and_plain,
     repeats_itself,
-)  # fmt: skip
+)
 
 
 def has_a_number(metric: Metric) -> None:
@@ -222,14 +225,19 @@ def _compare(one: Recording, other: Recording, *, rtol: float, atol: float) -> N
 def loop_with(component: Component) -> ClosedLoop:
     """A closed loop of podusv's own parts, with this one in its place."""
     parts: dict[str, Any] = {
-        "path": Line(), "disturbance": Calm(), "actuator": Ideal(), "controller": Pid(),
+        "path": Line(),
+        "disturbance": Calm(),
+        "actuator": Ideal(),
+        "controller": Pid(),
         "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
-    }  # fmt: skip
+    }
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
     return ClosedLoop(
-        vessel=usual_vessel(), nominal=usual_vessel(), start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
+        vessel=usual_vessel(),
+        nominal=usual_vessel(),
+        start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
         **parts | {place: component},
-    )  # fmt: skip
+    )
 
 
 def run_with(component: Component, compiled: bool) -> Recording:
@@ -267,9 +275,18 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
         call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())
     tau, rate, signals = outputs
     call(
-        law.law, t=t, x=x, memory=_to_read(memory), target=target, k=k, table=law.table(), tau=tau,
-        rate=rate, signals=signals, work=np.full(law.workspace(), np.nan),
-    )  # fmt: skip
+        law.law,
+        t=t,
+        x=x,
+        memory=_to_read(memory),
+        target=target,
+        k=k,
+        table=law.table(),
+        tau=tau,
+        rate=rate,
+        signals=signals,
+        work=np.full(law.workspace(), np.nan),
+    )
     return outputs
 
 
@@ -285,9 +302,15 @@ def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[V
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     out, hull = np.full(3 + len(sea.signals), np.nan), usual_vessel()
     call(
-        sea.evaluate, t=t, x=x, k=bundle(sea.constants_with(hull)), table=sea.table_for(hull, t),
-        b=out, again=0.0, stage=0.0,
-    )  # fmt: skip
+        sea.evaluate,
+        t=t,
+        x=x,
+        k=bundle(sea.constants_with(hull)),
+        table=sea.table_for(hull, t),
+        b=out,
+        again=0.0,
+        stage=0.0,
+    )
     return [out]
 
 
@@ -297,9 +320,17 @@ def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -
     k = bundle(actuator.constants())
     tau, rate, signals = outputs
     call(
-        actuator.drive, t=t, x=x, state=state, demand=demand, k=k, table=actuator.table(), tau=tau,
-        rate=rate, signals=signals,
-    )  # fmt: skip
+        actuator.drive,
+        t=t,
+        x=x,
+        state=state,
+        demand=demand,
+        k=k,
+        table=actuator.table(),
+        tau=tau,
+        rate=rate,
+        signals=signals,
+    )
     return outputs
 
 
@@ -329,6 +360,10 @@ def _estimator(estimator: Any, t: float, x: Vector, target: Vector, random: Any)
 
 
 CALLS = (
-    (Controller, _law), (AnyPath, _path), (Disturbance, _sea), (Actuator, _actuator),
-    (Measurement, _measurement), (Estimator, _estimator),
-)  # fmt: skip
+    (Controller, _law),
+    (AnyPath, _path),
+    (Disturbance, _sea),
+    (Actuator, _actuator),
+    (Measurement, _measurement),
+    (Estimator, _estimator),
+)

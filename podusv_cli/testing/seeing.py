@@ -197,9 +197,13 @@ def settle_estimate(tested: EstimatorUnderTest, place: Vector, known: tuple[bool
 
 ALL = (True,) * SIX
 MEASUREMENT_CHECKS: tuple[Callable[[Any], None], ...] = (
-    marks_what_it_delivers, measures_the_vessel, errs_alike_in_a_longer_run,
-)  # fmt: skip
+    marks_what_it_delivers,
+    measures_the_vessel,
+    errs_alike_in_a_longer_run,
+)
 ESTIMATOR_CHECKS: tuple[Callable[[Any], None], ...] = (
-    starts_at_the_truth, waits_for_a_delivery, comes_to_what_is_measured,
+    starts_at_the_truth,
+    waits_for_a_delivery,
+    comes_to_what_is_measured,
     takes_headings_by_the_nearest_turn,
-)  # fmt: skip
+)

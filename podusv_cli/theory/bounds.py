@@ -165,11 +165,17 @@ def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | No
 def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
     surge, yaw = axes
     candidates = {
-        "z_e": surge.k, "psi_e": yaw.k, "u_e": surge.gain, "r_e": yaw.gain,
-        "W_u": law.sigma_u / 2.0, "W_r": law.sigma_r / 2.0,
-        "b_u": law.sigma_bu / 2.0, "b_r": law.sigma_br / 2.0,
-        "y_u": surge.A, "y_r": yaw.A,
-    }  # fmt: skip
+        "z_e": surge.k,
+        "psi_e": yaw.k,
+        "u_e": surge.gain,
+        "r_e": yaw.gain,
+        "W_u": law.sigma_u / 2.0,
+        "W_r": law.sigma_r / 2.0,
+        "b_u": law.sigma_bu / 2.0,
+        "b_r": law.sigma_br / 2.0,
+        "y_u": surge.A,
+        "y_r": yaw.A,
+    }
     if observed is None:
         return Bound(_least(candidates), math.nan, math.nan, candidates)
     rates = np.arange(1, TRIES) / TRIES * _least(candidates)
@@ -192,9 +198,12 @@ def _terms(law: PolarBackstepping, observed: Observed, left: str, over: Pair) ->
 
 
 def _best(
-    candidates: dict[str, float], terms: dict[str, float], rates: Vector,
-    rooms: tuple[Vector, Vector], drift: Pair,
-) -> Bound:  # fmt: skip
+    candidates: dict[str, float],
+    terms: dict[str, float],
+    rates: Vector,
+    rooms: tuple[Vector, Vector],
+    drift: Pair,
+) -> Bound:
     """The lowest bound over lambda, which fixes sigma_yu and sigma_yr of (47)."""
     largest = _least(candidates)
     if largest <= 0.0:
@@ -223,8 +232,16 @@ def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[GainCondition, ...]
         why += ", and the cross terms that the printed sign doubles"
     half = "1/2 of it compensates the network's error (47)"
     leak = "without leakage the estimate is not bounded (48)"
-    leakage = ("Gamma_u", "sigma_u", "Gamma_r", "sigma_r", "gamma_u", "sigma_bu", "gamma_r",
-              "sigma_br")  # fmt: skip
+    leakage = (
+        "Gamma_u",
+        "sigma_u",
+        "Gamma_r",
+        "sigma_r",
+        "gamma_u",
+        "sigma_bu",
+        "gamma_r",
+        "sigma_br",
+    )
     return (
         GainCondition("k_ze", law.k_ze, surge.limit(), 0.0, why),
         GainCondition("k_psie", law.k_psie, yaw.limit(), 0.0, why),

@@ -113,7 +113,9 @@ def margins(cut: Cut) -> Margins:
     crossed, angles = _crossings(cut, omega)
     gains = _gains(cut, omega, L)
     return Margins(
-        omega, S, T,
+        omega,
+        S,
+        T,
         crossovers=crossed,
         phase_margin=float(np.abs(angles).min(initial=math.inf)),
         gain_margin=min((gain for gain in gains if gain > 1.0), default=math.inf),
@@ -121,7 +123,7 @@ def margins(cut: Cut) -> Margins:
         delay_margin=_delay(crossed, angles),
         peak_S=max(1.0, _peak(cut, omega, S, lambda L: 1.0 / abs(1.0 + L))),  # 1 is S at infinity
         peak_T=_peak(cut, omega, T, lambda L: abs(L / (1.0 + L))),
-    )  # fmt: skip
+    )
 
 
 def delay_margin(cut: Cut) -> float:

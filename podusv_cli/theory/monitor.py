@@ -41,14 +41,25 @@ FIXED = (
     _of_windows("v_bound", "m/s", "bound of the sway speed (51), with all damping", r"|v|_{\max}"),
 )
 V_DOT_BOUND = Signal(
-    "V_dot_bound", "1/s", "bound of V_dot (49), corrected; derived, not logged",
+    "V_dot_bound",
+    "1/s",
+    "bound of V_dot (49), corrected; derived, not logged",
     r"-2\lambda V+\Delta",
-)  # fmt: skip
+)
 # Quantities at every row from which the bounds are computed; not logged.
 UNLOGGED = (
-    "alpha_u_dot", "alpha_r_dot", "drift_u", "drift_r", "epsilon_u", "epsilon_r", "rest_u",
-    "rest_r", "push", "printed_push", "turn",
-)  # fmt: skip
+    "alpha_u_dot",
+    "alpha_r_dot",
+    "drift_u",
+    "drift_r",
+    "epsilon_u",
+    "epsilon_r",
+    "rest_u",
+    "rest_r",
+    "push",
+    "printed_push",
+    "turn",
+)
 
 Traces = dict[str, Vector]
 
@@ -107,9 +118,13 @@ def prepare(plan: Plan, compiled: bool) -> None:
 
 
 def monitor_recording(
-    plan: Plan, recording: Recording,
-    *, steady_fraction: float = 0.2, compiled: bool = True, allocate: Allocate = np.empty,
-) -> Monitored | None:  # fmt: skip
+    plan: Plan,
+    recording: Recording,
+    *,
+    steady_fraction: float = 0.2,
+    compiled: bool = True,
+    allocate: Allocate = np.empty,
+) -> Monitored | None:
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
@@ -158,9 +173,12 @@ def _largest(values: Vector) -> float:
 
 
 def _traces(
-    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed,
+    loop: ClosedLoop,
+    law: PolarBackstepping,
+    log: Recording,
+    now: Replayed,
     unknown: tuple[ideal_weights.IdealWeights, bounds.Pair],
-) -> Traces:  # fmt: skip
+) -> Traces:
     ideal, b = unknown
     e = error_rates(log, now, law)
     factors = ideal_weights.exponents(law.network, log)

@@ -63,14 +63,22 @@ def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors
     beta_r_dot = rates["beta_r"] if filtered else alpha_r_dot
     nothing = np.zeros_like(psi_e)
     return Errors(
-        z_e=z_e, psi_e=psi_e, u_e=signals["u_e"], r_e=signals["r_e"],
+        z_e=z_e,
+        psi_e=psi_e,
+        u_e=signals["u_e"],
+        r_e=signals["r_e"],
         y_u=log["beta_u"] - signals["alpha_u"] if filtered else nothing,
         y_r=log["beta_r"] - signals["alpha_r"] if filtered else nothing,
-        z_e_dot=z_e_dot, psi_e_dot=psi_e_dot,
-        u_e_dot=rates["u"] - beta_u_dot, r_e_dot=rates["r"] - beta_r_dot,
-        y_u_dot=beta_u_dot - alpha_u_dot, y_r_dot=beta_r_dot - alpha_r_dot,
-        alpha_u_dot=alpha_u_dot, alpha_r_dot=alpha_r_dot, turn=sight.turn,
-    )  # fmt: skip
+        z_e_dot=z_e_dot,
+        psi_e_dot=psi_e_dot,
+        u_e_dot=rates["u"] - beta_u_dot,
+        r_e_dot=rates["r"] - beta_r_dot,
+        y_u_dot=beta_u_dot - alpha_u_dot,
+        y_r_dot=beta_r_dot - alpha_r_dot,
+        alpha_u_dot=alpha_u_dot,
+        alpha_r_dot=alpha_r_dot,
+        turn=sight.turn,
+    )
 
 
 def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> SightLine:
@@ -88,11 +96,15 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
     spin = w - log["r"]
     bending = across - P * w + d["u"] * sin_e - d["v"] * cos_e + (u * cos_e + v * sin_e) * spin
     return SightLine(
-        turn=turn, side=turn if law.fold == "joint" else np.ones_like(turn),
-        distance=distance, distance_rate=distance_rate,
-        w=w, w_rate=np.where(held, 0.0, (bending - w * distance_rate) / distance),
-        P=P, P_rate=along + Q * w,
-    )  # fmt: skip
+        turn=turn,
+        side=turn if law.fold == "joint" else np.ones_like(turn),
+        distance=distance,
+        distance_rate=distance_rate,
+        w=w,
+        w_rate=np.where(held, 0.0, (bending - w * distance_rate) / distance),
+        P=P,
+        P_rate=along + Q * w,
+    )
 
 
 def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:

@@ -209,9 +209,14 @@ class _Frame:
         from scipy.integrate import BDF  # slow to import
 
         solver = BDF(
-            lambda _, q: self.row(q)[: len(q)], 0.0, q, SETTLING, rtol=1e-6, atol=1e-9,
+            lambda _, q: self.row(q)[: len(q)],
+            0.0,
+            q,
+            SETTLING,
+            rtol=1e-6,
+            atol=1e-9,
             jac=lambda _, q: self._central(q, STEPS[0])[: len(q)],
-        )  # fmt: skip
+        )
         way = [(0.0, math.hypot(*q[:2]))]
         while solver.status == "running" and solver.nfev < MOST_EVALUATIONS:
             solver.step()

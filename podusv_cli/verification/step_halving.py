@@ -35,9 +35,12 @@ def refine_grid(scenario: Scenario, halvings: int) -> TimeGrid:
     grid, finer = scenario.time_grid(), 2**halvings
     steps = grid.steps * finer
     return replace(
-        grid, step=grid.step / finer, steps=steps, log_every=max(steps, 1),
+        grid,
+        step=grid.step / finer,
+        steps=steps,
+        log_every=max(steps, 1),
         hold_every=grid.hold_every * finer,
-    )  # fmt: skip
+    )
 
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:

@@ -42,10 +42,7 @@ class RunVerification:
             }
             for name, e in self.estimates.items()
         }
-        return {
-            "status": [level.status for level in self.levels],
-            "numbers": numbers,
-        }
+        return {"status": [level.status for level in self.levels], "numbers": numbers}
 
 
 @dataclass(frozen=True)

@@ -48,10 +48,12 @@ class Benched:
         """What `--json` prints."""
         board = self.board.astype(object).where(self.board.notna(), None)
         return {
-            "format": 1, "folder": str(self.folder), "runs": len(self.runs),
+            "format": 1,
+            "folder": str(self.folder),
+            "runs": len(self.runs),
             "leaderboard": board.reset_index().to_dict("records"),
             "missing": [str(failure) for failure in self.missing],
-        }  # fmt: skip
+        }
 
 
 def bench(
@@ -104,9 +106,12 @@ def _simulate_cases(
 
 
 def _solve_optima(
-    every: Sequence[BenchCase], runs: Sequence[BenchRun], request: Request,
-    progress: Progress | None, extras: Extras,
-) -> Iterator[Least]:  # fmt: skip
+    every: Sequence[BenchCase],
+    runs: Sequence[BenchRun],
+    request: Request,
+    progress: Progress | None,
+    extras: Extras,
+) -> Iterator[Least]:
     """The optima of all cases; what has none is added to `extras`."""
     wanted, refused = optima.wanted_optima(every, runs)
     extras.missing += [Failure("an optimum for some cases", why) for why in refused]

@@ -17,9 +17,11 @@ from podusv_cli.theory.loop_margins import loop_margins
 
 
 def with_margins(
-    runs: Sequence[PastRun], made: Mapping[str, Scenario], claims: Sequence[ParsedClaim],
+    runs: Sequence[PastRun],
+    made: Mapping[str, Scenario],
+    claims: Sequence[ParsedClaim],
     extras: Extras,
-) -> list[PastRun]:  # fmt: skip
+) -> list[PastRun]:
     """The runs; those `made` now each with those margins of its loop that claims name.
 
     A finished run, and one whose loop has no margins, has none; `extras` says why.

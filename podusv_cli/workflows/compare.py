@@ -132,9 +132,12 @@ def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
 
 
 def compare_gathered(
-    given: Members, items: Sequence[Path], request: Request, progress: Progress | None = None,
+    given: Members,
+    items: Sequence[Path],
+    request: Request,
+    progress: Progress | None = None,
     loaded: Loaded | None = None,
-) -> Compared:  # fmt: skip
+) -> Compared:
     """The same for what is gathered already; `items` are the files and folders that it is from.
 
     `loaded` is the scenario whose verdicts are doubted, if any.
@@ -220,11 +223,15 @@ def make_runs(
             warm_up(case, request.compiling)
     tasks = [
         RunTask(
-            case.scenario, member.text, folder / member.label,
-            argv=request.argv, label=member.label, noticed=member.noticed,
+            case.scenario,
+            member.text,
+            folder / member.label,
+            argv=request.argv,
+            label=member.label,
+            noticed=member.noticed,
         )
         for member, case in wanted
-    ]  # fmt: skip
+    ]
 
     def advance(position: int, fraction: float) -> None:
         if progress:
@@ -238,9 +245,11 @@ def make_runs(
 
 
 def collect(
-    members: Sequence[Member], outcomes: Mapping[str, Outcome],
-    parsed: Sequence[claims.ParsedClaim], extras: Extras,
-) -> outputs.Result:  # fmt: skip
+    members: Sequence[Member],
+    outcomes: Mapping[str, Outcome],
+    parsed: Sequence[claims.ParsedClaim],
+    extras: Extras,
+) -> outputs.Result:
     """Open the runs and compare them; a law's cost or a verdict that fails is noted in `extras`.
 
     What the runs lack is missing in the comparison, too.
@@ -355,9 +364,14 @@ def _with_costs(runs: Sequence[PastRun], made: Mapping[str, Case], extras: Extra
 
 
 def _add_report(
-    writer: RunWriter, result: outputs.Result, title: str, origin: Mapping[str, Any],
-    extras: Extras, progress: Progress | None, request: Request,
-) -> None:  # fmt: skip
+    writer: RunWriter,
+    result: outputs.Result,
+    title: str,
+    origin: Mapping[str, Any],
+    extras: Extras,
+    progress: Progress | None,
+    request: Request,
+) -> None:
     """Draw the figures that are asked for, and write the report, which has them as PNG."""
     figures: dict[str, bytes] = {}
     if request.figures:

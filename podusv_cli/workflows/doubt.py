@@ -59,10 +59,7 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
     """The same for a scenario that is loaded and checked."""
     scenario, world = loaded.scenario, comparison(loaded)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with (
-        interrupts_deferred(),
-        writer_of(request, target) as writer,
-    ):
+    with interrupts_deferred(), writer_of(request, target) as writer:
         report, writer.extras.interrupted = doubt_subject(world, scenario, request, progress)
         outputs.write(writer, report, loaded.text, figures=request.figures)
         return outputs.Doubted(

@@ -43,9 +43,13 @@ class Studies:
         """The verdicts of the study with new values; what is there already is not made again."""
         own = Request(
             overrides=[*self.request.overrides, NO_LOGS, *new],
-            out=self.folder / "studies" / name, workers=self.request.workers, figures=False,
-            argv=self.request.argv, plugins=self.request.plugins, trust=self.request.trust,
-        )  # fmt: skip
+            out=self.folder / "studies" / name,
+            workers=self.request.workers,
+            figures=False,
+            argv=self.request.argv,
+            plugins=self.request.plugins,
+            trust=self.request.trust,
+        )
         try:
             done = sweep.run(self.config, own, lambda tally: None)
         except PodusvError as error:

@@ -115,9 +115,11 @@ class Finished:
 
 
 def execute(
-    task: RunTask, progress: Progress | None = None, watch: Stopwatch | None = None,
+    task: RunTask,
+    progress: Progress | None = None,
+    watch: Stopwatch | None = None,
     case: Case | None = None,
-) -> Finished:  # fmt: skip
+) -> Finished:
     """Simulate, measure, write, draw; `target` is there only when all of it is.
 
     `case` is the task's scenario with its plan, where it was looked at before.
@@ -179,10 +181,16 @@ def execute(
             final = writer.finish(status)
     message = recording.message or ("" if status == "finished" else UNDRAWN)
     return Finished(
-        final, recording.controller, status, message, metrics, watch.total(),
-        warnings=warnings, missing=tuple(extras.missing),
+        final,
+        recording.controller,
+        status,
+        message,
+        metrics,
+        watch.total(),
+        warnings=warnings,
+        missing=tuple(extras.missing),
         rows={m.name: m.about for m in headlines_first(task.scenario.known_metrics())},
-    )  # fmt: skip
+    )
 
 
 def why_unwritten(outcomes: Iterable[Outcome]) -> str:
@@ -221,9 +229,12 @@ def examine(case: Case) -> list[Finding]:
 
 
 def simulate_case(
-    case: Case, watch: Stopwatch, progress: Progress | None = None,
-    allocate: Allocate = np.empty, compiling: Progress | None = None,
-) -> Recording:  # fmt: skip
+    case: Case,
+    watch: Stopwatch,
+    progress: Progress | None = None,
+    allocate: Allocate = np.empty,
+    compiling: Progress | None = None,
+) -> Recording:
     """Simulate a scenario, with the probe of its metrics; `allocate` as `simulate` has it."""
     with watch.part("compile"), interrupts_enabled():
         warm_up(case, compiling)
@@ -266,10 +277,12 @@ def monitor_case(
     """The recording with what the stability monitor adds, and its findings; none without V."""
     plan, scenario = case.plan, case.scenario
     monitored_run = scenario.log.monitor and monitor.monitor_recording(
-        plan, recording,
-        steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
+        plan,
+        recording,
+        steady_fraction=scenario.metrics.steady_fraction,
+        compiled=scenario.simulation.compiled,
         allocate=allocate,
-    )  # fmt: skip
+    )
     if not monitored_run:
         return recording, {}
     return monitored_run.recording, theory_report(plan.loop, plan.grid, monitored_run)
@@ -295,9 +308,12 @@ def _write_log(
 
 
 def _write(
-    writer: folder.RunWriter, task: RunTask, recording: Recording, metrics: dict[str, float],
+    writer: folder.RunWriter,
+    task: RunTask,
+    recording: Recording,
+    metrics: dict[str, float],
     warnings: Sequence[Finding],
-) -> None:  # fmt: skip
+) -> None:
     writer.add("scenario.yaml", task.text.encode())
     for name, text in task.scenario.plugin_files().items():
         writer.add(name, text.encode())

@@ -171,11 +171,16 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
     members = [
         Member(
-            label, case.about, case.resolved_yaml, case.scenario.plugged,
-            case=case, text=loaded.text, noticed=examine(case),
+            label,
+            case.about,
+            case.resolved_yaml,
+            case.scenario.plugged,
+            case=case,
+            text=loaded.text,
+            noticed=examine(case),
         )
         for label, case in zip(labels, loaded.cases.values(), strict=True)
-    ]  # fmt: skip
+    ]
     claims = parse_claims(loaded)
     return Members(scenario.name, members, list(singles), claims, scenario.identify)
 

@@ -55,10 +55,7 @@ def identify_of(
         )
     logs = _read(loaded, scenario.identify.logs, progress)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with (
-        interrupts_deferred(),
-        writer_of(request, target) as writer,
-    ):
+    with interrupts_deferred(), writer_of(request, target) as writer:
         with interrupts_enabled():
             answer = answer_logs(scenario, scenario.identify, logs, progress)
         warnings = (

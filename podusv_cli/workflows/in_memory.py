@@ -20,6 +20,10 @@ def run_in_memory(case: Case) -> PastRun:
     findings = [*find_before_run(case), *postflight(case.scenario, whole)]
     numbers = summary(case, recording, extras)
     return PastRun(
-        whole.controller, case.about, whole, numbers,
-        warnings=tuple(map(str, (*findings, *extras.missing))), plugins=case.scenario.plugged,
-    )  # fmt: skip
+        whole.controller,
+        case.about,
+        whole,
+        numbers,
+        warnings=tuple(map(str, (*findings, *extras.missing))),
+        plugins=case.scenario.plugged,
+    )

@@ -24,10 +24,12 @@ from podusv_cli.workflows.examples import ROOM, examples, texts
 SCHEMA = "podusv.schema.json"
 # What to begin with, and what each shows.
 FIRST = {
-    "mu_2017/corrected": "a run", "own_vessel": "a hull of your own",
-    "mu_2017/corrected_compare": "a comparison of laws", "studies/hull_and_sea": "a study",
+    "mu_2017/corrected": "a run",
+    "own_vessel": "a hull of your own",
+    "mu_2017/corrected_compare": "a comparison of laws",
+    "studies/hull_and_sea": "a study",
     "identify/otter": "a hull from logs",
-}  # fmt: skip
+}
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 

@@ -62,6 +62,10 @@ def keep(
 def _task(folder: Path, plan: StudyPlan, run: KeptRun, request: Request) -> RunTask:
     scenario = scenario_of_draw(plan, run.law, run.cell, run.draw)
     return RunTask(
-        scenario, resolved_yaml(scenario), folder / LOGS / run.name,
-        figures=request.figures, argv=request.argv, label=run.law,
-    )  # fmt: skip
+        scenario,
+        resolved_yaml(scenario),
+        folder / LOGS / run.name,
+        figures=request.figures,
+        argv=request.argv,
+        label=run.law,
+    )

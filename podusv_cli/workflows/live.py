@@ -163,8 +163,11 @@ class Live:
             known = list(
                 dict.fromkeys(n for r in shown for n in r.signals if r.signal(n).ndim == 1)
             )
-            told |= {"controls": [asdict(c) for c in self.controls(loaded.scenario)],
-                     "signals": known, "name": loaded.scenario.name}  # fmt: skip
+            told |= {
+                "controls": [asdict(c) for c in self.controls(loaded.scenario)],
+                "signals": known,
+                "name": loaded.scenario.name,
+            }
         return told | {"cpu": time.thread_time() - began}
 
     def _moving(self, moved: Moved) -> dict[str, Case]:
@@ -199,18 +202,15 @@ class Live:
             key = dotted_key(error.steps).replace("controller", own, 1) or place
             text = str(error) if error.steps else said
             raise ScenarioError([Fault(Mark(self.source), key, text)]) from error
-        made, path, approach = (
-            Case.of(scenario),
-            scenario.path,
-            scenario.controller.approach(),
-        )
+        made, path, approach = (Case.of(scenario), scenario.path, scenario.controller.approach())
         seen = {
-            "length": scenario.vessel.length, "beam": scenario.vessel.beam,
+            "length": scenario.vessel.length,
+            "beam": scenario.vessel.beam,
             "waypoints": tuple(map(tuple, path.waypoints())),
             "circles": tuple(map(tuple, path.circles())),
             "standoff": approach.standoff if approach else 0.0,
             "values": {**case.about.values, "path": path.model_dump(mode="json")},
-        }  # fmt: skip
+        }
         vars(made)["about"] = case.about.model_copy(update=seen)  # all of it takes as long as a run
         self._puts[label] = (words, new), made
         return made
@@ -269,7 +269,9 @@ def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> li
     first = [m.about for m in headlines_first(scenario.known_metrics()) if m.about.headline]
     return [
         {
-            "name": a.name, "row": a.row, "unit": "" if a.unit == "1" else a.unit,
+            "name": a.name,
+            "row": a.row,
+            "unit": "" if a.unit == "1" else a.unit,
             "values": [
                 own[a.name] if math.isfinite(own.get(a.name, math.nan)) else a.undefined_word
                 for own in numbers.values()
@@ -277,4 +279,4 @@ def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> li
         }
         for a in first
         if any(a.name in own for own in numbers.values())
-    ]  # fmt: skip
+    ]

@@ -60,9 +60,12 @@ def folder_of(config: Config) -> Path | None:
 
 
 def kept_scenario(
-    folder: Path, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    added: Sequence[str] = (), plugged: Plugged = LOOKED_AT,
-) -> Loaded:  # fmt: skip
+    folder: Path,
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    added: Sequence[str] = (),
+    plugged: Plugged = LOOKED_AT,
+) -> Loaded:
     """The scenario that a folder keeps; no link to another file, either."""
     path = folder / SCENARIO
     return load_stored(files.read_text(path), str(path), overrides, checks, added, plugged)

@@ -32,22 +32,29 @@ class MarginsOfLaws:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints, and margins.json holds."""
         return {
-            "format": 1, "folder": None if self.folder is None else str(self.folder),
+            "format": 1,
+            "folder": None if self.folder is None else str(self.folder),
             "laws": {label: _as_json(law) for label, law in self.laws.items()},
             "failed": dict(self.failed),
-        }  # fmt: skip
+        }
 
 
 def _as_json(law: LoopMargins) -> dict[str, Any]:
     linear = law.linear
     return {
-        "at": linear.course.time, "speed": linear.course.speed, "turn": linear.course.turn,
-        "z_e": linear.distance, "motion": linear.motion, "load": linear.load,
-        "left_out": law.left_out, "open": law.open, "stable": law.stable,
+        "at": linear.course.time,
+        "speed": linear.course.speed,
+        "turn": linear.course.turn,
+        "z_e": linear.distance,
+        "motion": linear.motion,
+        "load": linear.load,
+        "left_out": law.left_out,
+        "open": law.open,
+        "stable": law.stable,
         "poles": [[pole.real, pole.imag] for pole in law.poles],
         "crossovers": {axis: loop.crossovers for axis, loop in law.loops.items()},
         "margins": law.numbers(),
-    }  # fmt: skip
+    }
 
 
 def margins(config: Path, request: Request, at: float | None = None) -> MarginsOfLaws:

@@ -41,9 +41,20 @@ from podusv_cli.storage.run_folder import (
 
 # Signals that every log has, as figures and comparisons need them.
 NEEDED = (
-    "time", "x", "y", "psi", "u", "v", "r", "x_d", "y_d", "tau_u_cmd", "tau_r_cmd", "tau_u",
+    "time",
+    "x",
+    "y",
+    "psi",
+    "u",
+    "v",
+    "r",
+    "x_d",
+    "y_d",
+    "tau_u_cmd",
+    "tau_r_cmd",
+    "tau_u",
     "tau_r",
-)  # fmt: skip
+)
 _TERMS = ("z_e", "psi_e", "u_e", "r_e", "y_u", "y_r", "W_u", "W_r", "b_u", "b_r")
 _BOUNDS = ("V", "window_start", "V_lambda", "V_Delta", "V_bound", "v_bound")
 # Signals that a signal needs beside it.
@@ -90,7 +101,7 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:
             run.path.name, run.about or _told_before(run, files), run.resolved_yaml, plugins, run
         )
         for run in runs_of(path)
-    ]  # fmt: skip
+    ]
 
 
 def runs_of(path: Path, *, optional: str = "") -> list[RunFolder]:

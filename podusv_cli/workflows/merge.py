@@ -40,9 +40,12 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
 
 
 def _join_stores(
-    store: Store, others: Sequence[Store], texts: Mapping[str, str], started: datetime,
+    store: Store,
+    others: Sequence[Store],
+    texts: Mapping[str, str],
+    started: datetime,
     request: Request,
-) -> Swept:  # fmt: skip
+) -> Swept:
     """Write the runs of the others into a study, and judge it where it is whole."""
     out = store.folder
     store.open(started.isoformat(timespec="seconds"), texts)

@@ -54,19 +54,26 @@ def _plugin(
 
 PARTS = {
     "law": _plugin(
-        "law", partial(kinds_of, Scenario, "controller"), "compare",
-        law="$name", more="controllers: {$name: {}, pid: {kind: pid}}",
+        "law",
+        partial(kinds_of, Scenario, "controller"),
+        "compare",
+        law="$name",
+        more="controllers: {$name: {}, pid: {kind: pid}}",
     ),
     "path": _plugin("path", partial(kinds_of, Scenario, "path"), "run", path="$name"),
     "disturbance": _plugin(
         "disturbance", partial(kinds_of, Scenario, "disturbance"), "run", disturbance="$name"
     ),
     "measurement": _plugin(
-        "measurement", partial(kinds_of, Scenario, "measurement"), "run",
+        "measurement",
+        partial(kinds_of, Scenario, "measurement"),
+        "run",
         more="measurement: {kind: $name}",
     ),
     "estimator": _plugin(
-        "estimator", partial(kinds_of, Scenario, "estimator"), "run",
+        "estimator",
+        partial(kinds_of, Scenario, "estimator"),
+        "run",
         more="measurement: {kind: sensors}\nestimator: {kind: $name}",
     ),
     "metric": _plugin("metric", lambda: METRICS, "run"),
@@ -79,14 +86,17 @@ PARTS = {
     "paper": StartingFiles(
         partial(kinds_of, Scenario, "controller"),
         {
-            "$name/$name.py": "law.py", "$name/test_$name.py": "test.py",
-            "$name/vessel.yaml": "vessel.yaml", "$name/base.yaml": "paper_base.yaml",
-            "$name/task.yaml": "paper_task.yaml", "$name/starts.yaml": "paper_starts.yaml",
+            "$name/$name.py": "law.py",
+            "$name/test_$name.py": "test.py",
+            "$name/vessel.yaml": "vessel.yaml",
+            "$name/base.yaml": "paper_base.yaml",
+            "$name/task.yaml": "paper_task.yaml",
+            "$name/starts.yaml": "paper_starts.yaml",
             "$name/README.md": "paper_page.md",
         },
         ("podusv compare $name/task.yaml", "python -m pytest $name/test_$name.py"),
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -126,11 +136,17 @@ def _check_name(what: str, name: str) -> None:
 
 def _words(what: str, name: str) -> dict[str, str]:
     own = {word: text.replace("$name", name) for word, text in PARTS[what].words.items()}
-    return DEFAULTS | own | {
-        "name": name, "what": what, "file": f"{name}.py",
-        "Class": "".join(word.capitalize() for word in name.split("_")),
-        "sentence": f"{'An' if what[0] in 'aeiou' else 'A'} {what} of our own.",
-    }  # fmt: skip
+    return (
+        DEFAULTS
+        | own
+        | {
+            "name": name,
+            "what": what,
+            "file": f"{name}.py",
+            "Class": "".join(word.capitalize() for word in name.split("_")),
+            "sentence": f"{'An' if what[0] in 'aeiou' else 'A'} {what} of our own.",
+        }
+    )
 
 
 def _fill_form(form: str, words: dict[str, str]) -> str:

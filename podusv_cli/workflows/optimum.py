@@ -60,21 +60,30 @@ class Optimum:
         """What `--json` prints of it."""
         stages = [
             {
-                "start": s.start, "step": s.step, "integral": s.integral,
-                "iterations": s.iterations, "s": s.seconds,
+                "start": s.start,
+                "step": s.step,
+                "integral": s.integral,
+                "iterations": s.iterations,
+                "s": s.seconds,
             }
             for s in self.stages
-        ]  # fmt: skip
+        ]
         return {
-            **self.run.as_json(), "minimised": self.minimised, "grids": stages,
-            "tolerance": self.tolerance, "departures": self.departures,
-        }  # fmt: skip
+            **self.run.as_json(),
+            "minimised": self.minimised,
+            "grids": stages,
+            "tolerance": self.tolerance,
+            "departures": self.departures,
+        }
 
 
 def optimum(
-    config: Path, request: Request, minimised: Minimised, step: float,
+    config: Path,
+    request: Request,
+    minimised: Minimised,
+    step: float,
     progress: Progress | None = None,
-) -> Optimum:  # fmt: skip
+) -> Optimum:
     """Find the optimum of a scenario from a run of its law, and write a run that repeats it.
 
     `step` [s] is that of the finest grid. Raises UsageError without CasADi and for a scenario that
@@ -87,9 +96,12 @@ def optimum(
 
 
 def optimum_of(
-    loaded: Loaded, request: Request, minimised: Minimised, step: float,
+    loaded: Loaded,
+    request: Request,
+    minimised: Minimised,
+    step: float,
     progress: Progress | None = None,
-) -> Optimum:  # fmt: skip
+) -> Optimum:
     """The same for a scenario that is loaded already."""
     collocation.casadi()
     scenario = single(loaded, request.controller) if request.controller else loaded.scenario
@@ -103,9 +115,16 @@ def optimum_of(
     stages, motion = collocation.search_optima(wanted, guesses, step, progress)
     repeated = _repeating(scenario, wanted, motion)
     task = RunTask(
-        repeated, resolved_yaml(repeated), target, request.force, request.out is not None,
-        request.figures, argv=request.argv, label="optimum", noticed=preflight(repeated),
-    )  # fmt: skip
+        repeated,
+        resolved_yaml(repeated),
+        target,
+        request.force,
+        request.out is not None,
+        request.figures,
+        argv=request.argv,
+        label="optimum",
+        noticed=preflight(repeated),
+    )
     done = execute(task, progress and (lambda fraction: progress("repeating", fraction)))
     return Optimum(minimised, stages, done, _departures(done.folder, motion))
 

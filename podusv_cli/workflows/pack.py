@@ -25,10 +25,11 @@ PACKAGES = "packages"  # the folder of wheels, which no manifest lists
 # A file that only folders of one kind have.
 KINDS = {mark: kind for mark, (kind, *_) in runs.KINDS.items()} | {"comparison.csv": "comparison"}
 AGAIN = {
-    "run": "podusv rerun {folder}", "comparison": "podusv rerun {folder}",
+    "run": "podusv rerun {folder}",
+    "comparison": "podusv rerun {folder}",
     "study": "podusv sweep run {folder}/scenario.yaml --out again",
     "search": "podusv tune {folder}/scenario.yaml --out again",
-}  # fmt: skip
+}
 # What podusv reads and shows; whatever else is in an archive counts as code.
 DATA = {".yaml", ".json", ".h5", ".csv", ".md", ".tex", ".png", ".pdf", ".gif", ".mp4"}
 PAGES = {".html", ".svg"}  # may have scripts, which a browser executes
@@ -168,8 +169,9 @@ def open_packed(path: Path) -> Iterator[Packed]:
             raise packed.fault(f"{gone[0]} is missing")
         sessions = _sessions(
             json_files.parsed_as(packed.text(name), path / name, _PackOrigin)
-            for name in sizes if _is_origin(name)
-        )  # fmt: skip
+            for name in sizes
+            if _is_origin(name)
+        )
         yield Packed(_contents(packed.name, listed, sizes, sessions), packed)
 
 
@@ -195,15 +197,20 @@ def _contents(
     kinds = (kind for mark, kind in KINDS.items() if mark in listed.files)
     ends = {name: PurePosixPath(name).suffix for name in sizes}
     return PackedContents(
-        name, next(kinds, "result"), listed.status, sizes,
+        name,
+        next(kinds, "result"),
+        listed.status,
+        sizes,
         lacking=tuple(sorted({*listed.files} - {*sizes})),
         code=tuple(name for name, end in ends.items() if end not in DATA | PAGES),
         pages=tuple(name for name, end in ends.items() if end in PAGES),
-        packages={f"{package} {version}": _find_package(package, version, sha256, sizes)
-                  for package, version, sha256 in _packages(sessions)},
+        packages={
+            f"{package} {version}": _find_package(package, version, sha256, sizes)
+            for package, version, sha256 in _packages(sessions)
+        },
         made_by={key: made_by[key] for key in ("podusv", "python", "packages") if key in made_by},
         differs=version_changes(made_by, provenance.surroundings()),
-    )  # fmt: skip
+    )
 
 
 def _packages(sessions: Iterable[_PackSession]) -> list[tuple[str, str, str]]:

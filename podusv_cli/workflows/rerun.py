@@ -107,10 +107,11 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
 
 def _scenario(run: RunFolder, request: Request) -> Scenario:
     return load_stored(
-        run.resolved_yaml, str(run.path / run_folder.RESOLVED),
+        run.resolved_yaml,
+        str(run.path / run_folder.RESOLVED),
         checks=(limits(request.allow_large, read_back=True),),
         plugged=of_folder(request.trust),
-    ).scenario  # fmt: skip
+    ).scenario
 
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
@@ -126,11 +127,14 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     again = [
         Member(
-            run.path.name, about_of(scenario), run.resolved_yaml,
-            case=Case.of(scenario), text=run.resolved_yaml,
+            run.path.name,
+            about_of(scenario),
+            run.resolved_yaml,
+            case=Case.of(scenario),
+            text=run.resolved_yaml,
         )
         for run, scenario in runs
-    ]  # fmt: skip
+    ]
     with _passing(request) as place:
         target = request.out or place / "again"
         room = disk_needed(sizes(again), available_workers())

@@ -42,15 +42,16 @@ def open_scenario(config: Path, request: Request, checks: Sequence[Check]) -> Lo
 def writer_of(request: Request, target: Path, needed: float = 0.0) -> RunWriter:
     """What writes the folder that a request asks for."""
     return RunWriter(
-        target, force=request.force, named=request.out is not None, needed=needed,
-        argv=request.argv,
-    )  # fmt: skip
+        target, force=request.force, named=request.out is not None, needed=needed, argv=request.argv
+    )
 
 
 def run_loaded(
-    loaded: Loaded, request: Request, progress: Progress | None = None,
+    loaded: Loaded,
+    request: Request,
+    progress: Progress | None = None,
     watch: Stopwatch | None = None,
-) -> Finished:  # fmt: skip
+) -> Finished:
     """Execute a scenario that is loaded and checked. Raises StorageError."""
     watch = watch or Stopwatch()
     with watch.part("load"):
@@ -68,10 +69,17 @@ def run_loaded(
     for finding in noticed:
         request.warn(finding)
     task = RunTask(
-        scenario, loaded.text, target, force=request.force, named=request.out is not None,
-        figures=request.figures, names=request.names, argv=request.argv, noticed=noticed,
+        scenario,
+        loaded.text,
+        target,
+        force=request.force,
+        named=request.out is not None,
+        figures=request.figures,
+        names=request.names,
+        argv=request.argv,
+        noticed=noticed,
         compiling=request.compiling,
-    )  # fmt: skip
+    )
     return execute(task, progress, watch, case)
 
 

@@ -52,9 +52,11 @@ class _RunOrigin(_Session):
 
 # A file that only folders of this kind have, the file with their scenario, what is read of it.
 KINDS = {
-    "metrics.json": ("run", "resolved.yaml", _OfRun), STUDY: ("study", "scenario.yaml", _Told),
-    "tune.json": ("search", "scenario.yaml", _Told), "runs.csv": ("bench", "", None),
-}  # fmt: skip
+    "metrics.json": ("run", "resolved.yaml", _OfRun),
+    STUDY: ("study", "scenario.yaml", _Told),
+    "tune.json": ("search", "scenario.yaml", _Told),
+    "runs.csv": ("bench", "", None),
+}
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,15 @@ class ListedRun:
     def as_json(self) -> dict[str, Any]:
         """As plain data."""
         return {
-            "folder": str(self.folder), "kind": self.kind, "name": self.name,
-            "laws": list(self.laws), "status": self.status, "started": self.started,
-            "seconds": self.seconds, "metrics": dict(self.metrics),
-        }  # fmt: skip
+            "folder": str(self.folder),
+            "kind": self.kind,
+            "name": self.name,
+            "laws": list(self.laws),
+            "status": self.status,
+            "started": self.started,
+            "seconds": self.seconds,
+            "metrics": dict(self.metrics),
+        }
 
 
 def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRun]:
@@ -129,11 +136,16 @@ def _read(folder: Path, mark: str) -> ListedRun:
     named = NAME.search(text)
     metrics = about.metrics if isinstance(about, _OfRun) else {}
     return ListedRun(
-        folder, kind, about.name or (named[1] if named else folder.name),
-        [*about.laws] or [*filter(None, [about.controller])], ending.status, sessions[0].started,
+        folder,
+        kind,
+        about.name or (named[1] if named else folder.name),
+        [*about.laws] or [*filter(None, [about.controller])],
+        ending.status,
+        sessions[0].started,
         sum(session.duration_s for session in sessions),
-        {name: math.nan if x is None else x for name, x in metrics.items()}, scenario,
-    )  # fmt: skip
+        {name: math.nan if x is None else x for name, x in metrics.items()},
+        scenario,
+    )
 
 
 def _if_there(path: Path, model: type[json_files.Model]) -> json_files.Model:

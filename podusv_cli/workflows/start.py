@@ -41,10 +41,14 @@ EXAMPLE = "2x180N@1.0: two of 180 N each, 1.0 m beside the centre line"
 SIZES = {"m": (1e-3, 1e3), "kg": (1e-3, 1e9), "N": (1e-4, 1e8), "m/s": (1e-3, 100.0)}
 # What is drawn in a study: a factor on each of these keys, by the name in `SCATTER`.
 FACTORS = {
-    "I_z": ("I_z",), "X_udot": ("X_udot",), "Y_vdot": ("Y_vdot",), "N_rdot": ("N_rdot",),
-    "surge_damping": ("X_u", "X_uu"), "sway_damping": ("Y_v", "Y_vv"),
+    "I_z": ("I_z",),
+    "X_udot": ("X_udot",),
+    "Y_vdot": ("Y_vdot",),
+    "N_rdot": ("N_rdot",),
+    "surge_damping": ("X_u", "X_uu"),
+    "sway_damping": ("Y_v", "Y_vv"),
     "yaw_damping": ("N_r", "N_rr"),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -221,11 +225,17 @@ def _fill_template(title: str, boat: str, study: str) -> str:
     speed = float(f"{min(hull.cruise, holds, RADIUS * facts.r_top * hull.length):.2g}")
     long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
     words = {
-        "title": title, "schema": SCHEMA, "length": f"{hull.length:g}", "mass": f"{hull.mass:g}",
-        "boat": boat, "speed": f"{speed:g}", "long": f"{long:g}", "wide": f"{wide:g}",
+        "title": title,
+        "schema": SCHEMA,
+        "length": f"{hull.length:g}",
+        "mass": f"{hull.mass:g}",
+        "boat": boat,
+        "speed": f"{speed:g}",
+        "long": f"{long:g}",
+        "wide": f"{wide:g}",
         "duration": f"{10.0 * math.ceil(0.1 * TIME * (2.0 * long + wide) / speed):g}",
         "study": study,
-    }  # fmt: skip
+    }
     template = files("podusv_cli.workflows").joinpath("starting_files", "boat.yaml.txt")
     return Template(template.read_text("utf-8")).substitute(words).rstrip() + "\n"
 

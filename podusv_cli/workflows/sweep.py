@@ -73,9 +73,15 @@ class Swept:
         counts = {"wanted": self.tally.wanted, "made": self.tally.made}
         missing = [str(failure) for failure in self.missing]
         return {
-            "format": 1, "status": status, "folder": str(self.folder), **counts, **answer,
-            "missing": missing, "missing_runs": self.missing_runs, "refused": self.refused,
-        }  # fmt: skip
+            "format": 1,
+            "status": status,
+            "folder": str(self.folder),
+            **counts,
+            **answer,
+            "missing": missing,
+            "missing_runs": self.missing_runs,
+            "refused": self.refused,
+        }
 
 
 def run(config: Config, request: Request, tell: Tell) -> Swept:
@@ -115,9 +121,13 @@ def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tel
 
 
 def _march_study(
-    store: Store, made: StudyPlan, request: Request, started: datetime, executor: Executor,
+    store: Store,
+    made: StudyPlan,
+    request: Request,
+    started: datetime,
+    executor: Executor,
     tell: Tell,
-) -> tuple[StudyTally, bool]:  # fmt: skip
+) -> tuple[StudyTally, bool]:
     """Simulate what is missing, and note the session; how far it is, and if it is whole."""
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
     seen = StudyTally(0)
@@ -129,9 +139,14 @@ def _march_study(
 
     try:
         return dispatch(
-            store, made, tell_tally, executor, seconds=request.seconds, part=request.shard,
+            store,
+            made,
+            tell_tally,
+            executor,
+            seconds=request.seconds,
+            part=request.shard,
             begin=partial(_announce, store.folder, made, request),
-        )  # fmt: skip
+        )
     except KeyboardInterrupt as stop:
         kept = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
         raise interruption(kept, "sweep run", store.folder) from stop

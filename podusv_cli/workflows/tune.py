@@ -66,12 +66,15 @@ class Tuned:
         """What `--json` prints."""
         results = self.results
         return {
-            "format": 1, "status": "finished", "folder": str(self.folder),
+            "format": 1,
+            "status": "finished",
+            "folder": str(self.folder),
             "laws": results.laws.to_dict("records"),
             "gains": {law: dict(results.winner(law).gains) for law in results.winners},
-            "remarks": remarks(results), "missing": [str(failure) for failure in self.missing],
+            "remarks": remarks(results),
+            "missing": [str(failure) for failure in self.missing],
             "refused": self.refused,
-        }  # fmt: skip
+        }
 
 
 def tune(config: Config, request: Request, tell: Tell) -> Tuned:
@@ -90,7 +93,7 @@ def tune(config: Config, request: Request, tell: Tell) -> Tuned:
 
 def _tune_folder(
     loaded: Loaded, folder: Path, request: Request, started: datetime, tell: Tell
-) -> Tuned:  # fmt: skip
+) -> Tuned:
     """Search what is not there yet, or all anew; no other process writes into the folder."""
     plan, texts = TunePlan(loaded.scenario), scenario_texts(loaded)
     noted = None if request.force else place.read_known(folder, plan)
@@ -120,9 +123,13 @@ def _load_config(config: Config, request: Request) -> tuple[Loaded, Path]:
 
 
 def _run_search(
-    plan: TunePlan, folder: Path, request: Request, started: datetime, executor: Executor,
+    plan: TunePlan,
+    folder: Path,
+    request: Request,
+    started: datetime,
+    executor: Executor,
     tell: Tell,
-) -> SearchResults:  # fmt: skip
+) -> SearchResults:
     """Search and validate what is not there yet, and note the session."""
     session = SessionLog(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}

@@ -26,11 +26,17 @@ RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `
 
 
 def verify(
-    config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
-    progress: Callable[[str, float], None] | None = None, *, force: bool = False,
-    plugins: Sequence[str] = (), trust: bool = False,
+    config: Path,
+    overrides: Sequence[str],
+    tolerance: float,
+    out: Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    *,
+    force: bool = False,
+    plugins: Sequence[str] = (),
+    trust: bool = False,
     warn: Callable[[object], None] = lambda finding: None,
-) -> Verification:  # fmt: skip
+) -> Verification:
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
     Raises UsageError for a run folder, ScenarioError, LawError, and StorageError where `out` is no

@@ -147,10 +147,13 @@ def test_what_cannot_be_stored_stays_an_error(podusv, monkeypatch):
 @pytest.mark.parametrize(
     "override",
     [
-        "simulation.step=0.5", "controller.k_psie=500", "controller.Gamma_u=1e5",
-        "controller.gamma_r=1e5", "vessel.Y_vv=100",
+        "simulation.step=0.5",
+        "controller.k_psie=500",
+        "controller.Gamma_u=1e5",
+        "controller.gamma_r=1e5",
+        "vessel.Y_vv=100",
     ],
-)  # fmt: skip
+)
 def test_the_theory_of_a_run_that_leaves_all_numbers_is_made(podusv, override):
     said = podusv("run", CORRECTED, "--set", override, "--no-figures", "-q", "--out", "x")
     assert said.code == 4

@@ -39,10 +39,12 @@ def begun(out: str, **environment: str) -> subprocess.Popen[str]:
     other = {name: text for name, text in os.environ.items() if name not in names}
     words = ["run", "a.yaml", "--out", out, "--no-figures", "-q"]
     return subprocess.Popen(
-        [sys.executable, "-m", "podusv_cli", *words], text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [sys.executable, "-m", "podusv_cli", *words],
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         env={**other, "PYTHONPATH": str(ROOT), **environment},
-    )  # fmt: skip
+    )
 
 
 def log(process: subprocess.Popen[str], said: str = "") -> bytes:

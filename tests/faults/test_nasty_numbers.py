@@ -28,9 +28,19 @@ from podusv_cli.storage import provenance
 from podusv_cli.workflows.execute import warm_up
 
 VALUES = (
-    "0", "-0.0", "5e-324", "1e-300", "1e-9", "-1.0", "1e9", "1e30", "1e150", "1e200", "1.7e308",
+    "0",
+    "-0.0",
+    "5e-324",
+    "1e-300",
+    "1e-9",
+    "-1.0",
+    "1e9",
+    "1e30",
+    "1e150",
+    "1e200",
+    "1.7e308",
     "-1e308",
-)  # fmt: skip
+)
 SHORT = "simulation.duration=0.5"
 EXTENDED = ("claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
 PARTS = [

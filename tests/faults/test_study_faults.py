@@ -83,9 +83,12 @@ def test_killed_at_any_time_it_goes_on_where_it_was(tmp_path):
 def started(folder, name):
     command = [sys.executable, "-m", "podusv_cli", "sweep", "run", "small.yaml", "--out", name]
     return subprocess.Popen(
-        [*command, "--no-figures"], cwd=folder,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        [*command, "--no-figures"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
 
 
 def children_are_gone(group, patience=20.0):

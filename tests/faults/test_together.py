@@ -111,9 +111,11 @@ def test_a_run_that_is_replaced_while_it_is_drawn_is_drawn_or_refused(podusv):
     """
     for _ in TIMES:
         drawn, made, compared = at_once(
-            podusv, ("plot", "x", "--out", "figures"), (*RUN, "--out", "x", "--force"),
+            podusv,
+            ("plot", "x", "--out", "figures"),
+            (*RUN, "--out", "x", "--force"),
             ("compare", "x", "both", "--out", "new", "--force", "--no-figures"),
-        )  # fmt: skip
+        )
         assert made.code == 0
         for each in (drawn, compared):
             assert each.code == 0 or (

@@ -217,9 +217,17 @@ class Actuator(Component):
         """Loads and rate of the state."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
         call(
-            self.drive, t=0.0, x=x, state=state, demand=demand, k=bundle(self.constants()),
-            table=self.table(), tau=tau, rate=rate, signals=signals,
-        )  # fmt: skip
+            self.drive,
+            t=0.0,
+            x=x,
+            state=state,
+            demand=demand,
+            k=bundle(self.constants()),
+            table=self.table(),
+            tau=tau,
+            rate=rate,
+            signals=signals,
+        )
         return tau, rate
 
     def input_matrix(self) -> Vector:

@@ -90,8 +90,10 @@ class ArduPilot(Rover):
 
     kind: Literal["ardupilot"] = "ardupilot"
     rules: ClassVar[dict[str, Rule]] = Rover.rules | {
-        "speed_FF": by.THROTTLE, "speed_P": by.THROTTLE, "speed_I": by.THROTTLE,
-    }  # fmt: skip
+        "speed_FF": by.THROTTLE,
+        "speed_P": by.THROTTLE,
+        "speed_I": by.THROTTLE,
+    }
     guidance: Literal["position", "l1"] = value(
         "position", "", "the position controller of Rover 4.3 and later, or L1 of 4.2 and before"
     )
@@ -110,9 +112,14 @@ class ArduPilot(Rover):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Guidance, then throttle and steering; where both exceed the thrusters, both give way."""
         rate[CROSS_I] = 0.0
         if k.guidance == L1:

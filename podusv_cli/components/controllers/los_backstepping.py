@@ -77,17 +77,21 @@ class LosBackstepping(Controller):
     k2: float = value(10.0, "kg/s", "gain of the sway velocity in alpha_2", ge=0)
     k3: float = value(2.5, "kg m2/s", "gain of the yaw rate", ge=0)
     circle: float = value(
-        2.51, "m", "radius of the circle about the ship, n of its lengths (here two of 1.255 m)",
+        2.51,
+        "m",
+        "radius of the circle about the ship, n of its lengths (here two of 1.255 m)",
         gt=0,
-    )  # fmt: skip
+    )
     w: float = value(0.9, "1/s", "triple pole of the filter of the line of sight", gt=0)
     sway: Literal["accounted", "left_out"] = value(
-        "accounted", "", "whether alpha_2' enters the moment, as in the source, or is left out",
-    )  # fmt: skip
+        "accounted", "", "whether alpha_2' enters the moment, as in the source, or is left out"
+    )
     filter_start: Literal["heading", "sight"] = value(
-        "heading", "", "where the filtered angle starts: at the ship's heading, so that z1 is 0, "
+        "heading",
+        "",
+        "where the filtered angle starts: at the ship's heading, so that z1 is 0, "
         "or at the line of sight",
-    )  # fmt: skip
+    )
 
     def slots(self) -> Slots:
         """alpha_2, then the filter."""
@@ -111,9 +115,14 @@ class LosBackstepping(Controller):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Backstepping: heading, then the three velocities, of which sway has alpha_2."""
         u, v, r, alpha_2, r_f = x[3], x[4], x[5], memory[0], memory[2]
         u_d = math.sqrt(target[2] * target[2] + target[3] * target[3])

@@ -42,11 +42,15 @@ def see_target(x: Vector, target: Vector, k: Any) -> Seen:
     e_x, e_y = target[0] - x[0], target[1] - x[1]
     e, V_d = Moving(e_x, e_y, 0.0, 0.0), Moving(target[2], target[3], target[4], target[5])
     return Seen(
-        e_x * c + e_y * s, e_y * c - e_x * s, V_d.x * c + V_d.y * s, V_d.y * c - V_d.x * s,
-        V_d.rate_x * c + V_d.rate_y * s, turn_rate(V_d, k.V_m),
+        e_x * c + e_y * s,
+        e_y * c - e_x * s,
+        V_d.x * c + V_d.y * s,
+        V_d.y * c - V_d.x * s,
+        V_d.rate_x * c + V_d.rate_y * s,
+        turn_rate(V_d, k.V_m),
         approach_speed(e, V_d, k.U),
         resting_gain(math.sqrt(e_x * e_x + e_y * e_y), math.sqrt(V_d.x * V_d.x + V_d.y * V_d.y), k),
-    )  # fmt: skip
+    )
 
 
 @kernel

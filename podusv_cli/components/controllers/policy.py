@@ -22,10 +22,15 @@ from podusv_cli.core.kernel import Vector, kernel, tail
 
 # What a policy is given, in the vessel's own frame: x ahead, y to starboard
 OBSERVED = (
-    "target ahead [m]", "target to starboard [m]", "u [m/s]", "v [m/s]", "r [rad/s]",
-    "target's velocity ahead [m/s]", "target's velocity to starboard [m/s]",
+    "target ahead [m]",
+    "target to starboard [m]",
+    "u [m/s]",
+    "v [m/s]",
+    "r [rad/s]",
+    "target's velocity ahead [m/s]",
+    "target's velocity to starboard [m/s]",
     "heading error [rad]",
-)  # fmt: skip
+)
 INPUTS, OUTPUTS = len(OBSERVED), 2
 RELU, CLIP = 1.0, 1.0  # the places of "relu" and "clip" among the choices, as kernels know them
 

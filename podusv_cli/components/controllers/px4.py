@@ -59,18 +59,26 @@ class Px4(Rover):
 
     kind: Literal["px4"] = "px4"
     no_gains: ClassVar[tuple[str, ...]] = (
-        *Rover.no_gains, "lookahead_min", "lookahead_max", "stops_at", "drives_at",
-    )  # fmt: skip
+        *Rover.no_gains,
+        "lookahead_min",
+        "lookahead_max",
+        "stops_at",
+        "drives_at",
+    )
     rules: ClassVar[dict[str, Rule]] = Rover.rules | {
-        "speed_FF": by.SLOWNESS, "speed_P": by.SLOWNESS, "speed_I": by.SLOWNESS,
-    }  # fmt: skip
+        "speed_FF": by.SLOWNESS,
+        "speed_P": by.SLOWNESS,
+        "speed_I": by.SLOWNESS,
+    }
     speed_FF: Ruled = value(0.996, "s/m", "throttle per wanted speed (1/RO_MAX_THR_SPEED)", gt=0)
     speed_P: Ruled = value(0.189, "s/m", "throttle per missing speed (RO_SPEED_P)", ge=0)
     speed_I: Ruled = value(0.0189, "1/m", "rate of throttle per missing speed (RO_SPEED_I)", ge=0)
     rate_FF: Ruled = value(
-        0.103, "s/rad", "steering per wanted yaw rate "
-        "(RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED))", ge=0,
-    )  # fmt: skip
+        0.103,
+        "s/rad",
+        "steering per wanted yaw rate (RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED))",
+        ge=0,
+    )
     rate_P: Ruled = value(0.0481, "s/rad", "steering per missing yaw rate (RO_YAW_RATE_P)", ge=0)
     rate_I: Ruled = value(
         0.0481, "1/rad", "rate of steering per missing yaw rate (RO_YAW_RATE_I)", ge=0
@@ -90,9 +98,12 @@ class Px4(Rover):
     )
     u_least: float = value(0.1, "m/s", "measured speed that counts as 0 (RO_SPEED_TH)", ge=0)
     catch_up: float = value(
-        0.2, "1/s", "wanted speed per distance to a target that is ahead; podusv's, for targets "
-        "with a timetable", ge=0,
-    )  # fmt: skip
+        0.2,
+        "1/s",
+        "wanted speed per distance to a target that is ahead; podusv's, for targets "
+        "with a timetable",
+        ge=0,
+    )
 
     def slots(self) -> Slots:
         """With whether it turns on the spot."""
@@ -119,9 +130,14 @@ class Px4(Rover):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Steering first; the wanted speed is what it leaves room for."""
         u_d = approach_speed(x, target, k.catch_up, k)
         r_d = wanted_turn(heading_error(x, target, u_d, k), k)

@@ -77,10 +77,12 @@ class Schedule(Controller):
     signals: ClassVar[tuple[Signal, ...]] = (FEEDBACK_U, FEEDBACK_R)
     file: str | None = value(None, "", "CSV file beside the scenario; its text is read into `rows`")
     rows: str = value(
-        "", "", "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
+        "",
+        "",
+        "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
         "and the gains from its errors, six of tau_u and six of tau_r; or of t and the commands "
         "of every pod, such as n_1 [1/s] and delta_1 [rad] of the first",
-    )  # fmt: skip
+    )
     between: Literal["linear", "hold"] = value(
         "linear", "", "demand or commands between rows: a straight line, or the last row's"
     )

@@ -43,9 +43,12 @@ class Zigzag(Steering):
         math.radians(10.0), "rad", "change of heading at which steering is reversed", gt=0
     )
     check_every: float = value(
-        0.0, "s", "time between two looks at the heading, a whole number of steps; 0: steering is "
-        "reversed when the heading has changed by `switch`, also within a step", ge=0,
-    )  # fmt: skip
+        0.0,
+        "s",
+        "time between two looks at the heading, a whole number of steps; 0: steering is "
+        "reversed when the heading has changed by `switch`, also within a step",
+        ge=0,
+    )
 
     def slots(self) -> Slots:
         """The side, the heading of the approach, the side at the end of the step, the last look."""

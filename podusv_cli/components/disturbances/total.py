@@ -72,10 +72,12 @@ class Total(Disturbance):
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel of the sum."""
-        return _sum(tuple(
-            SumPart(part.kernel_with(vessel), tuple(part.constants_with(vessel)), places)
-            for part, places in zip(self.parts, self._places(), strict=True)
-        ))  # fmt: skip
+        return _sum(
+            tuple(
+                SumPart(part.kernel_with(vessel), tuple(part.constants_with(vessel)), places)
+                for part, places in zip(self.parts, self._places(), strict=True)
+            )
+        )
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
         """Those of all parts, each with the part's position in front."""

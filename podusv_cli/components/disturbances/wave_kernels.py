@@ -95,9 +95,15 @@ def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float,
 
 @kernel
 def _long_motion(
-    t: float, x: Vector, way: float, c_gamma: float, s_gamma: float, k: Any, table: Vector,
+    t: float,
+    x: Vector,
+    way: float,
+    c_gamma: float,
+    s_gamma: float,
+    k: Any,
+    table: Vector,
     b: Vector,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """Put first-order motion, its velocity and the elevation into b; as `_long_envelopes`."""
     count, sums = int(k.lanes), scratch(LONG_ROOM)
     slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
@@ -148,9 +154,16 @@ def short_crested(
 
 @kernel
 def _facing(
-    j: int, i: int, c: float, s: float, c_gamma: float, s_gamma: float, count: int, table: Vector,
+    j: int,
+    i: int,
+    c: float,
+    s: float,
+    c_gamma: float,
+    s_gamma: float,
+    count: int,
+    table: Vector,
     sums: Vector,
-) -> None:  # fmt: skip
+) -> None:
     """Add to the envelopes of what is reflected ahead, astern, to port and to starboard."""
     ends, sides = table[6 * count + i], table[7 * count + i]
     ahead, astern = ends * max(c_gamma, 0.0), ends * max(-c_gamma, 0.0)

@@ -38,13 +38,7 @@ from pydantic import model_validator
 
 from podusv_cli.components.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
 from podusv_cli.components.measurements.base import FRESH, VALUE
-from podusv_cli.components.vessels.plant import (
-    lacking,
-    plant,
-    surge_force,
-    sway_force,
-    yaw_moment,
-)
+from podusv_cli.components.vessels.plant import lacking, plant, surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -131,11 +125,14 @@ class PassiveObserver(Estimator):
         notch, stiff = 2.0 * (self.zeta_n - self.lambda_w), self.omega_c * self.omega_v
         force, moment = stiff * (nominal.m11 + nominal.m22) / 2.0, stiff * nominal.m33
         return super().constants_with(nominal) | {
-            "K_11": -notch * self.omega_c / self.omega_0, "K_12": notch * self.omega_0,
+            "K_11": -notch * self.omega_c / self.omega_0,
+            "K_12": notch * self.omega_0,
             "K_2": self.omega_c,
-            "K_3": self.omega_b * force, "K_3_psi": self.omega_b * moment,
-            "K_4": force, "K_4_psi": moment,
-        }  # fmt: skip
+            "K_3": self.omega_b * force,
+            "K_3_psi": self.omega_b * moment,
+            "K_4": force,
+            "K_4_psi": moment,
+        }
 
     @staticmethod
     @kernel

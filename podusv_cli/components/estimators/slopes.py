@@ -53,9 +53,15 @@ def accelerate_column(
 
 @kernel
 def slopes(
-    state: Vector, unsure_v: float, unsure_r: float, b: Vector, cosine: float, sine: float, k: Any,
+    state: Vector,
+    unsure_v: float,
+    unsure_r: float,
+    b: Vector,
+    cosine: float,
+    sine: float,
+    k: Any,
     f: Vector,
-) -> None:  # fmt: skip
+) -> None:
     """Rows 0 to 5 of F: derivatives of the rates of (x, y, psi, u, v, r); b is in the body frame.
 
     By the heading, R^T b has the derivative (b_v, -b_u, 0). `unsure` are variances of v and r.

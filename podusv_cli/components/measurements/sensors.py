@@ -109,9 +109,11 @@ class Sensors(Measurement):
     def instruments(self) -> dict[str, tuple[Sensor | None, int]]:
         """Each sensor by its key, and how many quantities it has, in the order of the state."""
         return {
-            "position": (self.position, 2), "heading": (self.heading, 1),
-            "velocity": (self.velocity, 2), "yaw_rate": (self.yaw_rate, 1),
-        }  # fmt: skip
+            "position": (self.position, 2),
+            "heading": (self.heading, 1),
+            "velocity": (self.velocity, 2),
+            "yaw_rate": (self.yaw_rate, 1),
+        }
 
     def measured(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r have a sensor."""

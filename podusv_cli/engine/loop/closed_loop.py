@@ -87,10 +87,13 @@ class ClosedLoop:
     def parts(self) -> dict[str, Component]:
         """Those that kernels belong to, as `Plan.constants` calls them."""
         return {
-            "path": self.path, "disturbance": self.disturbance, "law": self.controller,
-            "actuator": self.actuator, "measurement": self.measurement,
+            "path": self.path,
+            "disturbance": self.disturbance,
+            "law": self.controller,
+            "actuator": self.actuator,
+            "measurement": self.measurement,
             "estimator": self.estimator,
-        }  # fmt: skip
+        }
 
     @property
     def measured(self) -> bool:

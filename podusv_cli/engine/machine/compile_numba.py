@@ -62,9 +62,7 @@ def widest(typing: Any) -> Any:
     return types.none(), code
 
 
-PRIMITIVES = {
-    kernel.tail: tail_of, kernel.scratch: scratch_of, kernel.widest: widest,
-}  # fmt: skip
+PRIMITIVES = {kernel.tail: tail_of, kernel.scratch: scratch_of, kernel.widest: widest}
 
 
 def object_code(function: Any, prototype: Any) -> Code:

@@ -31,11 +31,15 @@ PARTS: dict[type[ast.AST], str] = {
     ast.Assert: "assert: machine code knows no errors; write a number that tells, as a signal",
     ast.Raise: "raise: machine code knows no errors; write a number that tells, as a signal",
     ast.Try: "try: machine code knows no errors; test the numbers before",
-    ast.List: "a list: take variables, or scratch(n)", ast.Dict: "a dict: take variables",
-    ast.ListComp: "a list: write a loop", ast.GeneratorExp: "a generator: write a loop",
-    ast.Slice: "a slice: take tail(vector, n), or a loop", ast.JoinedStr: "text: take numbers",
-    ast.Lambda: "a lambda: write a kernel", ast.FunctionDef: "a function within: write a kernel",
-}  # fmt: skip
+    ast.List: "a list: take variables, or scratch(n)",
+    ast.Dict: "a dict: take variables",
+    ast.ListComp: "a list: write a loop",
+    ast.GeneratorExp: "a generator: write a loop",
+    ast.Slice: "a slice: take tail(vector, n), or a loop",
+    ast.JoinedStr: "text: take numbers",
+    ast.Lambda: "a lambda: write a kernel",
+    ast.FunctionDef: "a function within: write a kernel",
+}
 FROM_THE_END = (
     "counts from the end, and a kernel does not know where a vector ends; count from the front"
 )

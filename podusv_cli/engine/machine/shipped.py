@@ -28,9 +28,11 @@ from podusv_cli.engine.machine import kernel_source, object_cache
 FILE = Path(__file__).with_name("kernels.xz")
 # The files of podusv that make bitcode, from the package's folder.
 MAKERS = (
-    "core/kernel.py", "engine/machine/compile_numba.py", "engine/machine/finish.py",
+    "core/kernel.py",
+    "engine/machine/compile_numba.py",
+    "engine/machine/finish.py",
     "engine/machine/wide/*.py",
-)  # fmt: skip
+)
 
 
 def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:

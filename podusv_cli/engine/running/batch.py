@@ -193,9 +193,15 @@ class _Runs:
     """The runs of a batch while they are made."""
 
     def __init__(
-        self, loops: Loops, grid: TimeGrid, batch: Batch, probe: Probe,
-        like: Plan | None, progress: Callable[[float], None] | None, lanes: bool | None,
-    ) -> None:  # fmt: skip
+        self,
+        loops: Loops,
+        grid: TimeGrid,
+        batch: Batch,
+        probe: Probe,
+        like: Plan | None,
+        progress: Callable[[float], None] | None,
+        lanes: bool | None,
+    ) -> None:
         self._loops, self._grid, self._batch, self._probe = loops, grid, batch, probe
         self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)
@@ -328,7 +334,9 @@ class _Runs:
 
 def _blank(count: int, probe: Probe) -> Batch:
     return Batch(
-        status=np.full(count, "interrupted"), cause=np.full(count, "", object),
-        reached=np.zeros(count, np.int64), state=np.full((count, len(STATE)), np.nan),
+        status=np.full(count, "interrupted"),
+        cause=np.full(count, "", object),
+        reached=np.zeros(count, np.int64),
+        state=np.full((count, len(STATE)), np.nan),
         seen=np.full((count, probe.size), np.nan),
-    )  # fmt: skip
+    )

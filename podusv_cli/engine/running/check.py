@@ -125,9 +125,15 @@ def _ask(plan: Plan) -> None:
         raise LawError(f"{describe(law)}: it leaves {left} unwritten")
     if law.wants_loads():
         call(
-            law.after_saturation, t=0.0, memory=plan.first_memory.copy(), demand=tau,
-            tau=np.zeros(3), k=bundle(plan.law_constants), table=plan.law_table.copy(), rate=rate,
-        )  # fmt: skip
+            law.after_saturation,
+            t=0.0,
+            memory=plan.first_memory.copy(),
+            demand=tau,
+            tau=np.zeros(3),
+            k=bundle(plan.law_constants),
+            table=plan.law_table.copy(),
+            rate=rate,
+        )
 
 
 def _check_signals(plan: Plan) -> None:

@@ -66,9 +66,12 @@ def marcher(
         pointers = signatures.pointers(vectors, signatures.LANE_VECTOR)
         sizes = signatures.whole_numbers(lanes.layout)
         given = (
-            pointers, sizes, len(vectors[Vectors._fields.index("seen")]) // LANES,
-            signatures.pointer(lanes.under_way), signatures.pointer(lanes.ends),
-        )  # fmt: skip
+            pointers,
+            sizes,
+            len(vectors[Vectors._fields.index("seen")]) // LANES,
+            signatures.pointer(lanes.under_way),
+            signatures.pointer(lanes.ends),
+        )
 
         def over(first: int, last: int, steps: int = lanes.layout.steps) -> int:
             sizes[STEPS] = steps

@@ -26,9 +26,12 @@ March = Callable[..., int]
 Marcher = Callable[[Vectors, Layout, float], March]  # of vectors, with a step [s]
 # What a log says of a run, by how its march ended.
 RECORDED: dict[MarchStatus, Status] = {
-    "finished": "finished", "interrupted": "interrupted",
-    "diverged": "diverged", "crashed": "diverged", "hung": "diverged",
-}  # fmt: skip
+    "finished": "finished",
+    "interrupted": "interrupted",
+    "diverged": "diverged",
+    "crashed": "diverged",
+    "hung": "diverged",
+}
 
 
 def simulate(
@@ -46,9 +49,12 @@ def simulate(
 
 
 def run(
-    plan: Plan, *, compiled: bool = True, progress: Callable[[float], None] | None = None,
+    plan: Plan,
+    *,
+    compiled: bool = True,
+    progress: Callable[[float], None] | None = None,
     allocate: Allocate = np.empty,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """Integrate a loop over its grid.
 
     `progress` is called with the fraction done, about 20 times a second. An interrupt ends the
@@ -61,9 +67,11 @@ def run(
     advance = partial(marcher(plan, compiled)(vectors, layout, grid.step), 0, last)
     with np.errstate(all="ignore"), interrupts_deferred():
         ending = march(
-            advance, last, vectors.under_way,
+            advance,
+            last,
+            vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
-        )  # fmt: skip
+        )
         return replace(recording_of(plan, vectors, ending), about=about)
 
 

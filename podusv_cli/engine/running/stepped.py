@@ -164,9 +164,13 @@ class SteppedBatch:
     """
 
     def __init__(
-        self, plan: Plan, runs: Sequence[BatchRun], advance: Callable[[Lanes, float], March],
-        look: Any, size: int,
-    ) -> None:  # fmt: skip
+        self,
+        plan: Plan,
+        runs: Sequence[BatchRun],
+        advance: Callable[[Lanes, float], March],
+        look: Any,
+        size: int,
+    ) -> None:
         """Nothing is marched yet; the plan is that of runs like these."""
         layout, grid = plan.layout, plan.grid
         self.places = [run.position for run in runs]
@@ -178,8 +182,13 @@ class SteppedBatch:
         given = c.s[layout.estimate * LANES :]
         _, path, names = plan.functions[0]
         shared = shared_constants(plan)["path"]
-        vectors = {"x": given, "place": c.s[layout.place * LANES :], "k": c.path,
-                   "table": c.path_table, "target": target}  # fmt: skip
+        vectors = {
+            "x": given,
+            "place": c.s[layout.place * LANES :],
+            "k": c.path,
+            "table": c.path_table,
+            "target": target,
+        }
         self._aim = in_lanes("path", path, names, shared, vectors)
         self._look = in_lanes("law", look, (), NOTHING, vectors | {"signals": view})
         self.law_table, self._seen, self._view = map(self._by_run, (c.law_table, c.seen, view))

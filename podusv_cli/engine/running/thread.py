@@ -135,9 +135,11 @@ class Work:
 
 
 def march(
-    advance: Callable[[], int], last: int, under_way: Vector,
+    advance: Callable[[], int],
+    last: int,
+    under_way: Vector,
     progress: Callable[[int], None] | None = None,
-) -> Ending:  # fmt: skip
+) -> Ending:
     """March up to the instant `last`, excluded. To be called while interrupts are held."""
     work = Work(advance, under_way)
     try:

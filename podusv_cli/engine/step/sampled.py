@@ -24,9 +24,17 @@ def held_rates(
     """Rates of the law's memory at t with the last sample held, while the loads in the row act."""
     row, held = c.row, c.held
     law(
-        shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), c.law, c.law_table,
-        tail(held, HELD_DEMAND), rate, tail(held, HELD_SIGNALS), c.work,
-    )  # fmt: skip
+        shared(held[0]),
+        tail(held, HELD_X),
+        memory,
+        tail(held, HELD_TARGET),
+        c.law,
+        c.law_table,
+        tail(held, HELD_DEMAND),
+        rate,
+        tail(held, HELD_SIGNALS),
+        c.work,
+    )
     if n.wants_loads > 0:
         after(t, memory, tail(row, n.demand), tail(row, n.tau), c.law, c.law_table, rate)
 
@@ -53,9 +61,16 @@ def remember(
 
 @kernel
 def sample_and_hold(
-    k: int, t: float, h: float, path: Function, law: Function, sample: Function, after: Function,
-    c: Vectors, n: Layout,
-) -> None:  # fmt: skip
+    k: int,
+    t: float,
+    h: float,
+    path: Function,
+    law: Function,
+    sample: Function,
+    after: Function,
+    c: Vectors,
+    n: Layout,
+) -> None:
     """What happens at instants only: the law's own samples, and the hold of sampled control."""
     given, row, held = tail(c.s, n.estimate), c.row, c.held
     memory, aim = tail(c.s, n.memory), tail(row, n.shown)
@@ -72,9 +87,17 @@ def sample_and_hold(
             for _ in range(n.hold_every):  # the period that ends, with its loads
                 remember(t, 0.0, h, law, after, c, n)
         law(
-            t, given, memory, aim, p, table, tail(row, n.demand), tail(c.stages, n.memory),
-            tail(row, n.signals), c.work,
-        )  # fmt: skip
+            t,
+            given,
+            memory,
+            aim,
+            p,
+            table,
+            tail(row, n.demand),
+            tail(c.stages, n.memory),
+            tail(row, n.signals),
+            c.work,
+        )
 
 
 @kernel

@@ -109,9 +109,19 @@ def correct_filter(line: Vector, since: float, state: Vector, k: Any, out: Vecto
 
 @kernel
 def filter_rows(
-    loads: Function, follow: Function, count: int, width: int, apart: int, record: Vector,
-    actuator: Vector, table: Vector, p: Vector, state: Vector, out: Vector, track: Vector,
-) -> None:  # fmt: skip
+    loads: Function,
+    follow: Function,
+    count: int,
+    width: int,
+    apart: int,
+    record: Vector,
+    actuator: Vector,
+    table: Vector,
+    p: Vector,
+    state: Vector,
+    out: Vector,
+    track: Vector,
+) -> None:
     """The filter along the rows of a record: classical RK4 between them, with commands held.
 
     Rows of the track are so far `apart`; with 0 the last one alone is left.
@@ -146,8 +156,12 @@ def filter_rows(
 
 FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 3, *[PLAIN] * 7)
 FILTERED_LANES = (
-    LANE_PROTOTYPES["actuator"], LANE_PROTOTYPES["follow"], *[WHOLE] * 3, PLAIN, *[LANE_VECTOR] * 6,
-)  # fmt: skip
+    LANE_PROTOTYPES["actuator"],
+    LANE_PROTOTYPES["follow"],
+    *[WHOLE] * 3,
+    PLAIN,
+    *[LANE_VECTOR] * 6,
+)
 
 
 Follow = Callable[[FilterRecord, Sequence[Vector], Sequence[Vector], bool], Followed]
@@ -188,9 +202,14 @@ def side_by_side(actuator: Actuator) -> Follow:
         out, track = room(2 * record.delivered * LANES), room(N * rows * LANES)
         p, state = _in_lanes(constants), _in_lanes(starts)
         march(
-            loads, follow, count, width, apart, signatures.pointer(record.rows),
+            loads,
+            follow,
+            count,
+            width,
+            apart,
+            signatures.pointer(record.rows),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],
-        )  # fmt: skip
+        )
         runs = len(constants)
         pairs = out.reshape(record.delivered, 2, LANES)[..., :runs]
         return Followed(pairs[:, 0], pairs[:, 1], track.reshape(rows, N, LANES)[..., :runs])

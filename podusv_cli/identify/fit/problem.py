@@ -127,8 +127,9 @@ class FitProblem:
         own = {**dict.fromkeys(CURRENT if self.current else (), self.current), **self._first}
         each = [
             FreeNumber(f"{name}, {log.name}", 0.0, sd, ratio=False)
-            for log in self.logs for name, sd in own.items()
-        ]  # fmt: skip
+            for log in self.logs
+            for name, sd in own.items()
+        ]
         return [*self.hull, *noises, FreeNumber(DELAY, 0.0, self.wanted.step, ratio=False), *each]
 
     @cached_property

@@ -228,9 +228,10 @@ TURNS = {
     CENTI * DEGREES: ("COLUMN [1e-2 deg]", "psi is in hundredths of a degree"),
     math.radians(RADIANS): ("COLUMN [rad]", "psi is in radians and not in degrees"),
     math.radians(CENTI * DEGREES): (
-        "COLUMN [1e-2 deg]", "psi is in hundredths of a degree and not in degrees"
+        "COLUMN [1e-2 deg]",
+        "psi is in hundredths of a degree and not in degrees",
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -507,7 +508,13 @@ def _idle(motion: BinnedMotion) -> Iterator[str]:
 Check = Callable[[BinnedMotion], Iterator[str]]
 # Of every log, of those with headings, and of those that a hull is to be found from.
 OF_ALL: tuple[Check, ...] = (
-    _jumps, _clock, _places, _degrees_and_minutes, _speeds_apart, _speed_made_good, _empty,
-)  # fmt: skip
+    _jumps,
+    _clock,
+    _places,
+    _degrees_and_minutes,
+    _speeds_apart,
+    _speed_made_good,
+    _empty,
+)
 OF_HEADINGS: tuple[Check, ...] = (_compass, _courses, _yaw_rate, _speeds)
 OF_FITS: tuple[Check, ...] = (_slow_rows, _out_of_reach, _constant, _idle, _manoeuvres)

@@ -32,31 +32,48 @@ SIDES = "left|right|port|starboard|stbd"
 # stands for 1, 2, ... in the order of the log.
 NAMES = {
     TIME: r"time|t|timestamp|time_?stamp|stamp|timeus|epoch|secs?|seconds|date_?time|zeit",
-    "lat": r"lat|latitude|latitud|breite|breitengrad", "lon": r"lon|lng|long|longitude|longitud|"
+    "lat": r"lat|latitude|latitud|breite|breitengrad",
+    "lon": r"lon|lng|long|longitude|longitud|"
     "länge|längengrad|laenge|laengengrad",
-    "x": r"x|north|northing|pos_?n|pn|position\.x", "y": r"y|east|easting|pos_?e|pe|position\.y",
+    "x": r"x|north|northing|pos_?n|pn|position\.x",
+    "y": r"y|east|easting|pos_?e|pe|position\.y",
     "psi": r"psi|heading|hdg|compass|yaw|kompass|steuerkurs",
-    "u": r"u|surge|linear\.x|speed_?x|vx", "v": r"v|sway|linear\.y|speed_?y|vy",
+    "u": r"u|surge|linear\.x|speed_?x|vx",
+    "v": r"v|sway|linear\.y|speed_?y|vy",
     "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
     "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
     ".*propeller.*|.*motor.*|.*esc.*speed.*",
     "delta_#": r"delta_?\d|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
-    "tau_u": r"tau_u|surge_?force|force\.x", "tau_v": r"tau_v|sway_?force|force\.y",
+    "tau_u": r"tau_u|surge_?force|force\.x",
+    "tau_v": r"tau_v|sway_?force|force\.y",
     "tau_r": r"tau_r|yaw_?moment|torque\.z",
-}  # fmt: skip
+}
 # Of each of these a log needs one, the first where nothing is known.
 NEEDED = ((TIME,), ("x", "lat"), ("y", "lon"), ("psi",), ("n_1", "delta_1", "tau_u"))
 FORMS = ("^({})$", "([./ ]|_(?=...))({})$")  # the whole name, or its last part
 # Of quantities the unit that the end of a name means, and that which a range means that begins so.
 ENDINGS = {
-    "deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "deg": "deg", "rad": "", "kn": "kn",
-    "kts": "kn", "knots": "kn", "kmh": "km/h", "rpm": "rpm", "ms": "ms", "us": "us", "ns": "ns",
+    "deg_s": "deg/s",
+    "degs": "deg/s",
+    "dps": "deg/s",
+    "deg": "deg",
+    "rad": "",
+    "kn": "kn",
+    "kts": "kn",
+    "knots": "kn",
+    "kmh": "km/h",
+    "rpm": "rpm",
+    "ms": "ms",
+    "us": "us",
+    "ns": "ns",
     "timeus": "us",
-}  # fmt: skip
+}
 BEYOND = {
-    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "n_#": ((100.0, "rpm"),),
+    "psi": ((7.0, "deg"),),
+    "r": ((4.0, "deg/s"),),
+    "n_#": ((100.0, "rpm"),),
     "delta_#": ((3.2, "deg"),),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -88,9 +105,11 @@ class Listing:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "columns": [asdict(own) for own in self.columns],
-            "mapping": self.mapping(), "warnings": list(self.warnings),
-        }  # fmt: skip
+            "format": 1,
+            "columns": [asdict(own) for own in self.columns],
+            "mapping": self.mapping(),
+            "warnings": list(self.warnings),
+        }
 
     def mapping(self) -> list[str]:
         """Lines to write under `identify`; comments say what could not be guessed."""

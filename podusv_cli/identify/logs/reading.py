@@ -35,9 +35,10 @@ SENSED = {signal.name for signal in (*STATE, LAT, LON)}
 OPTIONAL = {signal.name for signal in STATE[3:]}  # that may be in a log without any number
 # What logs have beside the units that people write: propellers in rad/s, angles as integers.
 OF_LOGS = {
-    "1/s": {"rad/s": 0.5 / math.pi}, "rad": {"1e-2 deg": math.pi / 18000.0},
+    "1/s": {"rad/s": 0.5 / math.pi},
+    "rad": {"1e-2 deg": math.pi / 18000.0},
     "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "1e-6 deg": 1e-6},
-}  # fmt: skip
+}
 # Of each of podusv's units, what one of those that logs have is in it.
 UNITS: dict[str, dict[str, float]] = {
     unit: {name: float(factor) for name, factor in units_allowed_for(unit).items()}
@@ -158,9 +159,12 @@ def _in_frame(whole: LogTable, frame: str) -> LogTable:
     from_fix = "x" in flat and "x" not in whole.columns
     minutes = from_fix and all(may_be_minutes(whole.columns[place]) for place in PLACES)
     return replace(
-        whole, columns=flat, notes=tuple(f"{whole.name}: {note}." for note in notes),
-        from_fix=from_fix, maybe_minutes=minutes,
-    )  # fmt: skip
+        whole,
+        columns=flat,
+        notes=tuple(f"{whole.name}: {note}." for note in notes),
+        from_fix=from_fix,
+        maybe_minutes=minutes,
+    )
 
 
 def _series(

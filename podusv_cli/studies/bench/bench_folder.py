@@ -32,9 +32,12 @@ def draw_figures(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -
 
 
 def write_files(
-    writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture],
-    provenance: Mapping[str, Any], solved: Sequence[Least],
-) -> None:  # fmt: skip
+    writer: RunWriter,
+    made: pd.DataFrame,
+    figures: Sequence[Picture],
+    provenance: Mapping[str, Any],
+    solved: Sequence[Least],
+) -> None:
     """Write everything but provenance.json and the manifest. Raises StorageError."""
     writer.add(RUNS, _csv(made))
     writer.add(BOARD, page.as_markdown(made).encode())

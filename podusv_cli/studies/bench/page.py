@@ -36,26 +36,32 @@ class PageCell(NamedTuple):
 
 
 def page(
-    made: pd.DataFrame, figures: Sequence[Picture], provenance: Mapping[str, Any],
+    made: pd.DataFrame,
+    figures: Sequence[Picture],
+    provenance: Mapping[str, Any],
     optima: Sequence[Least] = (),
-) -> str:  # fmt: skip
+) -> str:
     """The page; `made` is `standing.table` of all runs, `with_optima` where there are any."""
     laws = list(made.law.unique())
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
-    return environment("podusv_cli.studies.bench").get_template("bench.html.j2").render(
-        title=f"Bench of {len(laws)} laws",
-        boards={vessel: leaderboard_rows(rows) for vessel, rows in by_vessel(made).items()},
-        laws=laws,
-        columns=columns(made),
-        counts=counts | {"cases": len(made) // len(laws), "runs": len(made)},
-        heat=list(_heat(made, laws)),
-        failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
-        more=max(0, len(failed) - FIRST),
-        figures=figures,
-        provenance=[(key, value_text(value)) for key, value in flat(provenance)],
-        optima=_grids(optima) if optima else None,
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.studies.bench")
+        .get_template("bench.html.j2")
+        .render(
+            title=f"Bench of {len(laws)} laws",
+            boards={vessel: leaderboard_rows(rows) for vessel, rows in by_vessel(made).items()},
+            laws=laws,
+            columns=columns(made),
+            counts=counts | {"cases": len(made) // len(laws), "runs": len(made)},
+            heat=list(_heat(made, laws)),
+            failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
+            more=max(0, len(failed) - FIRST),
+            figures=figures,
+            provenance=[(key, value_text(value)) for key, value in flat(provenance)],
+            optima=_grids(optima) if optima else None,
+        )
+    )
 
 
 def as_markdown(made: pd.DataFrame) -> str:

@@ -33,8 +33,11 @@ from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
 EXAMPLE = "share(a.iae < b.iae) >= 0.95"
 # of a number on the left of a comparison
 MIRRORED: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE,
-}  # fmt: skip
+    ast.Lt: ast.Gt,
+    ast.LtE: ast.GtE,
+    ast.Gt: ast.Lt,
+    ast.GtE: ast.LtE,
+}
 SHARES = {SHARE, FAILURES}
 COMPARED = (
     "compare a statistic with a number, or two shares with each other: failures(a) < failures(b); "
@@ -105,9 +108,11 @@ def parse(text: str, laws: Sequence[str], metrics: Mapping[str, MetricAbout]) ->
 
 
 def judge(
-    claims: Sequence[ParsedStudyClaim], runs: StudyRuns, level: float,
+    claims: Sequence[ParsedStudyClaim],
+    runs: StudyRuns,
+    level: float,
     metrics: Mapping[str, MetricAbout],
-) -> list[StudyVerdict]:  # fmt: skip
+) -> list[StudyVerdict]:
     """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
     tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
     levels = holm(lambda i, level: tried[i].at(level).answer is not None, len(tried), level)
@@ -241,12 +246,18 @@ def _verdict(parsed: ParsedStudyClaim, tried: _Evaluation) -> StudyVerdict:
     broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
     others = replace(tried, whole=False, samples={}) if broken else tried
     return StudyVerdict(
-        name=parsed.name, claim=parsed.claim, answer=tried.answer, level=tried.level,
+        name=parsed.name,
+        claim=parsed.claim,
+        answer=tried.answer,
+        level=tried.level,
         wanted=runs.wanted,
         parts=[
             Statistic.of(text, sample, tried.inside)
-            for text, samples in tried.samples.items() for sample in samples
+            for text, samples in tried.samples.items()
+            for sample in samples
         ],
-        by_cell=dict(zip(runs.cells, answers, strict=True)), needed=tried.draws_needed(),
-        broken=broken, without_broken=others.answer,
-    )  # fmt: skip
+        by_cell=dict(zip(runs.cells, answers, strict=True)),
+        needed=tried.draws_needed(),
+        broken=broken,
+        without_broken=others.answer,
+    )

@@ -133,9 +133,8 @@ def parse_success(text: str, metrics: Mapping[str, MetricAbout]) -> ast.expr:
 
 
 def judge_success(
-    tree: ast.expr, values: Mapping[str, Vector], finished: Mask,
-    metrics: Mapping[str, MetricAbout],
-) -> Mask:  # fmt: skip
+    tree: ast.expr, values: Mapping[str, Vector], finished: Mask, metrics: Mapping[str, MetricAbout]
+) -> Mask:
     """Which runs of a law are a success; one is not where the condition is unknown."""
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
     return np.broadcast_to(held, np.shape(finished))

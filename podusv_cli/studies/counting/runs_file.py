@@ -194,9 +194,10 @@ class RunsTable:
         return UnitResult(
             Unit(law, cell, rows.start, len(rows)),
             {name: self._file[name][place, cell, part] for name in self.metrics},
-            status[part], self._file["until"][place, cell, part],
+            status[part],
+            self._file["until"][place, cell, part],
             tuple(self.causes.get((place, cell, draw), "") for draw in rows),
-        )  # fmt: skip
+        )
 
 
 def stretches(there: Any) -> list[range]:

@@ -214,6 +214,9 @@ def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
 
 
 STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
-    SHARE: _share, FAILURES: _share, QUANTILE: _quantile, MEDIAN: _quantile,
-}  # fmt: skip
+    SHARE: _share,
+    FAILURES: _share,
+    QUANTILE: _quantile,
+    MEDIAN: _quantile,
+}
 SAMPLERS = STATISTICS | {ALONE: _discordant}

@@ -113,11 +113,12 @@ def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Int
     low = np.sort(np.where(np.isnan(values), -inf, values), axis=-1) if unknown else high
     return [
         Interval(
-            _at(high, _middle(n, q)), _at(low, _rank(n, q, level)),
+            _at(high, _middle(n, q)),
+            _at(low, _rank(n, q, level)),
             _at(high, n + 1 - _rank(n, 1.0 - q, level)),
         )
         for q in shares
-    ]  # fmt: skip
+    ]
 
 
 def _middle(n: int, q: float) -> int:

@@ -40,9 +40,13 @@ def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
     known |= {name: MetricAbout(name=name, **facts) for name, facts in foreign if name not in known}
     there = {*_metrics_measured(folder, digest(before.identity))}
     return record.of_scenario(
-        own, before.laws, before.cells, before.identity, known,
+        own,
+        before.laws,
+        before.cells,
+        before.identity,
+        known,
         tuple(name for name in known if name in there),
-    ).model_copy(update={"draws": before.draws, "history": before.history})  # fmt: skip
+    ).model_copy(update={"draws": before.draws, "history": before.history})
 
 
 def _metrics_measured(folder: Path, seal: str) -> Iterator[str]:

@@ -15,14 +15,7 @@ from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.loop.plan import Plan, no_probe
 from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.scenario.address import (
-    ValueRefused,
-    content,
-    describe_key,
-    has,
-    is_whole,
-    no_entry,
-)
+from podusv_cli.scenario.address import ValueRefused, content, describe_key, has, is_whole, no_entry
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import PER_RUN, Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
@@ -52,9 +45,12 @@ def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     whole = not (loaded.contradictions or loaded.clashes)
     draws = _vary(singles(scenario), loaded.plans, sweep) if whole else ()
     return laws or [
-        *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
+        *_metric_names(scenario),
+        *draws,
+        *_twice(sweep),
+        *_keep(scenario, sweep),
         *_claims(scenario, sweep),
-    ]  # fmt: skip
+    ]
 
 
 def unjudged_claims(scenario: Scenario) -> str:

@@ -208,11 +208,15 @@ class Cluster:
 
     def _submit(self, task: UnitTask) -> None:
         future = self._client.submit(
-            remote.make_unit, self._study.text, self._study.plugins, astuple(task.unit),
-            digest(self._ours), astuple(task.variant) if task.variant else None,
+            remote.make_unit,
+            self._study.text,
+            self._study.plugins,
+            astuple(task.unit),
+            digest(self._ours),
+            astuple(task.variant) if task.variant else None,
             pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
-        )  # fmt: skip
+        )
         self._running[future] = task
         future.add_done_callback(self._finished.put)
 
@@ -278,12 +282,13 @@ class Cluster:
         """Which worker made how many runs, of the study which ones, and who was refused."""
         workers = [
             {
-                "worker": worker, "machine": self._machines[worker],
+                "worker": worker,
+                "machine": self._machines[worker],
                 "runs": sum(task.unit.count for task in tasks),
                 "units": list(_join_units(task.unit for task in tasks if task.variant is None)),
             }
             for worker, tasks in self._made.items()
-        ]  # fmt: skip
+        ]
         return {"workers": workers, "refused": self._refused}
 
 

@@ -258,10 +258,15 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def dispatch(
-    store: Store, plan: StudyPlan, tell: Tell, executor: Executor, *, seconds: float = math.inf,
+    store: Store,
+    plan: StudyPlan,
+    tell: Tell,
+    executor: Executor,
+    *,
+    seconds: float = math.inf,
     part: Shard = (1, 1),
     begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
-) -> tuple[StudyTally, bool]:  # fmt: skip
+) -> tuple[StudyTally, bool]:
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
 
     `begin` is told before the first run what is missing, and which laws march one by one and why.

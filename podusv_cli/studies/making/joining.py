@@ -82,10 +82,11 @@ def digests(result: UnitResult) -> Any:
 def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
     """The names of what is different of one run."""
     old = next(
-        result for result in earlier.results()
+        result
+        for result in earlier.results()
         if (result.unit.law, result.unit.cell) == (new.unit.law, new.unit.cell)
         and draw in result.unit.draws
-    )  # fmt: skip
+    )
     one, two = _run(old, draw), _run(new, draw)
     for name, value in one.items():
         if not np.array_equal(value, two[name], equal_nan=name != "cause"):

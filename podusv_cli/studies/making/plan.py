@@ -103,9 +103,10 @@ class StudyPlan:
             for law in self.laws:
                 single = self.single(law, cell.index)
                 kept = {
-                    key: value for key, value in values(single).items()
+                    key: value
+                    for key, value in values(single).items()
                     if key.partition(".")[0] not in COSMETIC
-                }  # fmt: skip
+                }
                 facts |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
                 facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(self.run_plan(law, cell.index))
         return facts
@@ -117,10 +118,13 @@ class StudyPlan:
         plain = {"laws": (), "draws": variant.draws, "claims": {}, "keep": Keep()}
         scenario = self.scenario.model_copy(
             update={
-                "controllers": laws, "controller": next(iter(laws.values())), "claims": {},
-                "tune": None, "sweep": self.sweep.model_copy(update=plain),
+                "controllers": laws,
+                "controller": next(iter(laws.values())),
+                "claims": {},
+                "tune": None,
+                "sweep": self.sweep.model_copy(update=plain),
             }
-        )  # fmt: skip
+        )
         return StudyPlan(scenario, (Cell(0, (), scenario),), variant)
 
 

@@ -32,30 +32,46 @@ def about(plan: StudyPlan) -> StudyAbout:
 
 
 def of_scenario(
-    scenario: Scenario, laws: tuple[str, ...], cells: tuple[str, ...],
-    identity: Mapping[str, Any], metrics: dict[str, MetricAbout], measured: tuple[str, ...],
-) -> StudyAbout:  # fmt: skip
+    scenario: Scenario,
+    laws: tuple[str, ...],
+    cells: tuple[str, ...],
+    identity: Mapping[str, Any],
+    metrics: dict[str, MetricAbout],
+    measured: tuple[str, ...],
+) -> StudyAbout:
     """What the study of a scenario says about itself, with what follows from its cells and laws."""
     sweep, seas = scenario.sweep or Sweep(), scenario.disturbances().values()
     return StudyAbout(
-        name=scenario.name, description=scenario.description,
-        duration=scenario.simulation.duration, steady_fraction=scenario.metrics.steady_fraction,
+        name=scenario.name,
+        description=scenario.description,
+        duration=scenario.simulation.duration,
+        steady_fraction=scenario.metrics.steady_fraction,
         settling_radius=scenario.metrics.settling_radius,
         parts={
-            "path": scenario.path.label, "disturbance": ", ".join(sea.label for sea in seas),
+            "path": scenario.path.label,
+            "disturbance": ", ".join(sea.label for sea in seas),
             "actuator": scenario.actuator.label,
         },
         plugins={n: plugin.sha256 for n, plugin in scenario.plugins.items() if n.endswith(".py")},
-        laws=laws, cells=cells,
+        laws=laws,
+        cells=cells,
         grid={key: tuple(map(as_yaml, given)) for key, given in sweep.grid.items()},
-        draws=sweep.draws, seed=sweep.seed, design=sweep.design, success=sweep.success,
-        level=sweep.level, keep=sweep.keep, claims=sweep.claims,
+        draws=sweep.draws,
+        seed=sweep.seed,
+        design=sweep.design,
+        success=sweep.success,
+        level=sweep.level,
+        keep=sweep.keep,
+        claims=sweep.claims,
         quantities={
             name: QuantityAbout(keys=q.targets(name), drawn=in_words(q), is_seed=q.is_label)
             for name, q in sweep.vary.items()
         },
-        metrics=metrics, measured=measured, identity=json_text.plain(identity), history=(),
-    )  # fmt: skip
+        metrics=metrics,
+        measured=measured,
+        identity=json_text.plain(identity),
+        history=(),
+    )
 
 
 def drawing(study: StudyIdentity) -> tuple[Sweep, str]:

@@ -100,9 +100,12 @@ class Reply:
 
 
 def make_unit(
-    text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str,
+    text: str,
+    plugins: Plugins,
+    unit: tuple[str, int, int, int],
+    expected: str,
     variant: tuple[Any, ...] | None = None,
-) -> Reply:  # fmt: skip
+) -> Reply:
     """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
     from distributed import get_worker
 

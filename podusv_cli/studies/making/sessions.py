@@ -86,9 +86,13 @@ class SessionLog:
     """
 
     def __init__(
-        self, folder: Path, argv: Sequence[str], started: datetime, plugins: Iterable[Plugin],
+        self,
+        folder: Path,
+        argv: Sequence[str],
+        started: datetime,
+        plugins: Iterable[Plugin],
         others: Iterable[Path] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Note the session, after those of `others`, whose runs it takes over.
 
         The manifest of an earlier session is removed, because the folder is no longer finished.

@@ -95,9 +95,11 @@ class Store:
         self._agree(other.folder, other.about.identity, "leave it out")
 
     def _agree(
-        self, folder: Path, identity: Mapping[str, Any],
+        self,
+        folder: Path,
+        identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
-    ) -> None:  # fmt: skip
+    ) -> None:
         if different := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 
@@ -207,9 +209,11 @@ class Store:
 def encode_unit(result: UnitResult, seal: str) -> bytes:
     """A unit as the content of a file."""
     facts = {
-        "identity": seal, "unit": astuple(result.unit), "metrics": [*result.metrics],
+        "identity": seal,
+        "unit": astuple(result.unit),
+        "metrics": [*result.metrics],
         "causes": result.causes,
-    }  # fmt: skip
+    }
     table = np.array([*result.metrics.values(), result.until], "<f8")
     numbers = table.tobytes() + np.array(result.status, np.uint8).tobytes()
     return _head(facts, numbers) + numbers

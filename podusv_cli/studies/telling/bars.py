@@ -13,8 +13,11 @@ from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
 
 SIGNS: dict[type[ast.cmpop], str] = {
-    ast.Lt: "below", ast.LtE: "at most", ast.Gt: "above", ast.GtE: "at least",
-}  # fmt: skip
+    ast.Lt: "below",
+    ast.LtE: "at most",
+    ast.Gt: "above",
+    ast.GtE: "at least",
+}
 UPWARD = (ast.Gt, ast.GtE)
 FORMS = {False: ".4g", True: ".3g%"}  # of shares
 MARGIN = 0.12  # of an axis beyond what is on it

@@ -78,8 +78,9 @@ def _metric_by_law(results: Results, name: str, cell: int) -> dict[str, Vector]:
     runs, about = results.runs, results.known_metrics[name]
     return {
         law: values[runs.done(law)[cell]]
-        for law in runs.laws if (values := column_of(runs, law, cell, about)) is not None
-    }  # fmt: skip
+        for law in runs.laws
+        if (values := column_of(runs, law, cell, about)) is not None
+    }
 
 
 def _bands(level: float) -> str:
@@ -92,8 +93,8 @@ def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
         yield Sketch(
             _name_figure(f"distribution-{name}", results, cell),
             f"distribution of {name} over all draws{_at(results, cell)}: "
-            f"{results.known_metrics[name].meaning}; a curve that is higher has smaller values, and one "
-            f"that ends below 100 % has failed runs{_bands(level)}",
+            f"{results.known_metrics[name].meaning}; a curve that is higher has smaller values, "
+            f"and one that ends below 100 % has failed runs{_bands(level)}",
             partial(distributions, values, _label(results, name), level),
         )
 
@@ -133,9 +134,10 @@ def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[
     for part in parts:
         match part:
             case ast.Compare(
-                left=ast.Name(id=name), ops=[ast.Lt() | ast.LtE()],
+                left=ast.Name(id=name),
+                ops=[ast.Lt() | ast.LtE()],
                 comparators=[ast.Constant(value=limit)],
-            ):  # fmt: skip
+            ):
                 others = [other for other in parts if other is not part]
                 yield name, float(str(limit)), _limit_axis(results, name, others, cell)
 
@@ -274,9 +276,11 @@ def ratios(pairs: pd.DataFrame) -> Figure:
 
 
 def heatmaps(
-    panels: Mapping[str, Vector], label: str, x: tuple[str, Sequence[str]],
+    panels: Mapping[str, Vector],
+    label: str,
+    x: tuple[str, Sequence[str]],
     y: tuple[str, Sequence[str]],
-) -> Figure:  # fmt: skip
+) -> Figure:
     """A number of every cell for each law: columns are the values of x, rows those of y.
 
     `x` and `y` are grid keys with their values; NaN is a cell without one, inf a failure.
@@ -317,9 +321,15 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     for place, law in enumerate(table.columns):
         at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
         axes.barh(
-            at, table[law], 0.7 / count, color=nth_style(place)[0], label=escaping.figure(law),
-            edgecolor="white", linewidth=0.0, hatch=HATCHES[place % len(HATCHES)],
-        )  # fmt: skip
+            at,
+            table[law],
+            0.7 / count,
+            color=nth_style(place)[0],
+            label=escaping.figure(law),
+            edgecolor="white",
+            linewidth=0.0,
+            hatch=HATCHES[place % len(HATCHES)],
+        )
     if np.isfinite(chance):
         look_of_chance: dict[str, Any] = {"color": "#E4E4E4", "linewidth": 0.0, "zorder": 0.0}
         axes.axvspan(-chance, chance, label="by chance", **look_of_chance)
@@ -374,8 +384,8 @@ def _at_most(values: Vector, x: Vector) -> NDArray[np.int_]:
 
 
 def _share_curve(
-    axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float,
-) -> None:  # fmt: skip
+    axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float
+) -> None:
     """A share of draws [%] over x as steps, within its intervals."""
     color, linestyle, _ = nth_style(place)
     percent = [100.0 * np.asarray(part) for part in statistics.share(counts, n, level)]
@@ -397,10 +407,7 @@ def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[floa
     Returns its ends.
     """
     finite = [numbers[np.isfinite(numbers)] for numbers in values.values()]
-    ends = [
-        *shown,
-        *(end for numbers in finite if len(numbers) for end in _without_tails(numbers)),
-    ]
+    ends = [*shown, *(end for numbers in finite if len(numbers) for end in _without_tails(numbers))]
     low, high = min(ends, default=0.0), max(ends, default=1.0)
     if 0.0 < low * WIDE < high:
         axes.set_xscale("log")

@@ -103,8 +103,9 @@ def find_kept(folder: Path, results: Results, extras: Extras) -> list[Kept]:
     ]
     extras.missing += [
         Failure(f"{LOGS}/{run.wanted.name}", run.difference, problem="differs from runs.h5")
-        for run in kept if run.difference
-    ]  # fmt: skip
+        for run in kept
+        if run.difference
+    ]
     return kept
 
 

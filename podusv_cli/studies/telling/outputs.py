@@ -107,9 +107,7 @@ def export(runs: RunsTable, path: Path) -> None:
 
 def as_frame(runs: RunsTable) -> pd.DataFrame:
     """Every run that is made as a row: law, cell, draw, what was drawn, how it ended, metrics."""
-    frames = [
-        _frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))
-    ]  # fmt: skip
+    frames = [_frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))]
     import pandas as pd  # slow to import
 
     return pd.concat(frames, ignore_index=True)

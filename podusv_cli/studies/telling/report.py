@@ -47,37 +47,48 @@ class Rows(NamedTuple):
 
 
 def page(
-    folder: Path, results: Results, kept: Sequence[Kept], figures: Sequence[Picture],
+    folder: Path,
+    results: Results,
+    kept: Sequence[Kept],
+    figures: Sequence[Picture],
     missing: Sequence[Failure],
-) -> str:  # fmt: skip
+) -> str:
     """The whole report."""
     about, beside = results.about, _beside(figures, len(results.runs.laws))
     ordered = [*beside, *(picture for picture in figures if picture not in beside)]
     numbered = [*enumerate(ordered, 1)]
-    return environment("podusv_cli.studies.telling").get_template("study.html.j2").render(
-        title=f"{about.name}: a study",
-        folder=folder,
-        results=results,
-        about=about,
-        several=len(results.runs.cells) > 1,
-        answers=by_answer(results.verdicts),
-        claims=[(v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)],
-        laws=list(_laws(results)),
-        broken=runs_that(results, results.runs.broken),
-        failed=runs_that(results, results.runs.failed),
-        pairs=_pairs(results),
-        numbers=_numbers(results),
-        metrics={name: results.known_metrics[name] for name in results.shown_metrics},
-        varied=_varied_quantities(results),
-        grid=[(key, ", ".join(given)) for key, given in about.grid.items()],
-        kept=kept,
-        beside=numbered[: len(beside)],
-        figures=numbered,
-        missing=[str(failure) for failure in missing],
-        sittings=_sessions(folder),
-        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
-        first=FIRST,
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.studies.telling")
+        .get_template("study.html.j2")
+        .render(
+            title=f"{about.name}: a study",
+            folder=folder,
+            results=results,
+            about=about,
+            several=len(results.runs.cells) > 1,
+            answers=by_answer(results.verdicts),
+            claims=[
+                (v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)
+            ],
+            laws=list(_laws(results)),
+            broken=runs_that(results, results.runs.broken),
+            failed=runs_that(results, results.runs.failed),
+            pairs=_pairs(results),
+            numbers=_numbers(results),
+            metrics={name: results.known_metrics[name] for name in results.shown_metrics},
+            varied=_varied_quantities(results),
+            grid=[(key, ", ".join(given)) for key, given in about.grid.items()],
+            kept=kept,
+            beside=numbered[: len(beside)],
+            figures=numbered,
+            missing=[str(failure) for failure in missing],
+            sittings=_sessions(folder),
+            latest=[
+                (key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])
+            ],
+            first=FIRST,
+        )
+    )
 
 
 def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
@@ -130,11 +141,16 @@ def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]
     others = [other for other in runs.laws if other != law]
     failing = sum(not runs.success(other)[cell, draw] for other in others)
     return RunRow(
-        law, cell, runs.cells[cell], draw, ending, cause,
+        law,
+        cell,
+        runs.cells[cell],
+        draw,
+        ending,
+        cause,
         f"{failing} of {len(others)}",
         ", ".join(f"{name} {drawn[name][draw]:.3g}" for name in _decisive(results, law, cell))
         or "-",
-    )  # fmt: skip
+    )
 
 
 def _decisive(results: Results, law: str, cell: int) -> list[str]:
@@ -171,13 +187,19 @@ def _pairs(results: Results) -> list[Any]:
 def _numbers(results: Results) -> list[list[str]]:
     """Quantiles of the shown metrics, the median with its interval."""
     return [
-        [row["law"], row["cell"], row["metric"], row["unit"],
-         *(digits(row[q], infinite=word) for q in ("q05", "q25")),
-         Interval.of(row, "q50").text(infinite=word),
-         *(digits(row[q], infinite=word) for q in ("q75", "q95"))]
-        for row in results.tables.summary if row["metric"] in results.shown_metrics
+        [
+            row["law"],
+            row["cell"],
+            row["metric"],
+            row["unit"],
+            *(digits(row[q], infinite=word) for q in ("q05", "q25")),
+            Interval.of(row, "q50").text(infinite=word),
+            *(digits(row[q], infinite=word) for q in ("q75", "q95")),
+        ]
+        for row in results.tables.summary
+        if row["metric"] in results.shown_metrics
         for word in [results.known_metrics[row["metric"]].infinite]
-    ]  # fmt: skip
+    ]
 
 
 def _varied_quantities(results: Results) -> list[tuple[str, str, str]]:

@@ -168,9 +168,10 @@ def judge_study(about: StudyAbout, runs: RunsTable) -> Results:
         q: values for q, values in runs.drawn_quantities.items() if not about.quantities[q].is_seed
     }
     tables = Tables(
-        summary.summary(runs, level, known), summary.pairs(runs, MARGIN, level, known),
+        summary.summary(runs, level, known),
+        summary.pairs(runs, MARGIN, level, known),
         summary.sensitivity(runs, numbers, level, known),
-    )  # fmt: skip
+    )
     if not about.independent:
         tables = Tables(*map(summary.without_intervals, tables))
     verdicts = claims.judge(parsed, runs, level, known)

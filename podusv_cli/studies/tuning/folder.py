@@ -111,15 +111,20 @@ def _identity(plan: TunePlan) -> dict[str, Any]:
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
     tune = plan.tune
     asked = {
-        "budget": tune.budget, "repeats": tune.repeats, "validate": tune.validate,
+        "budget": tune.budget,
+        "repeats": tune.repeats,
+        "validate": tune.validate,
         "started": started,
-    }  # fmt: skip
+    }
     return {
-        "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
+        "format": FORMAT,
+        "name": plan.scenario.name,
+        "laws": list(plan.laws),
         "gains": {law: [gain.key for gain in gains] for law, gains in plan.gains.items()},
         "idle": {law: list(keys) for law, keys in plan.idle.items()},
-        "identity": _identity(plan), "history": [*history, asked],
-    }  # fmt: skip
+        "identity": _identity(plan),
+        "history": [*history, asked],
+    }
 
 
 def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:

@@ -14,10 +14,14 @@ from podusv_cli.studies.tuning.results import SearchResults
 def write_tables(folder: Path, results: SearchResults) -> None:
     """Write all tables. Raises StorageError."""
     tables = {
-        "laws": results.laws, "searches": results.searches, "limits": results.limits,
+        "laws": results.laws,
+        "searches": results.searches,
+        "limits": results.limits,
         "validation": results.pairs,
-        "gains": results.gains, "importance": results.importance, "history": results.history,
-    }  # fmt: skip
+        "gains": results.gains,
+        "importance": results.importance,
+        "history": results.history,
+    }
     files.write_all(
         {folder / f"{n}.csv": csv_files.text(t, DIGITS).encode() for n, t in tables.items()}
     )

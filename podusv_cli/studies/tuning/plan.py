@@ -61,11 +61,12 @@ class TunePlan:
         """The gains of every law; none for a law that is kept as it is."""
         return {
             label: tuple(
-                gain for gain in gains(single.controller, label, single, self.tune)
+                gain
+                for gain in gains(single.controller, label, single, self.tune)
                 if gain.key not in self.idle.get(label, ())
             )
             for label, single in singles(self.scenario).items()
-        }  # fmt: skip
+        }
 
     @cached_property
     def metrics(self) -> dict[str, Metric]:
@@ -92,9 +93,10 @@ class TunePlan:
         tune = self.tune
         return {
             law: (tune.searches * tune.budget, (1 + tune.searches) * tune.validate)
-            if of_law else (0, tune.validate)
+            if of_law
+            else (0, tune.validate)
             for law, of_law in self.gains.items()
-        }  # fmt: skip
+        }
 
     def in_words(self) -> Iterator[str]:
         """The gains of every law, and how many runs there are."""

@@ -19,10 +19,18 @@ BETTER = 0.8  # of the others' error: a law that ought to be noticed
 def remarks(results: SearchResults) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
-        *_answer(results), *_power(results), *_remark_unsettled(results), *_once(results),
-        *_bounds(results), *_remark_kept(results), *_idle(results), *_unsound(results), *_few(results),
-        *_remark_overfitted(results), *_beyond(results),
-    ]  # fmt: skip
+        *_answer(results),
+        *_power(results),
+        *_remark_unsettled(results),
+        *_once(results),
+        *_bounds(results),
+        *_remark_kept(results),
+        *_idle(results),
+        *_unsound(results),
+        *_few(results),
+        *_remark_overfitted(results),
+        *_beyond(results),
+    ]
 
 
 def _answer(results: SearchResults) -> Iterator[str]:
@@ -37,9 +45,9 @@ def _answer(results: SearchResults) -> Iterator[str]:
         if {row["a"], row["b"]} == {best, second}:
             yield (
                 f"{best} has the least {results.plan.tune.objective} in the median of its "
-                f"searches; the ratio of the median {results.plan.metrics[results.shown_metrics[0]].row} "
-                f"({results.shown_metrics[0]}) of {row['a']} and "
-                f"{row['b']} over searches and draws is {Interval.of(row, 'ratio'):.3f}: "
+                "searches; the ratio of the median "
+                f"{results.plan.metrics[results.shown_metrics[0]].row} ({results.shown_metrics[0]}) of "
+                f"{row['a']} and {row['b']} over searches and draws is {Interval.of(row, 'ratio'):.3f}: "
                 f"{_verdict(row)}"
             )
 
@@ -108,7 +116,7 @@ def _unsound(results: SearchResults) -> Iterator[str]:
             inequality.text
             for inequality, over in zip(results.plan.inequalities, trial.excesses, strict=True)
             if over > 0.0
-        ]  # fmt: skip
+        ]
         if broken:
             yield f"{law}: no trial held {' and '.join(broken)} on the training draws"
         elif not math.isfinite(trial.value):

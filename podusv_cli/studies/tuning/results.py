@@ -188,16 +188,28 @@ class SearchResults:
         """Every inequality on the fresh draws, before and after, for every law."""
         return pd.DataFrame(
             [
-                {"law": law, "when": when, "inequality": inequality.text,
-                 **self._limit(inequality, name),
-                 "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0}
+                {
+                    "law": law,
+                    "when": when,
+                    "inequality": inequality.text,
+                    **self._limit(inequality, name),
+                    "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0,
+                }
                 for law in self.plan.laws
                 for when, name in (("before", law), ("after", self.after(law)))
                 for i, inequality in enumerate(self.plan.inequalities)
             ],
-            columns=["law", "when", "inequality", "value", "value_low", "value_high", "holds",
-                     "held_in_training"],
-        )  # fmt: skip
+            columns=[
+                "law",
+                "when",
+                "inequality",
+                "value",
+                "value_low",
+                "value_high",
+                "holds",
+                "held_in_training",
+            ],
+        )
 
     def _limit(self, inequality: Inequality, name: str) -> dict[str, Any]:
         runs = self.outcomes_of(name)
@@ -218,11 +230,16 @@ class SearchResults:
         Empty where the runs have no total variation.
         """
         rows = [
-            {"law": law, "before": name == law, "error": median(self.outcomes_of(name), self.shown_metrics[0]),
-             "variation": median(self.outcomes_of(name), VARIATION)}
-            for law in self.plan.laws if VARIATION in self.runs.metrics
+            {
+                "law": law,
+                "before": name == law,
+                "error": median(self.outcomes_of(name), self.shown_metrics[0]),
+                "variation": median(self.outcomes_of(name), VARIATION),
+            }
+            for law in self.plan.laws
+            if VARIATION in self.runs.metrics
             for name in dict.fromkeys((law, *self._searched_names(law)))
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows, columns=["law", "before", "error", "variation"])
 
     @cached_property
@@ -249,32 +266,42 @@ class SearchResults:
         return pd.DataFrame(
             [
                 {
-                    "law": law, "gain": gain.key, **_ends(gain),
-                    "before": gain.own, "after": self.winner(law).gains[gain.key],
+                    "law": law,
+                    "gain": gain.key,
+                    **_ends(gain),
+                    "before": gain.own,
+                    "after": self.winner(law).gains[gain.key],
                     "at": gain.bound(self.winner(law).gains[gain.key]),
                     "repeats": " ".join(str(t.gains[gain.key]) for t in self.winners[law]),
                 }
-                for law in self.winners for gain in self.plan.gains[law]
+                for law in self.winners
+                for gain in self.plan.gains[law]
             ],
             columns=["law", "gain", "low", "high", "before", "after", "at", "repeats"],
-        )  # fmt: skip
+        )
 
     @cached_property
     def history(self) -> pd.DataFrame:
         """Every trial in its order, with the best so far."""
         return pd.DataFrame(
-            [row for law, all_ in self.trials.items() for repeat, trials in enumerate(all_, 1)
-             for row in _history(law, repeat, trials)]
-        )  # fmt: skip
+            [
+                row
+                for law, all_ in self.trials.items()
+                for repeat, trials in enumerate(all_, 1)
+                for row in _history(law, repeat, trials)
+            ]
+        )
 
     @cached_property
     def importance(self) -> pd.DataFrame:
         """How much each gain matters, with the least and the most of searches and of parts."""
         rows = [
             {"law": law, "gain": gain.key, **_range([part.get(gain.key, 0.0) for part in parts])}
-            for law in self.trials for parts in [list(self._importances(law))] if parts
+            for law in self.trials
+            for parts in [list(self._importances(law))]
+            if parts
             for gain in self.plan.gains[law]
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
 
     def _importances(self, law: str) -> Iterator[dict[str, float]]:
@@ -327,9 +354,16 @@ def _history(law: str, repeat: int, trials: Sequence[GainTrial]) -> Iterator[dic
         if trial.status == FINISHED:
             leader = min(leader, (trial.excess, trial.value))
         yield {
-            "law": law, "repeat": repeat, "trial": trial.number, "batch": trial.batch,
-            "status": trial.status, "runs": trial.runs, "spent": spent,
-            "objective": trial.value, "failures": trial.failures,
-            "excess": trial.excess, "best": leader[1],
+            "law": law,
+            "repeat": repeat,
+            "trial": trial.number,
+            "batch": trial.batch,
+            "status": trial.status,
+            "runs": trial.runs,
+            "spent": spent,
+            "objective": trial.value,
+            "failures": trial.failures,
+            "excess": trial.excess,
+            "best": leader[1],
             "gains": " ".join(f"{key}={number}" for key, number in trial.gains.items()),
-        }  # fmt: skip
+        }

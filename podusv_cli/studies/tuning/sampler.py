@@ -97,11 +97,13 @@ def importances(
     module = optuna()
     kinds = module.distributions
     space = {
-        gain.key: kinds.CategoricalDistribution(list(gain.words)) if gain.words
-        else kinds.IntDistribution(int(gain.low), int(gain.high)) if gain.whole
+        gain.key: kinds.CategoricalDistribution(list(gain.words))
+        if gain.words
+        else kinds.IntDistribution(int(gain.low), int(gain.high))
+        if gain.whole
         else kinds.FloatDistribution(gain.low, gain.high, log=gain.log)
         for gain in gains
-    }  # fmt: skip
+    }
     with _quiet():
         study = module.create_study()
         for trial, number in zip(tried, values, strict=True):

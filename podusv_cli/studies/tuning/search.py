@@ -184,11 +184,16 @@ class GainSearch:
                 FINISHED if met == tune.train else CUT if attempt.draws < tune.train else PRUNED
             )
             yield GainTrial(
-                len(self.trials) + place, self._batch, attempt.gains, met, status,
+                len(self.trials) + place,
+                self._batch,
+                attempt.gains,
+                met,
+                status,
                 self._value(runs),
                 tuple(excess(text, runs, self.plan.metrics) for text in self.plan.inequalities),
-                self._value(self._first(attempt)), float(np.mean(runs.failed)),
-            )  # fmt: skip
+                self._value(self._first(attempt)),
+                float(np.mean(runs.failed)),
+            )
 
     def _tell_sampler(self, made: Sequence[GainTrial]) -> None:
         self._sampler.tell([t.value for t in made], [t.excesses for t in made])

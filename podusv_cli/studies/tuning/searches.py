@@ -53,10 +53,13 @@ class LawRatios:
     def table(self) -> pd.DataFrame:
         """The ratio of every pair with an interval; all intervals hold together."""
         rows = [
-            (*pair, np.exp(ratio) if np.isfinite(ratio) else _one_sided(ratio),
-             *_ends(ratio, each, self._width))
+            (
+                *pair,
+                np.exp(ratio) if np.isfinite(ratio) else _one_sided(ratio),
+                *_ends(ratio, each, self._width),
+            )
             for pair, ratio, each in zip(self.pairs, self.ratios, self.samples, strict=True)
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows, columns=COLUMNS)
 
     @property
@@ -122,9 +125,7 @@ def compare_laws(
     return LawRatios(pairs, ratios, spread, level)
 
 
-def ratios(
-    runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1
-) -> pd.DataFrame:  # fmt: skip
+def ratios(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1) -> pd.DataFrame:
     """The table of `compare_laws`.
 
     A pair of which a sample is not finite has no interval, unless all samples are infinite on one

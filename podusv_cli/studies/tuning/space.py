@@ -171,7 +171,8 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
         if not having:
             yield (
                 name,
-                f"unknown gain{did_you_mean(name, _known_gains(laws))}; write a key of a law, or law.key",
+                f"unknown gain{did_you_mean(name, _known_gains(laws))}; "
+                "write a key of a law, or law.key",
             )
         yield from (
             (name, text)

@@ -60,9 +60,13 @@ def contestants(plan: TunePlan, trials: Searched) -> dict[str, Contestant]:
 
 
 def validate(
-    plan: TunePlan, trials: Searched, folder: Path, started: str, executor: Executor,
+    plan: TunePlan,
+    trials: Searched,
+    folder: Path,
+    started: str,
+    executor: Executor,
     tell: Callable[[StudyTally], None],
-) -> RunsTable:  # fmt: skip
+) -> RunsTable:
     """Simulate what is missing of the validation; its runs.
 
     Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.

@@ -18,16 +18,62 @@ SIZES = {"double": NUMBER, "i64": NUMBER, "ptr": NUMBER, "float": 4, "i32": 4, "
 NUMBERS = {"double", "float", "i64", "i32", "i16", "i8", "i1"}
 DIVISIONS = ("sdiv", "udiv", "srem", "urem")
 LANEWISE = {  # an operation of one type, with its result of this type, of i1 or of another one
-    "add", "sub", "mul", "shl", "lshr", "ashr", "and", "or", "xor", "fadd", "fsub", "fmul", "fdiv",
-    "frem", "fneg", "freeze", "fcmp", "icmp", "fptosi", "fptoui", "sitofp", "uitofp", "zext",
-    "sext", "trunc", "bitcast", "fpext", "fptrunc", *DIVISIONS,
-}  # fmt: skip
+    "add",
+    "sub",
+    "mul",
+    "shl",
+    "lshr",
+    "ashr",
+    "and",
+    "or",
+    "xor",
+    "fadd",
+    "fsub",
+    "fmul",
+    "fdiv",
+    "frem",
+    "fneg",
+    "freeze",
+    "fcmp",
+    "icmp",
+    "fptosi",
+    "fptoui",
+    "sitofp",
+    "uitofp",
+    "zext",
+    "sext",
+    "trunc",
+    "bitcast",
+    "fpext",
+    "fptrunc",
+    *DIVISIONS,
+}
 # LLVM's own functions of exact results, for vectors, too; the last argument of some is a flag.
 EXACT = {
-    "fabs", "sqrt", "floor", "ceil", "trunc", "rint", "nearbyint", "round", "roundeven", "copysign",
-    "smax", "smin", "umax", "umin", "abs", "fshl", "fshr", "ctpop", "ctlz", "cttz", "is.fpclass",
-    "scmp", "ucmp",
-}  # fmt: skip
+    "fabs",
+    "sqrt",
+    "floor",
+    "ceil",
+    "trunc",
+    "rint",
+    "nearbyint",
+    "round",
+    "roundeven",
+    "copysign",
+    "smax",
+    "smin",
+    "umax",
+    "umin",
+    "abs",
+    "fshl",
+    "fshr",
+    "ctpop",
+    "ctlz",
+    "cttz",
+    "is.fpclass",
+    "scmp",
+    "ucmp",
+}
 FLAGGED = ("abs", "ctlz", "cttz", "is.fpclass")
 SPOKEN_TO_COMPILER = ("llvm.lifetime", "llvm.assume", "llvm.experimental.noalias")
 MOST_CHEAP = 12  # instructions of a block that takes no longer than to jump over it
@@ -115,10 +161,8 @@ class Instructions(Values):
         if self.masks.points_at(instruction.name) == LANES_MEMORY:
             kind = room(kind)
         if not self.differs(instruction.name):
-            self.set(
-                instruction,
-                f"getelementptr {kind}, {self.operands_with_types(instruction.typed_operands, False)}",
-            )
+            operands = self.operands_with_types(instruction.typed_operands, False)
+            self.set(instruction, f"getelementptr {kind}, {operands}")
             return
         parts = [
             self.operands_with_types([(o, k)], o.startswith("%"))
@@ -204,10 +248,8 @@ class Instructions(Values):
             self._call_in_lanes(instruction, "llvm.sqrt.f64" if name == "sqrt" else name)
         else:
             self._declare(name, instruction.kind, instruction.kinds[:-1])
-            self.set(
-                instruction,
-                f'call {instruction.kind} @"{name}"({self.operands_with_types(instruction.typed_operands[:-1], False)})',
-            )
+            operands = self.operands_with_types(instruction.typed_operands[:-1], False)
+            self.set(instruction, f'call {instruction.kind} @"{name}"({operands})')
 
     def _declare(self, name: str, kind: str, kinds: list[str]) -> None:
         self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'

@@ -116,11 +116,15 @@ def _read(instruction: Any, block: int, line: str, kinds: dict[str, str]) -> Ins
     name = instruction.name
     opcode = instruction.opcode
     return Instruction(
-        opcode, f"%{name}" if name else "", kinds.get(name, "void"),
-        [text for text, _ in operands], [kind for _, kind in operands],
-        line.split(" = ", 1)[1] if name else line, block,
+        opcode,
+        f"%{name}" if name else "",
+        kinds.get(name, "void"),
+        [text for text, _ in operands],
+        [kind for _, kind in operands],
+        line.split(" = ", 1)[1] if name else line,
+        block,
         [int(b.name[1:]) for b in instruction.incoming_blocks] if opcode == "phi" else [],
-    )  # fmt: skip
+    )
 
 
 def _operand(operand: Any, kinds: dict[str, str]) -> tuple[str, str]:

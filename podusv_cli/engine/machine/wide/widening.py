@@ -62,12 +62,22 @@ class Blocks(Instructions):
         (first, _), _, *rest = self.function.arguments
         given = ", ".join(f"{kind} {name}" for name, kind in rest)
         places = [f"  {first} = alloca {result}", *(f"  {place}" for place in self.places)]
-        return "\n".join([
-            f"define {result} @{NAME}({given}) #0 {{", "begin:", *places, "  br label %at.0",
-            *self.text, "end:", f"  %result = load {result}, ptr {first}",
-            f"  ret {result} %result", "}", *self.declared.values(),
-            "attributes #0 = { nounwind }", "attributes #1 = { nounwind willreturn memory(none) }",
-        ])  # fmt: skip
+        return "\n".join(
+            [
+                f"define {result} @{NAME}({given}) #0 {{",
+                "begin:",
+                *places,
+                "  br label %at.0",
+                *self.text,
+                "end:",
+                f"  %result = load {result}, ptr {first}",
+                f"  ret {result} %result",
+                "}",
+                *self.declared.values(),
+                "attributes #0 = { nounwind }",
+                "attributes #1 = { nounwind willreturn memory(none) }",
+            ]
+        )
 
     def _level(self, loop: BlockLoop | None) -> None:
         level = self.masks.order.levels[loop]
