@@ -16,6 +16,7 @@ import pytest
 import typer
 import typer.core
 from conftest import kinds
+from process_samples import offered_for, python, said
 from scenario_samples import SOUND, write
 
 import podusv_cli
@@ -41,20 +42,6 @@ HEAVY = {
     "yaml",
     "jinja2",
 }
-ROOT = Path(podusv_cli.__file__).parents[1]
-
-
-def python(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
-    """A Python process of its own."""
-    return subprocess.run(
-        [sys.executable, *words],
-        stdout=stdout,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        text=True,
-        check=False,
-        timeout=60,
-    )
 
 
 def podusv_process(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
@@ -303,14 +290,6 @@ PODUSV = f"'{sys.executable}' -m podusv_cli"
 needs_bash = pytest.mark.skipif(not shutil.which("bash"), reason="there is no bash here")
 
 
-def said(*words: str, home: Path, **more: str) -> str:
-    """What a process prints, which has to end well."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "HOME": str(home), **more}
-    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
-    assert done.stderr == ""
-    return done.stdout
-
-
 @needs_bash
 def test_completion_is_installed_once_for_the_shell_that_asks(tmp_path: Path) -> None:
     for _ in range(2):
@@ -321,14 +300,6 @@ def test_completion_is_installed_once_for_the_shell_that_asks(tmp_path: Path) ->
     script = Path(line.removeprefix("source ").strip("'"))
     assert script.is_relative_to(tmp_path)
     assert "complete -o default" in script.read_text()
-
-
-def offered_for(typed: str, home: Path, script: str) -> list[str]:
-    """The lines that a shell gets from a script for what is typed."""
-    count = str(typed.count(" "))
-    asked = {"_PODUSV_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": count}
-    script = script.replace("import sys", "import sys\nsys.argv = ['podusv']", 1)
-    return said(sys.executable, "-c", script, home=home, **asked).splitlines()
 
 
 @pytest.mark.parametrize(

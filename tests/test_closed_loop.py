@@ -1,11 +1,11 @@
 """The closed loop as mathematics: order of RK4, an independent integrator, symmetry, readings."""
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import GENTLE, PAPER, SMOOTH_START, corrected, example, kinds, last_state, run
+from loop_samples import order
 from scipy.integrate import solve_ivp
 
 from podusv_cli.components.actuators.saturated import Saturated
@@ -31,12 +31,6 @@ def smooth(law: Any) -> ClosedLoop:
 
 def end(loop: ClosedLoop, step: float, **options: Any) -> Vector:
     return last_state(run(loop, 2.0, step, log_every=round(2.0 / step), **options), loop)
-
-
-def order(ends: list[Vector]) -> float:
-    """Mean order from ends at halved steps (Richardson: differences shrink as errors do)."""
-    gaps = [abs(a - b).max() for a, b in pairwise(ends)]
-    return float(-np.polyfit(range(len(gaps)), np.log2(gaps), 1)[0])
 
 
 @pytest.mark.parametrize("kind", CONTINUOUS.values(), ids=CONTINUOUS)

@@ -6,6 +6,7 @@ import pytest
 from comparison_samples import FRAME, about, scenario, verdicts
 from drawn_samples import recording, shown
 from html_tree import tree
+from page_samples import ERRORS, page, theory
 
 from podusv_cli.comparison import report, table
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
@@ -16,38 +17,11 @@ from podusv_cli.pages.page import Picture
 from podusv_cli.scenario.about import about_of
 
 MOVING = chase.chase(shown(("a", recording())))
-ERRORS = Picture("errors", "x_e & y_e, over <time>", b"<svg/>", "the paper's figure 4")
-
-
-def page(**parts):
-    story = {
-        "title": "planted",
-        "abouts": {"a": about()},
-        "endings": {"a": "", "lost": "killed <9>"},
-        "differences": {"start.x": {"a": 1.0, "lost": [1.0, 2.5]}},
-        "table": FRAME,
-        "noticed": [Finding("crosswise", "controller", "|x| < 1", ("<a>",))],
-        "verdicts": verdicts(),
-        "theories": {},
-        "figures": [ERRORS],
-        "provenance": {"git": {"commit": "abc"}},
-    }
-    return report.page(report.Story(**story | parts))
 
 
 def section(name, **parts):
     (found,) = tree(page(**parts)).all("section", id=name)
     return found
-
-
-def theory(bound, holds):
-    """A run's theory.json, as far as the report reads it."""
-    forms = {name: {"lambda": 0.05, "bound": bound} for name in ("corrected", "printed")}
-    return {
-        "conditions": [{"name": "k_ze", "value": 0.1, "limit": 0.05, "holds": holds}],
-        "assumptions": [{"assumption": "gives what is asked", "holds": holds, "found": 3.0}],
-        "windows": {"settled": {**forms, "largest_V": 0.25}},
-    }
 
 
 def test_the_report_has_the_bounds_of_every_run_with_a_theory():

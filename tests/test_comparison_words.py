@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from known_signals import ABOUT
-from test_reproduction import rerun
+from paper_samples import rerun
 
 from podusv_cli.comparison.claims import ParsedClaim, judge
 from podusv_cli.comparison.curves import Curve, decay, pointwise

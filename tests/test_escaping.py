@@ -14,7 +14,7 @@ import pytest
 from command_samples import BASE, Command, commanded, write
 from comparison_samples import FRAME, verdicts
 from html_tree import tree
-from test_comparison_page import page
+from page_samples import page
 
 from podusv_cli.cli import progress, terminal
 from podusv_cli.comparison import claims, report, table

@@ -258,7 +258,7 @@ def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
     for _ in range(20):
         demand, limits = random.normal(0.0, 10.0, 2), actuator.limits()
         cut = np.clip(demand, np.negative(limits), limits)
-        loads = actuator._driven(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
+        loads = actuator._drive_once(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
         assert np.array_equal(loads, [cut[0], 0.0, cut[1]]) == actuator.only_cuts
     for around in (Command(), EffectivenessLoss(time=1e9)):
         name = type(around).__name__.lower()

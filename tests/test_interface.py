@@ -18,7 +18,7 @@ import pytest
 import xarray
 from command_samples import BASE, ROOT, write
 from matplotlib.figure import Figure
-from test_cli_words import python
+from process_samples import python
 
 import podusv
 from podusv_cli import interface

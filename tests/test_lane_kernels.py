@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_lanes import aligned
+from lane_samples import aligned
 
 from podusv_cli.core.interpolation import segment
 from podusv_cli.core.kernel import LANES, Vector, kernel, shared, tail

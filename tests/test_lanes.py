@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
+from lane_samples import aligned, bits
 from plugin_samples import LAW
 
 from benchmarks.variants import variants
@@ -98,11 +99,6 @@ def same(one: Batch, other: Batch) -> None:
     assert one.reached.tolist() == other.reached.tolist()
     np.testing.assert_array_equal(bits(one.state), bits(other.state))
     np.testing.assert_array_equal(bits(one.seen), bits(other.seen))
-
-
-def bits(numbers: Vector) -> Any:
-    """The bits of numbers, zeros with their sign; what is no number is all the same."""
-    return np.where(np.isnan(numbers), np.nan, numbers).view(np.int64)
 
 
 @pytest.mark.parametrize("law", ["adaptive_neural", "pid", *SLOW])
@@ -309,14 +305,6 @@ def test_every_lane_goes_its_own_way_through_branches(t: float) -> None:
         side_by_side(t, 1.0, *(room.ctypes.data_as(LANE_VECTOR) for room in rooms))
         np.testing.assert_array_equal(rooms[1], wanted_row.ravel())
         np.testing.assert_array_equal(rooms[3], wanted.ravel())
-
-
-def aligned(content: Vector) -> Vector:
-    """A copy that begins at a whole register."""
-    room = np.zeros(content.size + LANES)
-    room = room[-(room.ctypes.data // 8) % LANES :][: content.size]
-    room[:] = content.ravel()
-    return room
 
 
 def test_the_law_that_podusv_new_writes_marches_side_by_side(podusv: Any) -> None:

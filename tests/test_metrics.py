@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from command_samples import TWO, write
 from conftest import NONLINEAR, POD, Constant, adrift, corrected, example, target_at
+from loop_samples import gathered
 
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.components.actuators.pod import Pod, Pods
@@ -40,15 +41,6 @@ from podusv_cli.metrics.table import METRICS, metrics_probe, metrics_with
 from podusv_cli.metrics.windows import CROSSED, NAMED, SETTLING, find, settle, settled_from
 from podusv_cli.scenario.load import load_text
 from podusv_cli.studies.counting.expressions import parse_success
-
-
-def gathered(
-    loop, *, steps=4000, log_every=1, radius=2.0, steady_fraction=0.25, compiled=True, **options
-):
-    grid = TimeGrid(0.01, steps, log_every)
-    probe = metrics_probe(Plan(loop, grid), steady_fraction=steady_fraction, settling_radius=radius)
-    recording = simulate(loop, grid, probe=probe, compiled=compiled, **options)
-    return recording, probe.summary(recording.seen)
 
 
 @pytest.fixture(scope="module")

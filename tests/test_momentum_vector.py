@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import NONLINEAR, VESSELS, ask, corrected, run, situations, target_at
 from law_samples import STEADY, WRONG, rms, task
-from test_pod import pods
+from pod_samples import pods
 from test_velocity_vector import SAMPLED
 
 from podusv_cli.components.actuators.saturated import Saturated

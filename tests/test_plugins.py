@@ -14,8 +14,9 @@ import pytest
 import yaml
 from command_samples import BASE, Command, one_line, write
 from loop_counts import loop_counts
+from plugin_parts import MORE
 from plugin_samples import LAW, SCENARIO, TWO, put
-from test_cli_words import offered_for
+from process_samples import offered_for
 
 import podusv as podusv_python
 from podusv_cli import plugin
@@ -329,31 +330,6 @@ def test_a_file_may_stand_alone_or_twice(podusv):
 
 # --- what a plug-in offers is known wherever podusv's own is
 
-MORE = """
-from podusv_cli.core.derived import difference
-from podusv_cli.core.finding import warn_after_run
-from podusv_cli.figures.panels import signals_over_time
-from podusv_cli.figures.sheet import figure
-from podusv_cli.metrics.metric import Accumulator, Metric, gathered
-
-
-@kernel
-def watch(t, weight, s, row, k, seen):
-    seen[0] = max(seen[0], abs(s[1]))
-
-
-largest_east = Metric(
-    "largest_east", "m", "largest |y|", Accumulator(watch, lambda _: 1, lambda _: {}), gathered(0)
-)
-GAP = Signal("gap", "m", "cross-track error less the distance to the target")
-gap = difference(GAP, "e_ct", "z_e")
-gaps = figure("gaps", caption="The gap over time", signals=("gap",))(signals_over_time("gap"))
-
-
-@warn_after_run("wide-gap", about="controller", meaning="the gap is wide")
-def wide_gap(scenario, log):
-    yield "the gap is wide"
-"""
 CLAIM = """
 claims:
   C1: {says: s, source: t, expect: 'min(cross_track.gap) < 0 and cross_track.largest_east > 1'}

@@ -10,13 +10,13 @@ from conftest import NONLINEAR, POD, SMOOTH_START, Constant, adrift, corrected, 
 from drawn_samples import drawn, shown
 from hypothesis import given
 from hypothesis import strategies as st
+from loop_samples import gathered, order
+from pod_samples import TWIN, pods
 from pydantic import ValidationError
-from test_closed_loop import order
-from test_metrics import gathered
 
 from podusv_cli.components.actuators import allocation_qp
 from podusv_cli.components.actuators.allocation import allocate
-from podusv_cli.components.actuators.pod import Pod, Pods, follow
+from podusv_cli.components.actuators.pod import Pods, follow
 from podusv_cli.components.actuators.propeller import inflow, speed_for, thrust
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.paths.line import Line
@@ -24,14 +24,6 @@ from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.figures.drawing import FIGURES
 
 DRAG = 0.72 * 0.5 + 1.32742 * 0.25 + 5.86643 * 0.125  # the paper's vessel at 0.5 m/s [N]
-
-
-def pods(*several: dict[str, float], **options: Any) -> Pods:
-    """Pods like `POD`, each with these fields changed; one on the centre line by default."""
-    return Pods(pods=tuple(Pod(**POD | own) for own in several or ({},)), **options)
-
-
-TWIN = ({"y": -0.078, "T_nn": 3.65e-3}, {"y": 0.078, "T_nn": 3.65e-3})
 
 
 def state_of(actuator: Pods, n: float, delta: float) -> Vector:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import Constant, adrift, corrected, run, vessel
+from pod_samples import pods
 from scipy.optimize import fsolve
-from test_pod import pods
 
 from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural

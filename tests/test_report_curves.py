@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from browser_samples import browsed, needs_browser
 from drawn_samples import drawn, panels, recording, shown
 from html_tree import tree
 from known_signals import ABOUT
-from test_comparison_page import page
-from test_report_chase import browsed, needs_browser
+from page_samples import page
 
 from podusv_cli import pages
 from podusv_cli.core.derived_signals import derived_with

@@ -11,13 +11,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from paper_samples import rerun, untimed
 
 from podusv_cli.comparison.claims import judge
 from podusv_cli.comparison.parsing import parse_claims
-from podusv_cli.core.past_run import PastRun
-from podusv_cli.engine.running import simulate as simulation
-from podusv_cli.metrics.operations import operations
-from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run
 
@@ -30,11 +27,6 @@ SIGNS = {"reproduced": "+", "not reproduced": "-", "cannot tell": "?"}
 README = (ROOT / "results/README.md").read_text()
 # Sits on the singularity and chatters; the last bit of the start decides its settled numbers.
 CHAOTIC = {"figures_compare": "dsc"}
-
-
-def untimed(runs):
-    """No times of laws, which take a while to measure and are not committed."""
-    return [{} for _ in runs]
 
 
 @pytest.fixture(
@@ -80,14 +72,6 @@ def committed(letter):
     path = ROOT / "results/mu_2017" / LETTERS[letter] / "claims.json"
     claims = json.loads(path.read_text())["claims"]
     return {c["claim"]: SIGNS[c["verdict"]] for c in claims}
-
-
-def rerun(scenario):
-    """A run without a folder, as a comparison sees it; nothing is timed."""
-    plan = scenario.plan()
-    recording = simulation.run(plan)
-    numbers = plan.probe.summary(recording.seen) | operations(plan, recording)
-    return PastRun("", about_of(scenario), recording, numbers)
 
 
 def signs(letter, sets, laws=("adaptive_neural", "full_backstepping", "pid")):

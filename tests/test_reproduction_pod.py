@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from test_reproduction import rerun, untimed
+from paper_samples import rerun, untimed
 
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, run

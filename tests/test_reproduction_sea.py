@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from test_reproduction import rerun, untimed
+from paper_samples import rerun, untimed
 
 import podusv
 from podusv_cli.scenario.load import load

@@ -8,8 +8,8 @@ import pytest
 from command_samples import ROOT
 from conftest import ROOMS, example, kinds
 from old_results import draw_quickly
+from paper_samples import untimed
 from storage_samples import files
-from test_reproduction import untimed
 
 from podusv_cli.scenario.load import load, load_stored
 from podusv_cli.scenario.presets import preset_names, with_presets

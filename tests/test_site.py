@@ -14,8 +14,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from browser_samples import BROWSER, QUIET, WIDTHS
 from command_samples import ROOT
-from test_report_chase import BROWSER, QUIET, WIDTHS
 
 import podusv
 from podusv_cli.cli import COMMANDS

@@ -52,7 +52,7 @@ def study(tmp_path_factory):
 
 def test_every_fault_is_that_of_its_run(study):
     runs, place = study.results.runs, study.results.runs.laws.index("mine")
-    starts, status = runs.drawn["start.x"], np.array(STATUSES)[runs.status("mine")[0]]
+    starts, status = runs.drawn_quantities["start.x"], np.array(STATUSES)[runs.status("mine")[0]]
     assert set(CAUSES) <= set(starts.tolist())  # each happens
     for draw, x in enumerate(starts.tolist()):
         word, cause = CAUSES.get(x, ("finished", ""))
@@ -64,7 +64,7 @@ def test_every_fault_is_that_of_its_run(study):
 
 def test_how_a_process_ended_is_told(study):
     runs, (session,) = study.results.runs, sessions(study.folder)
-    ended = np.flatnonzero(runs.drawn["start.x"] == -2.0)
+    ended = np.flatnonzero(runs.drawn_quantities["start.x"] == -2.0)
     assert set(session["ended"]) == {f"mine[0] draw {draw}" for draw in ended}
     (how,) = set(session["ended"].values())
     assert " -9, 2 " in how
@@ -81,4 +81,4 @@ def test_the_report_tells_them(study):
         assert cause in failures.text
     broken = int(study.results.runs.broken("mine").sum())
     assert f"{broken} runs crashed" in page.text
-    assert study.results.broken == broken
+    assert study.results.broken_runs == broken

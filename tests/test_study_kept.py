@@ -197,16 +197,16 @@ def test_every_sitting_is_kept(study, tmp_path):
 
 def test_values_to_choose_from_and_every_quantity_are_in_the_table(study):
     runs = study.results.runs
-    assert list(runs.drawn) == sorted(study.results.about.quantities)
-    assert set(runs.drawn["start.y"].tolist()) <= {0.0, 2.5}
-    assert set(judge_study(study.results.about, runs).sensitivity.quantity) == set(runs.drawn)
+    assert list(runs.drawn_quantities) == sorted(study.results.about.quantities)
+    assert set(runs.drawn_quantities["start.y"].tolist()) <= {0.0, 2.5}
+    assert set(judge_study(study.results.about, runs).sensitivity.quantity) == set(runs.drawn_quantities)
 
 
 def test_seeds_have_no_sensitivity_because_their_numbers_have_no_order(study):
     about, runs = study.results.about, study.results.runs
     seed = about.quantities["start.y"].model_copy(update={"is_seed": True})
     seeded = about.model_copy(update={"quantities": about.quantities | {"start.y": seed}})
-    assert set(judge_study(seeded, runs).sensitivity.quantity) == set(runs.drawn) - {"start.y"}
+    assert set(judge_study(seeded, runs).sensitivity.quantity) == set(runs.drawn_quantities) - {"start.y"}
 
 
 @pytest.mark.parametrize("command", ["plot", "compare", "rerun", "diff"])

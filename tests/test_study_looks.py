@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from installed_sample import LAB, importable, install
 from loop_counts import COUNTED, loop_counts
+from plugin_parts import MORE
 from plugin_samples import LAW
 from small_study import TEXT
-from test_plugins import MORE
 
 from podusv_cli.core.plugins import MODULES
 from podusv_cli.workflows import studies, sweep

@@ -7,10 +7,10 @@ from math import inf
 
 import numpy as np
 import pytest
+from browser_samples import WIDTHS, browsed, needs_browser
 from html_tree import tree
 from small_study import written
 from study_samples import claim, judged, study
-from test_report_chase import WIDTHS, browsed, needs_browser
 
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.pages.page import environment
@@ -134,7 +134,7 @@ def test_runs_that_ended_first_come_first(whole, monkeypatch):
     ],
 )
 def test_the_run_that_missed_success_by_most_comes_first_of_its_law(whole, success, missed):
-    runs = runs_file.RunsTable(whole.folder / "runs.h5", success, whole.results.known)
+    runs = runs_file.RunsTable(whole.folder / "runs.h5", success, whole.results.known_metrics)
     listed = report.runs_that(replace(whole.results, runs=runs), runs.failed).first
     for law in runs.laws:
         by = np.where(
@@ -149,7 +149,7 @@ def test_the_run_that_missed_success_by_most_comes_first_of_its_law(whole, succe
 def test_a_comparison_that_a_run_keeps_does_not_rank_it(whole):
     """All keep the first, each by another margin; the second decides."""
     success = "finished and iae < 1e3 and z_e_steady <= 0"
-    runs = runs_file.RunsTable(whole.folder / "runs.h5", success, whole.results.known)
+    runs = runs_file.RunsTable(whole.folder / "runs.h5", success, whole.results.known_metrics)
     listed = report.runs_that(replace(whole.results, runs=runs), runs.failed).first
     for law in runs.laws:
         steady, of_law = runs.metric(law, "z_e_steady"), [row for row in listed if row.law == law]
@@ -170,7 +170,7 @@ def test_of_a_draw_the_values_are_listed_that_go_together_most_with_success(draw
         if (r["law"], r["metric"]) == (row.law, "iae")
     }
     most = sorted(sizes, key=sizes.__getitem__, reverse=True)[: report.DECISIVE]
-    told = [f"{name} {results.runs.drawn[name][row.draw]:.3g}" for name in most]
+    told = [f"{name} {results.runs.drawn_quantities[name][row.draw]:.3g}" for name in most]
     assert told
     assert row.drawn == ("-" if by_chance == 1.0 else ", ".join(told))
 

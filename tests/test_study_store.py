@@ -45,7 +45,7 @@ def test_a_run_of_the_table_is_the_run_that_simulate_makes(whole):
         alone = probe.summary(log.seen)
         for name in runs.metrics:
             assert np.array_equal(runs.metric(law, name)[0, number], alone[name], equal_nan=True)
-    for name, values in runs.drawn.items():
+    for name, values in runs.drawn_quantities.items():
         assert values[39] == draw[name]
 
 

@@ -80,7 +80,7 @@ def test_every_search_spends_the_whole_budget_and_counts_pruned_trials(done):
         counts = {s: [t.runs for t in found if t.status == s] for s in (FINISHED, PRUNED, CUT)}
         assert set(counts[FINISHED]) == {4}
         assert set(counts[PRUNED]) == {1}, "a quarter of the draws"
-    assert done.results.spent == {"toy": 2 * BUDGET}
+    assert done.results.runs_spent == {"toy": 2 * BUDGET}
 
 
 def test_the_first_trial_has_the_published_gains(done):
@@ -132,7 +132,7 @@ def test_the_found_scenario_extends_the_searched_one(done):
 
 
 def test_numbers_of_the_report_come_from_draws_that_no_search_has_seen(done):
-    drawn = done.results.runs.drawn["start.psi"]
+    drawn = done.results.runs.drawn_quantities["start.psi"]
     plan = done.results.plan
     from podusv_cli.studies.making.draws import SWEEP, table
     from podusv_cli.studies.tuning.plan import TRAIN

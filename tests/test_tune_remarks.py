@@ -94,7 +94,7 @@ def test_the_power_of_a_table_is_said_where_every_pair_has_an_interval():
     (text,) = remarks._power(results)
     assert "had a probability of 0.3; a law that is 20% better" in text
     assert text.endswith("in 80% of all such tables")
-    results.compared.omnibus = math.nan
+    results.pairs_of_laws.omnibus = math.nan
     assert list(remarks._power(results)) == []
 
 

@@ -13,7 +13,7 @@ from conftest import NONLINEAR, SMOOTH_START, ask, corrected, run, situations, t
 from hypothesis import given
 from hypothesis import strategies as st
 from law_samples import STEADY, WRONG, rms, task
-from test_pod import pods
+from pod_samples import pods
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.velocity_steering import Aim, Wanted, surge_demand

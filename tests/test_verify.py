@@ -109,7 +109,7 @@ def smooth():
 @pytest.mark.slow
 def test_a_smooth_scenario_is_of_fourth_order_and_converged(smooth):
     assert smooth.estimates[POSITION].order == pytest.approx(4.0, abs=0.4)
-    assert smooth.unconverged(0.01) == []
+    assert smooth.unconverged_numbers(0.01) == []
 
 
 def test_the_error_that_is_estimated_is_the_error_that_there_is(smooth):

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import NONLINEAR, PRINTED_START, corrected, kinds, run, situations
+from pod_samples import TWIN, pods
 from pydantic import ValidationError
-from test_pod import TWIN, pods
 
 from podusv_cli.components.actuators.saturated import Saturated
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural

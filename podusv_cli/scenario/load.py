@@ -44,7 +44,7 @@ from podusv_cli.scenario.yaml_tree import (
 MOST_RESOLVED = 3 * MAX_NODES
 
 
-# From a tree to the tree with its plug-ins in order, and these; see `plugins.loaded`.
+# From a tree to the tree with its plug-ins in order, and these; see `plugins.load_plugins`.
 Plugged = Callable[[Node, list[Fault]], tuple[Node, Plugins]]
 LOOKED_AT: Plugged = partial(plugins.used_of, ())
 

@@ -99,7 +99,7 @@ def signals(plan: Plan) -> tuple[Signal, ...]:
     if law is None:
         return ()
     rate = () if plan.sampled else (V_DOT,)
-    return (V, *rate, *TERMS, *(ERRORS if law.filtered() else ()), *NETWORKS)
+    return (V, *rate, *TERMS, *(ERRORS if law.filter_slots() else ()), *NETWORKS)
 
 
 def about(plan: Plan) -> dict[str, Signal]:

@@ -78,7 +78,7 @@ class RunTask:
     force: bool = False
     named: bool = True
     figures: bool = False
-    names: Sequence[str] = ()  # of figures, as `figures.drawing.chosen` has them
+    names: Sequence[str] = ()  # of figures, as `figures.drawing.choose_sheets` has them
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
     noticed: Sequence[Finding] = ()

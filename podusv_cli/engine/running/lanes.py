@@ -86,7 +86,7 @@ def is_compiled(plan: Plan) -> bool:
     """Whether the march of runs like this loop is on the disk, or next to it: half a second."""
     from podusv_cli.engine.machine import object_cache
 
-    return all(object_cache.is_cached(p.name) or p.shipped for p in pieces(plan))
+    return all(object_cache.is_cached(p.name) or p.shipped_bitcode for p in pieces(plan))
 
 
 def pieces(plan: Plan) -> list[Any]:

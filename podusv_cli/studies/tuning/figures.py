@@ -51,9 +51,9 @@ def sketches(results: SearchResults) -> Iterator[Sketch]:
         yield Sketch(
             "effort",
             f"error against effort: the median {results.shown_metrics[0]} over the median total "
-            "variation of the surge demand on the fresh draws; hollow before, filled after the search, "
-            "the median of a law's searches with lines over their middle half; failed runs count as "
-            "the worst; down and to the left is better",
+            "variation of the surge demand on the fresh draws; hollow before, filled after the "
+            "search, the median of a law's searches with lines over their middle half; failed runs "
+            "count as the worst; down and to the left is better",
             partial(effort, results.effort, results.shown_metrics[0]),
         )
     if results.winners:

@@ -46,9 +46,9 @@ def _answer(results: SearchResults) -> Iterator[str]:
             yield (
                 f"{best} has the least {results.plan.tune.objective} in the median of its "
                 "searches; the ratio of the median "
-                f"{results.plan.metrics[results.shown_metrics[0]].row} ({results.shown_metrics[0]}) of "
-                f"{row['a']} and {row['b']} over searches and draws is {Interval.of(row, 'ratio'):.3f}: "
-                f"{_verdict(row)}"
+                f"{results.plan.metrics[results.shown_metrics[0]].row} "
+                f"({results.shown_metrics[0]}) of {row['a']} and {row['b']} over searches and "
+                f"draws is {Interval.of(row, 'ratio'):.3f}: {_verdict(row)}"
             )
 
 
