@@ -73,7 +73,8 @@ class Node:
 
     `key_mark` is the position of its key. `text` is a scalar as written. `faulty` says that a
     fault was reported here: a scalar or list has no content, a mapping may lack keys. `instead_of`
-    is the section of another kind that it stands in place of; `kinds.merge_kept` says what it keeps.
+    is the section of another kind that it stands in place of; `kinds.merge_kept` says what it
+    keeps.
     """
 
     content: Any

@@ -1,6 +1,6 @@
 """Whatever becomes of compiled code on disk, a run computes what its source says.
 
-Edited sources, torn writes, old caches: tests/test_cache.py.
+Edited sources, torn writes, old caches: tests/engine/test_cache.py.
 """
 
 import os
