@@ -11,10 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from itertools import chain, permutations
-from pathlib import Path
 from typing import Any
 
-import podusv_cli
 from podusv_cli.core import registry
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.engine.loop.closed_loop import nothing
@@ -29,8 +27,9 @@ from podusv_cli.interface.scenarios import load_scenario
 from podusv_cli.process.workers import available_workers, run_all
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.scenario.model import BASES
+from podusv_cli.scenario.shipped import folder
 
-CONFIGS = Path(podusv_cli.__file__).with_name("configs")
+CONFIGS = folder()
 BOAT = CONFIGS / "own_vessel.yaml"
 WINDAGE = {"vessel.windage": {"A_F": 0.2, "A_L": 0.5}}
 POINTS = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]

@@ -29,6 +29,12 @@ def test_the_nearest_are_found_by_imports_and_by_names(graph, monkeypatch, file,
     assert len(found) < len([*quick.ROOT.glob("tests/**/test_*.py")]), "it chooses"
 
 
+def test_of_equally_near_files_those_of_the_room_come_first(graph, monkeypatch):
+    monkeypatch.setattr(quick, "users", lambda: graph)
+    found = [*quick.nearest([quick.node("podusv_cli/engine/step/rk4.py")])]
+    assert [path.parent.name for path in found[:4]] == ["engine"] * 4  # not components first
+
+
 def test_nothing_is_near_to_what_nothing_uses(graph, monkeypatch):
     monkeypatch.setattr(quick, "users", lambda: graph)
     assert not [*quick.nearest(["nobody_uses_this.txt"])]
