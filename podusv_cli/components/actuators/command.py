@@ -104,7 +104,7 @@ def _inner(
     """Stands for an actuator's `drive`."""
 
 
-def _lose_nothing(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+def _lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
     """Stands for an actuator's `lose`."""
 
 
@@ -143,7 +143,7 @@ def _failing(
     """`drive`, and what is left of its loads in steps that begin after the failure."""
     _inner(t, x, state, demand, k, table, tau, rate, signals)
     if demand[BEGAN] >= k.failure_time:
-        _lose_nothing(state, k, table, tau, signals)
+        _lose(state, k, table, tau, signals)
 
 
 @cache
@@ -158,7 +158,7 @@ def with_command_path(drive: Drive) -> Drive:
 def failing(drive: Drive, lose: Drive) -> Drive:
     """A kernel with the failure behind `drive`; the same one for the same kernels."""
     inner, lost = taking(drive, DRIVE), taking(lose, LOSE)
-    made: Drive = specialise(_failing, f"{drive.__qualname__}_failing", _inner=inner, _lost=lost)
+    made: Drive = specialise(_failing, f"{drive.__qualname__}_failing", _inner=inner, _lose=lost)
     return made
 
 
