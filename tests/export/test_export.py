@@ -260,9 +260,8 @@ def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
         cut = np.clip(demand, np.negative(limits), limits)
         loads = actuator._drive_once(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
         assert np.array_equal(loads, [cut[0], 0.0, cut[1]]) == actuator.only_cuts
-    for around in (Command(), EffectivenessLoss(time=1e9)):
-        name = type(around).__name__.lower()
-        assert not actuator.model_copy(update={name: around}).only_cuts
+    for around in ({"command": Command()}, {"failure": EffectivenessLoss(time=1e9)}):
+        assert not actuator.model_copy(update=around).only_cuts
 
 
 def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(monkeypatch):
