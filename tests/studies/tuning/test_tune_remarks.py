@@ -34,7 +34,7 @@ def test_the_answer_tells_the_least_objective_and_who_wins_in_the_same_draw(rati
             }
         ),
         searches=pairs(ratio, *ends),
-        shown=["iae"],
+        shown_metrics=["iae"],
         plan=SimpleNamespace(tune=SimpleNamespace(objective="median(iae)"), metrics=METRICS),
     )
     (unranked,) = remarks._remark_unsettled(results)
@@ -90,7 +90,9 @@ def test_one_search_a_law_is_told_to_be_chance():
 
 
 def test_the_power_of_a_table_is_said_where_every_pair_has_an_interval():
-    results = SimpleNamespace(compared=SimpleNamespace(omnibus=0.3, power=lambda better: better))
+    results = SimpleNamespace(
+        pairs_of_laws=SimpleNamespace(omnibus=0.3, power=lambda better: better)
+    )
     (text,) = remarks._power(results)
     assert "had a probability of 0.3; a law that is 20% better" in text
     assert text.endswith("in 80% of all such tables")

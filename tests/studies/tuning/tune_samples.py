@@ -123,7 +123,7 @@ def faults(text: str, *changes: str) -> list[str]:
 
 def tuned(folder, *changes, tell=lambda tally, text: None, workers=1, figures=False):
     """A finished search in folder/out."""
-    request = workflow.Request(changes, folder / "out", workers, figures=figures)
+    request = workflow.Request(changes, folder / "out", workers=workers, figures=figures)
     return workflow.tune(toy(folder), request, tell)
 
 
