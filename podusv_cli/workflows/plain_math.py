@@ -1,0 +1,203 @@
+"""Equations of the pages as a terminal shows them: the symbols have the names that logs have.
+
+The pages have equations in LaTeX between lines of `$$`. `\\tau_u` becomes tau_u, `\\dot\\psi_e`
+psi_e', `\\hat W_u` W_hat_u and `m_{11}` m11; rows and columns of `aligned` stay beside each other.
+Only what the pages use is known: letters, accents, fractions, roots, cases and matrices.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+SIZES = re.compile(r"\\(left|right)(?![a-z])\.?")  # of parentheses
+BLOCK = re.compile(r"^( *)\$\$\n(.*?)\n *\$\$$", re.M | re.S)
+TOKEN = re.compile(r"\\[A-Za-z]+|\\.|\s+|[A-Za-z]+|[\d.]+|.", re.S)
+ACCENTS = {"dot": "'", "ddot": "''"}
+MARKS = {"hat": "_hat", "tilde": "_tilde", "bar": "_bar"}
+TEXTS = {"text", "mathrm", "mathsf"}
+NAMES = {
+    "le": "<=", "ge": ">=", "ne": "!=", "pm": "+-", "times": "x", "cdot": "\v", "leftarrow": "<-",
+    "lvert": "|", "rvert": "|", "lVert": "|", "rVert": "|", "lbrace": "{", "rbrace": "}",
+    "varphi": "phi", "star": "*", "quad": "\t", "qquad": "\t", "ldots": "...", "infty": "inf",
+}  # fmt: skip
+ENDS = {"}", "&", "\\\\", "\\end"}
+GAP = "    "  # between equations in a row
+
+
+def plain_blocks(markdown: str) -> str:
+    """Markdown whose equations in LaTeX are code blocks in plain symbols."""
+    return BLOCK.sub(_as_code, markdown)
+
+
+def _as_code(block: re.Match[str]) -> str:
+    indent = block[1]
+    lines = ["```", *plain(block[2]).splitlines(), "```"]
+    return "\n".join(indent + line for line in lines)
+
+
+def plain(latex: str) -> str:
+    """An equation in plain symbols, a line for each row, its columns below each other."""
+    body = re.sub(r"\\(begin|end)\{(aligned|gathered)\}", "", latex).strip()
+    rows = _Reader(SIZES.sub("", body)).rows()
+    widths = [max(map(len, column)) for column in zip(*_squared(rows), strict=True)]
+    return "\n".join(_line(row, widths) for row in rows)
+
+
+def _squared(rows: list[list[str]]) -> Iterator[list[str]]:
+    """The rows, as long as the longest; the last cell of a row sets no width."""
+    most = max(map(len, rows))
+    return ([*row[:-1], *[""] * (most - len(row) + 1)] for row in rows)
+
+
+def _line(cells: list[str], widths: list[int]) -> str:
+    """A left and a right side at a time, as `aligned` pairs its columns."""
+    padded = [cell.ljust(width) for cell, width in zip(cells, widths, strict=False)]
+    pairs = [" ".join(padded[at : at + 2]) for at in range(0, len(padded), 2)]
+    return GAP.join(pairs).rstrip()
+
+
+@dataclass(frozen=True)
+class _Symbol:
+    """A symbol or a group with what is written at it."""
+
+    base: str
+    below: str = ""
+    after: str = ""  # primes
+    above: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.base}{self.below}{self.after}{self.above}"
+
+
+class _Reader:
+    """Reads LaTeX token by token."""
+
+    def __init__(self, latex: str) -> None:
+        self._tokens: list[str] = TOKEN.findall(latex)
+        self._at = 0
+
+    def rows(self) -> list[list[str]]:
+        """The cells of the rows up to the end of this text or environment."""
+        rows = [[self._cell()]]
+        while self._next() in ("&", "\\\\"):
+            if self._take() == "&":
+                rows[-1].append(self._cell())
+            elif (cell := self._cell()) or self._next() == "&":
+                rows.append([cell])
+        return rows
+
+    def _cell(self) -> str:
+        """Symbols side by side up to the end of a cell, a group or the text."""
+        symbols: list[_Symbol] = []
+        while (token := self._next()) and token not in ENDS:
+            if token == "_" and symbols:
+                self._take()
+                symbols[-1] = replace(symbols[-1], below=_index(self._group()))
+            elif token == "^" and symbols:
+                self._take()
+                symbols[-1] = replace(symbols[-1], above=_power(self._group()))
+            else:
+                symbols.append(self._symbol())
+        return _beside(symbols)
+
+    def _symbol(self) -> _Symbol:
+        token = self._take()
+        if token == "{":
+            return _Symbol(self._rest_of_group())
+        if token.isspace():
+            return _Symbol(" ")
+        if not token.startswith("\\"):
+            return _Symbol(token)
+        return self._command(token[1:])
+
+    def _command(self, name: str) -> _Symbol:
+        readers: dict[str, Callable[[], _Symbol]] = {
+            "frac": self._fraction,
+            "tfrac": self._fraction,
+            "sqrt": lambda: _Symbol(f"sqrt({self._group()})"),
+            "begin": self._environment,
+        }
+        if name in readers:
+            return readers[name]()
+        if name in TEXTS:
+            return _Symbol(self._words())
+        if name in ACCENTS:
+            return _Symbol(self._group(), after=ACCENTS[name])
+        if name in MARKS:
+            return _Symbol(self._group() + MARKS[name])
+        return _Symbol(NAMES.get(name, name if name.isalpha() else name.strip(",;!") or " "))
+
+    def _fraction(self) -> _Symbol:
+        over, under = self._group(), self._group()
+        over = f"({over})" if re.search(r" [-+x] |, ", _outside(over)) else over
+        under = f"({under})" if re.search(r"[\s/+-]", _outside(under)) else under
+        return _Symbol(f"{over}/{under}")
+
+    def _environment(self) -> _Symbol:
+        kind = self._words()
+        rows = self.rows()
+        self._take()
+        self._words()
+        if kind == "cases":
+            return _Symbol("{" + "; ".join(" ".join(filter(None, row)) for row in rows) + "}")
+        return _Symbol("[" + ", ".join("[" + ", ".join(row) + "]" for row in rows) + "]")
+
+    def _group(self) -> str:
+        """What the next braces hold, else the next symbol."""
+        while self._next().isspace():
+            self._take()
+        return str(self._symbol())
+
+    def _rest_of_group(self) -> str:
+        inside = self._cell()
+        self._take()
+        return inside
+
+    def _words(self) -> str:
+        """What the next braces hold, as it is written."""
+        self._take()
+        words = ""
+        while self._next() not in ("}", ""):
+            words += self._take()
+        self._take()
+        return words
+
+    def _next(self) -> str:
+        return self._tokens[self._at] if self._at < len(self._tokens) else ""
+
+    def _take(self) -> str:
+        self._at += 1
+        return self._tokens[self._at - 1]
+
+
+def _beside(symbols: list[_Symbol]) -> str:
+    """Symbols in a row, a space between names; LaTeX needs none there."""
+    text = ""
+    for symbol in map(str, symbols):
+        apart = re.search(r"[\w'*]$", text) and re.match(r"\w", symbol)
+        text += f" {symbol}" if apart else symbol
+    spaced = re.sub(r"\s*\t\s*", GAP, re.sub(r"[ \n]+", " ", text))
+    return re.sub(r" (?=[,;.])", "", re.sub(r"\s*\v\s*", ".", spaced)).strip()
+
+
+def _index(index: str) -> str:
+    """What stands below a symbol: m11 and X_udot, as keys and logs are called."""
+    if len(index) > 1 and index.isdigit():
+        return index
+    named = re.sub(r"(?<=\w) (?=\w)", "", index.replace("'", "dot"))
+    named = re.sub(r",(?=\S)", "_", named)
+    return f"_{named}" if re.fullmatch(r"\w+", named) else f"_({index})"
+
+
+def _power(power: str) -> str:
+    if power in ("*", "'"):
+        return power
+    return f"^{power}" if re.fullmatch(r"-?[\w.]+", power) else f"^({power})"
+
+
+def _outside(text: str) -> str:
+    """A text without what its parentheses and bars hold."""
+    emptied = re.sub(r"\([^()]*\)|\|[^|]*\|", "", text)
+    return text if emptied == text else _outside(emptied)
