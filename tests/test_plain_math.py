@@ -29,7 +29,7 @@ PAGES = [name for name in docs.names() if "$$" in docs.page(name)]
         (r"\frac{-e}{\frac{a}{b}}", "-e/(a/b)"),
         (r"\sqrt{K_f} + \sqrt{a^2 + b^2}", "sqrt(K_f) + sqrt(a^2 + b^2)"),
         (r"M^{-1} x^2 e^{-2 \lambda t} W^\star R^T", "M^-1 x^2 e^(-2 lambda t) W* R^T"),
-        (r"\hat W_u \cdot \Phi, \quad 2 \times 3", "W_hat_u.Phi,    2 x 3"),
+        (r"\hat W_u \cdot \Phi, \quad 2 \times 3", "W_hat_u.Phi,   2 x 3"),
         (r"\left(1 - \frac{a}{b}\right)^2 \le \pi", "(1 - a/b)^2 <= pi"),
         (r"\begin{bmatrix} a & 0 \\ 0 & m_{22} \end{bmatrix} \nu", "[[a, 0], [0, m22]] nu"),
         (
@@ -51,9 +51,9 @@ def test_rows_and_columns_stay_beside_each_other() -> None:
     &\quad + c && \text{(2)}
     \end{aligned}"""
     assert plain(latex).splitlines() == [
-        "a     = b,    c = d     (1)",
+        "a     = b,   c = d   (1)",
         "tau_u = b",
-        "      + c               (2)",
+        "      + c   (2)",
     ]
 
 

@@ -23,7 +23,7 @@ NAMES = {
     "varphi": "phi", "star": "*", "quad": "\t", "qquad": "\t", "ldots": "...", "infty": "inf",
 }  # fmt: skip
 ENDS = {"}", "&", "\\\\", "\\end"}
-GAP = "    "  # between equations in a row
+GAP = "   "  # between equations in a row
 
 
 def plain_blocks(markdown: str) -> str:
@@ -52,10 +52,15 @@ def _squared(rows: list[list[str]]) -> Iterator[list[str]]:
 
 
 def _line(cells: list[str], widths: list[int]) -> str:
-    """A left and a right side at a time, as `aligned` pairs its columns."""
+    """A left and a right side at a time, as `aligned` pairs its columns.
+
+    A right side alone, such as the number of the equation, follows at once: lines stay short.
+    """
     padded = [cell.ljust(width) for cell, width in zip(cells, widths, strict=False)]
-    pairs = [" ".join(padded[at : at + 2]) for at in range(0, len(padded), 2)]
-    return GAP.join(pairs).rstrip()
+    line = " ".join(padded[:2])
+    for left, right in zip(padded[2::2], padded[3::2], strict=False):
+        line = f"{line}{GAP}{left} {right}" if left.strip() else f"{line.rstrip()}{GAP}{right}"
+    return line.rstrip()
 
 
 @dataclass(frozen=True)
