@@ -57,6 +57,11 @@ def test_rows_and_columns_stay_beside_each_other() -> None:
     ]
 
 
+def test_a_row_that_ends_early_moves_no_column() -> None:
+    latex = r"a &= b, & c &= d \\ e &= f + g + h + i"
+    assert plain(latex).splitlines() == ["a = b,   c = d", "e = f + g + h + i"]
+
+
 def test_of_a_page_equations_alone_are_changed() -> None:
     page = "Cost: $5 \\tau_u\n\n$$\n\\tau_u = 1\n$$\n\n- a\n\n  $$\n  x^2\n  $$\n"
     made = "Cost: $5 \\tau_u\n\n```\ntau_u = 1\n```\n\n- a\n\n  ```\n  x^2\n  ```\n"
