@@ -185,7 +185,7 @@ TABLE: dict[str, list[Row]] = {
      'test_numbers_that_verify_has_found_converged_are_not_doubted_again'),
 ],
 "equations in a terminal": [
-    ("return _Symbol(self._group(), after=ACCENTS[name])", "return _Symbol(self._group())",
+    ("(self._read_group(), after=ACCENTS[name])", "(self._read_group())",
      "test_an_equation_has_the_symbols_of_logs"),
     ("    if len(index) > 1 and index.isdigit():\n", "    if False:\n",
      "test_an_equation_has_the_symbols_of_logs"),

@@ -39,10 +39,16 @@ def arrow(axes: Axes, start: np.ndarray, end: np.ndarray, color: str, style: str
     """An arrow between two points of the earth frame."""
     axes.add_patch(
         FancyArrowPatch(
-            start[::-1], end[::-1], arrowstyle=style, mutation_scale=9, color=color, lw=1.1,
-            shrinkA=0, shrinkB=0,
+            start[::-1],
+            end[::-1],
+            arrowstyle=style,
+            mutation_scale=9,
+            color=color,
+            lw=1.1,
+            shrinkA=0,
+            shrinkB=0,
         )
-    )  # fmt: skip
+    )
 
 
 def word(axes: Axes, place: np.ndarray, text: str, color: str = BLACK) -> None:
@@ -53,9 +59,16 @@ def word(axes: Axes, place: np.ndarray, text: str, color: str = BLACK) -> None:
 def angle(axes: Axes, at: np.ndarray, radius: float, low: float, high: float, color: str) -> None:
     """An arc from one direction to another, with the second's arrow at its end."""
     axes.add_patch(
-        Arc(at[::-1], 2 * radius, 2 * radius, theta1=90.0 - np.rad2deg(high),
-            theta2=90.0 - np.rad2deg(low), color=color, lw=1.0)
-    )  # fmt: skip
+        Arc(
+            at[::-1],
+            2 * radius,
+            2 * radius,
+            theta1=90.0 - np.rad2deg(high),
+            theta2=90.0 - np.rad2deg(low),
+            color=color,
+            lw=1.0,
+        )
+    )
     tip = at + radius * ahead(high)
     arrow(axes, tip - 0.01 * ahead(high + np.pi / 2), tip, color)
 
@@ -101,8 +114,13 @@ def draw_forces(axes: Axes) -> None:
     angle(axes, VESSEL, 0.75, PSI + 2.2, PSI + 3.9, RED)
     word(axes, VESSEL + 1.3 * ahead(PSI + 2.1), r"$\tau_r, r$", RED)
     stern = in_earth(STERN)
-    axes.plot([stern[1], in_earth((-2.9, 0.0))[1]], [stern[0], in_earth((-2.9, 0.0))[0]], "--",
-              color=BLACK, lw=0.7)  # fmt: skip
+    axes.plot(
+        [stern[1], in_earth((-2.9, 0.0))[1]],
+        [stern[0], in_earth((-2.9, 0.0))[0]],
+        "--",
+        color=BLACK,
+        lw=0.7,
+    )
     thrust = ahead(PSI + DELTA)
     arrow(axes, stern - 1.7 * thrust, stern, RED)
     word(axes, stern - 1.95 * thrust, r"$T$", RED)

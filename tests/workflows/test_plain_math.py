@@ -50,11 +50,7 @@ def test_rows_and_columns_stay_beside_each_other() -> None:
     \tau_u &= b \\
     &\quad + c && \text{(2)}
     \end{aligned}"""
-    assert plain(latex).splitlines() == [
-        "a     = b,   c = d   (1)",
-        "tau_u = b",
-        "      + c   (2)",
-    ]
+    assert plain(latex).splitlines() == ["a     = b,   c = d   (1)", "tau_u = b", "      + c   (2)"]
 
 
 def test_a_row_that_ends_early_moves_no_column() -> None:
