@@ -41,7 +41,7 @@ help: ## what can be made
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
-reproduce: $(VENV)/run.done ## three papers, claim by claim, into results/.runs/
+reproduce: $(VENV)/run.done ## three papers, claim by claim, into results/runs/ and results/paper.md
 	@echo "$(words printed_from_zero $(COMPARISONS) $(LEFEBER) $(FOSSEN)) steps, two to eight minutes on two cores:"
 	@rm -f results/mu_2017.log results/lefeber_2003.log results/fossen_2003.log
 	@$(STEP) run mu_2017 printed_from_zero 4
@@ -52,7 +52,9 @@ reproduce: $(VENV)/run.done ## three papers, claim by claim, into results/.runs/
 	@for name in $(FOSSEN); do $(STEP) compare fossen_2003 $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/verdicts.py
 	@$(BIN)/python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003
-	@echo "what was found: results/README.md, lefeber_2003.md, fossen_2003.md; every table, claim and figure: results/.runs/*/*/report.html"
+	@$(BIN)/python examples/reproduce/paper_figures.py
+	@echo "every table, claim and figure: results/runs/*/*/report.html"
+	@echo "what was found: results/README.md, lefeber_2003.md, fossen_2003.md; the first paper in figures: results/paper.md"
 
 # In F and S the law without its network diverges, as it must: exit code 3.
 claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling
@@ -69,18 +71,18 @@ claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, 
 	@$(BIN)/python examples/reproduce/network_line.py results/mu_2017/networks.csv results/mu_2017/networks.png
 	@echo "what was found: results/claim.md"
 
-pod: $(VENV)/run.done ## the laws behind a pod, into results/.runs/pod/
+pod: $(VENV)/run.done ## the laws behind a pod, into results/runs/pod/
 	@echo "$(words $(PODS)) steps:"
 	@rm -f results/pod.log
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
-	@echo "what was found: results/pod.md; every table and figure: results/.runs/pod/*/report.html"
+	@echo "what was found: results/pod.md; every table and figure: results/runs/pod/*/report.html"
 
-sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/.runs/sea/
+sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/runs/sea/
 	@echo "$(words $(SEAS)) steps, about five minutes on two cores:"
 	@rm -f results/sea.log
 	@for name in $(SEAS); do $(STEP) compare sea $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
-	@echo "what was found: results/sea.md; every table and figure: results/.runs/sea/*/report.html"
+	@echo "what was found: results/sea.md; every table and figure: results/runs/sea/*/report.html"
 
 doubt: $(VENV)/run.done ## what the verdicts on papers and studies hang on, into results/doubt.md, half an hour on two cores
 	@for name in $(DOUBTED); do \

@@ -184,6 +184,17 @@ TABLE: dict[str, list[Row]] = {
     ('if not done.unconverged_by_run and tolerance <= TOLERANCE:', 'if tolerance <= TOLERANCE:',
      'test_numbers_that_verify_has_found_converged_are_not_doubted_again'),
 ],
+"equations in a terminal": [
+    ("(self._read_group(), after=ACCENTS[name])", "(self._read_group())",
+     "test_an_equation_has_the_symbols_of_logs"),
+    ("    if len(index) > 1 and index.isdigit():\n", "    if False:\n",
+     "test_an_equation_has_the_symbols_of_logs"),
+    ('        under = f"({under})" if', '        under = f"({under})" if False and',
+     "test_an_equation_has_the_symbols_of_logs"),
+    ("[*row[:-1], *[", "[*row, *[", "test_a_row_that_ends_early_moves_no_column"),
+    ("tuple(_sections(name, plain_blocks(", "tuple(_sections(name, str(",
+     "test_a_search_finds_equations_by_the_names_of_logs_and_shows_no_latex"),
+],
 "comparison": [
     ("if name not in unranked and is_ranked else math.nan", "if name not in unranked else math.nan",
      "test_a_run_by_itself_is_not_ranked"),

@@ -2,7 +2,7 @@
 
     python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003
 
-A name is a folder below results/.runs: one comparison, or all those in it.
+A name is a folder below results/runs: one comparison, or all those in it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-RUNS = Path(__file__).parents[2] / "results/.runs"
+RUNS = Path(__file__).parents[2] / "results/runs"
 VERDICTS = ("reproduced", "not reproduced", "cannot tell")
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from podusv_cli.interface import open_run
 
-SEA = Path(__file__).parents[2] / "results/.runs/sea"
+SEA = Path(__file__).parents[2] / "results/runs/sea"
 RUNS = ("exact", "state_6", "current")
 LAW, SINCE = "velocity_vector", 100.0  # s; after the approach
 SIGNALS = ["b_u", "b_v", "b_r", "psi_w", "r_w"]  # the last two where there are waves

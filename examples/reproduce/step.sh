@@ -4,11 +4,11 @@
 #   examples/reproduce/step.sh run|compare FOLDER NAME CODE
 #
 # for configs/FOLDER/NAME.yaml, which has to end with that exit code. What podusv says is kept in
-# results/FOLDER.log, the result in results/.runs/FOLDER/NAME. Of it, the files that results/FOLDER/NAME has are
+# results/FOLDER.log, the result in results/runs/FOLDER/NAME. Of it, the files that results/FOLDER/NAME has are
 # replaced there.
 set -uo pipefail
 verb=$1 folder=$2 name=$3 wanted=$4
-kept=results/$folder/$name made=results/.runs/$folder/$name log=results/$folder.log
+kept=results/$folder/$name made=results/runs/$folder/$name log=results/$folder.log
 
 printf '  %-26s' "$name"
 SECONDS=0

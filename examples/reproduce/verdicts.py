@@ -6,7 +6,7 @@ import json
 import sys
 from pathlib import Path
 
-PAPER = Path(__file__).parents[2] / "results/.runs/mu_2017"
+PAPER = Path(__file__).parents[2] / "results/runs/mu_2017"
 READINGS = {
     "P": "printed_compare",
     "F": "figures_compare",

@@ -38,7 +38,7 @@ def docs(
                 echo(f"  {name:<22} {title}")
         echo("read one: podusv docs NAME; find a word: podusv docs WORD")
     elif workflow.is_page(wanted):
-        _show(workflow.page(wanted))
+        _show(wanted)
     else:
         _list(wanted)
 
@@ -54,12 +54,14 @@ def _list(wanted: str) -> None:
 
 
 def _show(page: str) -> None:
-    """Print Markdown: rendered on a terminal, as it is in a pipe."""
+    """Print a page: rendered on a terminal, as Markdown in a pipe."""
+    from podusv_cli.workflows import docs as workflow
+
     if not sys.stdout.isatty():
-        typer.echo(page, nl=False)
+        typer.echo(workflow.page(page), nl=False)
         return
     from rich.console import Console
     from rich.markdown import Markdown
 
     console = Console(width=min(WIDEST, columns()), no_color=not supports_colours(sys.stdout))
-    console.print(Markdown(page, hyperlinks=False, code_theme="bw"))
+    console.print(Markdown(workflow.readable(page), hyperlinks=False, code_theme="bw"))

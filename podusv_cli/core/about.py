@@ -104,7 +104,7 @@ class StudyClaim(Component):
         "or fails, where a published claim is reproduced or not",
     )
     expect: str = value(
-        ..., "", "the claim as an expression over all draws; see podusv docs study_claims"
+        ..., "", "the claim as an expression over all draws; see podusv docs claims"
     )
     tolerance: float = value(
         0.0,

@@ -13,6 +13,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.phrases import did_you_mean
 from podusv_cli.scenario import shipped
 from podusv_cli.workflows import examples
+from podusv_cli.workflows.plain_math import plain_blocks
 
 CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
 CAPTION = re.compile(r"^   :caption: (.+)$")
@@ -76,6 +77,11 @@ def page(name: str) -> str:
     return reachable(_file(short).read_text("utf-8"), there)
 
 
+def readable(name: str) -> str:
+    """A page as a terminal shows it: Markdown with its equations in plain symbols."""
+    return plain_blocks(page(name))
+
+
 def reachable(text: str, folder: str) -> str:
     """Markdown of a file in this folder of a checkout, with links that lead on without one."""
     return CONFIG.sub(_name_shipped, LINK.sub(lambda link: _reachable(link, folder), text))
@@ -105,7 +111,7 @@ def search(text: str) -> list[tuple[Section, str]]:
 @cache
 def sections(name: str) -> tuple[Section, ...]:
     """The sections of a page; headings within code are none."""
-    return tuple(_sections(name, _file(name).read_text("utf-8")))
+    return tuple(_sections(name, plain_blocks(_file(name).read_text("utf-8"))))
 
 
 def _sections(name: str, text: str) -> Iterator[Section]:

@@ -82,6 +82,10 @@ def test_pages_that_are_followed_in_one_folder_write_into_folders_of_their_own()
     assert not set.intersection(*named)
 
 
+def test_readme_is_read_once() -> None:
+    assert len(text_of("README.md").split()) <= 600
+
+
 @pytest.fixture
 def podusv(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

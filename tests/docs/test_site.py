@@ -162,6 +162,18 @@ def test_the_site_builds_without_a_warning_and_loads_nothing_from_elsewhere(site
         assert not re.search(r"url\([\"']?(https?:)?//", style.read_text()), style
 
 
+@pytest.mark.slow
+def test_equations_are_drawn_without_a_script(site: Path) -> None:
+    for name in ("model", "laws", "theory"):
+        page = (site / f"docs/{name}.html").read_text()
+        source = (ROOT / f"docs/{name}.md").read_text()
+        assert page.count("<math") == len(re.findall(r"^ *\$\$$", source, re.M)) // 2
+        assert "$$" not in page
+        assert "mathjax" not in re.sub(r"(mathjax|tex2jax)_ignore", "", page).lower()
+        accented = r"<munder(?:over)?>\s*<mover accent"  # an index below in place of beside
+        assert not re.search(accented, page)
+
+
 def found(site: Path, word: str) -> set[str]:
     """The pages that the site's search finds for a stem, in text or headings."""
     text = (site / "searchindex.js").read_text()

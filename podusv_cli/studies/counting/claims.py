@@ -6,7 +6,7 @@
     median(adaptive_neural.iae / full_backstepping.iae) <= 1.0
     failures(adaptive_neural) < failures(pid)
 
-docs/study_claims.md describes the language.
+docs/claims.md describes the language.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     dsc.iae < 0.9 * pid.iae and finished(pid)          about the runs of several laws in a draw
     finished and z_e_steady <= 1.5                     about one run: when it is a success
 
-A condition holds, does not hold, or is unknown where a number is. docs/study_claims.md describes
+A condition holds, does not hold, or is unknown where a number is. docs/claims.md describes
 the language.
 """
 

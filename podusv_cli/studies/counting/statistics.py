@@ -3,7 +3,7 @@
 Metrics are smaller-is-better. A failed run is +inf. NaN is a number that nobody knows: it may lie
 anywhere, so it widens an interval, and in an estimate it counts as the worst. All intervals are
 two-sided: each side misses with a probability of at most (1 - level) / 2. Functions work along the
-last axis. docs/study_claims.md gives the sources.
+last axis. docs/claims.md gives the sources.
 """
 
 from __future__ import annotations
