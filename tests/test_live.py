@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import signal
@@ -284,3 +285,12 @@ def test_a_path_of_other_letters_is_no_token(served: tuple[str, str]) -> None:
 def test_a_question_that_lacks_something_is_answered_in_a_sentence(live: Live) -> None:
     (refused,) = live.answer("frame", {"moved": {}})["refused"]
     assert refused["text"] == "the question lacks signals, rest, controls"
+
+
+def test_a_value_that_moves_has_no_source_code_looked_at(live: Live, monkeypatch) -> None:
+    """To find where a class is written takes as long as a run; only an error says it."""
+    framed(live, {"controller.K_Pu": 78.0}, rest=False)
+    looked_at = []
+    monkeypatch.setattr(inspect, "getsourcelines", lambda obj: looked_at.append(obj) or ([], 1))
+    assert "refused" not in framed(live, {"controller.K_Pu": 79.0}, rest=False)
+    assert looked_at == []
