@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,7 +15,7 @@ from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import asked, check_law
-from podusv_cli.engine.running.thread import Ending, MarchStatus, marched
+from podusv_cli.engine.running.thread import Ending, MarchStatus, Work, march_together, marched
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
@@ -55,16 +55,39 @@ def run(
     march and keeps what was logged. `compiled=False` runs the same kernels as plain Python.
     `allocate` gives the room for the logged rows; the recording's signals are views of it.
     """
-    about, grid, layout = plan.about, plan.grid, plan.layout
-    plan.loop.check_fit(grid.step)
-    vectors, last = plan.vectors(grid.rows, allocate), layout.steps + 1
-    advance = partial(marcher(plan, compiled)(vectors, layout, grid.step), 0, last)
+    about = plan.about
+    vectors, last, advance = begin_march(plan, compiled, allocate)
     with np.errstate(all="ignore"), interrupts_deferred():
         ending = marched(
             advance, last, vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
         )  # fmt: skip
         return replace(recorded(plan, vectors, ending), about=about)
+
+
+def begin_march(
+    plan: Plan, compiled: bool, allocate: Allocate = np.empty
+) -> tuple[Vectors, int, Callable[[], int]]:
+    """The vectors of a loop at its start, the instant after the last, and the march up to it."""
+    plan.loop.check_fit(plan.grid.step)
+    vectors, last = plan.vectors(plan.grid.rows, allocate), plan.layout.steps + 1
+    march = marcher(plan, compiled)(vectors, plan.layout, plan.grid.step)
+    return vectors, last, partial(march, 0, last)
+
+
+def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Recording]:
+    """Integrate several loops at once, each in a thread of its own; the recordings of `run`.
+
+    An interrupt ends all marches and keeps what was logged.
+    """
+    begun = [begin_march(plan, compiled) for plan in plans]
+    works = [Work(advance, vectors.under_way) for vectors, _, advance in begun]
+    with np.errstate(all="ignore"), interrupts_deferred():
+        endings = march_together(works, [last for _, last, _ in begun])
+        return [
+            replace(recorded(plan, vectors, ending), about=plan.about)
+            for plan, (vectors, *_), ending in zip(plans, begun, endings, strict=True)
+        ]
 
 
 def to_end(
