@@ -70,6 +70,22 @@ def test_claims_about_laws_that_are_not_shown_are_left_out() -> None:
     assert claims_about([], ["pid"]) == []
 
 
+def test_a_claim_that_a_law_of_another_kind_cannot_answer_is_told_and_the_page_goes_on(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "claims.yaml"
+    file.write_text(
+        f"extends: {OWN}\nsimulation: {{duration: 20}}\nclaims:\n"
+        "  winds: {says: winds up, expect: max(abs(pid.z_u)) > 0.5}\n"
+    )
+    live = Live(str(file))
+    first = framed(live, {}, rest=True, wanted=True)
+    assert [v["name"] for v in first["verdicts"]] == ["winds"]
+    frame = framed(live, {"controller.kind": "momentum_vector"}, rest=True)
+    assert frame["verdicts"] == []
+    assert "claims.winds.expect" in frame["findings"][-1][0]
+
+
 def test_margins_are_those_of_the_command(podusv) -> None:
     live = Live(OWN)
     live.frame({}, (), rest=True, wanted=True)

@@ -40,7 +40,6 @@ FIRST_STEPS = """\
 podusv simulates and compares controllers for pod-propelled surface vessels. First steps:
 
   podusv demo                              see what it does: three laws, a chase, a page
-  podusv live                              move a gain or a delay, and see the boat answer
   podusv start mine                        a scenario for your boat, from length, mass and thrust
   podusv init mu_2017/corrected            copy a scenario here, to edit; podusv init lists them
   podusv run corrected.yaml                simulate it: log, metrics and figures in results/

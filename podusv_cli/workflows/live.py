@@ -65,11 +65,12 @@ class Base:
     """A scenario that is loaded, into which numbers are put while values move.
 
     `has_nominal`: the file gives what the laws are told of the hull. `several`: it has
-    `controllers`.
+    `controllers`. `unread` are sentences about claims that these laws have no signals for.
     """
 
     cases: dict[str, Case]
     claims: Sequence[ParsedClaim]
+    unread: Sequence[str]
     has_nominal: bool
     several: bool
 
@@ -211,6 +212,7 @@ class Live:
             "command": self.command(moved, [*cases]),
         }
         if rest:
+            findings |= {sentence: [*cases] for sentence in base.unread}
             told["findings"] = [[text, labels] for text, labels in findings.items()]
         if wanted:
             known = list(
@@ -258,9 +260,13 @@ class Live:
 
     def _base_of(self, loaded: Loaded) -> Base:
         cases = {n: Case(s, loaded.plan(s)) for n, s in self.singles(loaded.scenario).items()}
-        claims = claims_about(parse_claims(loaded), [*cases])
+        claims, unread = list[ParsedClaim](), tuple[str, ...]()
+        try:
+            claims = claims_about(parse_claims(loaded), [*cases])
+        except ScenarioError as error:  # a law of another kind may lack what a claim is about
+            unread = tuple(map(str, error.faults))
         several = bool(loaded.scenario.controllers)
-        return Base(cases, claims, "nominal" in loaded.root.mapping, several)
+        return Base(cases, claims, unread, "nominal" in loaded.root.mapping, several)
 
     def _moving(self, moved: Moved) -> tuple[Base, dict[str, Case]]:
         """A case for each law, whose numbers are put into one that was loaded with the words."""
@@ -382,7 +388,7 @@ def assigned(moved: Moved) -> list[str]:
 
 def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
     """The headline metrics: name, words, unit, and a number or a word for each run."""
-    first = [m.about for m in headlines_first(scenario.known_metrics()) if m.about.headline]
+    first = [m.about for m in headlines_first(scenario.known_metrics()) if m.headline]
     return [
         {
             "name": a.name, "row": a.row, "unit": "" if a.unit == "1" else a.unit,
