@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,6 +19,7 @@ pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(BROWSER is None, reason="no browser is on the path"),
 ]
+LEGS = "podusv:laws/legs.yaml"
 QUIET = """window.seen?.frames > 0
     && /^(refused.*)?$/.test(document.getElementById("state").textContent)"""
 OVERFLOWING = """[...document.querySelectorAll("body *")].filter((one) => {
@@ -26,11 +29,10 @@ OVERFLOWING = """[...document.querySelectorAll("body *")].filter((one) => {
 ROLES = {"slider", "spinbutton", "combobox", "textbox", "button", "checkbox"}
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Of a page that is served without a scenario's name, which is the demo's."""
-    command = [sys.executable, "-m", "podusv_cli", "live", "--no-open"]
-    folder = tmp_path_factory.mktemp("served")
+@contextmanager
+def serve(folder: Path, *words: str) -> Iterator[str]:
+    """The address of a page."""
+    command = [sys.executable, "-m", "podusv_cli", "live", *words, "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder) as process:
         assert process.stdout
         found = re.search(r"http://\S+", process.stdout.readline())
@@ -41,6 +43,13 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
             assert process.wait(30) == 130
         finally:
             process.kill()
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Of a page that is served without a scenario's name, which is the demo's."""
+    with serve(tmp_path_factory.mktemp("served")) as address:
+        yield address
 
 
 @pytest.fixture(scope="module")
@@ -214,3 +223,35 @@ def test_many_frames_leave_no_nodes_behind(page: Page) -> None:
     })()""")
     assert count_nodes() <= before + 20
     assert page.faults() == []
+
+
+def test_a_waypoint_is_dragged_on_the_map(browser: Chromium, tmp_path: Path) -> None:
+    with serve(tmp_path, LEGS) as address:
+        page = browser.open(address)
+        page.wait(QUIET)
+        grips = page.run("""[...document.querySelectorAll(".grip")].map((grip) => {
+            const { x, y, width } = grip.getBoundingClientRect();
+            return [x + width / 2, y + width / 2]; })""")
+        points = [
+            page.run(f"+document.getElementById('v-path.points[{i}][{axis}]').value")
+            for i in (0, 1)
+            for axis in (0, 1)
+        ]
+        metres = abs(complex(points[2] - points[0], points[3] - points[1]))
+        pixels = abs(complex(grips[1][0] - grips[0][0], grips[1][1] - grips[0][1]))
+        x, y = grips[1]
+        mouse = {"button": "left", "buttons": 1, "clickCount": 1}
+        page.ask("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, **mouse)
+        for far in range(1, 25):
+            page.ask("Input.dispatchMouseEvent", type="mouseMoved", x=x + far, y=y, **mouse)
+        page.ask("Input.dispatchMouseEvent", type="mouseReleased", x=x + 24, y=y, **mouse)
+        page.run("new Promise((done) => setTimeout(done, 50))")
+        page.wait(QUIET)
+        command = text(page, "command")
+        found = re.search(r"points\[1\]\[0\]=([-.\d]+).*points\[1\]\[1\]=([-.\d]+)", command)
+        assert found
+        assert float(found[1]) == pytest.approx(points[2], abs=2 * metres / pixels)
+        assert float(found[2]) == pytest.approx(
+            points[3] + 24 * metres / pixels, rel=0.02, abs=0.05
+        )
+        assert page.faults() == []

@@ -18,6 +18,7 @@ from podusv_cli.workflows.live import Live
 from podusv_cli.workflows.live_verdicts import claims_about
 
 OWN = "podusv:own_vessel.yaml"
+LEGS = "podusv:laws/legs.yaml"
 SHORT = ("simulation.duration=20.0",)
 ADDED = {"controllers.second.kind": "momentum_vector"}
 
@@ -131,6 +132,21 @@ def test_what_a_loop_dies_of_stands_first_and_is_a_whole_number_of_steps() -> No
     moving, rest = (framed(live, delay, rest=rest) for rest in (False, True))
     assert moving["curves"] == rest["curves"]
     assert moving["curves"] != framed(live, {}, rest=False)["curves"]
+
+
+def test_a_waypoint_is_moved_to_the_numbers_of_run_and_saved_in_its_list(podusv) -> None:
+    live = Live(LEGS, ["simulation.duration=40.0"])
+    controls = live.frame({}, (), rest=True, wanted=True)["controls"]
+    first = {c["key"]: c["value"] for c in controls if c["part"] == "waypoints"}
+    moved = {key: first[key] - 1.25 for key in ("path.points[1][0]", "path.points[1][1]")}
+    moving, rest = (framed(live, moved, rest=rest) for rest in (False, True))
+    for part in ("numbers", "curves", "chase", "command"):
+        assert moving[part] == rest[part], part
+    saved = live.answer("save", {"moved": moved, "name": "elsewhere"})
+    points = load("elsewhere.yaml").scenario.path.waypoints()
+    assert saved["command"].endswith("elsewhere.yaml")
+    assert list(points[1]) == [*moved.values()]
+    assert list(points[0]) == [first["path.points[0][0]"], first["path.points[0][1]"]]
 
 
 def test_several_laws_march_at_once_to_the_bits_of_one_after_the_other() -> None:

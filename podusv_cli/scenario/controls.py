@@ -28,6 +28,8 @@ LOOP = "sampling, delay and noise"
 LINK = ("command", "delay")  # of an actuator; a scenario may lack the section
 FIRST = ("control.period", "actuator.command.delay", "measurement.kind")
 OF_SENSORS = ("delay", "noise")
+PLACES = ("path", "points")
+MOST_PLACES = 24  # waypoints that may be moved one by one
 MOST_LATE = 100  # steps to which the slider of a time that is 0 reaches
 STEPPED = ("period", "delay", "duration")  # names of times that are whole numbers of steps
 
@@ -97,10 +99,30 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
             yield from _of_part(scenario, f"{part}.{name}", (*at, name), ruled)
         elif found := _control(scenario, part, (*at, name), key.keys[name], content):
             yield Control(**found, by_rule=(*at, name) in ruled)
+        elif (*at, name) == PLACES and 0 < len(content or ()) <= MOST_PLACES:
+            yield from _of_waypoints((*at, name), content)
         elif name == LINK[0] and part == "actuator" and content is None:
             delay = key.keys[name].keys[LINK[1]]
             if found := _control(scenario, part, (*at, *LINK), delay, delay.default):
                 yield Control(**found)
+
+
+def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Control]:
+    """North and east of each point, within as much as the points are apart."""
+    reach = max(max(axis) - min(axis) for axis in zip(*points, strict=True)) or 1.0
+    for row, point in enumerate(points):
+        for column, (name, now) in enumerate(zip(("north", "east"), point, strict=True)):
+            yield Control(
+                key=dotted((*at, row, column)),
+                part="waypoints",
+                name=f"waypoint {row + 1} {name}",
+                meaning="",
+                value=now,
+                default="",
+                unit="m",
+                low=now - reach,
+                high=now + reach,
+            )
 
 
 def _control(

@@ -1,7 +1,7 @@
 (() => {
   const one = (id) => document.getElementById(id), REST = 250, IDLE = 600; // ms without a move until all is computed, and from then to the margins
   const tracks = chaseOn(one("stage")), curves = curvesOn(one("plot"));
-  let latest = "", moved = new Map(), rows = new Map(), signals = [], last = null, ghost = null, busy = false, wanted = null, pause = 0, judged = new Map(), several = false, alone = "", added = new Set();
+  let latest = "", moved = new Map(), rows = new Map(), signals = [], last = null, ghost = null, busy = false, wanted = null, pause = 0, judged = new Map(), values = new Map(), heldBox = null, several = false, alone = "", added = new Set();
   const add = (parent, tag, properties = {}) => parent.appendChild(Object.assign(document.createElement(tag), properties));
   const ask = async (name, question) => {
     const answer = await fetch(BASE + name, {
@@ -111,13 +111,52 @@
   };
   const inWords = (x) => (typeof x === "number" ? `${+x.toPrecision(4)}` : x ?? "-");
   const named = ({ label, ...run }) => ({ label: `${label}, kept`, ...run, kept: true });
+  // Waypoints on the map, which a hand drags; their sliders move the same values.
+  const map = one("stage").querySelector(".map"), grips = make(map, "g");
+  const waypoint = (i) => [0, 1].map((axis) => `path.points[${i}][${axis}]`);
+  const drawGrips = () => {
+    let count = 0;
+    while (values.has(waypoint(count)[0])) count++;
+    while (grips.children.length > count) grips.lastChild.remove();
+    while (grips.children.length < count) addGrip(grips.children.length);
+    [...grips.children].forEach((grip, i) => {
+      const [x, y] = tracks.toMap(...waypoint(i).map((key) => moved.get(key) ?? values.get(key)));
+      set(grip, "cx", x);
+      set(grip, "cy", y);
+    });
+  };
+  const addGrip = (i) => {
+    const grip = make(grips, "circle", { r: 8, class: "grip" });
+    make(grip, "title", {}, `waypoint ${i + 1}: drag it`);
+    grip.addEventListener("pointerdown", (event) => {
+      grip.setPointerCapture(event.pointerId);
+      heldBox = last.chase.box; // the map does not move below the hand
+      event.preventDefault();
+    });
+    grip.addEventListener("pointermove", (event) => {
+      if (!heldBox) return;
+      const { left, top, width } = map.getBoundingClientRect(), scale = map.viewBox.baseVal.width / width;
+      const place = tracks.toWorld((event.clientX - left) * scale, (event.clientY - top) * scale);
+      latest = waypoint(i)[0];
+      waypoint(i).forEach((key, axis) => moved.set(key, +place[axis].toFixed(2)));
+      want();
+    });
+    for (const end of ["pointerup", "pointercancel"]) grip.addEventListener(end, () => {
+      if (!heldBox) return;
+      heldBox = null;
+      want({ controls: true, rest: true });
+    });
+  };
+  one("stage").querySelector("input[type=checkbox]").addEventListener("change", (event) => { grips.style.display = event.target.checked ? "none" : ""; });
+  addEventListener("resize", drawGrips);
   const draw = (hold) => {
     const runs = [...(ghost?.curves.runs ?? []), ...last.curves.runs], tracked = [...(ghost?.chase.runs ?? []), ...last.chase.runs];
     legend(one("stage").querySelector(".key"), tracked, false);
     legend(one("plot").querySelector(".key"), runs, true);
     const same = ghost && JSON.stringify(ghost.curves.signals.map((s) => s.name)) === JSON.stringify(last.curves.signals.map((s) => s.name));
     curves.show({ signals: last.curves.signals, runs: same ? runs : last.curves.runs }, hold);
-    tracks.show({ ...last.chase, runs: tracked }, last.chase.end);
+    tracks.show({ ...last.chase, runs: tracked, box: heldBox ?? last.chase.box }, last.chase.end);
+    drawGrips();
     const old = (name, i) => ghost.numbers.find((row) => row.name === name)?.values[i];
     table(one("numbers"), [
       ["", "unit", ...runs.map((run) => run.label)],
@@ -152,6 +191,7 @@
   const lay = (frame) => {
     const open = new Set([...document.querySelectorAll("#parts details[open]")].map((part) => part.dataset.part));
     rows = new Map();
+    values = new Map(frame.controls.map(({ key, value }) => [key, value]));
     one("parts").replaceChildren();
     if (one("add").length === 1) for (const kind of frame.kinds) add(one("add"), "option", { value: kind, textContent: kind });
     [several, alone, added] = [frame.several, frame.alone, new Set(frame.added.map((label) => `controllers.${label}`))];
