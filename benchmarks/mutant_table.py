@@ -188,6 +188,8 @@ TABLE: dict[str, list[Row]] = {
      "test_what_a_loop_dies_of_stands_first_and_is_a_whole_number_of_steps"),
     (r'ADDED = r"controllers\.[A-Za-z]\w*\.kind"', r'ADDED = r"controllers\..*\.kind"',
      "test_no_other_law_is_added"),
+    ("work.ending(last) if was_over else", "work.ending(last) if work.over else",
+     "test_an_interrupt_ends_all_marches_at_once"),
     ('return "none" if math.isnan(number) else "any"', 'return "none"',
      "test_margins_are_those_of_the_command"),
     ("first = self._law_of_its_own if is_added else []", "first: list[str] = []",

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
+import signal
+import time
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 import numpy as np
@@ -154,9 +158,21 @@ def test_several_laws_march_at_once_to_the_bits_of_one_after_the_other() -> None
     for one, together in zip(map(run, plans), run_together(plans), strict=True):
         assert one.status == together.status
         assert one.signals.keys() == together.signals.keys()
-        for name, signal in one.signals.items():
-            np.testing.assert_array_equal(signal, together.signals[name])
+        for name, numbers in one.signals.items():
+            np.testing.assert_array_equal(numbers, together.signals[name])
         np.testing.assert_array_equal(one.seen, together.seen)
+
+
+def test_an_interrupt_ends_all_marches_at_once() -> None:
+    long = ["simulation.duration=20000.0", "log.every=1000"]
+    plans = [single.plan() for single in load(SCENARIO, long).scenario.singles().values()]
+    run_together([single.plan() for single in load(SCENARIO).scenario.singles().values()])
+    Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    began = time.monotonic()
+    recordings = run_together(plans)
+    assert [recording.status for recording in recordings] == ["interrupted"] * 3
+    assert all(0 < len(recording["time"]) < 2000 for recording in recordings)
+    assert time.monotonic() - began < 10.0
 
 
 def test_a_law_that_is_added_is_shown_beside_the_one_that_was_alone(podusv) -> None:

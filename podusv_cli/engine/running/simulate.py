@@ -18,7 +18,7 @@ from podusv_cli.engine.running.check import asked, check_law
 from podusv_cli.engine.running.thread import Ending, MarchStatus, Work, march_together, marched
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
+from podusv_cli.engine.step.layout import BEFORE, STEPS, Layout, Parts, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
 # Over instants first .. last - 1, see `rk4.advance`; a third number stands for the grid's steps
@@ -167,7 +167,7 @@ def why(plan: Plan, vectors: Vectors, ending: Ending) -> str:
 
 
 def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
-    now = np.concatenate([[at], vectors.s, vectors.row])
+    now = np.concatenate([[at], vectors.s, vectors.row[:-BEFORE]])
     named = zip(labels, now, strict=True)
     bad = next((name for name, x in named if not abs(x) <= rk4.LARGEST), "?")
     return f"{bad} is not finite"

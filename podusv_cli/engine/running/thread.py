@@ -165,6 +165,10 @@ def march_together(works: Sequence[Work], lasts: Sequence[int]) -> list[Ending]:
                     work.wait()
         return [work.ending(last) for work, last in zip(works, lasts, strict=True)]
     except KeyboardInterrupt:
+        over = [work.over for work in works]  # before the others are told to stop
         for work in works:
             work.stop()
-        return [work.interrupted(last) for work, last in zip(works, lasts, strict=True)]
+        return [
+            work.ending(last) if was_over else Ending(work.stopped(), "interrupted")
+            for work, last, was_over in zip(works, lasts, over, strict=True)
+        ]
