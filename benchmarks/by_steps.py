@@ -14,9 +14,10 @@ from benchmarks.timing import in_turns, quartiles, ratio, timed
 
 SCENARIO = {
     "extends": "podusv:mu_2017/corrected.yaml",
-    "control": {"period": 0.1}, "simulation": {"duration": 20.0},
+    "control": {"period": 0.1},
+    "simulation": {"duration": 20.0},
     "sweep": {"vary": {"start.x": {"uniform": [-15.0, 15.0]}}},
-}  # fmt: skip
+}
 STEPS = 200  # in an episode, of ten integration steps each
 BESIDE = 8  # environments, one of each march
 MANY = 64

@@ -87,8 +87,9 @@ def run_probe(loop: ClosedLoop, over: TimeGrid) -> Metrics:
     settings = _scenario().metrics
     return metrics_probe(
         Plan(loop, over),
-        steady_fraction=settings.steady_fraction, settling_radius=settings.settling_radius,
-    )  # fmt: skip
+        steady_fraction=settings.steady_fraction,
+        settling_radius=settings.settling_radius,
+    )
 
 
 CASES = [Case(law, net) for law in LAWS[:-1] for net in NETWORKS] + [Case("pid")]

@@ -27,19 +27,32 @@ LIBRARIES = ("-c", "import numpy, h5py, pydantic, typer, yaml, llvmlite.binding"
 RUN = ("run", str(SCENARIO), "--json")
 FIRST = "podusv run --no-figures, for the first time"
 BOAT = (
-    "start", "boat", "--length", "2", "--beam", "0.8", "--mass", "60", "--thrusters", "2x50N@0.3"
-)  # fmt: skip
+    "start",
+    "boat",
+    "--length",
+    "2",
+    "--beam",
+    "0.8",
+    "--mass",
+    "60",
+    "--thrusters",
+    "2x50N@0.3",
+)
 # What somebody does first, each with nothing compiled.
 FIRST_RUNS = {
     "podusv run podusv:own_vessel.yaml --no-figures": (
-        "run", "podusv:own_vessel.yaml", "--no-figures"
+        "run",
+        "podusv:own_vessel.yaml",
+        "--no-figures",
     ),
     "podusv run podusv:mu_2017/corrected.yaml --no-figures": (
-        "run", "podusv:mu_2017/corrected.yaml", "--no-figures"
+        "run",
+        "podusv:mu_2017/corrected.yaml",
+        "--no-figures",
     ),
     "podusv demo": ("demo", "--no-browser"),
     "podusv compare of a scenario of podusv start": ("compare", "boat.yaml"),
-}  # fmt: skip
+}
 # podusv as a checkout without kernels.xz has it: numba compiles.
 BY_NUMBA = """
 from pathlib import Path
@@ -61,12 +74,19 @@ LATER = {
     "podusv compare": ("compare", str(COMPARED), "--json"),
     **{
         STUDY.format(draws): (
-            "sweep", "run", "short.yaml", "--force", "--no-figures", "--workers", "1",
-            "--set", f"sweep.draws={draws}",
+            "sweep",
+            "run",
+            "short.yaml",
+            "--force",
+            "--no-figures",
+            "--workers",
+            "1",
+            "--set",
+            f"sweep.draws={draws}",
         )
         for draws in (FEW, MANY)
     },
-}  # fmt: skip
+}
 # Drawn hulls and seas with one law, ten seconds each; no log is kept.
 STUDIED = f"""
 extends: {ROOT / "configs/studies/hull_and_sea.yaml"}
@@ -115,9 +135,11 @@ def spent(
     unit = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss in bytes
     megabytes = int(peak) * unit / 1e6
     return {
-        "seconds": float(seconds), "busy": float(busy), "megabytes": megabytes,
+        "seconds": float(seconds),
+        "busy": float(busy),
+        "megabytes": megabytes,
         "output": done.stdout,
-    }  # fmt: skip
+    }
 
 
 def commands() -> dict[str, dict[str, Any]]:

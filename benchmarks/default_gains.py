@@ -26,15 +26,24 @@ from podusv_cli.scenario.model import Scenario
 LAWS: dict[str, dict[str, str]] = {
     name: {"kind": name}
     for name in (
-        "velocity_vector", "momentum_vector", "los_pid", "alos", "adrc", "hand_position",
+        "velocity_vector",
+        "momentum_vector",
+        "los_pid",
+        "alos",
+        "adrc",
+        "hand_position",
         "sliding_mode",
     )
-} | {"ilos": {"kind": "alos", "learns": "integral"}}  # fmt: skip
+} | {"ilos": {"kind": "alos", "learns": "integral"}}
 # A preset, the full thrust of each of two fixed propellers [N] and their distance abeam [m].
 BASES = (
-    ("cybership1", 0.6, 0.1), ("otter", 120.0, 0.4), ("wamv", 200.0, 1.03),
-    ("milliampere", 500.0, 1.0), ("paper_nonlinear", 4.0, 0.12), ("revolt", 25.0, 0.3),
-)  # fmt: skip
+    ("cybership1", 0.6, 0.1),
+    ("otter", 120.0, 0.4),
+    ("wamv", 200.0, 1.03),
+    ("milliampere", 500.0, 1.0),
+    ("paper_nonlinear", 4.0, 0.12),
+    ("revolt", 25.0, 0.3),
+)
 SEED, DRAWS, SPREAD = 42, 2, (0.7, 1.3)
 KEPT = ("beam", "x_g")  # numbers that are not drawn
 SHARES = (0.3, 0.6, 0.9)  # of the speed at full thrust
@@ -76,10 +85,18 @@ def _numbers(name: str) -> dict[str, float]:
 
 def _propeller(x: float, y: float, thrust: float, lag: float) -> dict[str, float]:
     return {
-        "x": x, "y": y, "T_nn": thrust, "T_nn_astern": 0.8 * thrust, "n_max": 1.0,
-        "n_max_astern": 1.0, "n_rate": 10.0, "n_lag": lag, "angle_limit": 0.0, "angle_rate": 1.0,
+        "x": x,
+        "y": y,
+        "T_nn": thrust,
+        "T_nn_astern": 0.8 * thrust,
+        "n_max": 1.0,
+        "n_max_astern": 1.0,
+        "n_rate": 10.0,
+        "n_lag": lag,
+        "angle_limit": 0.0,
+        "angle_rate": 1.0,
         "angle_lag": 1.0,
-    }  # fmt: skip
+    }
 
 
 class Task(NamedTuple):
@@ -104,10 +121,14 @@ def tasks(hull: Hull, law: dict[str, str]) -> Iterator[Task]:
 def _scenario(hull: Hull, law: dict[str, str], task: dict[str, Any], load: float) -> Scenario:
     sea = {"kind": "step", "b_v": load} if load else {"kind": "none"}
     whole = {
-        "name": "judged", "vessel": hull.numbers, "actuator": hull.actuator, "disturbance": sea,
-        "controller": law, "control": {"period": 0.1},
+        "name": "judged",
+        "vessel": hull.numbers,
+        "actuator": hull.actuator,
+        "disturbance": sea,
+        "controller": law,
+        "control": {"period": 0.1},
         "metrics": {"steady_fraction": 0.2, "settling_radius": 0.5 * hull.numbers["length"]},
-    }  # fmt: skip
+    }
     return load_text(json.dumps(whole | task), "judged.yaml").scenario
 
 

@@ -96,9 +96,7 @@ def log_megabytes() -> float:
 
 def actuators(rounds: int = ROUNDS) -> dict[str, list[float]]:
     """Time of one step [s] with the usual law behind each actuator; pods differ by allocation."""
-    acting = {
-        "ideal": "ideal", "saturated": "corrected", "one pod": "single", "two pods": "kept",
-    }  # fmt: skip
+    acting = {"ideal": "ideal", "saturated": "corrected", "one pod": "single", "two pods": "kept"}
     loops = {label: _behind(name) for label, name in acting.items()}
     sparse = grid(log_every=10)
     return _a_step({label: (loop, sparse) for label, loop in loops.items()}, rounds)
@@ -117,10 +115,14 @@ def seas(rounds: int = ROUNDS) -> dict[str, list[float]]:
     sea = {"disturbance": parts}
     sensors = {"measurement": {"kind": "sensors"}}
     told = {
-        "calm": {"disturbance": {"kind": "none"}}, "sea": sea, "sea, sensors": sea | sensors,
-        **{f"sea, sensors, {kind}": sea | sensors | {"estimator": {"kind": kind}}
-           for kind in ("low_pass", "passive_observer", "ekf")},
-    }  # fmt: skip
+        "calm": {"disturbance": {"kind": "none"}},
+        "sea": sea,
+        "sea, sensors": sea | sensors,
+        **{
+            f"sea, sensors, {kind}": sea | sensors | {"estimator": {"kind": kind}}
+            for kind in ("low_pass", "passive_observer", "ekf")
+        },
+    }
     base = load(ROOT / "configs" / "mu_2017" / "corrected.yaml").scenario
     loops = {label: _changed(base, new).closed_loop() for label, new in told.items()}
     over = grid(log_every=10)

@@ -83,7 +83,8 @@ GOALS = (
     Goal("a step of 100 000 beside one of 10 000", 1.05, _steps),
     Goal("a node of 343 beside one of 125", 1.1, _nodes),
     Goal(
-        "N runs at once beside N / cores single ones", 1.05,
+        "N runs at once beside N / cores single ones",
+        1.05,
         lambda results: float(results["batch"]["31000"]["cost"][1]),
     ),
     Goal("a run side by side beside one by one, 31 000 steps", 0.3, _side_by_side(USUAL, 31_000)),
@@ -91,7 +92,8 @@ GOALS = (
     Goal("the same, 125 nodes, 31 000 steps", 0.25, _side_by_side(MANY_NODES, 31_000)),
     Goal("a run side by side beside C side by side", 1.3, _beside_c),
     Goal(
-        "a run in current, wind, 100 waves, with sensors, beside calm water", 2.5,
+        "a run in current, wind, 100 waves, with sensors, beside calm water",
+        2.5,
         lambda results: float(results["seas"]["sea, sensors"][1]),
     ),
     Goal("peak memory less the log, without figures", 150.0, _memory(RUN), "MB"),
@@ -103,17 +105,20 @@ GOALS = (
     Goal("the same, a comparison of four laws with report", 8, _beside_imports("podusv compare")),
     Goal("the same, what a study of eight draws takes beyond a run", 1.7, _study_beyond_a_run),
     Goal(
-        "the same in thousandths, one more run of 1000 steps in a study", 0.8,
+        "the same in thousandths, one more run of 1000 steps in a study",
+        0.8,
         lambda results: short_run(results["commands"]),
     ),
     Goal("peak memory less the log, of that comparison", 130.0, _memory("podusv compare"), "MB"),
     Goal(
-        "the report of that comparison", 3.0,
-        lambda results: float(results["commands"]["podusv compare"]["report_megabytes"]), "MB",
+        "the report of that comparison",
+        3.0,
+        lambda results: float(results["commands"]["podusv compare"]["report_megabytes"]),
+        "MB",
     ),
     Goal("the very first run", 5.0, _seconds(f"{RUN}, for the first time"), "s"),
     Goal("`podusv --help`", 0.15, _seconds("podusv --help"), "s"),
-)  # fmt: skip
+)
 
 
 def goal_rows(results: Results) -> Iterator[list[str]]:

@@ -125,9 +125,13 @@ def _pytest(files: list[Path], words: str, copy: Path, cache: Path) -> tuple[int
     command += ["-m", "not browser"]  # slow ones, too
     try:
         done = subprocess.run(
-            [*command, *map(str, files), "-k", words], cwd=copy, env=environment,
-            capture_output=True, text=True, timeout=LIMIT,
-        )  # fmt: skip
+            [*command, *map(str, files), "-k", words],
+            cwd=copy,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT,
+        )
     except subprocess.TimeoutExpired:
         return 1, f"longer than {LIMIT} s\n"
     return done.returncode if done.returncode >= 0 else 1, done.stdout + done.stderr
@@ -160,9 +164,10 @@ def main() -> int:
     parser.add_argument("-n", type=int, default=2, metavar="WORKERS", help="at a time; default 2")
     options = parser.parse_args()
     chosen = [
-        mutant for mutant in mutants()
+        mutant
+        for mutant in mutants()
         if options.room in (None, mutant.room) and options.only in (None, mutant.number)
-    ]  # fmt: skip
+    ]
     if options.list:
         print(*(f"{mutant}\n    {mutant.test}" for mutant in chosen), sep="\n")
         return 0

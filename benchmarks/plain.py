@@ -35,11 +35,13 @@ class Ship:
         V, R = abs(v), abs(r)
         momentum = p.m22 * v + p.m23 * r
         coriolis = np.array([-momentum * r, p.m11 * u * r, momentum * u - p.m11 * u * v])
-        damping = np.array([
-            (p.X_u + p.X_uu * abs(u) + p.X_uuu * u * u) * u,
-            (p.Y_v + p.Y_vv * V + p.Y_rv * R) * v + (p.Y_r + p.Y_vr * V + p.Y_rr * R) * r,
-            (p.N_v + p.N_vv * V + p.N_rv * R) * v + (p.N_r + p.N_vr * V + p.N_rr * R) * r,
-        ])  # fmt: skip
+        damping = np.array(
+            [
+                (p.X_u + p.X_uu * abs(u) + p.X_uuu * u * u) * u,
+                (p.Y_v + p.Y_vv * V + p.Y_rv * R) * v + (p.Y_r + p.Y_vr * V + p.Y_rr * R) * r,
+                (p.N_v + p.N_vv * V + p.N_rv * R) * v + (p.N_r + p.N_vr * V + p.N_rr * R) * r,
+            ]
+        )
         acceleration = self.inverse_inertia @ (load - coriolis + damping)
         return np.concatenate([[u * c - v * s, u * s + v * c, r], acceleration])
 
@@ -106,10 +108,12 @@ class Loop:
     def load(self, t: float) -> Array:
         """(52)."""
         sea = self.parts.disturbance
-        return np.array([
-            a.mean + a.sin * math.sin(a.sin_rate * t) + a.cos * math.cos(a.cos_rate * t)
-            for a in (sea.b_u, sea.b_v, sea.b_r)
-        ])  # fmt: skip
+        return np.array(
+            [
+                a.mean + a.sin * math.sin(a.sin_rate * t) + a.cos * math.cos(a.cos_rate * t)
+                for a in (sea.b_u, sea.b_v, sea.b_r)
+            ]
+        )
 
     def __call__(self, t: float, s: Array) -> Array:
         """Rates of s."""

@@ -99,8 +99,7 @@ def markdown(results: Results) -> str:
         _laws(results["law"]),
         "## One step behind each actuator\n",
         table(
-            ["actuator", "us"],
-            ([name, spread(q, 1e6)] for name, q in results["actuators"].items()),
+            ["actuator", "us"], ([name, spread(q, 1e6)] for name, q in results["actuators"].items())
         ),
         "## A run in a sea, beside one in calm water\n",
         table(

@@ -11,10 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from itertools import chain, permutations
-from pathlib import Path
 from typing import Any
 
-import podusv_cli
 from podusv_cli.core import registry
 from podusv_cli.core.errors import PodusvError
 from podusv_cli.engine.loop.closed_loop import nothing
@@ -25,12 +23,13 @@ from podusv_cli.engine.running import lanes
 from podusv_cli.engine.step import rk4
 from podusv_cli.export.law import ExportedLaw
 from podusv_cli.identify.fit import march
-from podusv_cli.interface.scenarios import loaded
+from podusv_cli.interface.scenarios import load_scenario
 from podusv_cli.process.workers import available_workers, run_all
 from podusv_cli.scenario.load import Loaded, load
 from podusv_cli.scenario.model import BASES
+from podusv_cli.scenario.shipped import folder
 
-CONFIGS = Path(podusv_cli.__file__).with_name("configs")
+CONFIGS = folder()
 BOAT = CONFIGS / "own_vessel.yaml"
 WINDAGE = {"vessel.windage": {"A_F": 0.2, "A_L": 0.5}}
 POINTS = [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]
@@ -40,8 +39,10 @@ PODS = {"actuator": {"kind": "pod", "preset": "otter"}}
 # What people put together, each for every kind of part.
 TASKS: Sequence[Mapping[str, Any]] = [
     WINDAGE | task | seen | thrust
-    for task in ({}, LEGS) for seen in ({}, SENSORS) for thrust in ({}, PODS)
-]  # fmt: skip
+    for task in ({}, LEGS)
+    for seen in ({}, SENSORS)
+    for thrust in ({}, PODS)
+]
 # What a kind cannot do without.
 NEEDS: Mapping[str, Mapping[str, Any]] = {
     "legs": {"points": POINTS},
@@ -76,7 +77,7 @@ def scenarios_of_kinds() -> Iterator[Loaded]:
     """What `changes` makes and podusv does not refuse."""
     for change in changes():
         with suppress(PodusvError):
-            yield loaded(str(BOAT), change, silent=True)
+            yield load_scenario(str(BOAT), change, silent=True)
 
 
 def pieces_of(scenarios: Iterable[Loaded]) -> dict[str, Piece]:
@@ -156,10 +157,10 @@ def make() -> int:
 def check(again: int) -> int:
     """Whether all are there, and whether some that are drawn come out as they are."""
     wanted = pieces()
-    ready = {name: piece for name, piece in wanted.items() if piece.shipped}
+    ready = {name: piece for name, piece in wanted.items() if piece.shipped_bitcode}
     drawn = random.sample(sorted(ready), min(again, len(ready)))
     made = bitcode({name: ready[name] for name in drawn})
-    other = [ready[name].label for name in drawn if made[name] != ready[name].shipped]
+    other = [ready[name].label for name in drawn if made[name] != ready[name].shipped_bitcode]
     print(f"{len(ready)} of {len(wanted)} kernels are in {shipped.FILE.name}", end="")
     print(f"; of {again} made anew {len(other)} differ: {', '.join(other)}" if again else "")
     if len(ready) < len(wanted):

@@ -50,9 +50,7 @@ def podusv() -> tuple[Callable[[], Any], Vector]:
     over = grid(STEPS, log_every=STEPS + 1)
     loops = variants(CASE.loop(), {"disturbance.scale": SCALES})
     probe = run_probe(loops[0], over)
-    many = partial(
-        simulate_many, loops, over, probe=probe, workers=1, side_by_side=True
-    )  # fmt: skip
+    many = partial(simulate_many, loops, over, probe=probe, workers=1, side_by_side=True)
     return many, probe.summaries(many().seen)["iae"]
 
 

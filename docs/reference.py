@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,31 +18,35 @@ import typer.main
 import podusv
 from podusv_cli.cli import app
 from podusv_cli.cli.exit_codes import MEANINGS
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.signal import Signal
 from podusv_cli.figures.drawing import FIGURES, draw
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.table import METRICS
-from podusv_cli.scenario.explain import Row, explain, signals
+from podusv_cli.scenario.explain import ExplainRow, explain, signals
 from podusv_cli.scenario.keys import SCENARIO, Key
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
 from podusv_cli.scenario.shipped import file_of
 
 # A figure is drawn from runs of the first of these scenarios that has its signals.
 SHOWN = (
-    "podusv:pod/kept.yaml", "podusv:sea/sensors.yaml", "podusv:sea/state_4.yaml",
+    "podusv:pod/kept.yaml",
+    "podusv:sea/sensors.yaml",
+    "podusv:sea/state_4.yaml",
     "podusv:laws/legs.yaml",
-)  # fmt: skip
+)
 SECONDS = 60.0
 # Runs to look at: scenarios that come with podusv, and which of their laws the gallery draws.
 GALLERY = {
-    "podusv:demo.yaml": (), "podusv:own_vessel.yaml": (),
+    "podusv:demo.yaml": (),
+    "podusv:own_vessel.yaml": (),
     "podusv:mu_2017/corrected_compare.yaml": ("adaptive_neural", "pid"),
     "podusv:pod/kept.yaml": ("adaptive_neural", "pid"),
     "podusv:sea/state_4.yaml": ("adaptive_neural", "pid"),
     "podusv:laws/legs.yaml": ("los_pid", "velocity_vector"),
     "podusv:trials/zigzag_20.yaml": (),
-}  # fmt: skip
+}
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*\n", re.MULTILINE)
 DRAWN = "figures"  # the folder of their pictures
 
@@ -68,19 +73,18 @@ def pictures() -> Iterable[tuple[str, bytes]]:
     for shown in SHOWN:
         scenario = podusv.load(shown, {"simulation.duration": SECONDS})
         runs = [
-            (name, *of_run(single))
+            past_run_of(name, single)
             for name, single in scenario.singles().items()
             if name in ("adaptive_neural", "pid")
         ]
         left = [sheet for name, sheet in FIGURES.items() if f"{name}.png" not in drawn]
-        drawn |= dict(draw(dressed(runs), left, ["png"]))
+        drawn |= dict(draw(dress_runs(runs), left, ["png"]))
     return drawn.items()
 
 
-def of_run(scenario: Any) -> tuple[Any, Any, Any]:
-    """What a figure needs of the run of a scenario, but its label."""
-    run = podusv.simulate(scenario)
-    return run.recording, run.about, scenario.plugged
+def past_run_of(label: str, scenario: Any) -> PastRun:
+    """The run of a scenario under a label."""
+    return replace(podusv.simulate(scenario).past, label=label)
 
 
 def gallery_pictures() -> Iterable[tuple[str, bytes]]:
@@ -88,11 +92,11 @@ def gallery_pictures() -> Iterable[tuple[str, bytes]]:
     for shown, laws in GALLERY.items():
         singles = podusv.load(shown).singles()
         runs = [
-            (label, *of_run(single))
+            past_run_of(label, single)
             for label, single in singles.items()
             if label in (laws or singles)
         ]
-        for _, picture in draw(dressed(runs), [FIGURES["trajectory"]], ["png"]):
+        for _, picture in draw(dress_runs(runs), [FIGURES["trajectory"]], ["png"]):
             yield f"{_picture(shown)}.png", picture
 
 
@@ -108,18 +112,23 @@ def gallery_page() -> str:
         made = "compare" if loaded.controllers else "run"
         yaml = Path(file_of(shown)).read_text("utf-8")
         parts += [
-            f"## {name}", text(loaded.description),
+            f"## {name}",
+            text(loaded.description),
             f"![tracks of {name}]({DRAWN}/{_picture(shown)}.png)",
             f"    podusv {made} {shown}\n    podusv init {name}    # a copy to edit",
             f"```yaml\n{EDITOR_LINE.sub('', yaml).strip()}\n```",
-        ]  # fmt: skip
+        ]
     return page(parts)
 
 
 KINDS = {
-    "controller": "Control laws", "path": "Paths", "disturbance": "Disturbances",
-    "actuator": "Actuators", "measurement": "Measurements", "estimator": "Estimators",
-}  # fmt: skip
+    "controller": "Control laws",
+    "path": "Paths",
+    "disturbance": "Disturbances",
+    "actuator": "Actuators",
+    "measurement": "Measurements",
+    "estimator": "Estimators",
+}
 
 
 def kinds_page(section: str) -> str:
@@ -252,25 +261,30 @@ def python_page() -> str:
         f".. autoclass:: podusv.{n}\n   :members:\n   :special-members: __getitem__"
         for n in classes
     ]
-    parts = [
-        "# Python interface",
-        "`import podusv`. [podusv from Python](../python.md)",
-    ]
+    parts = ["# Python interface", "`import podusv`. [podusv from Python](../python.md)"]
     return page([*parts, *(f"```{{eval-rst}}\n{text}\n```" for text in made)])
 
 
 PAGES: Mapping[str, Callable[[], str]] = {
-    "scenario": scenario_page, "vessels": vessels_page, "signals": signals_page,
-    "metrics": metrics_page, "findings": findings_page, "figures": figures_page,
-    "commands": commands_page, "exit_codes": exit_codes_page, "python": python_page,
+    "scenario": scenario_page,
+    "vessels": vessels_page,
+    "signals": signals_page,
+    "metrics": metrics_page,
+    "findings": findings_page,
+    "figures": figures_page,
+    "commands": commands_page,
+    "exit_codes": exit_codes_page,
+    "python": python_page,
     "gallery": gallery_page,
-}  # fmt: skip
+}
 
 
-def keys_table(rows: Iterable[Row], section: str = "") -> str:
+def keys_table(rows: Iterable[ExplainRow], section: str = "") -> str:
     """Keys of a section with what they may be, default and meaning."""
-    made = [(_key(row.key, section), _value(row), _default(row.default), text(row.meaning))
-            for row in rows]  # fmt: skip
+    made = [
+        (_key(row.key, section), _value(row), _default(row.default), text(row.meaning))
+        for row in rows
+    ]
     return table(("key", "value", "default", "meaning"), made)
 
 
@@ -278,7 +292,7 @@ def _key(name: str, section: str) -> str:
     return code(name.removeprefix(f"{section}."))
 
 
-def _value(row: Row) -> str:
+def _value(row: ExplainRow) -> str:
     if row.type in ("keys", "kinds"):
         return f"its {row.type}"
     unit = f"[{row.unit}]" if row.unit else ""

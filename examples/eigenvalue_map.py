@@ -18,7 +18,7 @@ import yaml
 from matplotlib.figure import Figure
 
 import podusv_cli
-from podusv_cli.components.controllers.momentum_schedule import Answer, schedule
+from podusv_cli.components.controllers.momentum_schedule import SwayResponse, schedule
 from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.components.vessels.vessel import Vessel
@@ -62,7 +62,7 @@ def momentum_growth(p: float, V: float) -> float:
     """Of `momentum_vector`, told p and d exactly."""
     hull = HULLS["paper_nonlinear"]
     k = bundle(momentum_law(hull).constants_with(hull))
-    gains = schedule(Answer(p, DAMPING), k)
+    gains = schedule(SwayResponse(p, DAMPING), k)
     return growth(
         momentum_vector_polynomial(
             SwayAnswer(p, DAMPING), MomentumGains(gains.eta, gains.k_b, k.Q, k.S, 0.0)
@@ -81,9 +81,11 @@ def momentum_hull(hull: Vessel, V: float) -> float:
 
 
 def panel(
-    axes: Any, title: str, colour: Callable[[float, float], float],
+    axes: Any,
+    title: str,
+    colour: Callable[[float, float], float],
     judge: Callable[[Vessel, float], float],
-) -> Any:  # fmt: skip
+) -> Any:
     """One law: colours behind, and a curve a hull, dotted where it grows."""
     field = np.array([[colour(p, V) for V in SPEEDS] for p in ANSWERS])
     mesh = axes.pcolormesh(

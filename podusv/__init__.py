@@ -13,10 +13,30 @@ if sys.flags.optimize > 1:
     raise ImportError(WITHOUT_DOCSTRINGS)
 
 __all__ = [
-    "Bench", "Comparison", "IdentifiedHull", "PodusvError", "Run", "Scenario", "Study", "Tuning",
-    "bench", "compare", "doubt", "identify", "load", "open_run", "open_session", "open_study",
-    "optimum", "run", "simulate", "simulate_many", "sweep", "tune", "verify",
-]  # fmt: skip
+    "Bench",
+    "Comparison",
+    "IdentifiedHull",
+    "PodusvError",
+    "Run",
+    "Scenario",
+    "Study",
+    "Tuning",
+    "bench",
+    "compare",
+    "doubt",
+    "identify",
+    "load",
+    "open_run",
+    "open_session",
+    "open_study",
+    "optimum",
+    "run",
+    "simulate",
+    "simulate_many",
+    "sweep",
+    "tune",
+    "verify",
+]
 
 
 def __getattr__(name: str) -> object:

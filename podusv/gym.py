@@ -31,6 +31,8 @@ def environments(num_envs: int, scenario: Any, **options: Any) -> VectorEnv:
 
 for name in {*NAMES} - {*registry}:  # a module may be imported again
     register(
-        name, entry_point="podusv.gym:environment", vector_entry_point="podusv.gym:environments",
+        name,
+        entry_point="podusv.gym:environment",
+        vector_entry_point="podusv.gym:environments",
         kwargs=NAMES[name],
-    )  # fmt: skip
+    )

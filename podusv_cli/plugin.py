@@ -30,17 +30,48 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.metrics.metric import Accumulator, Metric, add, gathered, ratio
 
 FIGURES = {
-    "figure": "sheet", "signals_over_time": "panels",
-    "Shown": "shown", "axis_label": "shown", "legend": "style", "new_figure": "style",
-}  # fmt: skip
+    "figure": "sheet",
+    "signals_over_time": "panels",
+    "Shown": "shown",
+    "axis_label": "shown",
+    "legend": "style",
+    "new_figure": "style",
+}
 RENAMED = {"before": "warn_before_run", "after": "warn_after_run"}
 
 __all__ = [
-    "FRESH", "MEASURED", "VALUE", "Accumulator", "Actuator", "Approach", "Axis", "Controller",
-    "Disturbance", "Estimator", "Loop", "Measurement", "Metric", "Most", "Path", "Recording",
-    "Signal", "Slots", "Vector", "Vessel", "add", "cos_sin", "direction", "gathered",
-    "kernel", "ratio", "tail", "value", "warn_after_run", "warn_before_run", "wrap",
-]  # fmt: skip
+    "FRESH",
+    "MEASURED",
+    "VALUE",
+    "Accumulator",
+    "Actuator",
+    "Approach",
+    "Axis",
+    "Controller",
+    "Disturbance",
+    "Estimator",
+    "Loop",
+    "Measurement",
+    "Metric",
+    "Most",
+    "Path",
+    "Recording",
+    "Signal",
+    "Slots",
+    "Vector",
+    "Vessel",
+    "add",
+    "cos_sin",
+    "direction",
+    "gathered",
+    "kernel",
+    "ratio",
+    "tail",
+    "value",
+    "warn_after_run",
+    "warn_before_run",
+    "wrap",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -78,9 +78,12 @@ def under_way(*words: str, script: str = "", first: str = "") -> Iterator[subpro
     what = ["-c", script] if script else ["-m", "podusv_cli"]
     process = subprocess.Popen(
         [sys.executable, *what, *words],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
         env={**os.environ, "PYTHONPATH": f"{first}:{ROOT}"},
-    )  # fmt: skip
+    )
     try:
         yield process
     finally:

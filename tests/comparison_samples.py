@@ -7,9 +7,9 @@ from known_signals import ABOUT
 
 from podusv_cli.comparison import claims, table
 from podusv_cli.comparison.claims import ParsedClaim
-from podusv_cli.comparison.entries import Entry, EntryWithoutLog
 from podusv_cli.comparison.expressions import parse
 from podusv_cli.core.about import Claim
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
@@ -42,25 +42,22 @@ def scenario(*overrides):
     return load_text(SCENARIO, "a.yaml", overrides).scenario
 
 
-class Folder:
-    """What an entry needs of a run folder."""
-
-    def __init__(self, metrics, status="finished", message=""):
-        self.metrics = metrics
-        self.theory = {}
-        t = np.linspace(0.0, 3.0, 4)
-        signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "z_e": t, "u": t}
-        self.recording = Recording(status, "pid", signals, message=message, about=ABOUT)
+def past_run(metrics, status="finished", message="", told=None, **more):
+    """A run of four rows with these metrics; `told` is what it says about itself."""
+    t = np.linspace(0.0, 3.0, 4)
+    signals = {"time": t, "x": 2 * t, "x_d": 3 * t, "z_e": t, "u": t}
+    log = Recording(status, "pid", signals, message=message, about=ABOUT)
+    return PastRun("a", told or about(), log, metrics, **more)
 
 
 def verdicts():
-    runs = {
-        "a": Entry("a", Folder({"iae": 3.0}), about()),
-        "lost": EntryWithoutLog(about(), "killed"),
-    }
+    runs = {"a": past_run({"iae": 3.0}), "lost": PastRun.without_log("lost", about(), "killed")}
     texts = {
-        "C1": "x.iae == 3", "C2": "x.iae > 4", "C3": "lost.iae < x.iae", "C4": "1 / 3 < 0 * x.iae",
-    }  # fmt: skip
+        "C1": "x.iae == 3",
+        "C2": "x.iae > 4",
+        "C3": "lost.iae < x.iae",
+        "C4": "1 / 3 < 0 * x.iae",
+    }
     parsed = [
         ParsedClaim(
             name,

@@ -41,14 +41,25 @@ from podusv_cli.process.interrupts import SIGNALS
 
 PACKAGE = File(podusv_cli.__file__).parent
 ROOMS: dict[str, Any] = {
-    "paths": Path, "disturbances": Disturbance, "actuators": Actuator, "controllers": Controller,
-    "measurements": Measurement, "estimators": Estimator,
-}  # fmt: skip
+    "paths": Path,
+    "disturbances": Disturbance,
+    "actuators": Actuator,
+    "controllers": Controller,
+    "measurements": Measurement,
+    "estimators": Estimator,
+}
 # CyberShip II's two propellers as one that turns, on the centre line.
 POD: dict[str, float] = {
-    "x": -0.499, "T_nn": 7.30068e-3, "T_nn_astern": 1.020512e-2, "n_max": 33.0,
-    "n_max_astern": 33.0, "n_rate": 60.0, "n_lag": 0.2, "angle_rate": 1.0, "angle_lag": 0.2,
-}  # fmt: skip
+    "x": -0.499,
+    "T_nn": 7.30068e-3,
+    "T_nn_astern": 1.020512e-2,
+    "n_max": 33.0,
+    "n_max_astern": 33.0,
+    "n_rate": 60.0,
+    "n_lag": 0.2,
+    "angle_rate": 1.0,
+    "angle_lag": 0.2,
+}
 # What a component needs that has no default; a new kind without an entry fails its contract test.
 REQUIRED: dict[str, dict[str, Any]] = {
     "legs": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
@@ -177,9 +188,13 @@ def situations(law: Controller, count: int, seed: int = 1) -> Iterator[Situation
 def corrected(**parts: Any) -> ClosedLoop:
     """The corrected closed loop without limits, from the printed start, with parts replaced."""
     defaults: dict[str, Any] = {
-        "vessel": NONLINEAR, "path": LineCircle(), "disturbance": HarmonicDisturbance(),
-        "actuator": Ideal(), "controller": AdaptiveNeural(), "start": PRINTED_START,
-    }  # fmt: skip
+        "vessel": NONLINEAR,
+        "path": LineCircle(),
+        "disturbance": HarmonicDisturbance(),
+        "actuator": Ideal(),
+        "controller": AdaptiveNeural(),
+        "start": PRINTED_START,
+    }
     chosen = defaults | parts
     return ClosedLoop(**{"nominal": chosen["vessel"]} | chosen)
 
@@ -211,9 +226,17 @@ class Constant(Controller):
     @staticmethod
     @kernel
     def law(
-        t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-        tau: Vector, rate: Vector, signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        t: float,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """The demand."""
         tau[0] = k.surge
         tau[1] = k.yaw
@@ -253,10 +276,7 @@ def before(tmp_path_factory):
 
 
 @pytest.fixture
-def beside_old_results(
-    before, tmp_path, monkeypatch,
-    capsys,
-):  # fmt: skip
+def beside_old_results(before, tmp_path, monkeypatch, capsys):
     """The command line in a folder with finished results, the same for every test of a file."""
     return among_old_results(before, tmp_path, monkeypatch, capsys)
 

@@ -7,9 +7,10 @@ import numpy as np
 from known_signals import ABOUT
 from matplotlib.patches import Polygon
 
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures.drawing import FIGURES
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.style import house_style
 from podusv_cli.scenario.about import about_of
 from podusv_cli.scenario.load import load_text
@@ -25,9 +26,26 @@ metrics: {{steady_fraction: 0.25}}
 simulation: {{duration: {duration}}}
 """
 PLAIN = (
-    "u", "v", "r", "psi_e", "tau_u", "tau_r", "tau_u_cmd", "tau_r_cmd", "b_u", "b_v", "b_r",
-    "alpha_u", "alpha_r", "beta_u", "beta_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r",
-)  # fmt: skip
+    "u",
+    "v",
+    "r",
+    "psi_e",
+    "tau_u",
+    "tau_r",
+    "tau_u_cmd",
+    "tau_r_cmd",
+    "b_u",
+    "b_v",
+    "b_r",
+    "alpha_u",
+    "alpha_r",
+    "beta_u",
+    "beta_r",
+    "b_hat_u",
+    "b_hat_r",
+    "f_hat_u",
+    "f_hat_r",
+)
 CENTER = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, -0.5]])
 WIDTH = np.array([0.5, 1.0, 2.0])
 
@@ -76,12 +94,12 @@ def recording(end=100.0, period=0.1, status="finished", shift=0.0, without=(), *
 def shown(*runs):
     """Recordings by label (with a scenario of their own, or the usual one) as figures take them."""
     usual = scenario()
-    return dressed([looked_at(label, log, *(own or [usual])) for label, log, *own in runs])
+    return dress_runs([looked_at(label, log, *(own or [usual])) for label, log, *own in runs])
 
 
 def looked_at(label, log, plan):
     """A recording with its scenario as figures take them."""
-    return label, log, about_of(plan), ()
+    return PastRun(label, about_of(plan), log)
 
 
 def drawn(name, runs, columns=2):

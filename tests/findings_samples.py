@@ -8,8 +8,9 @@ from conftest import PACKAGE
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case, preflight
+from podusv_cli.findings.finding import preflight
 from podusv_cli.process.extras import Extras
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.workflows import execute
@@ -18,9 +19,12 @@ CONFIGS = PACKAGE.parent / "configs" / "mu_2017"
 PLAIN = ("path={kind: line}", "actuator={kind: ideal}", "simulation.duration=20")
 # No adaptation, calm water: the bare linear loops.
 BARE = (
-    "controller.Gamma_u=0", "controller.Gamma_r=0", "controller.gamma_u=0", "controller.gamma_r=0",
+    "controller.Gamma_u=0",
+    "controller.Gamma_r=0",
+    "controller.gamma_u=0",
+    "controller.gamma_r=0",
     "disturbance={kind: none}",
-)  # fmt: skip
+)
 
 
 def scene(*overrides: str) -> Scenario:
@@ -42,7 +46,7 @@ def finding(code: str, *overrides: str) -> Finding:
 def simulated(*overrides: str) -> tuple[Recording, dict[str, float]]:
     """The run of that scenario, and its metrics."""
     case = Case.of(scene(*overrides).alone())
-    recording = execute.simulated(case, execute.Stopwatch())
+    recording = execute.simulate_case(case, execute.Stopwatch())
     return recording, execute.summary(case, recording, Extras())
 
 

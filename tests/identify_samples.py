@@ -11,13 +11,10 @@ from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.kernel import bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.fit.estimate import (
-    estimated,
-    prior_kept,
-)
-from podusv_cli.identify.fit.problem import Problem
+from podusv_cli.identify.fit.estimate import estimate_hull, prior_kept
+from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import log_of
-from podusv_cli.identify.logs.reading import Table
+from podusv_cli.identify.logs.reading import LogTable
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 
@@ -25,10 +22,12 @@ LOGS = (LogFile(file="a.csv"),)
 SCENARIO = load(
     "podusv:trials/base.yaml",
     [
-        "vessel={preset: cybership2}", "actuator={kind: ideal}", "controller={kind: pid}",
+        "vessel={preset: cybership2}",
+        "actuator={kind: ideal}",
+        "controller={kind: pid}",
         "name=boat",
     ],
-).scenario  # fmt: skip
+).scenario
 HULL = SCENARIO.vessel
 
 
@@ -82,7 +81,7 @@ def table_of(times, states, commands, *, noise=(0.01, 0.005, 0.002), seed=1, nam
         n: states[:, names.index(n)] + sigma[n] * rng.standard_normal(len(times)) for n in sigma
     }
     columns |= {"tau_u": commands[:, 0], "tau_r": commands[:, 2]}
-    return Table(name, times, columns)
+    return LogTable(name, times, columns)
 
 
 def made_logs():
@@ -99,8 +98,8 @@ def made_logs():
 def problem(logs, vessel=HULL, **wanted):
     """The problem of logs, by default with the wide prior of a hull that is guessed."""
     scenario = SCENARIO.model_copy(update={"vessel": vessel, "nominal": vessel})
-    return Problem(scenario, Identify(logs=LOGS, **wanted), logs)
+    return FitProblem(scenario, Identify(logs=LOGS, **wanted), logs)
 
 
 def fitted(given):
-    return prior_kept(given.search, estimated(given.search))
+    return prior_kept(given.search, estimate_hull(given.search))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_samples import ROOT
 
-from podusv_cli.core.plugins import installed
+from podusv_cli.core.plugins import installed_plugins
 
 LAB = ROOT / "examples" / "my_lab"
 
@@ -41,8 +41,8 @@ def importable(site: Path) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(site))
         patch.setenv("PYTHONPATH", str(site), prepend=":")
-        installed.cache_clear()
+        installed_plugins.cache_clear()
         yield
-    installed.cache_clear()
+    installed_plugins.cache_clear()
     for name in [name for name in sys.modules if name.partition(".")[0] == "my_lab"]:
         del sys.modules[name]

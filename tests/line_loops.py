@@ -19,9 +19,15 @@ def line_rates(law: Any, s: Vector, vessel: Vessel, V: float, share: float) -> V
     found = ask(law, x, memory, np.array([0.0, 0.0, V, 0.0, 0.0, 0.0]), vessel)
     tau = np.array([found.tau[0], share * found.tau[1], found.tau[1]])
     call(
-        law.after_saturation, t=1.0, memory=memory, demand=found.tau, tau=tau,
-        k=bundle(law.constants_with(vessel)), table=law.table(), rate=found.rate,
-    )  # fmt: skip
+        law.after_saturation,
+        t=1.0,
+        memory=memory,
+        demand=found.tau,
+        tau=tau,
+        k=bundle(law.constants_with(vessel)),
+        table=law.table(),
+        rate=found.rate,
+    )
     plant(x, tau, np.zeros(3), bundle(vessel.constants()), out)
     out[0] -= V
     return np.concatenate([out, found.rate])

@@ -34,9 +34,13 @@ def weaving(rows: int = 400) -> Columns:
     u, v = 1.0 + 0.3 * np.sin(0.2 * fine), 0.15 * np.cos(0.5 * fine)
     north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
     found = {
-        "time": fine, "x": 20.0 + np.cumsum(north) * 0.01, "y": -7.0 + np.cumsum(east) * 0.01,
-        "psi": psi, "u": u, "r": 0.05 + 0.4 * np.cos(0.5 * fine),
-    }  # fmt: skip
+        "time": fine,
+        "x": 20.0 + np.cumsum(north) * 0.01,
+        "y": -7.0 + np.cumsum(east) * 0.01,
+        "psi": psi,
+        "u": u,
+        "r": 0.05 + 0.4 * np.cos(0.5 * fine),
+    }
     return {name: values[::10].copy() for name, values in found.items()}
 
 
@@ -109,15 +113,25 @@ def order_of_columns(rng: random.Random, columns: Columns) -> Damaged:
 
 
 def units_in_brackets(rng: random.Random, columns: Columns) -> Damaged:
-    ways = {"time [ms]": 1e3, "x [km]": 1e-3, "y (cm)": 100.0, "psi [deg]": 180.0 / math.pi,
-            "u [kn]": 3600.0 / 1852.0, "r [deg/s]": 180.0 / math.pi}  # fmt: skip
+    ways = {
+        "time [ms]": 1e3,
+        "x [km]": 1e-3,
+        "y (cm)": 100.0,
+        "psi [deg]": 180.0 / math.pi,
+        "u [kn]": 3600.0 / 1852.0,
+        "r [deg/s]": 180.0 / math.pi,
+    }
     chosen = rng.sample(list(ways), rng.randint(1, len(ways)))
     changed = {}
     for name, values in columns.items():
         way = next((way for way in chosen if way.split()[0] == name), name)
         changed[way] = values * ways.get(way, 1.0)
-    return _whole(text_of(list(changed), [[f"{x:.12f}" for x in row] for row in
-                                          zip(*changed.values(), strict=True)]))  # fmt: skip
+    return _whole(
+        text_of(
+            list(changed),
+            [[f"{x:.12f}" for x in row] for row in zip(*changed.values(), strict=True)],
+        )
+    )
 
 
 # Cells
@@ -175,11 +189,18 @@ def broken_rows(rng: random.Random, columns: Columns) -> Damaged:
     lines = text_of(*_plain(columns)).splitlines()
     for _ in range(rng.randint(1, 5)):
         at = rng.randrange(1, len(lines))
-        lines[at] = rng.choice([
-            lines[at].replace(",", "", 1), lines[at].replace(",", ",,", 1), lines[at] + ",7",
-            lines[at][: len(lines[at]) // 2], '"' + lines[at], "\0" * 40, "garbage",
-            lines[at] + lines[at],
-        ])  # fmt: skip
+        lines[at] = rng.choice(
+            [
+                lines[at].replace(",", "", 1),
+                lines[at].replace(",", ",,", 1),
+                lines[at] + ",7",
+                lines[at][: len(lines[at]) // 2],
+                '"' + lines[at],
+                "\0" * 40,
+                "garbage",
+                lines[at] + lines[at],
+            ]
+        )
     return _whole("\n".join(lines) + "\n", "number of cells|no number")
 
 
@@ -272,10 +293,16 @@ def header_of_other_separators(rng: random.Random, columns: Columns) -> Damaged:
 
 def other_unit(rng: random.Random, columns: Columns) -> Damaged:
     changes = [
-        ("time", 1e3, "ms"), ("time", 1e6, "us"), ("time", 1e9, "ns"), ("time", 1 / 3600, "hours"),
-        ("time", 1 / 60, "units of time|minutes"), ("psi", 180 / math.pi, "deg"),
-        ("r", 180 / math.pi, "deg/s"), ("u", 3600 / 1852, "kn"), ("u", 3.6, "km/h"),
-    ]  # fmt: skip
+        ("time", 1e3, "ms"),
+        ("time", 1e6, "us"),
+        ("time", 1e9, "ns"),
+        ("time", 1 / 3600, "hours"),
+        ("time", 1 / 60, "units of time|minutes"),
+        ("psi", 180 / math.pi, "deg"),
+        ("r", 180 / math.pi, "deg/s"),
+        ("u", 3600 / 1852, "kn"),
+        ("u", 3.6, "km/h"),
+    ]
     name, factor, says = rng.choice(changes)
     return _whole(text_of(*_plain({**columns, name: columns[name] * factor})), says)
 
@@ -301,7 +328,7 @@ def places(rng: random.Random, columns: Columns) -> Damaged:
         ({"x": lat, "y": lon}, "degrees"),
         ({"lat": lat + 180.0, "lon": lon}, "beyond 90"),
         ({"lat": lat, "lon": lon + 360.0}, "beyond 180"),
-    ]  # fmt: skip
+    ]
     changed, says = rng.choice(ways)
     return _whole(text_of(*_plain({**rest, **changed})), says)
 
@@ -323,10 +350,36 @@ def flipped_bytes(rng: random.Random, columns: Columns) -> Damaged:
 
 
 DAMAGES: tuple[Damage, ...] = (
-    trailing_separators, other_separators, decimal_commas, quoted_decimal_commas, encodings,
-    degrees_in_latin_1, blanks_and_comments, order_of_columns, units_in_brackets,
-    cell_that_is_none, cell_of_other_decimals, missing_cells, empty_column, sentinels,
-    lost_decimal_point, broken_rows, shifted_rows, cut_file, swapped_rows, double_rows,
-    contradicting_rows, two_boots, no_names, equal_names, name_with_two_units, units_below_names,
-    broken_names, header_of_other_separators, other_unit, places, clock_times, flipped_bytes,
-)  # fmt: skip
+    trailing_separators,
+    other_separators,
+    decimal_commas,
+    quoted_decimal_commas,
+    encodings,
+    degrees_in_latin_1,
+    blanks_and_comments,
+    order_of_columns,
+    units_in_brackets,
+    cell_that_is_none,
+    cell_of_other_decimals,
+    missing_cells,
+    empty_column,
+    sentinels,
+    lost_decimal_point,
+    broken_rows,
+    shifted_rows,
+    cut_file,
+    swapped_rows,
+    double_rows,
+    contradicting_rows,
+    two_boots,
+    no_names,
+    equal_names,
+    name_with_two_units,
+    units_below_names,
+    broken_names,
+    header_of_other_separators,
+    other_unit,
+    places,
+    clock_times,
+    flipped_bytes,
+)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from podusv_cli.core.signal import STATE, TAU
-from podusv_cli.identify.logs.reading import Named, table
+from podusv_cli.identify.logs.reading import NamedQuantities, table
 
 
 def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, tilted=None):
@@ -45,10 +45,11 @@ def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, til
             )
             message = make(
                 "nav_msgs/msg/Odometry",
-                make("std_msgs/msg/Header", stamp, "map"), "boat",
+                make("std_msgs/msg/Header", stamp, "map"),
+                "boat",
                 make("geometry_msgs/msg/PoseWithCovariance", pose, np.zeros(36)),
                 make("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
-            )  # fmt: skip
+            )
             raw = store.serialize_cdr(message, "nav_msgs/msg/Odometry")
             writer.write(odometry, now + 5_000_000, raw)
         for i in range(10):
@@ -126,4 +127,4 @@ def written(path, columns):
 
 
 def read(path, columns=None, frame="ned"):
-    return table(path, WANTED, Named(columns or {}, frame))
+    return table(path, WANTED, NamedQuantities(columns or {}, frame))

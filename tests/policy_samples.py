@@ -39,10 +39,11 @@ def symmetric() -> dict[str, Any]:
     first[2, [1, 4, 7]] = 0.05, -0.6, 0.8
     first[3, [3, 4, 6]] = 0.1, -0.5, 0.2
     return {
-        "0.weight": first, "0.bias": np.array([0.1, -0.2, 0.0, 0.0]),
+        "0.weight": first,
+        "0.bias": np.array([0.1, -0.2, 0.0, 0.0]),
         "2.weight": np.array([[1.5, 0.5, 0.0, 0.0], [0.0, 0.0, 1.2, 0.4]]),
         "2.bias": np.array([0.05, 0.0]),
-    }  # fmt: skip
+    }
 
 
 def drawn(sizes: list[int], seed: int = 3, dtype: Any = np.float64) -> dict[str, Any]:

@@ -86,9 +86,17 @@ def _public(text: str) -> set[str]:
     return set(re.findall(r"\bpodusv\.(\w+)", text)) & set(podusv.__all__)
 
 
+def rooms_of(begin: list[str]) -> set[Path]:
+    """The folders of tests that mirror the rooms of these nodes."""
+    modules = [Path(*name.split(".")[1:]) for name in begin if name.startswith("podusv_cli.")]
+    return {ROOT / "tests" / room for module in modules for room in module.parents if room.name}
+
+
 def nearest(begin: list[str]) -> Iterator[Path]:
-    """Test files in the order of their distance from these nodes."""
-    places = {path.stem: path for path in sorted(ROOT.glob("tests/**/*.py"))}
+    """Test files in the order of their distance from these nodes; those of their rooms first."""
+    rooms = rooms_of(begin)
+    every = sorted(ROOT.glob("tests/**/*.py"), key=lambda path: (path.parent not in rooms, path))
+    places = {path.stem: path for path in every}
     used_by = users()
     seen, level = set(begin), set(begin)
     while level:

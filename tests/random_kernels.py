@@ -20,10 +20,13 @@ from podusv_cli.core.kernel import kernel, tail
 GAIN, COUNT, PAIR = 1.5, 3, (0.25, -2.0)
 """
 KERNELS = {  # their arguments and what they return; one may call those before it
-    "whole": ("x, n", "{i}"), "truth": ("x, y", "{b}"), "one": ("x, y, seen", "{f}"),
-    "two": ("x, n, seen", "({f}, {i})"), "effect": ("x, seen", ""),
+    "whole": ("x, n", "{i}"),
+    "truth": ("x, y", "{b}"),
+    "one": ("x, y, seen", "{f}"),
+    "two": ("x, n, seen", "({f}, {i})"),
+    "effect": ("x, seen", ""),
     "watch": ("t, weight, s, row, k, seen", ""),
-}  # fmt: skip
+}
 # What may be written for a float f, a whole number i, a truth b, a condition c, a place q, a place
 # that is written out p, and a float as a whole number w. "{f}" stands for a float, and so on.
 FORMS = {
@@ -40,15 +43,19 @@ FORMS = {
     "({b} or {b})|not {c}|bool({f})|math.isnan({f})|math.isfinite({f})|truth({f}, {f})|"
     "({b} if {c} else {b})|({b}) == ({b})",
     "c": "{b}|{b}|({c} and {c})|({c} or {c})|not ({c})|{f}|{i}",
-    "q": "{w} % 4|({i}) % 4|min(max({i}, 0), 4)|whole({f}, {i}) % 3", "p": "0|1|2|3|4|COUNT",
+    "q": "{w} % 4|({i}) % 4|min(max({i}, 0), 4)|whole({f}, {i}) % 3",
+    "p": "0|1|2|3|4|COUNT",
     "w": "int(max(-9e9, min({f}, 9e9)))",
-}  # fmt: skip
+}
 LEAVES = {
     "f": "0.0|-0.0|0.3|-2.5|1e300|GAIN|PAIR[1]|1|seen[0]|seen[1]|seen[3]",
     "i": "0|2|-3|COUNT|{w}|{w}",
-    "b": "{f} < {f}|{f} >= {f}|{f} == {f}|True", "c": "{f} < {f}|{f} > 0.0",
-    "q": "0|1|2|COUNT|{w} % 4", "p": FORMS["p"], "w": FORMS["w"],
-}  # fmt: skip
+    "b": "{f} < {f}|{f} >= {f}|{f} == {f}|True",
+    "c": "{f} < {f}|{f} > 0.0",
+    "q": "0|1|2|COUNT|{w} % 4",
+    "p": FORMS["p"],
+    "w": FORMS["w"],
+}
 INPUTS = ("s[0]", "s[1]", "s[2]", "k.gain", "k.mode", "row[2]")
 STATEMENTS = ["assign"] * 4 + ["store"] * 3 + ["augment", "several", "call"]
 BLOCKS = ["branch", "branch", "loop", "rounds", "leaving", "guarded"]

@@ -11,8 +11,9 @@ from scenario_samples import SOUND
 from storage_samples import files, log
 
 import podusv_cli
+from podusv_cli.core import json_text
 from podusv_cli.core.recording import Recording, Status
-from podusv_cli.storage import json_files, log_reader
+from podusv_cli.storage import log_reader
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.workflows import run
 
@@ -45,9 +46,11 @@ def relogged(folder: Path, change: Callable[[dict[str, Any]], None]) -> Callable
     signals = {name: np.array(array) for name, array in recorded.signals.items()}
     change(signals)
     texts = {
-        "resolved_yaml": log_reader.resolved_yaml(folder / "log.h5"), "title": "t", "source": "s",
+        "resolved_yaml": log_reader.resolved_yaml(folder / "log.h5"),
+        "title": "t",
+        "source": "s",
         "version": podusv_cli.__version__,
-    }  # fmt: skip
+    }
     return lambda _: log(replace(recorded, signals=signals), **texts)
 
 
@@ -62,7 +65,7 @@ def told_otherwise(**facts: Any) -> Callable[[bytes], bytes]:
     def change(content: bytes) -> bytes:
         told = json.loads(content)
         told["packages"] |= facts
-        return json_files.encode(told)
+        return json_text.encode(told)
 
     return change
 

@@ -10,9 +10,7 @@ from podusv_cli.studies.making import remote
 from podusv_cli.studies.making.plan import digest
 from podusv_cli.studies.making.remote import Reply
 
-REPORT = {
-    "podusv": "1.0", "numpy": "2.0", "the kernels of pid": "abc", "the study": "def",
-}  # fmt: skip
+REPORT = {"podusv": "1.0", "numpy": "2.0", "the kernels of pid": "abc", "the study": "def"}
 
 
 class KilledWorker(Exception):

@@ -59,10 +59,17 @@ def trained(seed, steps):
     envs.seed(seed)
     envs = VecNormalize(envs, clip_obs=np.inf, epsilon=EPSILON)  # the law cuts nothing off
     model = PPO(
-        "MlpPolicy", envs, seed=seed, device="cpu", n_steps=EPISODE, batch_size=EPISODE, n_epochs=5,
-        gamma=0.99, learning_rate=lambda left: 1e-3 * left,
+        "MlpPolicy",
+        envs,
+        seed=seed,
+        device="cpu",
+        n_steps=EPISODE,
+        batch_size=EPISODE,
+        n_epochs=5,
+        gamma=0.99,
+        learning_rate=lambda left: 1e-3 * left,
         policy_kwargs={"net_arch": [32, 32], "log_std_init": -0.5},
-    )  # fmt: skip
+    )
     return model.learn(steps, progress_bar=False), envs
 
 

@@ -18,9 +18,14 @@ CHANGE = 0.01  # m s, cost of a demand that changes from limit to limit in a ste
 # Of the observer, from its bandwidth in surge, sway and yaw [rad/s]
 POLE = np.exp(-PERIOD * np.array([2.5, 2.0, 1.2]))
 IPOPT = {
-    "ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "expand": True,
-    "ipopt.max_iter": 100, "ipopt.tol": 1e-5, "ipopt.mu_init": 1e-3,
-}  # fmt: skip
+    "ipopt.print_level": 0,
+    "ipopt.sb": "yes",
+    "print_time": False,
+    "expand": True,
+    "ipopt.max_iter": 100,
+    "ipopt.tol": 1e-5,
+    "ipopt.mu_init": 1e-3,
+}
 
 
 class Nmpc:
@@ -60,19 +65,28 @@ def rate(vessel, x, demand, load):
     """Rate of the state (x, y, psi, u, v, r), the plant of docs/model.md on CasADi's symbols."""
     k, (psi, u, v, r) = vessel, ca.vertsplit(x[2:])
     au, av, ar, momentum = ca.fabs(u), ca.fabs(v), ca.fabs(r), k.m22 * v + k.m23 * r
-    force = ca.vertcat(
-        k.coriolis * momentum * r + (k.X_u + k.X_uu * au + k.X_uuu * u * u) * u,
-        -k.coriolis * k.m11 * u * r
-        + (k.Y_v + k.Y_vv * av + k.Y_rv * ar) * v + (k.Y_r + k.Y_vr * av + k.Y_rr * ar) * r,
-        k.coriolis * (k.m11 * v - momentum) * u
-        + (k.N_v + k.N_vv * av + k.N_rv * ar) * v + (k.N_r + k.N_vr * av + k.N_rr * ar) * r,
-    ) + load + ca.vertcat(demand[0], 0.0, demand[1])  # fmt: skip
+    force = (
+        ca.vertcat(
+            k.coriolis * momentum * r + (k.X_u + k.X_uu * au + k.X_uuu * u * u) * u,
+            -k.coriolis * k.m11 * u * r
+            + (k.Y_v + k.Y_vv * av + k.Y_rv * ar) * v
+            + (k.Y_r + k.Y_vr * av + k.Y_rr * ar) * r,
+            k.coriolis * (k.m11 * v - momentum) * u
+            + (k.N_v + k.N_vv * av + k.N_rv * ar) * v
+            + (k.N_r + k.N_vr * av + k.N_rr * ar) * r,
+        )
+        + load
+        + ca.vertcat(demand[0], 0.0, demand[1])
+    )
     determinant = k.m22 * k.m33 - k.m23 * k.m32
     return ca.vertcat(
-        u * ca.cos(psi) - v * ca.sin(psi), u * ca.sin(psi) + v * ca.cos(psi), r,
-        force[0] / k.m11, (k.m33 * force[1] - k.m23 * force[2]) / determinant,
+        u * ca.cos(psi) - v * ca.sin(psi),
+        u * ca.sin(psi) + v * ca.cos(psi),
+        r,
+        force[0] / k.m11,
+        (k.m33 * force[1] - k.m23 * force[2]) / determinant,
         (k.m22 * force[2] - k.m32 * force[1]) / determinant,
-    )  # fmt: skip
+    )
 
 
 def ahead(vessel):

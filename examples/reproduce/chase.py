@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 import podusv
 
 LOOKS = {
-    "pid_winds_up": ("#ffb000", "PID that winds up"), "pid": ("#ffffff", "PID with anti-windup"),
+    "pid_winds_up": ("#ffb000", "PID that winds up"),
+    "pid": ("#ffffff", "PID with anti-windup"),
     "momentum_vector": ("#7fffd4", "momentum_vector"),
-}  # fmt: skip
+}
 EVERY, LARGER = 8.0, 1.8  # s between two hulls; how much larger than they are they are drawn
 WATER, CREST = "#0b3c5d", "#1d5f8a"
 HULL = np.array([[0.5, 0.0], [0.2, 0.17], [-0.5, 0.17], [-0.5, -0.17], [0.2, -0.17]])  # lengths

@@ -22,16 +22,16 @@ from podusv_cli.components.controllers.network import activation
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import rates_replay
-from podusv_cli.findings import finding
 from podusv_cli.findings.stability import loops, sampled_growth
 from podusv_cli.process.workers import run_all
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.theory.ideal_weights import unloaded_accelerations
 from podusv_cli.theory.loop_margins import loop_margins
-from podusv_cli.workflows.execute import Stopwatch, simulated
+from podusv_cli.workflows.execute import Stopwatch, simulate_case
 
-Case, Value = TypeVar("Case"), TypeVar("Value")
+Item, Value = TypeVar("Item"), TypeVar("Value")
 PAPER = Path(__file__).parents[2] / "configs/mu_2017"
 READINGS = {
     "F": "figures_compare.yaml",
@@ -47,10 +47,23 @@ SCALED = {
     "mass": ("m", "X_udot", "Y_vdot"),
     "inertia": ("I_z", "N_rdot"),
     "damping": (
-        "X_u", "X_uu", "X_uuu", "Y_v", "Y_vv", "Y_rv", "Y_r", "Y_vr", "Y_rr",
-        "N_v", "N_vv", "N_rv", "N_r", "N_vr", "N_rr",
+        "X_u",
+        "X_uu",
+        "X_uuu",
+        "Y_v",
+        "Y_vv",
+        "Y_rv",
+        "Y_r",
+        "Y_vr",
+        "Y_rr",
+        "N_v",
+        "N_vv",
+        "N_rv",
+        "N_r",
+        "N_vr",
+        "N_rr",
     ),
-}  # fmt: skip
+}
 SCALED["all of it"] = tuple(key for keys in SCALED.values() for key in keys)
 FACTORS = (0.7, 0.85, 1.15, 1.3, 1.5)
 STEP = 0.0005  # s, of the sampled runs
@@ -73,8 +86,8 @@ def laws(config: str, *overrides: str) -> dict[str, Scenario]:
 
 def made(scenario: Scenario) -> tuple[dict[str, float], Recording]:
     """Metrics and log of a run."""
-    case = finding.Case.of(scenario)
-    recording = simulated(case, Stopwatch())
+    case = Case.of(scenario)
+    recording = simulate_case(case, Stopwatch())
     seen = recording.seen
     assert seen is not None  # the probe saw it
     return case.plan.probe.summary(seen), recording
@@ -87,11 +100,11 @@ def errors(scenario: Scenario) -> dict[str, float]:
     return {name: metrics[name] if finished else np.nan for name in ("iae_e", "e_steady")}
 
 
-def parallel(work: Callable[[Case], Value], runs: Sequence[Case]) -> list[Value]:
+def parallel(work: Callable[[Item], Value], runs: Sequence[Item]) -> list[Value]:
     """What the work gives for each run, in as many processes as there are cores."""
 
-    def job(case: Case, progress: object) -> Value:
-        return work(case)
+    def job(item: Item, progress: object) -> Value:
+        return work(item)
 
     outcomes = run_all([partial(job, run) for run in runs], lambda *_: None)
     if failures := [outcome.failure for outcome in outcomes if outcome.failure]:
@@ -137,10 +150,14 @@ def sampled(config: str, count: int, update: str) -> dict[str, Scenario]:
     period = count * STEP
     difference = math.ceil(DIFFERENCE / period - 1e-9) * period if count else DIFFERENCE
     return laws(
-        config, f"simulation.step={STEP}", f"control.period={period:.9g}",
-        f"controller.difference_step={difference:.9g}", f"control.update={update}",
-        "log.every=10", "log.monitor=false",
-    )  # fmt: skip
+        config,
+        f"simulation.step={STEP}",
+        f"control.period={period:.9g}",
+        f"controller.difference_step={difference:.9g}",
+        f"control.update={update}",
+        "log.every=10",
+        "log.monitor=false",
+    )
 
 
 def cycle(scenario: Scenario) -> dict[str, float]:
@@ -160,9 +177,10 @@ def predicted(scenario: Scenario) -> float:
     counts = range(1, LONGEST + 1)
     first = scenario.time_grid().update_first
     unstable = (
-        n for n in counts
+        n
+        for n in counts
         if any(sampled_growth(loop, STEP, n, update_first=first) > GROWS for loop in found)
-    )  # fmt: skip
+    )
     return (next(unstable, LONGEST + 1) - 1) * STEP
 
 
@@ -194,8 +212,10 @@ def limits() -> pd.DataFrame:
     """The longest stable period [s], found by bisection and predicted by the linearised loops."""
     cases = [
         (reading, label, update)
-        for reading, config in READINGS.items() for label in laws(config) for update in UPDATES
-    ]  # fmt: skip
+        for reading, config in READINGS.items()
+        for label in laws(config)
+        for update in UPDATES
+    ]
 
     def both(case: tuple[str, str, str]) -> dict[str, float]:
         reading, label, update = case
@@ -293,9 +313,11 @@ def velocity_errors(scenario: Scenario) -> dict[str, float]:
     if log.status != "finished":
         return dict.fromkeys(("iae_e", "e_steady", "rms_u_e", "rms_r_e"), np.nan)
     return {
-        "iae_e": metrics["iae_e"], "e_steady": metrics["e_steady"],
-        "rms_u_e": settled_rms(log["u_e"]), "rms_r_e": settled_rms(log["r_e"]),
-    }  # fmt: skip
+        "iae_e": metrics["iae_e"],
+        "e_steady": metrics["e_steady"],
+        "rms_u_e": settled_rms(log["u_e"]),
+        "rms_r_e": settled_rms(log["r_e"]),
+    }
 
 
 def settled_rms(signal: Vector) -> float:
@@ -304,9 +326,13 @@ def settled_rms(signal: Vector) -> float:
 
 
 TABLES: Mapping[str, Callable[[], pd.DataFrame]] = {
-    "unknown": unknown, "discrete": discrete, "limits": limits, "learnt": learnt, "gains": gains,
+    "unknown": unknown,
+    "discrete": discrete,
+    "limits": limits,
+    "learnt": learnt,
+    "gains": gains,
     "networks": networks,
-}  # fmt: skip
+}
 
 if __name__ == "__main__":
     TABLES[sys.argv[1]]().to_csv(sys.stdout, float_format="%.6g", lineterminator="\n")

@@ -94,12 +94,17 @@ def stated(config: str, text: str, date: str = "") -> dict[str, Text]:
         claims |= {each["id"]: each for each in stated_here} if as_list else stated_here
     return {
         name: Text(
-            date, config, name, _with(RENAMED, claim["expect"]),
-            _with(RENAMED, claim.get("given", "")), str(claim.get("tolerance", "")),
+            date,
+            config,
+            name,
+            _with(RENAMED, claim["expect"]),
+            _with(RENAMED, claim.get("given", "")),
+            str(claim.get("tolerance", "")),
             "no" if claim.get("untestable") else "yes",
         )
-        for name, claim in claims.items() if "expect" in (claim or ())
-    }  # fmt: skip
+        for name, claim in claims.items()
+        if "expect" in (claim or ())
+    }
 
 
 def _git(*words: str) -> str:
@@ -186,10 +191,12 @@ def page(texts: Sequence[Text]) -> str:
     changed = sorted(of_several(texts), key=lambda of_claim: not _turns(of_claim))
     pairs = [pair for of_claim in changed for pair in pairwise(of_claim)]
     head = HEAD.format(
-        changed=len(changed), claims=len({text.key for text in texts}),
-        turns=sum(map(_turns, changed)), known=sum(bool(a.verdict and b.verdict) for a, b in pairs),
+        changed=len(changed),
+        claims=len({text.key for text in texts}),
+        turns=sum(map(_turns, changed)),
+        known=sum(bool(a.verdict and b.verdict) for a, b in pairs),
         names=", ".join(of_claim[0].claim for of_claim in changed if _turns(of_claim)),
-    )  # fmt: skip
+    )
     return "\n".join((head, *map(_section, changed)))
 
 

@@ -17,9 +17,15 @@ from typing import Any
 
 BUILT = "by construction"  # robust, as nothing that was moved acts on it
 WORDS = (
-    "knife's edge", "fragile", "under conditions", "in combination only",
-    "robust where it can tell", "robust", BUILT, "",
-)  # fmt: skip
+    "knife's edge",
+    "fragile",
+    "under conditions",
+    "in combination only",
+    "robust where it can tell",
+    "robust",
+    BUILT,
+    "",
+)
 SAID = {"": "cannot tell"}
 HEAD = """\
 # What our verdicts hang on
@@ -92,11 +98,14 @@ def rows(folder: Path) -> Iterator[dict[str, Any]]:
             word = BUILT if row["word"] == "robust" and row["acted"] == "0" else row["word"]
             turns = claims[row["claim"]]["turns"]
             yield {
-                **row, "word": word, "paper": folder.parent.name, "scenario": folder.name,
+                **row,
+                "word": word,
+                "paper": folder.parent.name,
+                "scenario": folder.name,
                 "own": claims[row["claim"]]["source"].startswith("ours"),
                 "turns": [turn for turn in turns if not turn["task"]],
                 "others": [turn for turn in turns if turn["task"]],
-            }  # fmt: skip
+            }
 
 
 def nearest(turns: Sequence[dict[str, Any]]) -> tuple[str, str]:
@@ -150,9 +159,16 @@ def main(*folders: str) -> None:
         sum(row["word"] == word for row in found) for word in WORDS
     )
     kept = KEPT.format(
-        all=len(found), robust=robust, conditions=conditions, combined=combined, fragile=fragile,
-        edge=edge, unknown=unknown, dumb=dumb, built=built,
-    )  # fmt: skip
+        all=len(found),
+        robust=robust,
+        conditions=conditions,
+        combined=combined,
+        fragile=fragile,
+        edge=edge,
+        unknown=unknown,
+        dumb=dumb,
+        built=built,
+    )
     papers = dict.fromkeys(row["paper"] for row in found)
     solid = [row for row in found if row["word"] == "robust"]
     others = sum(row["word_for_neighbours"] != "robust" for row in solid)

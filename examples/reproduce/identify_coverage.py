@@ -34,32 +34,48 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import simulate
-from podusv_cli.identify.answer import AXES, SIDE, Answer
-from podusv_cli.identify.fit.estimate import OPEN, directions, estimated, prior_kept
-from podusv_cli.identify.fit.problem import Problem
-from podusv_cli.identify.fit.records import Log
+from podusv_cli.identify.answer import AXES, SIDE, Identification
+from podusv_cli.identify.fit.estimate import OPEN, directions, estimate_hull, prior_kept
+from podusv_cli.identify.fit.problem import FitProblem
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.model import Scenario
 
 HULLS = {
-    "cybership2": {"kind": "saturated"}, "otter": {"kind": "pod", "preset": "otter"},
+    "cybership2": {"kind": "saturated"},
+    "otter": {"kind": "pod", "preset": "otter"},
     "revolt": {"kind": "pod", "preset": "revolt"},
-}  # fmt: skip
+}
 GNSS = (0.01, 1.0)  # m, standard deviation of a position
 # A law, its thrust over the hull's largest, and the angle of the thrust [rad].
 MANOEUVRES = (
-    ("zigzag", 0.15, 0.35), ("zigzag", 0.5, 0.35), ("turning_circle", 0.2, 0.6),
+    ("zigzag", 0.15, 0.35),
+    ("zigzag", 0.5, 0.35),
+    ("turning_circle", 0.2, 0.6),
     ("turning_circle", 0.6, 0.35),
-)  # fmt: skip
+)
 CURRENT = 0.05  # of the speed at full thrust
 LOAD = 0.02  # of largest force and moment: deviation of a load that is fixed to the earth
 LASTING = 10.0  # s on the model ship: how long a gust's load lasts
 WANTED = Identify(logs=(LogFile(file="-"),))
 HEAD = (
-    "sea", "hull", "gnss", "set", "what", "name", "truth", "value", "low", "high", "width", "off",
-    "holds", "determined", "settled",
-)  # fmt: skip
+    "sea",
+    "hull",
+    "gnss",
+    "set",
+    "what",
+    "name",
+    "truth",
+    "value",
+    "low",
+    "high",
+    "width",
+    "off",
+    "holds",
+    "determined",
+    "settled",
+)
 
 
 class Cell(NamedTuple):
@@ -74,19 +90,24 @@ class Cell(NamedTuple):
 def known(hull: str) -> Scenario:
     """The hull as it is known before, with its actuator."""
     return podusv.Scenario(
-        name=hull, vessel={"preset": hull}, actuator=HULLS[hull], controller={"kind": "pid"},
-        path={"kind": "line", "speed": 0.0}, disturbance={"kind": "none"}, identify=WANTED,
-    )  # fmt: skip
+        name=hull,
+        vessel={"preset": hull},
+        actuator=HULLS[hull],
+        controller={"kind": "pid"},
+        path={"kind": "line", "speed": 0.0},
+        disturbance={"kind": "none"},
+        identify=WANTED,
+    )
 
 
-def true_hull(problem: Problem, rng: np.random.Generator) -> Vessel:
+def true_hull(problem: FitProblem, rng: np.random.Generator) -> Vessel:
     """A hull drawn from the prior; another where none can be like that."""
     while True:
         with suppress(ValidationError):
             return problem.vessel(rng.standard_normal(len(problem.hull)))
 
 
-def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[Log]:
+def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[FilterLog]:
     """What the sensors deliver in one manoeuvre; none where the run does not end."""
     kind, share, angle = MANOEUVRES[i]
     facts, seed = before.facts, 1 + cell.number
@@ -94,19 +115,28 @@ def logs(before: Scenario, true: Vessel, cell: Cell, i: int) -> list[Log]:
     seeds = np.random.default_rng([seed, i])
     direction = seeds.uniform(-math.pi, math.pi)
     scenario = podusv.Scenario(
-        name=before.name, vessel=true.model_dump(), nominal=before.vessel.model_dump(),
-        start={"u": 0.3 * facts.s}, path={"kind": "line", "speed": 0.0},
+        name=before.name,
+        vessel=true.model_dump(),
+        nominal=before.vessel.model_dump(),
+        start={"u": 0.3 * facts.s},
+        path={"kind": "line", "speed": 0.0},
         disturbance=[
             {"kind": "current", "speed": CURRENT * facts.U, "direction": direction},
             *SEAS[cell.sea](facts, seeds),
         ],
-        actuator=HULLS[before.name], measurement=sensors(cell.gnss, step, seed * 10 + i),
-        estimator={"kind": "ekf"}, control={"period": 10 * step},
+        actuator=HULLS[before.name],
+        measurement=sensors(cell.gnss, step, seed * 10 + i),
+        estimator={"kind": "ekf"},
+        control={"period": 10 * step},
         controller={
-            "kind": kind, "thrust": share * facts.F, "angle": angle, "execute": 1000 * step
+            "kind": kind,
+            "thrust": share * facts.F,
+            "angle": angle,
+            "execute": 1000 * step,
         },
-        simulation={"step": step, "duration": 12000 * step}, log={"every": 2},
-    )  # fmt: skip
+        simulation={"step": step, "duration": 12000 * step},
+        log={"every": 2},
+    )
     scenario.ready()
     run = simulate(scenario.closed_loop(), scenario.time_grid())
     if run.status != "finished":
@@ -133,9 +163,14 @@ def gusts(
         rates = np.tan(seeds.uniform(0.0, highest * math.pi, 2)) / (LASTING * math.sqrt(facts.lam))
         phases = seeds.uniform(0.0, 2.0 * math.pi, 2)
         return {
-            "mean": size * seeds.standard_normal(), "sin": size, "sin_rate": rates[0],
-            "sin_phase": phases[0], "cos": size, "cos_rate": rates[1], "cos_phase": phases[1],
-        }  # fmt: skip
+            "mean": size * seeds.standard_normal(),
+            "sin": size,
+            "sin_rate": rates[0],
+            "sin_phase": phases[0],
+            "cos": size,
+            "cos_rate": rates[1],
+            "cos_phase": phases[1],
+        }
 
     return [_earth(facts, axis) for _ in range(sines)]
 
@@ -146,10 +181,14 @@ def swings(facts: Facts, seeds: np.random.Generator) -> list[dict[str, Any]]:
     def axis(largest: float) -> dict[str, float]:
         rates = seeds.uniform(0.1, 0.5, 2) / math.sqrt(facts.lam)
         return {
-            "mean": LOAD * largest * seeds.uniform(-1.0, 1.0), "sin": LOAD * largest,
-            "sin_rate": rates[0], "sin_phase": seeds.uniform(0.0, 6.0), "cos": LOAD * largest,
-            "cos_rate": rates[1], "cos_phase": seeds.uniform(0.0, 6.0),
-        }  # fmt: skip
+            "mean": LOAD * largest * seeds.uniform(-1.0, 1.0),
+            "sin": LOAD * largest,
+            "sin_rate": rates[0],
+            "sin_phase": seeds.uniform(0.0, 6.0),
+            "cos": LOAD * largest,
+            "cos_rate": rates[1],
+            "cos_phase": seeds.uniform(0.0, 6.0),
+        }
 
     return [_earth(facts, axis)]
 
@@ -170,11 +209,13 @@ def sensors(gnss: float, step: float, seed: int) -> dict[str, Any]:
     """GNSS every 20 steps, compass and gyro every 10, without delay."""
     alone = {"delay": 0.0, "bias": 0.0}
     return {
-        "kind": "sensors", "seed": seed, "velocity": None,
+        "kind": "sensors",
+        "seed": seed,
+        "velocity": None,
         "position": {"period": 20 * step, "noise": gnss, **alone},
         "heading": {"period": 10 * step, "noise": math.radians(0.5), **alone},
         "yaw_rate": {"period": 10 * step, "noise": 0.002, **alone},
-    }  # fmt: skip
+    }
 
 
 def replayed(scenario: Scenario, run: Recording) -> dict[str, Vector]:
@@ -191,25 +232,25 @@ def rows(cell: Cell) -> list[tuple[Any, ...]]:
     """What comes out of one set of logs, beside the truth."""
     before = known(cell.hull)
     rng = np.random.default_rng([1 + cell.number, [*HULLS].index(cell.hull), GNSS.index(cell.gnss)])
-    true = true_hull(Problem(before, WANTED, []), rng)
+    true = true_hull(FitProblem(before, WANTED, []), rng)
     try:
         given = [log for i in range(len(MANOEUVRES)) for log in logs(before, true, cell, i)]
         if not given:
             return []
-        problem = Problem(before, WANTED, given)
-        found = prior_kept(problem.search, estimated(problem.search))
+        problem = FitProblem(before, WANTED, given)
+        found = prior_kept(problem.search, estimate_hull(problem.search))
     except UsageError as error:
         print(f"{cell}: {error}", file=sys.stderr)
         return []
     ways = directions(found.covariance, len(problem.hull))
-    answer = Answer(problem, found, ways, (), ())
+    answer = Identification(problem, found, ways, (), ())
     return [
         (*cell, *row, found.settled)
         for row in (*of_numbers(answer, true), *of_forces(answer, true))
     ]
 
 
-def of_numbers(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
+def of_numbers(answer: Identification, true: Vessel) -> Iterator[tuple[Any, ...]]:
     """Of every number of the hull: how far off in its own standard deviations."""
     truth = true.constants()
     for p in answer.parameters[: len(answer.problem.hull)]:
@@ -231,7 +272,7 @@ def of_numbers(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
         )
 
 
-def of_forces(answer: Answer, true: Vessel) -> Iterator[tuple[Any, ...]]:
+def of_forces(answer: Identification, true: Vessel) -> Iterator[tuple[Any, ...]]:
     """Of every damping force at speeds of the logs."""
     k = bundle(true.constants())
     for f in answer.forces:
@@ -256,11 +297,13 @@ def summary(made: pd.DataFrame) -> pd.DataFrame:
         {
             "sets": sets.set.nunique(),
             "settled": sets.apply(lambda cell: cell[cell.settled].set.nunique()),
-            "determined": by.size(), "of": sets.settled.sum(), "held": by.holds.mean(),
+            "determined": by.size(),
+            "of": sets.settled.sum(),
+            "held": by.holds.mean(),
             "off_rms": by.off.apply(lambda off: float(np.sqrt(np.mean(off**2)))),
             "off_median": by.off.apply(lambda off: float(np.median(np.abs(off)))),
         }
-    ).reset_index()  # fmt: skip
+    ).reset_index()
 
 
 def main() -> None:

@@ -110,12 +110,16 @@ class Verdict:
         medians = statistics.quantile(found, 0.5, self.sweep.level).estimate
         held = [self._holds(runs) for runs in (before, *after)]
         return {
-            "searches": len(after), "draws": own.size, "failed_before": before.failed.mean(),
+            "searches": len(after),
+            "draws": own.size,
+            "failed_before": before.failed.mean(),
             **over_searches("failed_after", [runs.failed.mean() for runs in after]),
             **statistics.quantile(own[0], 0.5, self.sweep.level).columns("before"),
-            **over_searches("after", medians), **dict(self._ratio(own, found)),
-            "held_before": held[0], "held_after": sum(held[1:]),
-        }  # fmt: skip
+            **over_searches("after", medians),
+            **dict(self._ratio(own, found)),
+            "held_before": held[0],
+            "held_after": sum(held[1:]),
+        }
 
     def _ratio(self, own: Vector, found: Vector) -> Iterator[tuple[str, float]]:
         """After over before, at a level at which the intervals of all laws hold together."""

@@ -31,10 +31,13 @@ def main() -> None:
     loads = topic(folder, "tau_actual")
     angle = 2.0 * np.arctan2(heading["quaternion_z"], heading["quaternion_w"])
     columns = {
-        "lat [deg]": fix["latitude"], "lon [deg]": fix["longitude"],
-        "psi [rad]": np.arctan2(np.sin(angle), np.cos(angle)), "tau_u [N]": loads["wrench_force_x"],
-        "tau_v [N]": loads["wrench_force_y"], "tau_r [N m]": loads["wrench_torque_z"],
-    }  # fmt: skip
+        "lat [deg]": fix["latitude"],
+        "lon [deg]": fix["longitude"],
+        "psi [rad]": np.arctan2(np.sin(angle), np.cos(angle)),
+        "tau_u [N]": loads["wrench_force_x"],
+        "tau_v [N]": loads["wrench_force_y"],
+        "tau_r [N m]": loads["wrench_torque_z"],
+    }
     table = pd.concat(columns, axis=1).sort_index()
     loaded = ["tau_u [N]", "tau_v [N]", "tau_r [N m]"]
     table[loaded] = table[loaded].ffill()

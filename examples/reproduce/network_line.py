@@ -22,10 +22,7 @@ from podusv_cli.theory.loop_margins import loop_margins
 
 CORRECTED = Path(__file__).parents[2] / "configs/mu_2017/corrected.yaml"
 FIXED = "controller={kind: adaptive_neural, Gamma_u: 0, Gamma_r: 0, gamma_u: 0, gamma_r: 0, "
-LAWS = {
-    "network of 27 nodes": (),
-    "fixed gain 13 208 kg/s": (FIXED + "k_ue: 13208, k_re: 191}",),
-}
+LAWS = {"network of 27 nodes": (), "fixed gain 13 208 kg/s": (FIXED + "k_ue: 13208, k_re: 191}",)}
 
 
 def errors(axes: Axes, table: pd.DataFrame) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from podusv_cli.studies.tuning.searches import compared
+from podusv_cli.studies.tuning.searches import compare_laws
 
 RESULTS = Path(__file__).parents[2] / "results"
 LEVEL = 0.95  # of intervals that hold together
@@ -49,8 +49,12 @@ def searched(case: str) -> Iterator[list[Any]]:
     """The rows of a search."""
     gains = table(case, "gains").groupby("law").size()
     for row in table(case).sort_values("repeats_median").to_dict("records"):
-        yield [row["law"], gains[row["law"]], place(row),
-               *error(row, "objective_before", "repeats", "_median")]  # fmt: skip
+        yield [
+            row["law"],
+            gains[row["law"]],
+            place(row),
+            *error(row, "objective_before", "repeats", "_median"),
+        ]
 
 
 def ratios() -> Iterator[list[str]]:
@@ -86,7 +90,7 @@ def sentences() -> Iterator[tuple[Any, ...]]:
     yield (
         "Given these 500 draws {} of 91 pairs are apart, {} of them without `pid`",
         *_apart_given_draws("hull"),
-    )  # fmt: skip
+    )
     hulls = ("fresh", "cybership2", "otter")
     fresh, other, otter = (table(f"judged/{hull}").set_index("law") for hull in hulls)
     yield "On CyberShip II {} of 91 pairs are apart", _apart("cybership2")
@@ -100,7 +104,7 @@ def sentences() -> Iterator[tuple[Any, ...]]:
         "Found gains take {} to {} % off the paper's laws, PID and `los_pid` on other draws of "
         "these hulls, and at most {} % off the others",
         *map(whole, (off.min(), off.max(), rest.max())),
-    )  # fmt: skip
+    )
     lost = whole(100 * other.failed_after_high["adrc"])
     yield "one set of `adrc` fails in {} % of the draws", lost
     before = 100 * other.failed_before[["adrc", "hand_position", "pid"]]
@@ -114,8 +118,9 @@ def sentences() -> Iterator[tuple[Any, ...]]:
     yield "{} of the 280 sets hold all of them there", other.held_after.sum()
     yield (
         "{} of 280 sets do, on the Otter, with limits in proportion to its forces, {}.",
-        fresh.held_after.sum(), otter.held_after.sum(),
-    )  # fmt: skip
+        fresh.held_after.sum(),
+        otter.held_after.sum(),
+    )
     places = ["law", "training_set", "search"]
     spread = table("hull", "spread").set_index(places)["median"].unstack()
     within = np.log(spread).var(axis=1).groupby("law").mean()
@@ -127,7 +132,7 @@ def sentences() -> Iterator[tuple[Any, ...]]:
         "laws by at most {} %; the tuner's seed moves laws by {} to {} % on one set",
         *map(whole, (named.min(), named.max(), sets.drop(named.index).max())),
         *map(whole, (seeds.min(), seeds.max())),
-    )  # fmt: skip
+    )
 
 
 def _apart(hull: str) -> int:
@@ -146,7 +151,7 @@ def _apart_given_draws(case: str) -> tuple[int, int]:
     spread = table(case, "spread").sort_values(["search", "training_set"])
     medians = {law: rows["median"].to_numpy()[:, None] for law, rows in spread.groupby("law")}
     sets = spread.training_set.nunique()
-    tables = [compared(medians, LEVEL, seed, sets=sets).table() for seed in range(SEEDS)]
+    tables = [compare_laws(medians, LEVEL, seed, sets=sets).table() for seed in range(SEEDS)]
     apart = [_those_apart(table)[["a", "b"]] for table in tables]
     without = [pairs[~pairs.eq("pid").any(axis=1)] for pairs in apart]
     return int(np.median([*map(len, apart)])), int(np.median([*map(len, without)]))

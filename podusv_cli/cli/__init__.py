@@ -24,10 +24,33 @@ from podusv_cli.cli.installed_commands import installed_commands, load_command
 
 # NAME is the function NAME of cli/NAME.py
 COMMANDS = (
-    "init", "start", "run", "compare", "rerun", "diff", "plot", "validate", "verify", "margins",
-    "optimum", "explain", "list", "schema", "new", "bench", "tune", "doubt", "identify", "docs",
-    "demo", "runs", "export", "pack", "unpack", "live",
-)  # fmt: skip
+    "init",
+    "start",
+    "run",
+    "compare",
+    "rerun",
+    "diff",
+    "plot",
+    "validate",
+    "verify",
+    "margins",
+    "optimum",
+    "explain",
+    "list",
+    "schema",
+    "new",
+    "bench",
+    "tune",
+    "doubt",
+    "identify",
+    "docs",
+    "demo",
+    "runs",
+    "export",
+    "pack",
+    "unpack",
+    "live",
+)
 
 # What others call it, and the command that does it.
 MEANT = {

@@ -63,14 +63,14 @@ def bench(
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.bench(wanted, request, bars, optimum=optimum)
     show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    raise typer.Exit(SOME_CRASHED if done.crashed else 0)
+    raise typer.Exit(SOME_CRASHED if done.crashed_count else 0)
 
 
 def _report(done: Benched) -> None:
-    from podusv_cli.studies.bench.standing import by_vessel, written
+    from podusv_cli.studies.bench.standing import by_vessel, leaderboard_rows
 
     for vessel, runs in by_vessel(done.runs).items():
         echo(vessel)
-        head, *rows = written(runs)
+        head, *rows = leaderboard_rows(runs)
         echo_table(head, rows)
     echo(f"{len(done.runs)} runs: {done.folder / 'report.html'}")

@@ -26,7 +26,7 @@ from podusv_cli.cli.terminal import (
 from podusv_cli.core.escaping import visible
 
 if TYPE_CHECKING:
-    from podusv_cli.comparison.entries import Entry
+    from podusv_cli.core.past_run import PastRun
     from podusv_cli.workflows.compare import Compared
 
 SOME_FAILED = 3
@@ -121,7 +121,7 @@ def compare(
         if ending:
             echo(*f"{label}: {ending}".splitlines(), err=True)
     for part in done.missing:
-        echo(part.traced, err=True)
+        echo(part.sentence_with_trace, err=True)
     if done.status == "interrupted":
         echo("interrupted; the runs made so far are compared, without figures", err=True)
         raise typer.Exit(INTERRUPTED)
@@ -142,15 +142,15 @@ def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
         for label, timing in result.timings.items():
             shown = ", ".join(f"{name} {seconds:.3f}" for name, seconds in timing.items())
             echo(f"{label}: {shown}")
-    echo(f"compared {_counted(result.entries)}: {done.folder}")
+    echo(f"compared {_count_words(result.runs)}: {done.folder}")
 
 
-def _counted(entries: Sequence[Entry]) -> str:
+def _count_words(past: Sequence[PastRun]) -> str:
     """How many runs, and how many logs beside them."""
     from podusv_cli.comparison.measured import NO_LAW
 
-    logs = sum(entry.recording.controller == NO_LAW for entry in entries)
-    runs = len(entries) - logs
+    logs = sum(run.recording.controller == NO_LAW for run in past)
+    runs = len(past) - logs
     words = [f"{runs} {'run' if runs == 1 else 'runs'}", *(["1 log"] if logs else [])]
     return " and ".join(words)
 
@@ -174,7 +174,7 @@ def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
     from podusv_cli.comparison.table import cells, head, note, window
 
     result = done.result
-    rows = cells(result.table, result.metrics, result.unsettled, chosen=metrics)
+    rows = cells(result.table, result.metrics, result.unsettled_runs, chosen=metrics)
     echo_table(head(result.table), rows)
     echo(*filter(None, (note(result.table), window(result.table))))
 
@@ -185,7 +185,12 @@ def _echo_brief(done: Compared, metrics: Sequence[str]) -> bool:
 
     result = done.result
     every = rows(
-        result.table, result.metrics, result.unsettled, chosen=metrics, brief=True, ratios=False
+        result.table,
+        result.metrics,
+        result.unsettled_runs,
+        chosen=metrics,
+        brief=True,
+        ratios=False,
     )
     shown = [r for r in every if metrics or (r.metric.headline and {*r.texts} != {"-"})]
     if not shown:
@@ -212,7 +217,7 @@ def _advice(
     """How to find out whether the numbers of the first run that is not verified have converged."""
     from podusv_cli.workflows.measured import is_log
 
-    finished = {e.label: e.run.folder for e in done.result.entries}
+    finished = {run.label: done.place(run) for run in done.result.runs}
     label = done.unverified[0]
     if label in done.result.timings:
         scenario = next(i for i in items if not (Path(i).is_dir() or is_log(Path(i))))

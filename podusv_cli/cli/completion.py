@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Offered = list[tuple[str, str]]
 
 
-def cached(
+def complete_from_cache(
     known: Callable[[Plugins], Mapping[str, str]],
 ) -> Callable[[typer.Context, str], Offered]:
     """What completes words that are known with these plug-ins, and what each means.
@@ -36,7 +36,7 @@ def cached(
     def complete(context: typer.Context, incomplete: str) -> Offered:
         if context.params.get("plugin"):
             return _beginning(incomplete, known(_plugins(context) or ()))
-        from podusv_cli.engine.machine.code_folder import write
+        from podusv_cli.process.code_folder import write
 
         folder, state = _folder(), _state()
         place = folder and folder / f"{known.__name__}.json"
@@ -59,7 +59,7 @@ def _folder() -> Path | None:
     """Where words are kept; None where nothing can be."""
     import logging
 
-    from podusv_cli.engine.machine.code_folder import code_folder
+    from podusv_cli.process.code_folder import code_folder
 
     before = logging.root.manager.disable
     logging.disable()  # a shell has no place for a message
@@ -75,7 +75,7 @@ def _state() -> str:
     from pathlib import Path
 
     import podusv_cli
-    from podusv_cli.core.plugins import installed
+    from podusv_cli.core.plugins import installed_plugins
     from podusv_cli.scenario import shipped
 
     folders = (Path(podusv_cli.__file__).parent, shipped.folder())
@@ -83,11 +83,11 @@ def _state() -> str:
         path for folder in folders for end in ("py", "yaml") for path in folder.rglob(f"*.{end}")
     )
     times = [(str(path), path.stat().st_mtime_ns) for path in files]
-    plugins = [(plugin.name, plugin.sha256) for plugin in installed()]
+    plugins = [(plugin.name, plugin.sha256) for plugin in installed_plugins()]
     return hashlib.sha256(repr((sorted(times), plugins)).encode()).hexdigest()
 
 
-@cached
+@complete_from_cache
 def starting_points(plugins: Plugins) -> Mapping[str, str]:
     """Names that `podusv init` takes."""
     from podusv_cli.workflows.examples import examples
@@ -136,7 +136,7 @@ def _keys_in(name: str, plugins: Plugins) -> Mapping[str, str]:
     return assignments_in(load(name, plugged=without_own(plugins)).scenario)
 
 
-@cached
+@complete_from_cache
 def all_keys(plugins: Plugins) -> Mapping[str, str]:
     """The same for any scenario."""
     from podusv_cli.scenario.explain import assignments
@@ -160,7 +160,7 @@ def laws(context: typer.Context, incomplete: str) -> Offered:
         return []  # no study, or none that can be read: there is no place for a message
 
 
-@cached
+@complete_from_cache
 def figures(plugins: Plugins) -> Mapping[str, str]:
     """Names of figures."""
     from podusv_cli.figures.drawing import figures_with
@@ -168,7 +168,7 @@ def figures(plugins: Plugins) -> Mapping[str, str]:
     return {name: sheet.caption for name, sheet in figures_with(plugins).items()}
 
 
-@cached
+@complete_from_cache
 def metrics(plugins: Plugins) -> Mapping[str, str]:
     """Names of metrics."""
     from podusv_cli.metrics.table import metrics_with
@@ -176,7 +176,7 @@ def metrics(plugins: Plugins) -> Mapping[str, str]:
     return {name: metric.meaning for name, metric in metrics_with(plugins).items()}
 
 
-@cached
+@complete_from_cache
 def names(plugins: Plugins) -> Mapping[str, str]:
     """What `podusv explain` explains: keys, kinds, signals, presets, metrics, findings."""
     from podusv_cli.findings.finding import finding_kinds

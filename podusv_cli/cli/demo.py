@@ -57,14 +57,15 @@ def demo(
         raise typer.Exit(INTERRUPTED)
     echo_comparison(done, METRICS)
     for part in done.missing:
-        echo(part.traced, err=True)
+        echo(part.sentence_with_trace, err=True)
     _open(done.folder / "report.html", browser)
     echo(
-        "", "Three commands to try next:",
+        "",
+        "Three commands to try next:",
         "  podusv init demo        copy the scenario; change it, then: podusv compare demo.yaml",
         "  podusv list laws        which other laws there are",
         "  podusv docs tutorial    from an empty folder to a comparison of your own",
-    )  # fmt: skip
+    )
     raise typer.Exit(SOME_FAILED if any(done.result.endings.values()) else 0)
 
 

@@ -65,11 +65,11 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
 
 def _show_metrics(difference: RunDifference) -> None:
     from podusv_cli.comparison.run_difference import relative
-    from podusv_cli.core.plugins import installed
+    from podusv_cli.core.plugins import installed_plugins
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.metrics.windows import find
 
-    known = metrics_with(installed())
+    known = metrics_with(installed_plugins())
     units = {name: metric.unit for name in difference.metrics if (metric := find(name, known))}
     rows = [
         [name, units.get(name, ""), _number(a), _number(b), _number(relative(a, b), "+.2g")]

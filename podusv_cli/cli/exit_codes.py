@@ -100,11 +100,11 @@ def replace_closed_streams() -> None:
     while (number := os.open(os.devnull, os.O_RDWR)) <= STDERR:  # the lowest free number
         os.set_inheritable(number, True)
     os.close(number)
-    sys.stdout = _buffered(sys.stdout or open(os.devnull, "w"))  # noqa: SIM115
-    sys.stderr = _buffered(sys.stderr or open(os.devnull, "w"))  # noqa: SIM115
+    sys.stdout = _with_buffer(sys.stdout or open(os.devnull, "w"))  # noqa: SIM115
+    sys.stderr = _with_buffer(sys.stderr or open(os.devnull, "w"))  # noqa: SIM115
 
 
-def _buffered(stream: TextIO) -> TextIO:
+def _with_buffer(stream: TextIO) -> TextIO:
     """The stream with a buffer, which PYTHONUNBUFFERED removes.
 
     Without one, Python ignores that a full disk took only a part of the text.

@@ -14,7 +14,7 @@ from podusv_cli.cli.terminal import echo, echo_entry
 if TYPE_CHECKING:
     from podusv_cli.core.finding import FindingKind
     from podusv_cli.core.plugins import Plugins as Known
-    from podusv_cli.scenario.explain import Row
+    from podusv_cli.scenario.explain import ExplainRow
 
 EQUATION = re.compile(r"\(\d+\)")
 
@@ -81,7 +81,7 @@ def _echo_finding(kind: FindingKind) -> None:
     echo_entry(kind.name, kind.meaning, condition, remedy, facts=facts)
 
 
-def _echo(row: Row) -> None:
+def _echo(row: ExplainRow) -> None:
     where = f"in {', '.join(row.kinds)}" if row.kinds else ""
     if row.type in ("keys", "kinds"):
         inside = f"{row.type}: {', '.join(row.choices)}" if row.choices else ""

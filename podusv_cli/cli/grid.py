@@ -18,7 +18,7 @@ def grid(head: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[
     """
     columns = list(zip(*rows, strict=True))
     stacks = [
-        _stacked(word, max(SHORT, *map(len, column)))
+        _break_head(word, max(SHORT, *map(len, column)))
         for word, column in zip(head, columns, strict=True)
     ]
     widths = [max(map(len, (*s, *column))) for s, column in zip(stacks, columns, strict=True)]
@@ -43,7 +43,7 @@ def grid(head: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[
     ]
 
 
-def _stacked(word: str, width: int) -> list[str]:
+def _break_head(word: str, width: int) -> list[str]:
     """A head in lines no longer than `width`, as far as its underscores allow that."""
     lines = []
     for line in word.split("\n"):

@@ -40,10 +40,11 @@ def _report_columns(found: Listing) -> None:
 Columns = Annotated[
     Path | None,
     typer.Option(
-        "--columns", metavar="LOG",
+        "--columns",
+        metavar="LOG",
         help="Only list the columns of a log, and what each may be; needs no CONFIG.",
     ),
-]  # fmt: skip
+]
 
 
 def identify(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from podusv_cli.cli.completion import cached
+from podusv_cli.cli.completion import complete_from_cache
 from podusv_cli.cli.options import Plugins
 from podusv_cli.cli.terminal import echo, echo_entry
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Entries = Iterable[tuple[str, str, str]]  # name, what it is, facts
 
 
-class Part(NamedTuple):
+class ListPart(NamedTuple):
     """A part of the list; `words` are what it can be called on the command line."""
 
     words: tuple[str, ...]
@@ -33,8 +33,8 @@ THEN = {
 }  # by section
 
 
-@cached
-def listed(plugins: Known) -> Mapping[str, str]:
+@complete_from_cache
+def words_of_list(plugins: Known) -> Mapping[str, str]:
     """Words for a part of the list."""
     return dict.fromkeys((word for part in parts(plugins) for word in part.words), "")
 
@@ -44,7 +44,7 @@ def list(
         str,
         typer.Argument(
             help="One part only: vessels, paths, laws, metrics, figures, findings, ...",
-            autocompletion=listed,
+            autocompletion=words_of_list,
         ),
     ] = "",
     plugin: Plugins = None,
@@ -54,14 +54,14 @@ def list(
     `podusv explain NAME` tells more about each.
     """
     from podusv_cli.core.errors import UsageError
-    from podusv_cli.core.phrases import unknown
+    from podusv_cli.core.phrases import unknown_word
     from podusv_cli.scenario.plugins import on_hand
 
     every = [*parts(on_hand(plugin or ()))]
     chosen = [group for group in every if not part or {part, f"{part}s"} & {*group.words}]
     if not chosen:
         known = dict.fromkeys(word for group in every for word in group.words)
-        raise UsageError(unknown(f"part {part!r}", part, known))
+        raise UsageError(unknown_word(f"part {part!r}", part, known))
     for group in chosen:
         echo(f"{group.heading}:")
         for name, text, facts in group.entries:
@@ -70,7 +70,7 @@ def list(
             echo(group.then, err=True)
 
 
-def parts(plugins: Known) -> Iterator[Part]:
+def parts(plugins: Known) -> Iterator[ListPart]:
     """All parts, in the order of the list."""
     from podusv_cli.metrics.table import metrics_with
     from podusv_cli.scenario.explain import first_sentence, kinds
@@ -80,7 +80,7 @@ def parts(plugins: Known) -> Iterator[Part]:
     for section, summaries in kinds(plugins).items():
         words = (f"{section}s", f"{BASES[section].noun}s")
         entries = ((kind, text, "") for kind, text in summaries.items())
-        yield Part(words, section, entries, THEN.get(section, ""))
+        yield ListPart(words, section, entries, THEN.get(section, ""))
     for key, (_, presets) in with_presets().items():
         texts = [
             (
@@ -92,11 +92,11 @@ def parts(plugins: Known) -> Iterator[Part]:
             for name in preset_names(presets, plugins)
         ]
         words = (f"{key.partition('.')[0]}s", "presets")
-        yield Part(words, f"{key} (preset, a {presets.noun})", texts)
+        yield ListPart(words, f"{key} (preset, a {presets.noun})", texts)
     metrics = ((name, m.meaning, f"[{m.unit}]") for name, m in metrics_with(plugins).items())
-    yield Part(("metrics",), "metrics", metrics)
-    yield Part(("figures",), "figures", _figures(plugins))
-    yield Part(("findings",), "findings (silence)", _findings(plugins))
+    yield ListPart(("metrics",), "metrics", metrics)
+    yield ListPart(("figures",), "figures", _figures(plugins))
+    yield ListPart(("findings",), "findings (silence)", _findings(plugins))
 
 
 SIZES = {"length": "m", "beam": "m", "m": "kg"}  # what tells vessels apart at once

@@ -35,8 +35,9 @@ def live(
 
     Only this machine can reach the page, and only with the address that is printed.
     """
+    from podusv_cli.comparison.live_page import live_page
     from podusv_cli.process.local_page import serve
-    from podusv_cli.workflows.live import Live, page
+    from podusv_cli.workflows.live import Live
 
     shown = Live(config, assign or (), controller or (), trust, plugin or ())
     shown.frame({}, (), rest=True, wanted=True)  # errors are for the terminal, and code is compiled
@@ -47,7 +48,7 @@ def live(
     gc.freeze()
     gc.set_threshold(10_000)
 
-    def started(address: str) -> None:
+    def print_address(address: str) -> None:
         import webbrowser
 
         has_display = sys.platform == "darwin" or any(map(os.environ.get, DISPLAYS))
@@ -55,4 +56,4 @@ def live(
         echo(f"{'opened' if opened else 'open in a browser:'} {address}", "Ctrl-C ends it")
         sys.stdout.flush()
 
-    serve(partial(page, config), shown.answer, started, port)
+    serve(partial(live_page, config), shown.answer, print_address, port)

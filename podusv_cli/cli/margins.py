@@ -21,9 +21,16 @@ SOME_FAILED = 3
 STILL = 1e-12  # m/s, rad/s; what is slower is rounding
 FLAT = 1e-6  # of a pole's magnitude; an imaginary part up to this is rounding
 HEAD = [
-    "law", "loop", "crossover [rad/s]", "phase [rad]", "gain", "reduction", "delay [s]",
-    "peak |S|", "peak |T|",
-]  # fmt: skip
+    "law",
+    "loop",
+    "crossover [rad/s]",
+    "phase [rad]",
+    "gain",
+    "reduction",
+    "delay [s]",
+    "peak |S|",
+    "peak |T|",
+]
 
 
 def margins(
@@ -32,7 +39,9 @@ def margins(
     at: Annotated[
         float | None,
         typer.Option(
-            metavar="SECONDS", min=0.0, help="When the steady motion begins.",
+            metavar="SECONDS",
+            min=0.0,
+            help="When the steady motion begins.",
             show_default="the last time on a straight line, or on a circle",
         ),
     ] = None,
@@ -50,7 +59,7 @@ def margins(
     as_json: options.AsJson = False,
     trust: options.Trust = False,
     plugin: options.Plugins = None,
-) -> None:  # fmt: skip
+) -> None:
     """Tell how much phase, gain and delay the loops of a scenario's laws can take.
 
     The closed loop is linearised about its steady motion on the path, and opened at the plant's
@@ -132,14 +141,16 @@ def _rows(label: str, law: LoopMargins) -> list[list[str]]:
     for axis, loop in law.loops.items():
         crossed = ", ".join(f"{omega:.4g}" for omega in loop.crossovers) or "-"
         phase = f"{loop.phase_margin:.4g} ({math.degrees(loop.phase_margin):.1f} deg)"
-        known = phase if math.isfinite(loop.phase_margin) else _told(loop.phase_margin)
-        numbers = [_told(getattr(loop, name)) for name in NUMBERS[1:]]
+        known = phase if math.isfinite(loop.phase_margin) else _format_margin(loop.phase_margin)
+        numbers = [_format_margin(getattr(loop, name)) for name in NUMBERS[1:]]
         rows.append([label, f"{axis} load", crossed, known, *numbers])
     together = {"both demands": law.delay_margin, "both loads": law.delay_margin_loads}
-    more = [[label, what, *[""] * 4, _told(delay), "", ""] for what, delay in together.items()]
+    more = [
+        [label, what, *[""] * 4, _format_margin(delay), "", ""] for what, delay in together.items()
+    ]
     return [*rows, *more]
 
 
-def _told(number: float) -> str:
+def _format_margin(number: float) -> str:
     """A margin; - where the loop has none."""
     return "-" if math.isnan(number) else f"{number:.4g}"

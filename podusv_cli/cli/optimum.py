@@ -83,15 +83,13 @@ def optimum(
     echo_result(done, lambda: _report(done), as_json=as_json, quiet=quiet)
     for finding in done.run.warnings:
         warned(finding)
-    for text in (done.run.message, *(part.traced for part in done.run.missing)):
+    for text in (done.run.message, *(part.sentence_with_trace for part in done.run.missing)):
         if text:
             echo(f"{config}: {text}", err=True)
     raise typer.Exit(EXIT_CODES[done.run.status])
 
 
 def _report(done: Optimum) -> None:
-    from podusv_cli.optimum.collocation import TOLERANCE
-
     name = done.minimised
     unit = done.run.rows[name].unit
     rows = [
@@ -99,7 +97,7 @@ def _report(done: Optimum) -> None:
         for s in done.stages
     ]
     echo_table(["from a run of", "step", f"{name} [{unit}]", "iterations", "time"], rows)
-    echo(f"a local optimum, to IPOPT's tolerance of {TOLERANCE:g}; a search from the run of")
+    echo(f"a local optimum, to IPOPT's tolerance of {done.tolerance:g}; a search from the run of")
     echo("another law in `controllers` may lead to a lower one")
     if name in done.run.metrics and done.departures:
         away = done.departures

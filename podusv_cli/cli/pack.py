@@ -12,7 +12,7 @@ from podusv_cli.cli.options import AsJson, Force
 from podusv_cli.cli.terminal import echo, echo_entry, echo_json
 
 if TYPE_CHECKING:
-    from podusv_cli.workflows.pack import Contents
+    from podusv_cli.workflows.pack import PackedContents
 
 SHOWN = 5  # names of files in a line
 
@@ -55,7 +55,7 @@ def in_words(size: float) -> str:
     return bytes_in_words(size)
 
 
-def show(contents: Contents) -> None:
+def show(contents: PackedContents) -> None:
     """What a packed folder has: its kind, code, packages and versions."""
     sizes = contents.sizes
     count = f"{len(sizes)} files, {in_words(sum(sizes.values()))}"

@@ -67,13 +67,8 @@ def plot(
 
     formats = [name.strip() for name in form.split(",")]
     request = Request(out=out, plugins=plugin or (), names=figure or (), formats=formats)
-    choice = workflow.Choice(
-        signal or (),
-        since,
-        until,
-        label or (),
-        workflow.look_of(columns, size, style),
-        animate,
+    choice = workflow.PlotChoice(
+        signal or (), since, until, label or (), workflow.look_of(columns, size, style), animate
     )
     drawn = workflow.plot([Path(run) for run in runs], request, choice)
     for path in drawn.files:

@@ -19,7 +19,7 @@ from podusv_cli.core.quantities import time_in_words
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from podusv_cli.studies.making.dispatch import Tally
+    from podusv_cli.studies.making.dispatch import StudyTally
 
 PATIENCE = 0.7  # s before a bar appears
 SILENT = 1.0  # s of compiling before a line is printed where no bar can be
@@ -49,10 +49,13 @@ def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
     began = time.monotonic()
     # No thread refreshes the bars, since threads do not survive the forks of a comparison.
     bars = Progress(
-        TextColumn("{task.description}", markup=False), BarColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
         TimeRemainingColumn(elapsed_when_finished=True),
-        console=Console(stderr=True), transient=True, auto_refresh=False,
-    )  # fmt: skip
+        console=Console(stderr=True),
+        transient=True,
+        auto_refresh=False,
+    )
     tasks: dict[str, TaskID] = {}
     with ExitStack() as stack:
 
@@ -108,16 +111,18 @@ class StudyLine:
         """Nothing is shown yet."""
         self._wanted, self._last = wanted and supports_colours(sys.stderr), 0.0
 
-    def tell(self, tally: Tally) -> None:
+    def tell(self, tally: StudyTally) -> None:
         """Show runs done, rate, time left and failures so far."""
         if time.monotonic() - self._last > PERIOD:
             self._show(
-                f"{tally.made} of {tally.wanted} runs", *_left(tally),
-                f"{tally.failed} did not finish", f"{tally.rate:.3g} a second",
+                f"{tally.made} of {tally.wanted} runs",
+                *_left(tally),
+                f"{tally.failed} did not finish",
+                f"{tally.rate:.3g} a second",
                 "Ctrl-C keeps what is done",
-            )  # fmt: skip
+            )
 
-    def advance(self, tally: Tally, text: str) -> None:
+    def advance(self, tally: StudyTally, text: str) -> None:
         """Show runs done, time left, and what is told of them."""
         if time.monotonic() - self._last > PERIOD:
             self._show(f"{tally.made} of {tally.wanted} runs", *_left(tally), text)
@@ -159,7 +164,7 @@ class StudyLine:
                 typer.echo(ERASED, nl=False, err=True)
 
 
-def _left(tally: Tally) -> list[str]:
+def _left(tally: StudyTally) -> list[str]:
     """The time that is left, where that can be said."""
     known = tally.made < tally.wanted and math.isfinite(tally.left)
     return [f"{time_in_words(tally.left)} left"] if known else []

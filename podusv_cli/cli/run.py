@@ -71,7 +71,7 @@ def run(
     if done.message:
         echo(f"{config}: {done.message}", err=True)
     for part in done.missing:
-        echo(f"{config}: {part.traced}", err=True)
+        echo(f"{config}: {part.sentence_with_trace}", err=True)
     if not (figure or quiet or as_json):
         echo_how_to_draw(done.folder, [done.folder])
     raise typer.Exit(EXIT_CODES[done.status])
@@ -88,7 +88,7 @@ def _report(done: Finished, verbose: bool) -> None:
         number = done.metrics[name]
         shown = f"{number:>12.6g} {metric.unit if metric.unit != '1' else ''}"
         if math.isnan(number):
-            shown = f"{metric.undefined:>12}"
+            shown = f"{metric.undefined_word:>12}"
         echo(f"{metric.row:<{words}} {shown:<{numbers}}  {name}")
     if counted := window(table({done.controller: done.metrics}, done.rows)):
         echo(counted)

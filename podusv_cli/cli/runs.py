@@ -18,25 +18,28 @@ USUAL = "iae"
 
 
 def runs(
-    folder: Annotated[
-        Path, typer.Argument(help="Where to look, in all folders below.")
-    ] = Path("results"),
+    folder: Annotated[Path, typer.Argument(help="Where to look, in all folders below.")] = Path(
+        "results"
+    ),
     where: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="KEY=VALUE", help="Only those whose scenario has this value; repeatable.",
+            metavar="KEY=VALUE",
+            help="Only those whose scenario has this value; repeatable.",
             autocompletion=completion.keys,
         ),
     ] = None,
     sort: Annotated[
         str,
         typer.Option(
-            metavar="METRIC", help="Show this metric, the smallest first, in place of the latest.",
-            autocompletion=completion.metrics, show_default=False,
+            metavar="METRIC",
+            help="Show this metric, the smallest first, in place of the latest.",
+            autocompletion=completion.metrics,
+            show_default=False,
         ),
     ] = "",
     as_json: options.AsJson = False,
-) -> None:  # fmt: skip
+) -> None:
     """List the runs, studies, searches and benches below a folder, a line each.
 
     Reads their small files alone, and executes none of them.
@@ -59,7 +62,12 @@ def _row(run: ListedRun, metric: str) -> list[str]:
     law = run.laws[0] if len(run.laws) == 1 else f"{len(run.laws)} laws"
     number = run.metrics.get(metric, math.nan)
     return [
-        run.started[:16].replace("T", " ") or "-", run.kind, run.name, law if run.laws else "-",
-        run.status, time_in_words(run.seconds) if run.seconds > 0 else "-",
-        "-" if math.isnan(number) else f"{number:.5g}", str(run.folder),
-    ]  # fmt: skip
+        run.started[:16].replace("T", " ") or "-",
+        run.kind,
+        run.name,
+        law if run.laws else "-",
+        run.status,
+        time_in_words(run.seconds) if run.seconds > 0 else "-",
+        "-" if math.isnan(number) else f"{number:.5g}",
+        str(run.folder),
+    ]

@@ -42,8 +42,7 @@ def run(
     ],
     assign: options.Assignments = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the study.", show_default="results/<name>-sweep"),
+        Path | None, typer.Option(help="Folder of the study.", show_default="results/<name>-sweep")
     ] = None,
     draws: Annotated[
         int, typer.Option(min=0, help="How many draws.", show_default="the scenario's")
@@ -129,7 +128,7 @@ def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
     Exits with 3 for broken runs, and for kept logs that differ from the table.
     """
     show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
-    if done.results and (done.results.broken or done.results.contradicted):
+    if done.results and (done.results.broken_runs or done.results.contradicted):
         raise typer.Exit(SOME_FAILED)
 
 
@@ -147,8 +146,8 @@ def _report(done: Swept) -> None:
         echo_entry(v.name, v.claim.says, v.evidence(), facts=v.in_words)
     if done.results.contradicted:
         echo(done.results.contradicted)
-    if done.results.broken:
-        echo(f"{done.results.broken} runs crashed, hung or were invalid: see the report")
+    if done.results.broken_runs:
+        echo(f"{done.results.broken_runs} runs crashed, hung or were invalid: see the report")
     echo(f"study: {done.folder}")
     if (done.folder / "report.html").exists():
         echo(f"report: {done.folder / 'report.html'}")
@@ -178,9 +177,11 @@ def status(study: Study, as_json: options.AsJson = False) -> None:
 
 @command
 def report(
-    study: Study, figures: options.Figures = True, as_json: options.AsJson = False,
+    study: Study,
+    figures: options.Figures = True,
+    as_json: options.AsJson = False,
     quiet: options.Quiet = False,
-) -> None:  # fmt: skip
+) -> None:
     """Make the tables, verdicts and figures of a study anew, of what is there."""
     from podusv_cli.workflows import sweep as workflow
     from podusv_cli.workflows.request import Request

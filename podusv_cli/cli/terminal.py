@@ -31,7 +31,7 @@ def echo(*lines: object, err: bool = False) -> None:
     """
     shown = [visible(line) for line in lines]
     if (sys.stderr if err else sys.stdout).isatty():
-        shown = [folded(line, _width()) for line in shown]
+        shown = [fold_line(line, _width()) for line in shown]
     typer.echo("\n".join(shown), err=err)
 
 
@@ -43,7 +43,7 @@ def echo_path(path: Path) -> None:
 
 def echo_json(content: Mapping[str, Any]) -> None:
     """One JSON object."""
-    from podusv_cli.storage.json_files import encode
+    from podusv_cli.core.json_text import encode
 
     typer.echo(encode(content), nl=False)
 
@@ -77,7 +77,7 @@ def show(done: Done, report: Callable[[], None], *, as_json: bool, quiet: bool) 
     """Print what was made as it was asked for, and on stderr what of it is missing."""
     echo_result(done, report, as_json=as_json, quiet=quiet)
     for part in done.missing:
-        echo(part.traced, err=True)
+        echo(part.sentence_with_trace, err=True)
 
 
 def echo_entry(name: str, *lines: str, facts: str = "") -> None:
@@ -85,19 +85,19 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
     width = _width()
     name, facts, lines = visible(name), visible(facts), tuple(map(visible, lines))
 
-    def wrapped(text: str, indent: str) -> str:
+    def wrap_indented(text: str, indent: str) -> str:
         return textwrap.fill(
             text, width, initial_indent=indent, subsequent_indent="    ", break_on_hyphens=False
         )
 
-    head = wrapped(f"{name}  {facts}".rstrip(), "")
+    head = wrap_indented(f"{name}  {facts}".rstrip(), "")
     typer.echo(
         head.replace(name, typer.style(name, bold=True), 1)
         if supports_colours(sys.stdout)
         else head
     )
     for line in filter(None, lines):
-        typer.echo(wrapped(line, "    "))
+        typer.echo(wrap_indented(line, "    "))
 
 
 def supports_colours(stream: TextIO) -> bool:
@@ -138,7 +138,7 @@ def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
     yield part
 
 
-def folded(text: str, width: int) -> str:
+def fold_line(text: str, width: int) -> str:
     """A line wrapped at spaces, the rest of it indented by two; paths are not broken."""
     return textwrap.fill(
         text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
@@ -190,11 +190,11 @@ class Warnings:
     def all_of(self, findings: Sequence[Finding], together: Sequence[str]) -> None:
         """Print findings; those of one kind about one key as one, if runs go `together`."""
         new = [finding for finding in findings if str(finding) not in self._shown]
-        for finding in _grouped(new, together) if together else new:
+        for finding in _group_findings(new, together) if together else new:
             self(finding)
 
 
-def _grouped(findings: Sequence[Finding], labels: Sequence[str]) -> Iterator[Finding]:
+def _group_findings(findings: Sequence[Finding], labels: Sequence[str]) -> Iterator[Finding]:
     """One finding of each kind and key, with all its runs and the sentence of the first."""
     alike: dict[tuple[str, str], list[Finding]] = {}
     for finding in findings:

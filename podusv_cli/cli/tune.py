@@ -20,8 +20,7 @@ def tune(
     config: options.Config,
     assign: options.Assignments = None,
     out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the search.", show_default="results/<name>-tune"),
+        Path | None, typer.Option(help="Folder of the search.", show_default="results/<name>-tune")
     ] = None,
     workers: options.Workers = 0,
     scheduler: options.Scheduler = "",
@@ -66,16 +65,22 @@ def tune(
 
 def _report(done: Tuned) -> None:
     from podusv_cli.studies.tuning.remarks import remarks
-    from podusv_cli.studies.tuning.report import intervals, percent, ratio, spread, turned
+    from podusv_cli.studies.tuning.report import count_change, intervals, percent, ratio, spread
 
     results = done.results
     rows = [
-        [row["law"], turned(row, "rank"), turned(row, "better_than"),
-         intervals(row, "before"), intervals(row, "after"),
-         ratio(row) if row["runs"] else "-",
-         f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}", spread(row)]
+        [
+            row["law"],
+            count_change(row, "rank"),
+            count_change(row, "better_than"),
+            intervals(row, "before"),
+            intervals(row, "after"),
+            ratio(row) if row["runs"] else "-",
+            f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}",
+            spread(row),
+        ]
         for row in results.laws.sort_values("rank_after").to_dict("records")
-    ]  # fmt: skip
+    ]
     ratios = "ratio, after / before"
     head = ["law", "rank", "better than", "before", "after", ratios, "failed", "searches"]
     echo(f"{results.plan.tune.objective} on {results.plan.tune.validate} fresh draws:")

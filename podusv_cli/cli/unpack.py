@@ -32,7 +32,7 @@ def unpack(
     from podusv_cli.cli.progress import progress_bars
     from podusv_cli.workflows import pack as workflow  # heavy imports only when needed
 
-    with workflow.opened(archive) as packed:
+    with workflow.open_packed(archive) as packed:
         contents = packed.contents
         target = None if look else out or Path(contents.name)
         if not as_json:

@@ -39,4 +39,4 @@ def validate(
     )
     done = workflow.validate(Path(config), request)
     first, *others = done.lines()
-    echo(f"{config}: {first}", *others, *(done.explained() if verbose else ()))
+    echo(f"{config}: {first}", *others, *(done.explain_lines() if verbose else ()))

@@ -15,7 +15,7 @@ from podusv_cli.verification import TOLERANCE
 
 if TYPE_CHECKING:
     from podusv_cli.verification.ranking import Ranking
-    from podusv_cli.verification.richardson import Estimate
+    from podusv_cli.verification.richardson import StepEstimate
     from podusv_cli.verification.verify import RunVerification, Verification
 
 NOT_CONVERGED = 3
@@ -50,9 +50,16 @@ def verify(
     with progress_bars(wanted=not (quiet or as_json)) as progress:
         try:
             done = verifying.verify(
-                Path(config), assign or (), tolerance, out, progress, force=force,
-                plugins=plugin or (), trust=trust, warn=Warnings(quiet),
-            )  # fmt: skip
+                Path(config),
+                assign or (),
+                tolerance,
+                out,
+                progress,
+                force=force,
+                plugins=plugin or (),
+                trust=trust,
+                warn=Warnings(quiet),
+            )
         except KeyboardInterrupt:
             text = f"{config}: interrupted before all steps were simulated; nothing was written"
             raise KeyboardInterrupt(text) from None
@@ -64,7 +71,7 @@ def verify(
             echo_json(done.as_json())
         elif not quiet:
             _report(done)
-    raise typer.Exit(NOT_CONVERGED if done.unconverged else 0)
+    raise typer.Exit(NOT_CONVERGED if done.unconverged_by_run else 0)
 
 
 def _report(done: Verification) -> None:
@@ -72,7 +79,7 @@ def _report(done: Verification) -> None:
         _show_run(label, run, done)
     if done.rankings:
         _show_rankings(done.rankings)
-    failed = [f"{label}: {', '.join(names)}" for label, names in done.unconverged.items()]
+    failed = [f"{label}: {', '.join(names)}" for label, names in done.unconverged_by_run.items()]
     heading = "not converged" if failed else "converged"
     echo("end_position: distance from where the run with the smallest step ends")
     echo(f"{heading} within {done.tolerance:.3g} relative", *failed)
@@ -98,7 +105,7 @@ def _show_run(label: str, run: RunVerification, done: Verification) -> None:
     echo("")
 
 
-def _cells(e: Estimate, tolerance: float) -> list[str]:
+def _cells(e: StepEstimate, tolerance: float) -> list[str]:
     values = ["-" if math.isnan(value) else f"{value:.6g}" for value in e.values]
     order = "-" if math.isnan(e.order) else f"{e.order:.1f}"
     error = "-" if math.isinf(e.relative) else f"{e.relative:.1e}"

@@ -95,9 +95,10 @@ def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
 
 
 def judge(
-    claims: Sequence[ParsedClaim], runs: Mapping[str, ClaimedRun],
+    claims: Sequence[ParsedClaim],
+    runs: Mapping[str, ClaimedRun],
     metrics: Mapping[str, MetricAbout] = METRICS,
-) -> list[RunsVerdict]:  # fmt: skip
+) -> list[RunsVerdict]:
     """A verdict on every claim; `runs` by label."""
     return [_verdict(parsed, runs, metrics) for parsed in claims]
 

@@ -16,7 +16,7 @@ NEAR = 1e-9  # s; times closer than this are the same
 
 
 class ClaimedRun(Protocol):
-    """A run, as far as claims can be about it."""
+    """What claims ask of a run: of one that is over, or, before there are runs, of an example."""
 
     @property
     def until(self) -> float:
@@ -33,8 +33,11 @@ class ClaimedRun(Protocol):
     def metric(self, name: str) -> float:
         """A metric; NaN where the run has none of this name."""
 
+    def has(self, name: str) -> bool:
+        """Whether the run has a signal of this name, logged or derivable."""
+
     def signal(self, name: str) -> Vector:
-        """A logged signal; empty where the run has none of this name."""
+        """A signal that it has."""
 
     def check(self, name: str) -> bool | None:
         """Whether a named property of the run holds; None where that is unknown."""
@@ -75,7 +78,7 @@ def metric(label: str, run: ClaimedRun, about: MetricAbout) -> float:
 
 def signal(label: str, run: ClaimedRun, name: str) -> Curve:
     """A signal of a run. Raises CannotTell."""
-    values = run.signal(name)
+    values = run.signal(name) if run.has(name) else np.empty(0)
     if not len(values):
         raise CannotTell(f"{label}.{name}: {label} {run.ending or 'does not log it'}")
     return Curve(run.signal("time")[: len(values)], values, {label: run})
@@ -105,14 +108,14 @@ def rate(curve: Curve) -> Curve:
     """The derivative: central differences, one-sided at the ends. Raises CannotTell."""
     for label, run in curve.runs.items():
         if run.every > 1:
-            raise _thinned("rate", label, run)
+            raise _refuse_thinned_log("rate", label, run)
     several = len(curve.values) > 1
     rates = np.gradient(curve.values, curve.time) if several else curve.values * np.nan
     return Curve(curve.time, rates, curve.runs)
 
 
 @np.errstate(all="ignore")
-def reduced(
+def reduce_curve(
     name: str, text: str, curve: Curve, settings: Sequence[float], window: Sequence[float]
 ) -> float:
     """One number for a curve, over the whole run or a window (start and end [s], or empty).
@@ -127,7 +130,7 @@ def reduced(
             raise CannotTell(f"{text}: {label} {run.ending or f'ends at {run.until:g} s'}")
         last = name == "final" and not window and abs(t[-1] - run.until) <= NEAR
         if run.every > 1 and not last:
-            raise _thinned(text, label, run)
+            raise _refuse_thinned_log(text, label, run)
     if window:
         inside = (t >= window[0] - NEAR) & (t <= window[1] + NEAR)
         t, y = t[inside], y[inside]
@@ -136,7 +139,7 @@ def reduced(
     return float(REDUCERS[name](t, y, *settings))
 
 
-def _thinned(text: str, label: str, run: ClaimedRun) -> CannotTell:
+def _refuse_thinned_log(text: str, label: str, run: ClaimedRun) -> CannotTell:
     return CannotTell(
         f"{text}: {label} logs only one step in {run.every}, and the signal is unknown in between; "
         "log every step (log.every: 1), or use a metric, which sees every step"

@@ -11,15 +11,15 @@ from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import flat
 
 PROSE = (".source", ".validity")
-IGNORED = (
-    "name", "description", "controller", "controllers", "claims", "silence", *BESIDE_RUNS,
-)  # fmt: skip
+IGNORED = ("name", "description", "controller", "controllers", "claims", "silence", *BESIDE_RUNS)
 
 
 def differences(
-    scenarios: Mapping[str, Mapping[str, Any]], *,
-    ignored: Sequence[str] = IGNORED, prose: tuple[str, ...] = PROSE,
-) -> dict[str, dict[str, Any]]:  # fmt: skip
+    scenarios: Mapping[str, Mapping[str, Any]],
+    *,
+    ignored: Sequence[str] = IGNORED,
+    prose: tuple[str, ...] = PROSE,
+) -> dict[str, dict[str, Any]]:
     """Keys whose values differ, with the value of every run; None for a missing key.
 
     `scenarios` are resolved scenarios by label. Sections in `ignored` and keys with an ending in
@@ -69,7 +69,7 @@ def _section(key: str) -> str:
 
 def _follows_from_kind(
     key: str, values: Mapping[str, Any], differing: Mapping[str, Mapping[str, Any]]
-) -> bool:  # fmt: skip
+) -> bool:
     """Whether the key has one value, and is missing only in runs of another kind.
 
     Then the kind may also come from a plug-in that the others do not need.

@@ -21,45 +21,49 @@ import numpy as np
 
 from podusv_cli.comparison import curves
 from podusv_cli.comparison.curves import REDUCERS, SETTINGS, CannotTell, ClaimedRun, Curve, Quantity
-from podusv_cli.comparison.entries import CHECKS
 from podusv_cli.core.about import MetricAbout
+from podusv_cli.core.derived_signals import derived_with
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.past_run import CHECKS
 from podusv_cli.core.signal import Signal
 from podusv_cli.expressions.margins import SIGNS, around, below
 from podusv_cli.expressions.reading import (
     ExpressionError,
     function,
-    known,
+    known_name,
     literal,
     refuse,
     syntax_tree,
 )
 from podusv_cli.expressions.walk import Condition, Walk
-from podusv_cli.figures.signals import DERIVED
 from podusv_cli.metrics.table import METRICS
 
 EXAMPLE = "a.iae < b.iae"
 STRICT = (ast.Lt, ast.Gt)  # too close to tell where the difference is within the tolerance
 # norms of the weights, which have one value for every node of a network
-NORMS = {derived.needs[0]: name for name, derived in DERIVED.items() if len(derived.needs) == 1}
+NORMS = {
+    derived.needs[0]: name for name, derived in derived_with(()).items() if len(derived.needs) == 1
+}
 
 
 def parse(
-    text: str, runs: Collection[str], signals: Mapping[str, Signal],
+    text: str,
+    runs: Collection[str],
+    signals: Mapping[str, Signal],
     metrics: Mapping[str, MetricAbout] = METRICS,
-) -> ast.expr:  # fmt: skip
+) -> ast.expr:
     """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
     It is checked by evaluating it for runs that have all of these. Raises ExpressionError.
     """
     tree = syntax_tree(text, EXAMPLE)
-    example = _Example(signals, metrics)
+    example = _ExampleRun(signals, metrics)
     Evaluation(dict.fromkeys(runs, example), metrics=metrics).holds(tree)
     return tree
 
 
 @dataclass(frozen=True)
-class _Example:
+class _ExampleRun:
     """A run that has every metric and signal; to check an expression before there are runs."""
 
     signals: Mapping[str, Signal]
@@ -74,6 +78,9 @@ class _Example:
     def check(self, name: str) -> bool:
         return True
 
+    def has(self, name: str) -> bool:
+        return True
+
     def signal(self, name: str) -> Vector:
         """Two samples. Raises ExpressionError unless the signal is one number over time."""
         about = self.signals.get(name)
@@ -86,7 +93,7 @@ class _Example:
                 f"{name!r} has a value for every {' and '.join(about.axes)}{hint}"
             )
         usable = [s.name for s in self.signals.values() if not (s.fixed or s.axes)]
-        known(name, [*usable, *self.metrics], "signal or metric")
+        known_name(name, [*usable, *self.metrics], "signal or metric")
         return np.array([0.0, 1.0])
 
 
@@ -121,7 +128,7 @@ class Evaluation(Walk):
             why = "never happen" if never else within
             self.doubts.append(f"{ast.unparse(left)} and {ast.unparse(right)} {why}")
             return Condition.of([None])
-        return Condition.known(self.signs[type(sign)](a, b, self.tolerance))
+        return Condition.known_everywhere(self.signs[type(sign)](a, b, self.tolerance))
 
     def _close(self, a: float, b: float) -> bool:
         """Whether neither is smaller by more than a margin that there is."""
@@ -161,7 +168,7 @@ class Evaluation(Walk):
         """A check of a run."""
         if not isinstance(node, ast.Call):
             refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
-        name = known(function(node), CHECKS, "check")
+        name = known_name(function(node), CHECKS, "check")
         if len(node.args) != 1 or not isinstance(node.args[0], ast.Name):
             refuse(node, "a check takes the name of one run")
         label = node.args[0].id
@@ -172,7 +179,7 @@ class Evaluation(Walk):
             self.doubts.append(f"{text}: {label} {run.ending}")
         return Condition.of([answer])
 
-    def calculated(self, operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quantity:
+    def calculate(self, operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quantity:
         """At the times that all curves cover."""
         return curves.pointwise(operation, parts)
 
@@ -190,14 +197,14 @@ class Evaluation(Walk):
         refuse(node, "no meaning here; write run.metric or run.signal")
 
     def _call(self, node: ast.Call) -> Quantity:
-        name = known(function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
+        name = known_name(function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
         if name in REDUCERS:
-            return self._or_doubt(lambda: self._reduced(name, node))
+            return self._or_doubt(lambda: self._reduce(name, node))
         count, operation = OPERATIONS.get(name, (1, None))
         if len(node.args) != count:
             refuse(node, f"{name} takes {count} argument(s)")
         if operation:
-            return self.calculated(operation, [self.value(part) for part in node.args])
+            return self.calculate(operation, [self.value(part) for part in node.args])
         return curves.rate(self._curve(node.args[0]))
 
     def _curve(self, node: ast.expr) -> Curve:
@@ -206,7 +213,7 @@ class Evaluation(Walk):
             refuse(node, "a number where a signal is needed")
         return curve
 
-    def _reduced(self, name: str, node: ast.Call) -> float:
+    def _reduce(self, name: str, node: ast.Call) -> float:
         wanted = " and ".join(["a signal", *filter(None, [SETTINGS.get(name)])])
         count = 1 + (name in SETTINGS)
         if len(node.args) not in (count, count + 2):
@@ -217,7 +224,7 @@ class Evaluation(Walk):
         settings, window = numbers[: count - 1], numbers[count - 1 :]
         if window and not 0 <= window[0] < window[1]:
             refuse(node, "the first time must lie before the second")
-        return curves.reduced(name, ast.unparse(node), curve, settings, window)
+        return curves.reduce_curve(name, ast.unparse(node), curve, settings, window)
 
     def _or_doubt(self, number: Callable[[], float]) -> float:
         """The number, or NaN and a doubt."""
@@ -228,7 +235,7 @@ class Evaluation(Walk):
             return math.nan
 
     def _run(self, label: str) -> ClaimedRun:
-        return self.runs[known(label, self.runs, "run")]
+        return self.runs[known_name(label, self.runs, "run")]
 
 
 def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:

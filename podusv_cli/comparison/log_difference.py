@@ -139,9 +139,14 @@ class LogDifference:
 
 def _as_json(d: Deviation) -> dict[str, Any]:
     return {
-        "signal": d.signal, "time": d.time, "values": [d.one, d.other], "difference": d.gap,
-        "ulps": d.ulps, "relative": d.relative, "relative_to_peak": d.relative_to_peak,
-    }  # fmt: skip
+        "signal": d.signal,
+        "time": d.time,
+        "values": [d.one, d.other],
+        "difference": d.gap,
+        "ulps": d.ulps,
+        "relative": d.relative,
+        "relative_to_peak": d.relative_to_peak,
+    }
 
 
 @dataclass(frozen=True)
@@ -162,7 +167,7 @@ class _Pair:
 
 def compare(one: Recording, other: Recording) -> LogDifference:
     """Compare the signals of two recordings at their common times."""
-    pairs = list(_paired(one, other))
+    pairs = list(_pair_signals(one, other))
     alike = [pair for pair in pairs if pair.one.shape == pair.other.shape]
     unequal = [pair for pair in alike if differing(pair.one, pair.other).any()]
     names, others = ((*log.signals, *log.fixed) for log in (one, other))
@@ -185,7 +190,7 @@ def _end(log: Recording) -> float:
     return float(log["time"][-1]) if len(log["time"]) else 0.0
 
 
-def _paired(one: Recording, other: Recording) -> Iterator[_Pair]:
+def _pair_signals(one: Recording, other: Recording) -> Iterator[_Pair]:
     """Time, then the other signals that both have, then the arrays constant in time."""
     times, at_one, at_other = _shared_times(one["time"], other["time"])
     yield _Pair("time", times, other["time"][at_other], times, one.about["time"])
@@ -235,7 +240,9 @@ def _deviation(pair: _Pair, place: Place) -> Deviation:
     return Deviation(
         signal=f"{pair.name}{index}",
         time=None if pair.times is None else float(pair.times[place[0]]),
-        one=float(pair.one[place]), other=float(pair.other[place]),
-        peak=float(both[np.isfinite(both)].max(initial=0.0)), period=pair.period,
+        one=float(pair.one[place]),
+        other=float(pair.other[place]),
+        peak=float(both[np.isfinite(both)].max(initial=0.0)),
+        period=pair.period,
         unit=pair.about.unit,
-    )  # fmt: skip
+    )

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import LOOP, STATE
 from podusv_cli.metrics.measured import (
@@ -21,7 +22,6 @@ from podusv_cli.metrics.measured import (
     log_heading_rms,
     log_instants,
 )
-from podusv_cli.storage.run_folder import FinishedRun, InMemory
 
 POSE = tuple(signal.name for signal in STATE[:3])
 PLANE = POSE[:2]
@@ -54,14 +54,14 @@ class Track:
         """Which of its times lie in a span [s]."""
         return (self.times >= begin) & (self.times <= end)
 
-    def timed(self, begin: float) -> Track:
+    def start_clock_at(self, begin: float) -> Track:
         """It; where it is to begin as the runs do, with its first position at this time [s]."""
         if self.aligned != START:
             return self
         shifted = begin - float(self.times[0])
         return replace(self, times=self.times - self.times[0] + begin, shifted=shifted)
 
-    def placed(self, label: str, run: Recording) -> Track:
+    def place_beside(self, label: str, run: Recording) -> Track:
         """It; where that is asked for, with its first position at a time of the run the run's.
 
         A remark says what was moved, and by how much.
@@ -93,23 +93,28 @@ class Track:
         said = {**run.said, "controller": NO_LAW}
         return run.model_copy(
             update={
-                "duration": float(self.times[-1]), "settings": (), "law": (), "said": said,
+                "duration": float(self.times[-1]),
+                "settings": (),
+                "law": (),
+                "said": said,
                 "values": {**run.values, "controller": {"kind": NO_LAW}},
-                "polar": False, "optimum_of": "", "path_steady": {},
+                "polar": False,
+                "optimum_of": "",
+                "path_steady": {},
                 "path_end": {"time": counts_to} if math.isfinite(counts_to) else {},
             }
-        )  # fmt: skip
+        )
 
-    def beside(self, run: Recording) -> FinishedRun:
-        """It as a run, with the target of another one."""
+    def beside(self, run: Recording, label: str, about: RunAbout) -> PastRun:
+        """It as a run, with the target of another one; `about` as the method has it."""
         signals = {"time": self.times, **self.signals}
         for name in TARGET:
             signals[name] = np.interp(self.times, run["time"], run[name])
         if "z_e" in run:
             signals["z_e"] = np.hypot(signals["x_d"] - signals["x"], signals["y_d"] - signals["y"])
-        about = {signal.name: signal for signal in LOOP if signal.name in signals}
-        log = Recording("finished", NO_LAW, signals, about=about)
-        return InMemory(self.file, "finished", {}, {}, "", kept=log)
+        known = {signal.name: signal for signal in LOOP if signal.name in signals}
+        log = Recording("finished", NO_LAW, signals, about=known)
+        return PastRun(label, about, log, folder=self.file)
 
     def departures(self, run: Recording) -> dict[str, float]:
         """How far a run is from it where times agree, by metric; over FEWEST instants at least.

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from podusv_cli.comparison.entries import Entry
 from podusv_cli.core.about import PROSE
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.metrics.distance import OF_OPTIMUM
 from podusv_cli.pages.page import flat
 from podusv_cli.process.extras import Extras, Failure
@@ -15,30 +15,30 @@ from podusv_cli.process.extras import Extras, Failure
 TASK = ("vessel", "start", "path", "disturbance", "actuator")
 
 
-def related(entries: Sequence[Entry], extras: Extras) -> list[Entry]:
-    """The entries, each with its ratio to the optimum among them that has the same task.
+def with_optimum_ratios(runs: Sequence[PastRun], extras: Extras) -> list[PastRun]:
+    """The runs, each with its ratio to the optimum among them that has the same task.
 
     A run of another task has no ratio; `extras` says what differs.
     """
-    related_entries = list(entries)
+    related_runs = list(runs)
     for metric, ratio in OF_OPTIMUM.items():
-        optima = [e for e in entries if e.about.optimum_of == metric]
-        for i, entry in enumerate(related_entries):
-            same = [other for other in optima if not any(_other(entry, other))]
+        optima = [e for e in runs if e.about.optimum_of == metric]
+        for i, run in enumerate(related_runs):
+            same = [other for other in optima if not any(_other(run, other))]
             if same:
                 least = min(other.metric(metric) for other in same)
-                cost = {**entry.cost, ratio.name: entry.metric(metric) / least}
-                related_entries[i] = replace(entry, cost=cost)
+                cost = {**run.cost, ratio.name: run.metric(metric) / least}
+                related_runs[i] = replace(run, cost=cost)
             elif optima:
-                what = ", ".join(_other(entry, optima[0]))
+                what = ", ".join(_other(run, optima[0]))
                 why = f"the optimum {optima[0].label} has another {what}"
-                extras.missing.append(Failure(f"{ratio.name} of {entry.label}", why))
-    return related_entries
+                extras.missing.append(Failure(f"{ratio.name} of {run.label}", why))
+    return related_runs
 
 
-def _other(entry: Entry, other: Entry) -> Iterator[str]:
+def _other(run: PastRun, other: PastRun) -> Iterator[str]:
     """The keys of the task in which the two differ."""
-    one, two = entry.about, other.about
+    one, two = run.about, other.about
     yield from (key for key in TASK if _alike(one.values.get(key)) != _alike(two.values.get(key)))
     if one.duration != two.duration:
         yield "simulation.duration"

@@ -8,16 +8,16 @@ from functools import partial
 from typing import Any
 
 from podusv_cli.comparison import claims, report, table
-from podusv_cli.comparison.entries import Entry
+from podusv_cli.core import json_text
 from podusv_cli.core.about import MetricAbout, RunAbout
-from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.finding import Finding, merge_findings
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures import chase, traces
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.metrics.table import CLOCKED, METRICS
 from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras
-from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import RunWriter
 
 TABLE = "comparison.csv"
@@ -25,24 +25,35 @@ TIMING = "timing.json"
 IN_REPORT = "png"  # the format of figures in report.html
 # Names that no run may have: files of the comparison's folder and columns of its table.
 RESERVED = (
-    TABLE, "comparison.md", "comparison.tex", "claims.json", "claims.md", "figures",
-    "manifest.json", "metric", "missing.json", "provenance.json", "report.html", TIMING, "unit",
-)  # fmt: skip
+    TABLE,
+    "comparison.md",
+    "comparison.tex",
+    "claims.json",
+    "claims.md",
+    "figures",
+    "manifest.json",
+    "metric",
+    "missing.json",
+    "provenance.json",
+    "report.html",
+    TIMING,
+    "unit",
+)
 
 
 @dataclass(frozen=True)
 class Result:
     """What a comparison found.
 
-    All but `entries`, the runs that have a log, are by label. An ending says why a run did not
+    All but `runs`, those that have a log, are by label. An ending says why a run did not
     finish, "" if it did. Warnings and timings are those of the runs made for this comparison.
     """
 
     abouts: Mapping[str, RunAbout]
-    entries: Sequence[Entry]
+    runs: Sequence[PastRun]
     endings: Mapping[str, str]
     differences: Mapping[str, Mapping[str, Any]]
-    table: table.Table
+    table: table.MetricTable
     verdicts: Sequence[claims.RunsVerdict]
     timings: Mapping[str, Mapping[str, float]]
     warnings: Mapping[str, Sequence[Finding]]
@@ -55,9 +66,9 @@ class Result:
     meanings: Mapping[str, str] = field(default_factory=dict)  # of the codes of warnings
 
     @property
-    def unsettled(self) -> list[str]:
+    def unsettled_runs(self) -> list[str]:
         """The runs that do not end at their target, which no table ranks."""
-        return [entry.label for entry in self.entries if entry.off_target]
+        return [run.label for run in self.runs if run.off_target]
 
 
 def write(writer: RunWriter, result: Result, extras: Extras) -> None:
@@ -79,20 +90,20 @@ def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
     forms: dict[str, Callable[[], bytes]] = {
         TABLE: lambda: table.as_csv(lasting, result.metrics).encode(),
         "comparison.md": lambda: table.as_markdown(
-            lasting, result.endings, result.metrics, result.unsettled, chosen=result.chosen
+            lasting, result.endings, result.metrics, result.unsettled_runs, chosen=result.chosen
         ).encode(),
         "comparison.tex": lambda: table.as_latex(
             lasting,
             result.metrics,
-            result.unsettled,
+            result.unsettled_runs,
             chosen=result.chosen or headlines,
             ratios=result.ratios,
         ).encode(),
-        TIMING: lambda: json_files.encode({**_claims(timed), "metrics": times}),
+        TIMING: lambda: json_text.encode({**_claims(timed), "metrics": times}),
     }
     if result.verdicts:
         forms["claims.md"] = lambda: claims.with_timed(judged, timed, TIMING).encode()
-        forms["claims.json"] = lambda: json_files.encode(_claims(judged))
+        forms["claims.json"] = lambda: json_text.encode(_claims(judged))
     return forms
 
 
@@ -102,36 +113,41 @@ def _claims(verdicts: Iterable[claims.RunsVerdict]) -> dict[str, Any]:
 
 def add_made(writer: RunWriter, extras: Extras, name: str, form: Callable[[], bytes]) -> None:
     """Write what `form` returns into a file of the folder; if it fails, `extras` notes it."""
-    content = extras.made(name, form)
+    content = extras.make_or_record(name, form)
     if content is not None:
         writer.add(name, content)
 
 
-def drawn(
-    result: Result, extras: Extras, progress: Callable[[str, float], None] | None = None,
-    names: Sequence[str] = (), formats: Sequence[str] = ("png",), workers: int = 0,
-) -> dict[str, bytes]:  # fmt: skip
+def draw_comparison(
+    result: Result,
+    extras: Extras,
+    progress: Callable[[str, float], None] | None = None,
+    names: Sequence[str] = (),
+    formats: Sequence[str] = ("png",),
+    workers: int = 0,
+) -> dict[str, bytes]:
     """The figures of all runs together by file name: as asked, and as PNGs for the report.
 
     `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
     """
     # matplotlib is slow to import
-    from podusv_cli.figures.drawing import PHONE, chosen, draw_in_parallel
+    from podusv_cli.figures.drawing import PHONE, choose_sheets, draw_in_parallel
 
     tell = partial(progress or (lambda what, fraction: None), "drawing figures")
     tell(0.0)
-    shown = dressed(
-        [(e.label, e.recording, e.about, e.plugins) for e in result.entries], result.peaks
-    )
-    sheets = chosen(names, shown, extras)
+    shown = dress_runs(result.runs, result.peaks)
+    sheets = choose_sheets(names, shown, extras)
     formats = tuple(dict.fromkeys((*formats, IN_REPORT, PHONE)))
     return draw_in_parallel(shown, sheets, formats, extras, progress=tell, workers=workers)
 
 
 def as_report(
-    result: Result, title: str, figures: Mapping[str, bytes], provenance: Mapping[str, Any],
+    result: Result,
+    title: str,
+    figures: Mapping[str, bytes],
+    provenance: Mapping[str, Any],
     missing: Iterable[object] = (),
-) -> str:  # fmt: skip
+) -> str:
     """The HTML report; `figures` as `drawn` gives them."""
     pictures: list[Picture] = []
     if figures:
@@ -150,15 +166,24 @@ def as_report(
             for name, sheet in figures_of([result.plugins]).items()
             if f"{name}.{IN_REPORT}" in figures
         ]
-    shown = dressed([(e.label, e.recording, e.about, e.plugins) for e in result.entries])
+    shown = dress_runs(result.runs)
     story = report.Story(
-        title=title, abouts=result.abouts, meanings=result.meanings,
-        endings=result.endings, missing=[str(part) for part in missing],
+        title=title,
+        abouts=result.abouts,
+        meanings=result.meanings,
+        endings=result.endings,
+        missing=[str(part) for part in missing],
         differences=result.differences,
-        noticed=merged(result.warnings), table=result.table, verdicts=result.verdicts,
-        theories={entry.label: entry.run.theory for entry in result.entries if entry.run.theory},
-        figures=pictures, provenance=provenance, chase=chase.chase(shown),
-        traces=traces.traces(shown), metrics=result.metrics, unsettled=result.unsettled,
+        noticed=merge_findings(result.warnings),
+        table=result.table,
+        verdicts=result.verdicts,
+        theories={run.label: run.theory for run in result.runs if run.theory},
+        figures=pictures,
+        provenance=provenance,
+        chase=chase.chase(shown),
+        traces=traces.traces(shown),
+        metrics=result.metrics,
+        unsettled=result.unsettled_runs,
         doubts=result.doubts,
-    )  # fmt: skip
+    )
     return report.page(story)

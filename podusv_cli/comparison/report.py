@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from podusv_cli.comparison import stability
 from podusv_cli.comparison.claims import RunsVerdict
 from podusv_cli.comparison.differences import as_text
-from podusv_cli.comparison.table import Row, Table, leaders, rows, window
+from podusv_cli.comparison.table import MetricRow, MetricTable, leaders, rows, window
 from podusv_cli.core.about import MetricAbout, RunAbout, SettingAbout
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.phrases import value_text
@@ -37,7 +37,7 @@ class Story:
     endings: Mapping[str, str]  # how each run ended
     differences: Mapping[str, Mapping[str, Any]]
     noticed: Sequence[Finding]
-    table: Table
+    table: MetricTable
     verdicts: Sequence[RunsVerdict]
     theories: Mapping[str, Mapping[str, Any]]  # theory.json of the runs that have one
     figures: Sequence[Picture]
@@ -60,36 +60,40 @@ def page(story: Story) -> str:
     table = rows(story.table, story.metrics, story.unsettled)
     first = [row for row in table if row.metric.headline] or table
     standings = _standings(story, first)
-    return environment("podusv_cli.comparison").get_template("report.html.j2").render(
-        title=story.title,
-        story=story,
-        scenario=about.values,
-        seas=[about.section(at)["kind"] for at in about.said if at.startswith("disturbance")],
-        bad={label: ending for label, ending in story.endings.items() if ending},
-        differing=as_text(story.differences),
-        answers=by_answer(story.verdicts),
-        standings=standings,
-        window=window(story.table),
-        ranked=any(standing.names or standing.more for standing in standings.values()),
-        noticed=_by_code(story),
-        metrics={row.metric.name: row.metric for row in table},
-        many=MANY,
-        few=FEW,
-        single=len(story.table.columns) == 1,
-        headlines=first,
-        others=table[len(first) :],
-        stability=(stability.HEAD, [*stability.rows(story.theories)]),
-        beside=figures[:BESIDE],
-        figures=figures,
-        changed=about.settings,
-        laws=laws([about.law for about in story.abouts.values()]),
-        parts=parts,
-        cited=any(EQUATION.search(said) for _, said, _ in parts),
-        provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
-        chase_json=Markup(chase.as_json(dict(story.chase))),
-        traces_json=Markup(chase.as_json(dict(story.traces))),
-        pieces=PIECES,
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.comparison")
+        .get_template("report.html.j2")
+        .render(
+            title=story.title,
+            story=story,
+            scenario=about.values,
+            seas=[about.section(at)["kind"] for at in about.said if at.startswith("disturbance")],
+            bad={label: ending for label, ending in story.endings.items() if ending},
+            differing=as_text(story.differences),
+            answers=by_answer(story.verdicts),
+            standings=standings,
+            window=window(story.table),
+            ranked=any(standing.names or standing.more for standing in standings.values()),
+            noticed=_by_code(story),
+            metrics={row.metric.name: row.metric for row in table},
+            many=MANY,
+            few=FEW,
+            single=len(story.table.columns) == 1,
+            headlines=first,
+            others=table[len(first) :],
+            stability=(stability.HEAD, [*stability.rows(story.theories)]),
+            beside=figures[:BESIDE],
+            figures=figures,
+            changed=about.settings,
+            laws=laws([about.law for about in story.abouts.values()]),
+            parts=parts,
+            cited=any(EQUATION.search(said) for _, said, _ in parts),
+            provenance=[(key, value_text(value)) for key, value in flat(story.provenance)],
+            chase_json=Markup(chase.as_json(dict(story.chase))),
+            traces_json=Markup(chase.as_json(dict(story.traces))),
+            pieces=PIECES,
+        )
+    )
 
 
 class Standing(NamedTuple):
@@ -100,7 +104,7 @@ class Standing(NamedTuple):
     more: int
 
 
-def _standings(story: Story, rows: Sequence[Row]) -> dict[str, Standing]:
+def _standings(story: Story, rows: Sequence[MetricRow]) -> dict[str, Standing]:
     """Every run that finished, by label; the rows are those that a reader sees first."""
     best = leaders(story.table, story.metrics, story.unsettled)
     standings = {}

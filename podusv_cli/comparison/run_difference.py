@@ -15,7 +15,7 @@ from podusv_cli.pages.page import flat
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Fault, plain
 from podusv_cli.storage import log_reader, manifest
-from podusv_cli.storage.run_folder import LOG, FinishedRun
+from podusv_cli.storage.run_folder import LOG, RunFolder
 
 Change = tuple[Any, Any]
 Numbers = tuple[float | None, float | None]
@@ -81,15 +81,15 @@ def relative(one: float | None, other: float | None) -> float | None:
     return (other - one) / abs(one) if one else 0.0
 
 
-def difference(one: FinishedRun, other: FinishedRun) -> RunDifference:
+def difference(one: RunFolder, other: RunFolder) -> RunDifference:
     """Compare two opened run folders. Raises StorageError.
 
     A log that is missing, as it was not packed, is compared by its digest.
     """
-    entries = [manifest.read(run.folder).files[LOG] for run in (one, other)]
+    entries = [manifest.read(run.path).files[LOG] for run in (one, other)]
     whole = one.has_log and other.has_log
     texts = [
-        log_reader.resolved_yaml(run.folder / LOG) if whole else run.resolved_yaml
+        log_reader.resolved_yaml(run.path / LOG) if whole else run.resolved_yaml
         for run in (one, other)
     ]
     given = dict.fromkeys((*one.metrics, *other.metrics))
@@ -104,7 +104,7 @@ def difference(one: FinishedRun, other: FinishedRun) -> RunDifference:
     )
 
 
-def _number(run: FinishedRun, name: str) -> float | None:
+def _number(run: RunFolder, name: str) -> float | None:
     number = run.metrics.get(name)
     return number if number is None or math.isfinite(number) else None
 

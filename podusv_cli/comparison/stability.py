@@ -9,9 +9,14 @@ from typing import Any
 from podusv_cli.core.errors import StorageError
 
 HEAD = (
-    "run", "window", "lambda [1/s]", "bound of V", "as printed", "largest V",
+    "run",
+    "window",
+    "lambda [1/s]",
+    "bound of V",
+    "as printed",
+    "largest V",
     "conditions of the proof that fail",
-)  # fmt: skip
+)
 
 
 def check(theory: Mapping[str, Any], path: Path) -> None:
@@ -29,8 +34,11 @@ def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
         for part, window in theory["windows"].items():
             corrected, printed = window["corrected"], window["printed"]
             numbers = (
-                corrected["lambda"], corrected["bound"], printed["bound"], window["largest_V"]
-            )  # fmt: skip
+                corrected["lambda"],
+                corrected["bound"],
+                printed["bound"],
+                window["largest_V"],
+            )
             yield [label, part, *map(_number, numbers), failing]
 
 

@@ -47,7 +47,7 @@ NUMBER = re.compile(r"(-?\d+)(\.\d+)?(?:e([+-]\d+))?")
 Names = Collection[str]
 
 
-class Row(NamedTuple):
+class MetricRow(NamedTuple):
     """A metric's row: the metric, and for every run number and ratio to the first run."""
 
     metric: MetricAbout
@@ -63,7 +63,7 @@ class Scaled(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
+class MetricTable:
     """A number for every metric (`rows`, by name) and run (`columns`), NaN where there is none."""
 
     columns: tuple[str, ...]
@@ -74,9 +74,9 @@ class Table:
         place = self.columns.index(label)
         return {name: numbers[place] for name, numbers in self.rows.items()}
 
-    def only(self, names: Collection[str]) -> Table:
+    def only(self, names: Collection[str]) -> MetricTable:
         """The table of these metrics alone."""
-        return Table(self.columns, {n: row for n, row in self.rows.items() if n in names})
+        return MetricTable(self.columns, {n: row for n, row in self.rows.items() if n in names})
 
     @property
     def finished(self) -> list[bool]:
@@ -95,17 +95,17 @@ class Table:
 
 def table(
     metrics: Mapping[str, Mapping[str, float]], known: Mapping[str, MetricAbout] = METRICS
-) -> Table:
+) -> MetricTable:
     """Metrics by label as a table: one row per metric that is known, one column per run."""
     names = [name for name in known if any(name in numbers for numbers in metrics.values())]
     rows = {
         name: tuple(float(numbers.get(name, math.nan)) for numbers in metrics.values())
         for name in names
     }
-    return Table(tuple(metrics), rows)
+    return MetricTable(tuple(metrics), rows)
 
 
-def numbers(frame: Table) -> dict[str, dict[str, float | None]]:
+def numbers(frame: MetricTable) -> dict[str, dict[str, float | None]]:
     """The table as plain data: numbers (or None) by metric and run."""
     return {
         name: {
@@ -115,7 +115,7 @@ def numbers(frame: Table) -> dict[str, dict[str, float | None]]:
     }
 
 
-def as_csv(frame: Table, known: Mapping[str, MetricAbout] = METRICS) -> str:
+def as_csv(frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS) -> str:
     """The table as CSV, in full precision, with ratios last."""
     first = frame.columns[0]
     heads = [METRIC, "unit", *frame.columns, *(f"{column}/{first}" for column in frame.columns[1:])]
@@ -135,7 +135,7 @@ def _ratio(number: float, first: float) -> float:
     return number / first if first else math.nan
 
 
-def window(frame: Table) -> str:
+def window(frame: MetricTable) -> str:
     """Up to when the numbers of each run count, as a sentence; empty where no path has ended."""
     ends = dict(zip(frame.columns, frame.rows.get(END, ()), strict=False))
     over = {label: f"{time:.5g} s" for label, time in ends.items() if not math.isnan(time)}
@@ -153,46 +153,58 @@ def window(frame: Table) -> str:
     )
 
 
-def note(frame: Table) -> str:
+def note(frame: MetricTable) -> str:
     """What the marks of the table mean; a run by itself is not ranked."""
     return f"{RANKED if len(frame.columns) > 1 else ''}{UNDEFINED}"
 
 
 def rows(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, chosen: Sequence[str] = (), brief: bool = False, ratios: bool = True,
-) -> list[Row]:  # fmt: skip
+    frame: MetricTable,
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+    brief: bool = False,
+    ratios: bool = True,
+) -> list[MetricRow]:
     """The rows of the metrics `chosen`, in this order; best numbers marked with *.
 
     None chosen: all, those that a reader sees first before the others. `unsettled` are the runs
     that do not end at their target; they are never the best, and neither is a run by itself.
     `brief` numbers have FEW digits.
     """
-    of_metrics = dict[str, Row]()
-    unranked, finished = _unranked(frame, known), frame.finished
+    of_metrics = dict[str, MetricRow]()
+    unranked, finished = _metrics_without_best(frame, known), frame.finished
     out, is_ranked = [label in unsettled for label in frame.columns], len(frame.columns) > 1
     for name, numbers in frame.rows.items():
         ranked = [x for x, off in zip(numbers, out, strict=True) if not (off or math.isnan(x))]
         best = min(ranked, default=math.nan) if name not in unranked and is_ranked else math.nan
         first, metric = numbers[0], known[name]
         texts = [
-            metric.undefined if metric.happens and finished[i] and math.isnan(number) else
-            "no limit" if metric.margin and math.isinf(number) else
-            _cell(
-                number, first if i and ratios else math.nan, math.nan if out[i] else best,
+            metric.undefined_word
+            if metric.happens and finished[i] and math.isnan(number)
+            else "no limit"
+            if metric.margin and math.isinf(number)
+            else _cell(
+                number,
+                first if i and ratios else math.nan,
+                math.nan if out[i] else best,
                 FEW if brief else DIGITS,
             )
             for i, number in enumerate(numbers)
-        ]  # fmt: skip
-        of_metrics[name] = Row(metric, texts)
+        ]
+        of_metrics[name] = MetricRow(metric, texts)
     first_read = sorted(of_metrics, key=lambda name: not known[name].headline)
     return [of_metrics[name] for name in chosen or first_read if name in of_metrics]
 
 
 def cells(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, chosen: Sequence[str] = (),
-) -> list[list[str]]:  # fmt: skip
+    frame: MetricTable,
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+) -> list[list[str]]:
     """The `rows` as text: what the metric is, unit, a text a run, and the metric's name."""
     return [
         [metric.row, metric.unit, *texts, metric.name]
@@ -200,12 +212,14 @@ def cells(
     ]
 
 
-def head(frame: Table) -> list[str]:
+def head(frame: MetricTable) -> list[str]:
     """What stands above the `cells`."""
     return [*HEAD, *frame.columns, LAST]
 
 
-def _unranked(frame: Table, known: Mapping[str, MetricAbout] = METRICS) -> list[str]:
+def _metrics_without_best(
+    frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS
+) -> list[str]:
     """Metrics in which no run is marked best.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
@@ -221,26 +235,26 @@ def _unranked(frame: Table, known: Mapping[str, MetricAbout] = METRICS) -> list[
 
 
 def leaders(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
+    frame: MetricTable, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = ()
 ) -> dict[str, list[str]]:
     """The metrics in which each run is best; equal numbers and measured times rank nobody.
 
     Neither do `unsettled` runs, which do not end at their target.
     """
-    unranked = _unranked(frame, known)
+    unranked = _metrics_without_best(frame, known)
     best: dict[str, list[str]] = {column: [] for column in frame.columns if column not in unsettled}
     for name, numbers in frame.rows.items():
         paired = zip(frame.columns, numbers, strict=True)
         ranked = {label: x for label, x in paired if label in best and not math.isnan(x)}
-        shown = {label: _shown(x) for label, x in ranked.items()}
+        shown = {label: _format_number(x) for label, x in ranked.items()}
         if name not in unranked and len({*shown.values()}) > 1:
-            least = _shown(min(ranked.values()))
+            least = _format_number(min(ranked.values()))
             for label in (label for label, text in shown.items() if text == least):
                 best[label].append(name)
     return best
 
 
-def _shown(number: float, digits: int = DIGITS) -> str:
+def _format_number(number: float, digits: int = DIGITS) -> str:
     """As readers see it; numbers are compared as printed. FEW digits are all there, zeros too."""
     if digits == FEW and number:
         return f"{number:#.{digits}g}".removesuffix(".")
@@ -250,16 +264,20 @@ def _shown(number: float, digits: int = DIGITS) -> str:
 def _cell(number: float, first: float, best: float, digits: int) -> str:
     if math.isnan(number):
         return "-"
-    shown = _shown(number, digits)
-    mark = "*" if shown == _shown(best, digits) else ""
+    shown = _format_number(number, digits)
+    mark = "*" if shown == _format_number(best, digits) else ""
     ratio = f" ({number / first:.3g})" if first and math.isfinite(first) else ""
     return f"{shown}{mark}{ratio}"
 
 
 def as_markdown(
-    frame: Table, endings: Mapping[str, str], known: Mapping[str, MetricAbout] = METRICS,
-    unsettled: Names = (), *, chosen: Sequence[str] = (),
-) -> str:  # fmt: skip
+    frame: MetricTable,
+    endings: Mapping[str, str],
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+) -> str:
     """The table in Markdown, followed by the reasons why runs did not finish."""
     last = {label: ending.strip().splitlines()[-1:] for label, ending in endings.items()}
     failures = [
@@ -281,9 +299,13 @@ def as_markdown(
 
 
 def as_latex(
-    frame: Table, known: Mapping[str, MetricAbout] = METRICS, unsettled: Names = (),
-    *, chosen: Sequence[str] = (), ratios: bool = False,
-) -> str:  # fmt: skip
+    frame: MetricTable,
+    known: Mapping[str, MetricAbout] = METRICS,
+    unsettled: Names = (),
+    *,
+    chosen: Sequence[str] = (),
+    ratios: bool = False,
+) -> str:
     """The table in LaTeX, as wide as the column, or in `table*` the page.
 
     Symbols or words, numbers of FEW digits with their decimal points aligned, the best of a row in
@@ -294,14 +316,14 @@ def as_latex(
         _of_a_power(row)
         for row in rows(frame, known, unsettled, chosen=chosen, brief=True, ratios=ratios)
     ]
-    heads = [_broken(label) for label in frame.columns]
-    lines = [[*HEAD, *(rf"\multicolumn{{2}}{{c}}{{{_stacked(head)}}}" for head in heads)]]
+    heads = [_break_label(label) for label in frame.columns]
+    lines = [[*HEAD, *(rf"\multicolumn{{2}}{{c}}{{{_stack_lines(head)}}}" for head in heads)]]
     for metric, texts, power in shown:
         words = f"${metric.symbol}$" if metric.symbol else escaping.latex(metric.row)
         parts = [part for text in texts for part in _cut(text)]
         unit = [rf"$10^{{{power}}}$"] if power else []
         if not power or metric.unit != "1":
-            unit.append(quantities.raised(metric.unit))
+            unit.append(quantities.raise_powers(metric.unit))
         lines.append([words, " ".join(unit), *parts])
     top, *body = (" & ".join(cells) + r" \\" for cells in lines)
     width = _least_width(heads, shown)
@@ -311,7 +333,7 @@ def as_latex(
     return "\n".join([*opening, top, r"\midrule", *body, r"\bottomrule", r"\end{tabularx}}", ""])
 
 
-def _of_a_power(row: Row) -> Scaled:
+def _of_a_power(row: MetricRow) -> Scaled:
     """A row of large or small numbers as multiples of a power of ten, which its unit then has."""
     numbers = [float(match[0]) for text in row.texts if (match := NUMBER.match(text))]
     powers = [math.floor(math.log10(abs(number))) for number in numbers if number]
@@ -319,7 +341,7 @@ def _of_a_power(row: Row) -> Scaled:
     if (max(powers, default=0) > -SMALL and power < FEW) or max(powers) - power >= FEW:
         return Scaled(*row, 0)
     texts = [
-        NUMBER.sub(lambda own: _shown(float(own[0]) / 10.0**power, FEW), text, count=1)
+        NUMBER.sub(lambda own: _format_number(float(own[0]) / 10.0**power, FEW), text, count=1)
         for text in row.texts
     ]
     return Scaled(row.metric, texts, power)
@@ -341,13 +363,13 @@ def _lengths(text: str) -> tuple[int, int]:
     return len(whole), len(point) + POWER * bool(power) + len(ratio)
 
 
-def _broken(label: str) -> list[str]:
+def _break_label(label: str) -> list[str]:
     """A label in lines, broken behind underscores."""
     lines = textwrap.wrap(label.replace("_", "_ "), LABEL, break_long_words=False)
     return [line.replace("_ ", "_") for line in lines] or [label]
 
 
-def _stacked(lines: Sequence[str]) -> str:
+def _stack_lines(lines: Sequence[str]) -> str:
     stack = r"\\".join(map(escaping.latex, lines))
     return rf"\shortstack{{{stack}}}" if len(lines) > 1 else stack
 

@@ -57,7 +57,7 @@ class Facts:
     noise: tuple[float, ...] = (0.0,) * 6
     duration: float = 0.0
 
-    def _given(self, u: float, demand: tuple[float, float]) -> float:
+    def _given_demand(self, u: float, demand: tuple[float, float]) -> float:
         """What is given of a demand at the speed u [m/s], on the axis of its largest number."""
         x, axis = np.array([0.0, 0.0, 0.0, u, 0.0, 0.0]), int(abs(demand[1]) > abs(demand[0]))
         try:
@@ -68,7 +68,7 @@ class Facts:
     def _ahead(self, u: float) -> float:
         """The largest surge force at the speed u [N]; infinite without a limit."""
         asked = ENOUGH * A0 * self.nominal.m11
-        given = self._given(u, (asked, 0.0))
+        given = self._given_demand(u, (asked, 0.0))
         return given if given < DELIVERED * asked else math.inf
 
     @cached_property
@@ -109,7 +109,7 @@ class Facts:
         asked = ENOUGH * W0 * W0 * self.nominal.m33 / self.lam
         u = CRUISE * self.U
         cruising = self._drag(u)
-        given = [side * self._given(u, (cruising, side * asked)) for side in (1.0, -1.0)]
+        given = [side * self._given_demand(u, (cruising, side * asked)) for side in (1.0, -1.0)]
         least = min(given)
         return least if least < DELIVERED * asked else asked / ENOUGH
 

@@ -42,7 +42,7 @@ class MetricAbout:
         return self.words or self.meaning
 
     @property
-    def undefined(self) -> str:
+    def undefined_word(self) -> str:
         """What a table has for a run that finished without the number."""
         return "never" if self.happens else "-"
 
@@ -72,9 +72,11 @@ class Claim(Component):
 
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(
-        "ours", "", "where it was published: section, figure, equation; what begins with `ours` "
+        "ours",
+        "",
+        "where it was published: section, figure, equation; what begins with `ours` "
         "was not published: it holds or fails, where a published claim is reproduced or not",
-    )  # fmt: skip
+    )
     expect: str = value(..., "", "the claim as an expression over runs; see podusv docs claims")
     given: str = value(
         "", "", "a condition without which the claim has no meaning: if it fails, cannot tell"
@@ -83,9 +85,11 @@ class Claim(Component):
         0.05, "", "relative: how near `==` is, and how clear `<` and `>` have to be", ge=0, lt=1
     )
     untestable: str = value(
-        "", "", "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
+        "",
+        "",
+        "why no run at hand can decide it: the verdict is `cannot tell`, and what the runs "
         "show of `expect` stands beside it",
-    )  # fmt: skip
+    )
     remark: str = value("", "", "choices made where the source is silent")
 
 
@@ -94,9 +98,11 @@ class StudyClaim(Component):
 
     says: str = value(..., "", "the claim, in a sentence of your own")
     source: str = value(
-        "ours", "", "where it was published; what begins with `ours` was not published: it holds "
+        "ours",
+        "",
+        "where it was published; what begins with `ours` was not published: it holds "
         "or fails, where a published claim is reproduced or not",
-    )  # fmt: skip
+    )
     expect: str = value(
         ..., "", "the claim as an expression over all draws; see podusv docs study_claims"
     )
@@ -110,20 +116,20 @@ class StudyClaim(Component):
     remark: str = value("", "", "choices made where the source is silent")
 
 
-class _Plain(BaseModel):
+class _PlainJson(BaseModel):
     """Read from JSON; keys that nobody knows are passed over."""
 
     model_config = ConfigDict(strict=True, frozen=True)
 
 
-class SweepCall(_Plain):
+class SweepCall(_PlainJson):
     """How many draws one `podusv sweep run` asked for, and when it began."""
 
     draws: PositiveInt
     started: str
 
 
-class QuantityAbout(_Plain):
+class QuantityAbout(_PlainJson):
     """A drawn quantity: the keys that it changes, and how it is drawn, in words.
 
     `is_seed`: a larger number means nothing, as of seeds and of rows of a table.
@@ -134,7 +140,7 @@ class QuantityAbout(_Plain):
     is_seed: bool
 
 
-class StudyIdentity(_Plain):
+class StudyIdentity(_PlainJson):
     """What the numbers of a study depend on, by dotted keys, and what was asked for."""
 
     draws: PositiveInt
@@ -190,7 +196,7 @@ class StudyAbout(StudyIdentity):
 PROSE = (".source", ".validity")  # endings of keys that are read by people alone
 
 
-class SettingAbout(_Plain):
+class SettingAbout(_PlainJson):
     """A key with its value and what this would be without it, as they are shown."""
 
     key: str
@@ -204,7 +210,7 @@ class SettingAbout(_Plain):
 Spans = tuple[tuple[float, float], ...]
 
 
-class RunAbout(_Plain):
+class RunAbout(_PlainJson):
     """about.json: a run as whoever reads its log has to know it.
 
     `values` is the scenario as plain data. `path_end` is where a followed path is over, and

@@ -21,7 +21,7 @@ FORMULA = tuple("=+-@\uff1d\uff0b\uff0d\uff20")
 
 def visible(text: object) -> str:
     r"""The text on one line; what would move a cursor or turn letters around, as `\x1b`."""
-    return _spelt(str(text), _named)
+    return _spelt(str(text), _entity_name)
 
 
 def markdown(text: str) -> str:
@@ -76,7 +76,7 @@ def _shows(letter: str) -> bool:
     return letter.isprintable() or unicodedata.category(letter) == "Zs"  # spaces of any width
 
 
-def _named(letter: str) -> str:
+def _entity_name(letter: str) -> str:
     return letter.encode("unicode_escape").decode()
 
 

@@ -46,7 +46,7 @@ class Finding:
         return {"code": self.code, "where": self.where, "text": self.text}
 
 
-def merged(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
+def merge_findings(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
     """Findings of several runs (by label), each once, with its runs unless all runs have it."""
     alike: dict[Finding, list[str]] = {}
     for label, several in findings.items():
@@ -110,9 +110,15 @@ Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 
 def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
     def kind_of(
-        name: str, *, about: str, meaning: str, condition: str = "", remedy: str = "",
-        law: type[Any] = object, needs: tuple[str, ...] = (),
-    ) -> Decorator:  # fmt: skip
+        name: str,
+        *,
+        about: str,
+        meaning: str,
+        condition: str = "",
+        remedy: str = "",
+        law: type[Any] = object,
+        needs: tuple[str, ...] = (),
+    ) -> Decorator:
         """Make a kind of finding of a function.
 
         `before` a run it takes a `Case`, `after` a run the scenario and its recording.

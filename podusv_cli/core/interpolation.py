@@ -26,7 +26,7 @@ def linear(s: float, before: float, after: float) -> float:
 
 
 @kernel
-def passed(level: float, before: float, after: float) -> float:
+def passing_place(level: float, before: float, after: float) -> float:
     """Where on the straight line from `before` (0) to `after` (1) the level is passed."""
     return (level - before) / (after - before)
 

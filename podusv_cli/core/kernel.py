@@ -130,7 +130,7 @@ def padded_rounds(whole: int, count: int) -> int:
     return whole
 
 
-def taken(function: Any, offered: Collection[str]) -> tuple[str, ...]:
+def arguments_of(function: Any, offered: Collection[str]) -> tuple[str, ...]:
     """The arguments that a kernel takes, in its own order; it names those that it needs.
 
     Raises LawError for one that is not among those offered.
@@ -148,8 +148,8 @@ def taken(function: Any, offered: Collection[str]) -> tuple[str, ...]:
 
 
 def call(function: Any, **offered: Any) -> Any:
-    """What a kernel gives for those of these arguments that it takes; raises as `taken`."""
-    return function(*(offered[name] for name in taken(function, offered)))
+    """What a kernel gives for those of these arguments that it takes; raises as `arguments_of`."""
+    return function(*(offered[name] for name in arguments_of(function, offered)))
 
 
 class NoKernel(LawError):
@@ -168,9 +168,11 @@ def absent(name: str) -> Callable[[], None]:
 def taking(function: Any, arguments: Sequence[str], named: Any = None) -> Any:
     """A kernel that takes all of these arguments and passes `function` those that it names.
 
-    With `named` it passes `named(k)` for the constants k. Raises LawError as `taken`.
+    With `named` it passes `named(k)` for the constants k. Raises LawError as `arguments_of`.
     """
-    passed = ", ".join("named(k)" if a == "k" and named else a for a in taken(function, arguments))
+    passed = ", ".join(
+        "named(k)" if a == "k" and named else a for a in arguments_of(function, arguments)
+    )
     text = f"def adapter({', '.join(arguments)}):\n    kernel({passed})"
     scope: dict[str, Any] = {"kernel": function, "named": named, TEXT: text}
     scope["__name__"] = function.__module__
@@ -187,7 +189,7 @@ def with_globals(function: Any, name: str, **replaced: Any) -> Any:
     return copy
 
 
-def transplanted(function: Any, parts: Mapping[Any, Any]) -> Any:
+def transplant(function: Any, parts: Mapping[Any, Any]) -> Any:
     """A copy of a kernel, and of all kernels it calls, with other objects in place of some.
 
     `parts` says what stands for a kernel, a module or a builtin. So the copy computes with other
@@ -200,7 +202,7 @@ def transplanted(function: Any, parts: Mapping[Any, Any]) -> Any:
         if other is not None:
             replaced[name] = other
         elif is_kernel(thing):
-            replaced[name] = transplanted(thing, parts)
+            replaced[name] = transplant(thing, parts)
     return with_globals(function, function.__name__, **replaced)
 
 

@@ -13,26 +13,26 @@ MOST_LINES = 3  # of a text that is shown as it is
 LONGEST_WORD = 400  # characters that are shown as they are
 
 
-def quoted(text: str) -> str:
+def quote(text: str) -> str:
     """The text in quotes on one line, cut where it is long."""
     return repr(text if len(text) <= 60 else text[:57] + "...")
 
 
-def found(content: Any, text: str) -> str:
+def describe_found(content: Any, text: str) -> str:
     """A value as its writer would recognise it; `text` is a scalar as written."""
     if isinstance(content, dict):
         return "a mapping of keys" if content else "an empty mapping"
     if isinstance(content, tuple):
         return f"a list of {len(content)}"
     if isinstance(content, str):
-        return quoted(content)
+        return quote(content)
     return f"{text:.60}" or "nothing"
 
 
 def as_yaml(content: Any) -> str:
     """A plain value as it would stand in a scenario, cut where it is long."""
     text = content if isinstance(content, str) and content else json.dumps(content)
-    return quoted(text) if len(text) > 60 or not text.isprintable() else text
+    return quote(text) if len(text) > 60 or not text.isprintable() else text
 
 
 def value_text(value: Any) -> str:
@@ -59,9 +59,14 @@ def without_case(word: str) -> str:
 
 # Words that others use, and the keys that podusv has for them.
 SYNONYMS = {
-    "gnss": "position", "gps": "position", "compass": "heading", "gyro": "yaw_rate",
-    "speed_log": "velocity", "rate": "period", "frequency": "period",
-}  # fmt: skip
+    "gnss": "position",
+    "gps": "position",
+    "compass": "heading",
+    "gyro": "yaw_rate",
+    "speed_log": "velocity",
+    "rate": "period",
+    "frequency": "period",
+}
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
@@ -73,7 +78,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
-def unknown(what: str, word: str, known: Iterable[str], listed: str = "") -> str:
+def unknown_word(what: str, word: str, known: Iterable[str], listed: str = "") -> str:
     """`unknown key; did you mean 'length'? (allowed: ...)`.
 
     Of many words the nearest, if there is a command that lists all of them.

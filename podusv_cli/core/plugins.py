@@ -26,9 +26,17 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.foreign import in_folder
 
 ROOMS = (
-    "controllers", "paths", "disturbances", "actuators", "measurements", "estimators", "vessels",
-    "metrics", "figures", "findings",
-)  # fmt: skip
+    "controllers",
+    "paths",
+    "disturbances",
+    "actuators",
+    "measurements",
+    "estimators",
+    "vessels",
+    "metrics",
+    "figures",
+    "findings",
+)
 GROUPS = tuple(f"podusv.{room}" for room in ROOMS)
 TEXT = "__text__"  # where a module of a file keeps its text; the file may be edited or gone
 MODULES = "podusv_plugins"  # what the modules of files are called: podusv_plugins.my_law_1a2b3c4d
@@ -54,19 +62,19 @@ class Plugin:
 
     def members(self, room: str) -> Iterator[Any]:
         """Everything in this plug-in that may belong to a room. Raises LawError."""
-        for thing in self._offered(room):
+        for thing in self._offers(room):
             yield from _inside(thing)
 
     def folders(self, room: str) -> list[str]:
         """The packages of this plug-in whose YAML files are presets of a room. Raises LawError."""
-        return [thing.__name__ for thing in self._offered(room) if hasattr(thing, "__path__")]
+        return [thing.__name__ for thing in self._offers(room) if hasattr(thing, "__path__")]
 
-    def _offered(self, room: str) -> Iterator[Any]:
+    def _offers(self, room: str) -> Iterator[Any]:
         for place, thing in self.offers:
             if place in ("", room):
-                yield self._loaded(thing) if isinstance(thing, EntryPoint) else thing
+                yield self._load_point(thing) if isinstance(thing, EntryPoint) else thing
 
-    def _loaded(self, point: EntryPoint) -> Any:
+    def _load_point(self, point: EntryPoint) -> Any:
         try:
             return point.load()
         except Exception as error:
@@ -115,10 +123,10 @@ def _module(name: str, path: str, text: str) -> ModuleType:
     """The module that is made of just this text; Python's own import might take an older one."""
     whole = f"{MODULES}.{name}"
     with _ONE_AT_A_TIME:  # another thread would find a module that is not complete
-        return sys.modules.get(whole) or _executed(whole, path, text)
+        return sys.modules.get(whole) or _execute_module(whole, path, text)
 
 
-def _executed(whole: str, path: str, text: str) -> ModuleType:
+def _execute_module(whole: str, path: str, text: str) -> ModuleType:
     module = ModuleType(whole)
     module.__file__ = str(Path(path).resolve())
     vars(module)[TEXT] = text
@@ -144,7 +152,7 @@ def _fault(error: BaseException, path: str) -> str:
 
 
 @cache
-def installed() -> Plugins:
+def installed_plugins() -> Plugins:
     """What installed packages offer by entry points of the groups `podusv.controllers` and so on.
 
     Their modules are imported when something is looked for in their room. A package that lies in

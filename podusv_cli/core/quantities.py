@@ -22,12 +22,12 @@ def time_in_words(seconds: float) -> str:
     return _in_words(seconds, TIMES)
 
 
-def raised(unit: str) -> str:
+def raise_powers(unit: str) -> str:
     """A unit with its powers raised, as LaTeX and matplotlib read it: `m$^2$ s` for `m2 s`."""
     return re.sub(r"(?<=[A-Za-z])(\d)", r"$^\1$", unit)
 
 
-def lettered(symbol: str) -> list[tuple[str, str]]:
+def letters_of_symbol(symbol: str) -> list[tuple[str, str]]:
     """The symbol of a signal as text: what stands on the line, and what below it, in turns."""
     plain = re.sub(
         r"\\([A-Za-z]+) ?", lambda m: ACCENTS.get(m[1], html5.get(f"{m[1]};", m[1])), symbol

@@ -74,14 +74,14 @@ def any_of(package: str, base: type[Kind], plugins: Plugins = ()) -> Any:
     return Annotated[reduce(or_, choices), Field(discriminator="kind")]
 
 
-def named(package: str, kind: type[Named], plugins: Plugins = ()) -> dict[str, Named]:
+def find_by_name(package: str, kind: type[Named], plugins: Plugins = ()) -> dict[str, Named]:
     """Every object of class `kind` in the modules of `package` and in the plug-ins, by its `name`.
 
     Modules come in alphabetical order, objects in the order of their definition. Raises LawError
     for two objects of one name.
     """
     by_name: dict[str, tuple[str, Named]] = {}
-    for origin, thing in _placed(package, plugins):
+    for origin, thing in _places_of_objects(package, plugins):
         if isinstance(thing, kind):
             name = thing.name  # type: ignore[attr-defined]
             first, other = by_name.setdefault(name, (origin, thing))
@@ -118,10 +118,10 @@ def _signals(thing: Any) -> Iterator[Signal]:
 
 
 def _members(package: str, plugins: Plugins) -> Iterator[Any]:
-    yield from (thing for _, thing in _placed(package, plugins))
+    yield from (thing for _, thing in _places_of_objects(package, plugins))
 
 
-def _placed(package: str, plugins: Plugins) -> Iterator[tuple[str, Any]]:
+def _places_of_objects(package: str, plugins: Plugins) -> Iterator[tuple[str, Any]]:
     """Everything in the modules of a package and in the plug-ins, and which of them it is in."""
     yield from scan_package(package)
     for plugin in plugins:
@@ -134,12 +134,12 @@ def scan_package(package: str) -> tuple[tuple[str, Any], ...]:
     return tuple(
         (module.name, thing)
         for module in iter_modules(import_module(package).__path__, f"{package}.")
-        for name, thing in vars(_imported(module.name)).items()
+        for name, thing in vars(_import_module(module.name)).items()
         if not name.startswith("__")
     )
 
 
-def _imported(module: str) -> Any:
+def _import_module(module: str) -> Any:
     try:
         return import_module(module)
     except SyntaxError as error:  # which names its place

@@ -86,12 +86,10 @@ LOOP = (
     Signal("b_u", "N", "disturbance force in surge"),
     Signal("b_v", "N", "disturbance force in sway"),
     Signal("b_r", "N m", "disturbance moment in yaw"),
-)  # fmt: skip
+)
 
 
-def by_name(
-    declared: Iterable[tuple[Callable[[], str], Iterable[Signal]]],
-) -> dict[str, Signal]:
+def by_name(declared: Iterable[tuple[Callable[[], str], Iterable[Signal]]]) -> dict[str, Signal]:
     """Signals of the parts of one log, by name.
 
     Raises LawError where two have the same name; what a part is called is only asked then.
@@ -107,13 +105,14 @@ def by_name(
             other, known = owners.setdefault(signal.name, (part, signal))
             if (other, known) != (part, signal):
                 raise LawError(
-                    f"{part()}: it logs {signal.name!r}, {described(signal)}, and {other()} logs "
-                    f"{described(known)} under this name; give one of them another name"
+                    f"{part()}: it logs {signal.name!r}, {describe_signal(signal)}, "
+                    f"and {other()} logs {describe_signal(known)} under this name; "
+                    "give one of them another name"
                 )
     return {name: signal for name, (_, signal) in owners.items()}
 
 
-def described(signal: Signal) -> str:
+def describe_signal(signal: Signal) -> str:
     """`distance to the target (18) [m]`."""
     along = f" along {', '.join(signal.axes)}" if signal.axes else ""
     return f"{signal.meaning} [{signal.unit}]{along}"

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.units import NUMBER, allowed, spelled
+from podusv_cli.core.units import NUMBER, spell_unit, units_allowed_for
 
 LARGEST = 900_000  # characters: the resolved scenario, which has the rows, must be readable
 NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
 Layouts = Mapping[int, Sequence[str]]  # by count: the columns' names, as `b_u [N]`
 
 
-class Line(NamedTuple):
+class TextLine(NamedTuple):
     """A line of the text with its number from 1, cut at its commas."""
 
     number: int
@@ -35,7 +35,7 @@ def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
     header, lines = lines_of(text)
     if len(lines) < 2:
         raise ValueError(f"{noun} needs at least two lines, has {len(lines)}")
-    _counted(lines, noun, layouts)
+    _check_counts(lines, noun, layouts)
     rows = _numbers(lines, noun)
     if header:
         names = layouts[rows.shape[1]]
@@ -49,14 +49,14 @@ def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
     return rows
 
 
-class Named(NamedTuple):
+class NamedRows(NamedTuple):
     """Rows of numbers under names, as text with commas has them."""
 
     names: tuple[str, ...]
     rows: Vector
 
 
-def named_rows(text: str, noun: str) -> Named:
+def named_rows(text: str, noun: str) -> NamedRows:
     """The rows under the names in the first line; `noun` is what the text is called.
 
     Raises ValueError, which does not repeat the text but for names.
@@ -73,17 +73,17 @@ def named_rows(text: str, noun: str) -> Named:
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise ValueError(f"line {header.number} of {noun} names {twice[0]!r} twice")
-    _counted(lines, noun, {len(names): names})
-    return Named(names, _numbers(lines, noun))
+    _check_counts(lines, noun, {len(names): names})
+    return NamedRows(names, _numbers(lines, noun))
 
 
-def lines_of(text: str) -> tuple[Line | None, list[Line]]:
+def lines_of(text: str) -> tuple[TextLine | None, list[TextLine]]:
     """The header, which is a first line of several cells without any number, and all other lines.
 
     # starts a comment.
     """
     lines = [line.partition("#")[0].strip() for line in text.removeprefix("\ufeff").splitlines()]
-    filled = [Line(number, _cells(line)) for number, line in enumerate(lines, 1) if line]
+    filled = [TextLine(number, _cells(line)) for number, line in enumerate(lines, 1) if line]
     if filled and len(filled[0].cells) > 1 and not any(map(_is_number, filled[0].cells)):
         return filled[0], filled[1:]
     return None, filled
@@ -98,19 +98,19 @@ def _is_number(cell: str) -> bool:
     return bool(NUMBER.fullmatch(cell) or NOT_FINITE.fullmatch(cell))
 
 
-def _counted(lines: list[Line], noun: str, layouts: Layouts) -> None:
+def _check_counts(lines: list[TextLine], noun: str, layouts: Layouts) -> None:
     for number, cells in lines:
         if len(cells) not in layouts or len(cells) != len(lines[0].cells):
-            wanted = " or ".join(f"{n} ({_listed(names)})" for n, names in layouts.items())
+            wanted = " or ".join(f"{n} ({_list_names(names)})" for n, names in layouts.items())
             found = "1 value; separate values by commas:" if len(cells) == 1 else f"{len(cells)};"
             raise ValueError(f"line {number} of {noun} has {found} every line must have {wanted}")
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     return ", ".join(name.partition(" [")[0] for name in names)
 
 
-def _numbers(lines: list[Line], noun: str) -> Vector:
+def _numbers(lines: list[TextLine], noun: str) -> Vector:
     if wrong := _wrong_cell(lines, noun):
         raise ValueError(wrong)
     rows = np.array([cells for _, cells in lines], dtype=float)
@@ -121,7 +121,7 @@ def _numbers(lines: list[Line], noun: str) -> Vector:
     return rows
 
 
-def _wrong_cell(lines: list[Line], noun: str) -> str:
+def _wrong_cell(lines: list[TextLine], noun: str) -> str:
     """Where a cell is no number; empty where all are."""
     for number, cells in lines:
         for column, cell in enumerate(cells, 1):
@@ -130,7 +130,7 @@ def _wrong_cell(lines: list[Line], noun: str) -> str:
     return ""
 
 
-def _in_order(rows: Vector, order: list[int], header: Line, noun: str) -> Vector:
+def _in_order(rows: Vector, order: list[int], header: TextLine, noun: str) -> Vector:
     """The rows with their columns in this order; behind a header that does not name each, as is."""
     if order == sorted(order):
         return rows
@@ -139,25 +139,25 @@ def _in_order(rows: Vector, order: list[int], header: Line, noun: str) -> Vector
     return rows[:, order]
 
 
-def _in_own_units(header: Line, names: Sequence[str]) -> tuple[Line, list[float]]:
+def _in_own_units(header: TextLine, names: Sequence[str]) -> tuple[TextLine, list[float]]:
     """The header with the units that columns of these names have, and the factor to each."""
-    own = dict(map(_parted, names))
+    own = dict(map(_split_unit, names))
     cells, factors = list(header.cells), [1.0] * len(header.cells)
     for i, cell in enumerate(header.cells):
-        name, unit = _parted(cell)
-        factor = allowed(own[name]).get(spelled(unit)) if own.get(name) else None
+        name, unit = _split_unit(cell)
+        factor = units_allowed_for(own[name]).get(spell_unit(unit)) if own.get(name) else None
         if factor:
             cells[i], factors[i] = f"{name} [{own[name]}]", float(factor)
-    return Line(header.number, cells), factors
+    return TextLine(header.number, cells), factors
 
 
-def _parted(cell: str) -> tuple[str, str]:
+def _split_unit(cell: str) -> tuple[str, str]:
     """Name and unit of "b_u [N]"; without a unit, none."""
     name, _, unit = " ".join(cell.split()).partition(" [")
     return name, unit.removesuffix("]")
 
 
-def columns(header: Line, names: Sequence[str], noun: str) -> list[int]:
+def columns(header: TextLine, names: Sequence[str], noun: str) -> list[int]:
     """Where the header has these columns. A name stands with its unit, `b_u [N]`, or without.
 
     Raises ValueError where one is missing, unknown or given twice.

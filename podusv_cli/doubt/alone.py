@@ -12,7 +12,7 @@ import numpy as np
 
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.compared import ClaimNumber
-from podusv_cli.doubt.judged import Judge, Judged, moved
+from podusv_cli.doubt.judged import Judge, Judged, world_with
 
 NEAR = 1e-4  # of the scale: how near the search looks before it looks at rounding
 BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that turn and turn back
@@ -89,7 +89,7 @@ class TriedChoice:
 
     def turns(self, claim: str, base: Judged) -> list[Turn]:
         """Where a claim's verdict turns: for words each that does, for numbers on each side."""
-        turned = [t for t in self.trials if t.judged.turned(claim, base)]
+        turned = [t for t in self.trials if t.judged.turns(claim, base)]
         if not self.choice.range:
             return [Turn(self.choice, t.value, self.choice.own, 0.0) for t in turned]
         sides = ([t for t in turned if (t.value > self.choice.own) == up] for up in (True, False))
@@ -102,26 +102,29 @@ class TriedChoice:
         own = self.choice.own
         first = min(turned, key=lambda t: abs(t.value - own))
         inside = [
-            value for value in holding
+            value
+            for value in holding
             if (value > own) == (first.value > own) and abs(value - own) < abs(first.value - own)
-        ]  # fmt: skip
+        ]
         held = max(inside, key=lambda value: abs(value - own), default=own)
         return Turn(self.choice, first.value, held, abs(first.value - own))
 
 
-def explored(
+def explore_choice(
     choice: Choice, judge: Judge, base: Judged, numbers: Mapping[str, Sequence[ClaimNumber]]
 ) -> TriedChoice:
     """Try the values of a choice, and find where verdicts turn; `numbers` are those of a claim."""
     if not choice.range:
         return TriedChoice(
-            choice, tuple(TriedValue(v, judge(moved(choice, v))) for v in choice.values)
+            choice, tuple(TriedValue(v, judge(world_with(choice, v))) for v in choice.values)
         )
     sides = [_Side(choice, end, judge, base) for end in ends(choice)]
     acting = any(
-        _acts(side.tried(share * side.whole), claim, base)
-        for side in sides for share in SHOWING for claim in base.answers
-    )  # fmt: skip
+        _acts(side.judge_at(share * side.whole), claim, base)
+        for side in sides
+        for share in SHOWING
+        for claim in base.answers
+    )
     for side in sides if acting else ():
         places = side.tried_between()
         for claim in base.answers:
@@ -153,23 +156,25 @@ class _Side:
         assert choice.range
         self.choice, self.end, self.judge, self.base = choice, end, judge, base
         self.scale, self.whole = choice.range.scale, abs(end - choice.own)
-        self.trials = {self.whole: (end, judge(moved(choice, end)))}  # a value and what is said
+        self.trials = {
+            self.whole: (end, judge(world_with(choice, end)))
+        }  # a value and what is said
 
-    def tried(self, distance: float) -> Judged:
+    def judge_at(self, distance: float) -> Judged:
         """What the claims say there."""
         if distance not in self.trials:
             value = self.choice.own + math.copysign(distance, self.end - self.choice.own)
-            self.trials[distance] = value, self.judge(moved(self.choice, value))
+            self.trials[distance] = value, self.judge(world_with(self.choice, value))
         return self.trials[distance][1]
 
-    def turned(self, distance: float, claim: str) -> bool:
+    def turns_at(self, distance: float, claim: str) -> bool:
         """Whether a verdict is the opposite there."""
-        return self.tried(distance).turned(claim, self.base)
+        return self.judge_at(distance).turns(claim, self.base)
 
     def tried_between(self) -> list[float]:
         """Try the places that every side has, and give all that were tried."""
         for distance in (NEAR * self.scale, *(share * self.whole for share in BETWEEN)):
-            self.tried(distance)
+            self.judge_at(distance)
         return sorted(self.trials)
 
 
@@ -179,12 +184,12 @@ def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumb
     It ends with a turn, or where the number would have to fall more steeply than it may.
     """
     unknown = side.base.answers[claim] is None  # so that nothing can turn it
-    if unknown or any(side.turned(distance, claim) for distance in side.trials):
+    if unknown or any(side.turns_at(distance, claim) for distance in side.trials):
         return
     edges = number.turning(side.base.numbers[claim])
 
     def away(distance: float) -> float:
-        judged = side.tried(distance) if distance else side.base
+        judged = side.judge_at(distance) if distance else side.base
         far = min(abs(number.of(judged.numbers.get(claim, {})) - edge) for edge in edges)
         return far if math.isfinite(far) else math.inf
 
@@ -202,7 +207,7 @@ def _golden(
         if away(b) > STEEPER * max(slopes[0] * (c - b), slopes[1] * (b - a)):
             return
         new = b - GOLDEN * (b - a) if b - a > c - b else b + GOLDEN * (c - b)
-        if side.turned(new, claim):
+        if side.turns_at(new, claim):
             return
         low, high = sorted((b, new))
         a, b, c = (a, low, high) if away(low) < away(high) else (low, high, c)
@@ -212,9 +217,9 @@ def _bisect(side: _Side, claim: str) -> None:
     """Find where a verdict turns first, to `SHARP`, or that one unit in the last place turns it."""
     near, last = NEAR * side.scale, math.ulp(side.choice.own or side.scale)
     pairs = pairwise([last, *sorted(side.trials)])
-    held, turned = next((p for p in pairs if side.turned(p[1], claim)), (0.0, 0.0))
-    if not turned or (turned <= near and side.turned(last, claim)):
+    held, turned = next((p for p in pairs if side.turns_at(p[1], claim)), (0.0, 0.0))
+    if not turned or (turned <= near and side.turns_at(last, claim)):
         return
     while turned / held > SHARP:
         middle = math.sqrt(turned * held)
-        turned, held = (middle, held) if side.turned(middle, claim) else (turned, middle)
+        turned, held = (middle, held) if side.turns_at(middle, claim) else (turned, middle)

@@ -10,23 +10,27 @@ from typing import Any
 
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.doubt.alone import TriedChoice, Turn
-from podusv_cli.doubt.compared import ClaimNumber, Spread, compared
+from podusv_cli.doubt.compared import ClaimNumber, Spread, compared_numbers
 from podusv_cli.doubt.events import Event
 from podusv_cli.doubt.judged import Judged
-from podusv_cli.doubt.together import Draws, Explained, counted, explained
+from podusv_cli.doubt.together import Draws, Explained, count_turns, explain_turns
 from podusv_cli.expressions.verdict import Verdict
 from podusv_cli.scenario.model import Scenario
 
 KNIFE, FRAGILE = 1e-3, 0.1  # of a choice's scale, within which a verdict turns
 LEVEL = 0.95  # of the bound on the share of draws that turn a verdict where none does
 WORDS = (
-    "knife's edge", "fragile", "under conditions", "in combination only",
-    "robust where it can tell", "robust",
-)  # fmt: skip
+    "knife's edge",
+    "fragile",
+    "under conditions",
+    "in combination only",
+    "robust where it can tell",
+    "robust",
+)
 
 
 @dataclass(frozen=True)
-class Answer:
+class DoubtAnswer:
     """A claim's verdict and what it hangs on.
 
     `turns` are those of the same task, the nearest first; `neighbours` those by which the task is
@@ -80,7 +84,7 @@ class Answer:
         return self.number.margin(self.numbers, self.spread)
 
 
-def _word(answer: Answer, turns: Sequence[Turn], turned: int) -> str:
+def _word(answer: DoubtAnswer, turns: Sequence[Turn], turned: int) -> str:
     if answer.verdict.answer is None:
         return ""
     nearest = min((turn.share for turn in turns), default=math.nan)
@@ -105,13 +109,13 @@ class DoubtReport:
     """What figures and page are about: a scenario, the answers on its claims, what was tried."""
 
     scenario: Scenario
-    answers: Sequence[Answer]
+    answers: Sequence[DoubtAnswer]
     tried: Tried
 
 
 def answers(
     verdicts: Sequence[Verdict], tried: Tried, events: Mapping[str, Event | None] | None = None
-) -> list[Answer]:
+) -> list[DoubtAnswer]:
     """An answer on every verdict; `events` are those nearest to a claim's windows, by its name."""
     known = events or {}
     return [replace(_answer(verdict, tried), event=known.get(verdict.name)) for verdict in verdicts]
@@ -124,36 +128,44 @@ def labels_of(claim: Any) -> frozenset[str]:
     return frozenset(node.id for node in nodes if isinstance(node, ast.Name))
 
 
-def _answer(verdict: Verdict, tried: Tried) -> Answer:
+def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
     claim, base, worlds = verdict.name, tried.base, tried.worlds
     labels = labels_of(verdict.claim)
     moved = [
-        alone for alone in tried.alone
+        alone
+        for alone in tried.alone
         if alone.possible and alone.choice.labels & labels and not alone.choice.is_contrast(labels)
-    ]  # fmt: skip
+    ]
     turns = sorted(
         (t for alone in moved for t in alone.turns(claim, base)), key=lambda turn: turn.share
     )
     acting = {alone.choice.name: alone.acts(claim, base) for alone in tried.alone}
-    turned, known = counted(claim, worlds, base)
+    turned, known = count_turns(claim, worlds, base)
     failed = sum(bool(world.failed) for world in worlds)
     number, spread = _nearest(verdict, base, worlds)
-    return Answer(
-        verdict, tuple(t for t in turns if not t.choice.task),
+    return DoubtAnswer(
+        verdict,
+        tuple(t for t in turns if not t.choice.task),
         tuple(t for t in turns if t.choice.task),
-        tuple(explained(tried.draws, turned, known, acting)),
-        int((known & ~turned).sum()), int(turned.sum()), int((~known).sum()) - failed, failed,
-        len(moved), sum(acting[alone.choice.name] for alone in moved),
-        sum(alone.silences(claim) for alone in moved if not alone.choice.task), base.numbers[claim],
-        number, spread,
-    )  # fmt: skip
+        tuple(explain_turns(tried.draws, turned, known, acting)),
+        int((known & ~turned).sum()),
+        int(turned.sum()),
+        int((~known).sum()) - failed,
+        failed,
+        len(moved),
+        sum(acting[alone.choice.name] for alone in moved),
+        sum(alone.silences(claim) for alone in moved if not alone.choice.task),
+        base.numbers[claim],
+        number,
+        spread,
+    )
 
 
 def _nearest(
     verdict: Verdict, base: Judged, worlds: Sequence[Judged]
 ) -> tuple[ClaimNumber, Spread]:
     """The number of a claim that is nearest to its limit, in half-widths of its draws."""
-    numbers = compared(verdict.claim.expect, verdict.claim.tolerance)
+    numbers = compared_numbers(verdict.claim.expect, verdict.claim.tolerance)
     spreads = {n: n.spread(verdict.name, worlds) for n in numbers}
     own = base.numbers[verdict.name]
     number = min(spreads, key=lambda n: n.margin(own, spreads[n]))
@@ -166,20 +178,21 @@ def place(turn: Turn) -> str:
     if not choice.range:
         return f"{choice.name}: {as_yaml(turn.value)} ({as_yaml(choice.own)})"
     own = "" if turn.near else f" ({choice.own:.3g})"
-    return f"{choice.name} {reached(turn)}{unit}{own}"
+    return f"{choice.name} {describe_turn(turn)}{unit}{own}"
 
 
-def reached(turn: Turn) -> str:
+def describe_turn(turn: Turn) -> str:
     """The number that turns a verdict, `down from 0.36`; near its own how far from it, `+7e-06`."""
     if turn.near:
         return f"{turn.value - turn.choice.own:+.2g}"
     return f"{'from' if turn.value > turn.choice.own else 'down from'} {turn.value:.3g}"
 
 
-def as_json(answer: Answer) -> dict[str, Any]:
+def as_json(answer: DoubtAnswer) -> dict[str, Any]:
     """An answer as plain data."""
     return {
-        **answer.verdict.as_json(), "word": answer.word,
+        **answer.verdict.as_json(),
+        "word": answer.word,
         "word_for_neighbours": answer.word_for_neighbours,
         "draws": {n: getattr(answer, n) for n in ("kept", "turned", "unknown", "failed")},
         "choices": {"moved": answer.tried, "acted": answer.acted, "silent": answer.silent},
@@ -188,15 +201,22 @@ def as_json(answer: Answer) -> dict[str, Any]:
             {"key": e.choice.name, "part": e.part, "inside": e.inside, "outside": e.outside}
             for e in answer.explained
         ],
-        "number": answer.number.text, "edges": list(answer.number.edges), "spread": answer.spread,
+        "number": answer.number.text,
+        "edges": list(answer.number.edges),
+        "spread": answer.spread,
         "event": answer.event and answer.event._asdict(),
-    }  # fmt: skip
+    }
 
 
 def turn_as_json(turn: Turn) -> dict[str, Any]:
     """A turn as plain data; a share of None where there is no distance."""
     return {
-        "key": turn.choice.name, "own": turn.choice.own, "turns_at": turn.value, "held": turn.held,
-        "unit": turn.choice.unit, "distance": turn.distance,
-        "share": turn.share if math.isfinite(turn.share) else None, "task": turn.choice.task,
-    }  # fmt: skip
+        "key": turn.choice.name,
+        "own": turn.choice.own,
+        "turns_at": turn.value,
+        "held": turn.held,
+        "unit": turn.choice.unit,
+        "distance": turn.distance,
+        "share": turn.share if math.isfinite(turn.share) else None,
+        "task": turn.choice.task,
+    }

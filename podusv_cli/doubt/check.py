@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.doubt.choices import by_key, with_loads
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import Route, bracketed
+from podusv_cli.scenario.yaml_tree import Route, bracketed_key
 
 Faults = Iterator[tuple[Route, str]]
 LISTED = "podusv explain"
@@ -17,16 +17,19 @@ LISTED = "podusv explain"
 def doubt_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     """Steps of the key and message for everything that is wrong; nothing without the section."""
     scenario = loaded.scenario
-    return [] if scenario.doubt is None else [*_printed(scenario), *_vary(scenario)]
+    return [] if scenario.doubt is None else [*_faults_of_printed(scenario), *_vary(scenario)]
 
 
-def _printed(scenario: Scenario) -> Faults:
+def _faults_of_printed(scenario: Scenario) -> Faults:
     assert scenario.doubt
     known = set(by_key(with_loads(scenario.singles())))
     sections = {key[:end] for key in known for end in range(len(key)) if key[end] in ".["}
     for place, key in enumerate(scenario.doubt.printed):
-        if bracketed(key) not in known | sections:
-            yield ("doubt", "printed", place), unknown(f"key {key!r}", key, sorted(known), LISTED)
+        if bracketed_key(key) not in known | sections:
+            yield (
+                ("doubt", "printed", place),
+                unknown_word(f"key {key!r}", key, sorted(known), LISTED),
+            )
 
 
 def _vary(scenario: Scenario) -> Faults:
@@ -41,6 +44,6 @@ def _vary(scenario: Scenario) -> Faults:
             yield ("doubt", "vary", name), text
             continue
         for key in quantity.targets(name):
-            if bracketed(key) not in known:
-                text = unknown(f"key {key!r}", key, sorted(known), LISTED)
+            if bracketed_key(key) not in known:
+                text = unknown_word(f"key {key!r}", key, sorted(known), LISTED)
                 yield ("doubt", "vary", name), text

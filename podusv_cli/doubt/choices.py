@@ -16,13 +16,13 @@ from typing import Any
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.disturbances.step import Step
 from podusv_cli.core.component import Component
-from podusv_cli.doubt.ranges import RANGES, TRIED, Range
-from podusv_cli.scenario.address import ValueRefused, content, described, with_values
+from podusv_cli.doubt.ranges import RANGES, TRIED, DoubtRange
+from podusv_cli.scenario.address import ValueRefused, content, describe_key, with_values
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Quantity
-from podusv_cli.scenario.yaml_tree import Route, bracketed, dotted
+from podusv_cli.scenario.yaml_tree import Route, bracketed_key, dotted_key
 
 HULL: Route = ("vessel",)  # where the name of a preset stands for the whole hull
 Singles = Mapping[str, Scenario]  # the scenario of each law, by its label
@@ -44,7 +44,7 @@ class Choice:
     places: tuple[Place, ...]
     own: Any
     unit: str = ""
-    range: Range | None = None
+    range: DoubtRange | None = None
     values: tuple[Any, ...] = ()
     task: bool = False  # whether another value is another task
     beside: frozenset[str] = frozenset()  # laws of the same kind that differ in it
@@ -61,7 +61,7 @@ class Choice:
         if not self.rows:
             return dict.fromkeys(self.places, value)
         row = dict(zip(self.rows.lines.names, self.rows.lines.rows[value].tolist(), strict=True))
-        keys = {place: f".{dotted(place[1])}" for place in self.places}
+        keys = {place: f".{dotted_key(place[1])}" for place in self.places}
         return {
             place: row[max((name for name in row if key.endswith(f".{name}")), key=len)]
             for place, key in keys.items()
@@ -90,10 +90,10 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
     groups: dict[tuple[str, str], list[Place]] = defaultdict(list)
     for label, scenario in singles.items():
         for route, own in _leaves(scenario):
-            groups[dotted(route), repr(own)].append((label, route))
+            groups[dotted_key(route), repr(own)].append((label, route))
     unprinted = [g for g in groups.values() if not any(_is_printed(public(p), doubt) for p in g)]
     of_values = [choice for places in unprinted for choice in _of_places(places, singles)]
-    own = [_given(name, quantity, singles) for name, quantity in doubt.vary.items()]
+    own = [_choice_from_vary(name, quantity, singles) for name, quantity in doubt.vary.items()]
     taken = {place for choice in own for place in choice.places}
     return [
         *hulls(singles, doubt),
@@ -115,7 +115,7 @@ def hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
 def public(place: Place) -> str:
     """The key as the comparison's scenario has it."""
     label, route = place
-    return dotted(("controllers", label, *route[1:]) if route[0] == "controller" else route)
+    return dotted_key(("controllers", label, *route[1:]) if route[0] == "controller" else route)
 
 
 def by_key(singles: Singles) -> dict[str, list[Place]]:
@@ -164,7 +164,7 @@ def _of_places(places: Sequence[Place], singles: Singles) -> Iterator[Choice]:
     tried = TRIED.get(base.name, lambda own: _values(key, own))(base.own)
     tried = tried or _in_whole_steps(base, singles[places[0][0]], places[0][1])
     way = RANGES.get(str(places[0][1][0]), {})
-    known = (*places, *_known(places, singles))
+    known = (*places, *_places_laws_know(places, singles))
     if tried:
         yield replace(base, places=known, values=tried)
     elif (
@@ -193,7 +193,7 @@ def _in_whole_steps(base: Choice, scenario: Scenario, route: Route) -> tuple[flo
 def _base(places: Sequence[Place], singles: Singles) -> tuple[Choice, Key]:
     """A choice without other values, and its key."""
     (label, route), name = places[0], public(places[0])
-    key, own = described(singles[label], route), content(singles[label], route)
+    key, own = describe_key(singles[label], route), content(singles[label], route)
     task = (name.startswith(TASK) and not name.startswith(WAYS_OF_LAW)) or _adds_load(route, own)
     beside = _beside(places, singles)
     named = bool(beside) and own != key.default
@@ -209,33 +209,35 @@ def with_loads(singles: Singles) -> Singles:
     calm, steady = Calm(), Step()
     return {
         label: single.model_copy(update={"disturbance": steady})
-        if single.disturbance == calm else single
+        if single.disturbance == calm
+        else single
         for label, single in singles.items()
-    }  # fmt: skip
+    }
 
 
-def _given(name: str, quantity: Quantity, singles: Singles) -> Choice:
+def _choice_from_vary(name: str, quantity: Quantity, singles: Singles) -> Choice:
     """The choice that `doubt.vary` has for a key; see `faults` for what cannot be one."""
     known = by_key(singles)
-    own = [place for key in quantity.targets(name) for place in known[bracketed(key)]]
+    own = [place for key in quantity.targets(name) for place in known[bracketed_key(key)]]
     base, key = _base(own, singles)
-    moving = (*own, *_known(own, singles))
+    moving = (*own, *_places_laws_know(own, singles))
     if quantity.rows:
         return replace(base, name=name, own=ITS_OWN, unit="", places=moving, rows=quantity)
     if quantity.seed or quantity.distribution.choice:
         values = quantity.distribution.choice or _values(key, base.own)
         return replace(base, places=moving, values=values)
     scale = abs(base.own) or max(abs(quantity.value(base.own, 1.0)), 1.0)
-    return replace(base, places=moving, range=Range(quantity, quantity, scale))
+    return replace(base, places=moving, range=DoubtRange(quantity, quantity, scale))
 
 
-def _known(places: Sequence[Place], singles: Singles) -> list[Place]:
+def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
     """Where laws know the same of the hull, which moves with it."""
     hull = [(label, at, ("nominal", *at[1:])) for label, at in places if at[0] == "vessel"]
     return [
-        (label, known) for label, at, known in hull
+        (label, known)
+        for label, at, known in hull
         if content(singles[label], at) == content(singles[label], known)
-    ]  # fmt: skip
+    ]
 
 
 def _values(key: Key, own: Any) -> tuple[Any, ...]:

@@ -62,7 +62,7 @@ class ClaimNumber(NamedTuple):
         return (max(self.edges, key=lambda edge: abs(edge - own)),) if self.between else self.edges
 
 
-def compared(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
+def compared_numbers(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
     """What an expression compares; a condition such as `finished(run)` is 1 or 0."""
     tree = ast.parse(expect, mode="eval").body
     links = []
@@ -74,9 +74,10 @@ def compared(expect: str, tolerance: float = 0.0) -> list[ClaimNumber]:
 
 # What the right side is times where a comparison turns, for a tolerance.
 SIDES: dict[type[ast.cmpop], Callable[[float], tuple[float, ...]]] = {
-    ast.Eq: lambda t: (1.0 - t, 1.0 + t), ast.LtE: lambda t: (1.0 + t,),
+    ast.Eq: lambda t: (1.0 - t, 1.0 + t),
+    ast.LtE: lambda t: (1.0 + t,),
     ast.GtE: lambda t: (1.0 - t,),
-}  # fmt: skip
+}
 
 
 def _strictly(tolerance: float) -> tuple[float, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from podusv_cli.comparison.claims import ParsedClaim
 from podusv_cli.comparison.curves import REDUCERS, SETTINGS
-from podusv_cli.comparison.entries import Entry
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.expressions.reading import literal
 
 
@@ -43,13 +43,15 @@ class Event(NamedTuple):
         )
 
 
-def nearest_event(claim: ParsedClaim, entries: Mapping[str, Entry]) -> Event | None:
+def nearest_event(claim: ParsedClaim, runs: Mapping[str, PastRun]) -> Event | None:
     """The event nearest to an edge of a window; None where no window or nothing changes."""
     events = (
         Event(label, *event, edge)
-        for label, edges in _windows(claim) if label in entries
-        for event in _events(entries[label]) for edge in edges
-    )  # fmt: skip
+        for label, edges in _windows(claim)
+        if label in runs
+        for event in _events(runs[label])
+        for edge in edges
+    )
     return min(events, key=lambda event: event.gap, default=None)
 
 
@@ -65,11 +67,11 @@ def _windows(claim: ParsedClaim) -> Iterator[tuple[str, list[float]]]:
                         yield run, [literal(edge) for edge in edges]
 
 
-def _events(entry: Entry) -> Iterator[tuple[str, float, float]]:
+def _events(run: PastRun) -> Iterator[tuple[str, float, float]]:
     """Every change of a logged signal that has whole numbers alone: name, new value, time [s]."""
-    time = entry.recording["time"]
-    for name, values in entry.recording.signals.items():
-        about = entry.recording.about.get(name)
+    time = run.recording["time"]
+    for name, values in run.recording.signals.items():
+        about = run.recording.about.get(name)
         if about and about.unit == "1" and values.ndim == 1 and (values == np.round(values)).all():
             for i in np.flatnonzero(np.diff(values)) + 1:
                 yield name, float(values[i]), float(time[i])

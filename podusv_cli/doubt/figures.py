@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
 from podusv_cli.doubt.alone import TriedChoice, ends
-from podusv_cli.doubt.answer import Answer, DoubtReport, reached
+from podusv_cli.doubt.answer import DoubtAnswer, DoubtReport, describe_turn
 from podusv_cli.doubt.judged import Judged
-from podusv_cli.doubt.together import counted
+from podusv_cli.doubt.together import count_turns
 from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
@@ -57,12 +57,14 @@ def sketches(report: DoubtReport) -> Iterator[Sketch]:
             )
 
 
-def specification(report: DoubtReport, answer: Answer, acting: Sequence[TriedChoice]) -> Figure:
+def specification(
+    report: DoubtReport, answer: DoubtAnswer, acting: Sequence[TriedChoice]
+) -> Figure:
     """A claim's number over the draws, sorted, with what was drawn below."""
     tried, name = report.tried, answer.verdict.name
     number = answer.number
     numbers = np.array([number.of(world.numbers.get(name, {})) for world in tried.worlds])
-    turned, known = counted(name, tried.worlds, tried.base)
+    turned, known = count_turns(name, tried.worlds, tried.base)
     order = [i for i in np.argsort(numbers) if np.isfinite(numbers[i])]
     lanes = _lanes(report, answer, {a.choice.name for a in acting}, numbers[order], order)
     figure = new_figure(COLUMNS, 2.2 + LANE * len(lanes))
@@ -93,7 +95,11 @@ def specification(report: DoubtReport, answer: Answer, acting: Sequence[TriedCho
 
 
 def _lanes(
-    report: DoubtReport, answer: Answer, acting: set[str], numbers: Vector, order: Sequence[int]
+    report: DoubtReport,
+    answer: DoubtAnswer,
+    acting: set[str],
+    numbers: Vector,
+    order: Sequence[int],
 ) -> list[int]:
     """The columns of the draws that explain the turns, then those that the number follows."""
     draws = report.tried.draws
@@ -109,7 +115,7 @@ def _lanes(
     return list(dict.fromkeys([*first, *sorted(others, key=follows)]))[:LANES]
 
 
-def ranges(report: DoubtReport, answer: Answer, rows: Sequence[TriedChoice]) -> Figure:
+def ranges(report: DoubtReport, answer: DoubtAnswer, rows: Sequence[TriedChoice]) -> Figure:
     """The range of each choice, from its own value to both ends, and where the verdict turns."""
     turns = {
         (t.choice.name, t.value > t.choice.own): t for t in (*answer.turns, *answer.neighbours)
@@ -124,13 +130,24 @@ def ranges(report: DoubtReport, answer: Answer, rows: Sequence[TriedChoice]) -> 
             if turn:
                 for span in turned_spans(shown, end, answer.verdict.name, report.tried.base):
                     axes.plot(
-                        span, [row, row], "|-", color=TURNED, lw=3.0, solid_capstyle="butt",
-                        ms=4.0, mew=1.2,
-                    )  # fmt: skip
+                        span,
+                        [row, row],
+                        "|-",
+                        color=TURNED,
+                        lw=3.0,
+                        solid_capstyle="butt",
+                        ms=4.0,
+                        mew=1.2,
+                    )
                 axes.annotate(
-                    escaping.figure(reached(turn)), (side, row), (0, 3), fontsize=SMALL,
-                    textcoords="offset points", va="bottom", ha="right" if side > 0 else "left",
-                )  # fmt: skip
+                    escaping.figure(describe_turn(turn)),
+                    (side, row),
+                    (0, 3),
+                    fontsize=SMALL,
+                    textcoords="offset points",
+                    va="bottom",
+                    ha="right" if side > 0 else "left",
+                )
     axes.axvline(0.0, color="black", lw=0.8)
     words = [(c.name, f"{c.own:.3g} {c.unit}".rstrip()) for c in (row.choice for row in rows)]
     names = ["\n".join(map(escaping.figure, lines)) for lines in words]
@@ -150,7 +167,7 @@ def turned_spans(
     """
     own = shown.choice.own
     side = [t for t in shown.trials if (t.value > own) == (end > own)]
-    places = sorted((abs(t.value - own), t.judged.turned(claim, base)) for t in side)
+    places = sorted((abs(t.value - own), t.judged.turns(claim, base)) for t in side)
     for turned, run in groupby(places, key=lambda place: place[1]):
         if turned:
             at = [distance / abs(end - own) for distance, _ in run]

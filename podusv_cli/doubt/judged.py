@@ -26,7 +26,7 @@ class Judged:
         """Whether a claim has the same numbers, bit for bit; two missing ones are the same."""
         return repr(self.numbers.get(claim)) == repr(other.numbers.get(claim))
 
-    def turned(self, claim: str, base: Judged) -> bool:
+    def turns(self, claim: str, base: Judged) -> bool:
         """Whether the answer on a claim is the opposite of the base's."""
         answer, first = self.answers.get(claim), base.answers[claim]
         return answer is not None and first is not None and answer is not first
@@ -35,7 +35,7 @@ class Judged:
 Judge = Callable[[World], Judged]
 
 
-def moved(choice: Choice, value: Any) -> World:
+def world_with(choice: Choice, value: Any) -> World:
     """The world in which one choice has another value."""
     return choice.at(value)
 

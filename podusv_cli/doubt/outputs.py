@@ -12,12 +12,12 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import as_yaml, value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.doubt.alone import ends
-from podusv_cli.doubt.answer import Answer, DoubtReport, as_json, place
+from podusv_cli.doubt.answer import DoubtAnswer, DoubtReport, as_json, place
 from podusv_cli.doubt.choices import Choice
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.scenario.words import in_words as rows_in_words
-from podusv_cli.storage import csv_files, json_files
+from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 
 HEAD = ("claim", "verdict", "in draws", "turns at", "hangs on")
@@ -28,20 +28,22 @@ class Doubted:
     """What the verdicts of a scenario hang on, and where the tables, figures and page are."""
 
     folder: Path
-    answers: Sequence[Answer]
+    answers: Sequence[DoubtAnswer]
     status: Status
     missing: tuple[Failure, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "status": self.status, "folder": str(self.folder),
+            "format": 1,
+            "status": self.status,
+            "folder": str(self.folder),
             "claims": [as_json(answer) for answer in self.answers],
             "missing": [str(part) for part in self.missing],
-        }  # fmt: skip
+        }
 
 
-def in_words(answer: Answer) -> str:
+def in_words(answer: DoubtAnswer) -> str:
     """What the verdict hangs on: its word, and how near the nearest place is."""
     nearest = answer.turns[0].share if answer.turns else math.inf
     far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
@@ -55,7 +57,7 @@ def _share(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-def row(answer: Answer) -> list[str]:
+def row(answer: DoubtAnswer) -> list[str]:
     """A claim's row of the table."""
     open_ = f", {answer.unknown} cannot tell" if answer.unknown and answer.word else ""
     kept = f"{answer.kept} of {answer.draws}{open_}" if answer.draws else "-"
@@ -69,13 +71,12 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
     writer.add("scenario.yaml", text.encode())
     for name, text in report.scenario.plugin_files().items():
         writer.add(name, text.encode())
-    writer.add(
-        "doubt.json", json_files.encode({"claims": [as_json(answer) for answer in report.answers]})
-    )
+    writer.add_json("doubt.json", {"claims": [as_json(answer) for answer in report.answers]})
     for name, rows in {
-        "doubt.csv": table(report.answers), "turns.csv": _turns(report),
+        "doubt.csv": table(report.answers),
+        "turns.csv": _turns(report),
         "draws.csv": _draws(report),
-    }.items():  # fmt: skip
+    }.items():
         writer.add(name, csv_files.lines(rows).encode())
     pictures = _pictures(report, writer.extras) if figures else []
     for picture in pictures:
@@ -84,20 +85,41 @@ def write(writer: RunWriter, report: DoubtReport, text: str, *, figures: bool) -
     writer.add("report.html", page(report, pictures, origin).encode())
 
 
-def table(answers: Sequence[Answer]) -> Iterator[Sequence[Any]]:
+def table(answers: Sequence[DoubtAnswer]) -> Iterator[Sequence[Any]]:
     """A head, and a row a claim."""
     yield (
-        "claim", "verdict", "word", "word_for_neighbours", "kept", "turned", "unknown", "failed",
-        "moved", "acted", "silent", "nearest", "turns_at", "nearest_share",
-    )  # fmt: skip
+        "claim",
+        "verdict",
+        "word",
+        "word_for_neighbours",
+        "kept",
+        "turned",
+        "unknown",
+        "failed",
+        "moved",
+        "acted",
+        "silent",
+        "nearest",
+        "turns_at",
+        "nearest_share",
+    )
     for answer in answers:
         first = answer.turns[0] if answer.turns else None
         nearest = (first.choice.name, first.value, first.share) if first else ("", "", "")
         yield (
-            answer.verdict.name, answer.verdict.verdict, answer.word, answer.word_for_neighbours,
-            answer.kept, answer.turned, answer.unknown, answer.failed, answer.tried, answer.acted,
-            answer.silent, *nearest,
-        )  # fmt: skip
+            answer.verdict.name,
+            answer.verdict.verdict,
+            answer.word,
+            answer.word_for_neighbours,
+            answer.kept,
+            answer.turned,
+            answer.unknown,
+            answer.failed,
+            answer.tried,
+            answer.acted,
+            answer.silent,
+            *nearest,
+        )
 
 
 def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
@@ -105,17 +127,27 @@ def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
     for answer in report.answers:
         for turn in (*answer.turns, *answer.neighbours):
             yield (
-                answer.verdict.name, turn.choice.name, turn.choice.own, turn.value, turn.held,
-                turn.choice.unit, turn.distance, turn.share, turn.choice.task,
-            )  # fmt: skip
+                answer.verdict.name,
+                turn.choice.name,
+                turn.choice.own,
+                turn.value,
+                turn.held,
+                turn.choice.unit,
+                turn.distance,
+                turn.share,
+                turn.choice.task,
+            )
 
 
 def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
     names = [(claim, text) for claim, own in report.tried.base.numbers.items() for text in own]
     yield (
-        "draw", *(choice.name for choice in report.tried.draws.choices), *report.tried.base.answers,
-        *(f"{claim}: {text}" for claim, text in names), "failed",
-    )  # fmt: skip
+        "draw",
+        *(choice.name for choice in report.tried.draws.choices),
+        *report.tried.base.answers,
+        *(f"{claim}: {text}" for claim, text in names),
+        "failed",
+    )
     for i, world in enumerate(report.tried.worlds):
         answers = (world.answers.get(claim) for claim in report.tried.base.answers)
         numbers = (world.numbers.get(claim, {}).get(text, math.nan) for claim, text in names)
@@ -124,9 +156,9 @@ def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
 
 def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
     from podusv_cli.doubt.figures import sketches  # matplotlib is slow to import
-    from podusv_cli.figures.sketch import rendered
+    from podusv_cli.figures.sketch import render_sketches
 
-    return rendered(sketches(report), extras)[1]
+    return render_sketches(sketches(report), extras)[1]
 
 
 def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
@@ -137,17 +169,26 @@ def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, 
         ]
         for answer in report.answers
     }
-    return environment("podusv_cli.doubt").get_template("doubt.html.j2").render(
-        title=f"What the verdicts of {report.scenario.name} hang on",
-        scenario=report.scenario, answers=report.answers, head=HEAD,
-        rows={answer.verdict.name: row(answer) for answer in report.answers},
-        place=place, in_words=in_words, pictures=by_claim, draws=len(report.tried.worlds),
-        moved=[
-            (c.name, value_text(c.own), _moves(c), c.task)
-            for c in (alone.choice for alone in report.tried.alone)
-        ],
-        provenance=[(key, value_text(value)) for key, value in flat(origin)],
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.doubt")
+        .get_template("doubt.html.j2")
+        .render(
+            title=f"What the verdicts of {report.scenario.name} hang on",
+            scenario=report.scenario,
+            answers=report.answers,
+            head=HEAD,
+            rows={answer.verdict.name: row(answer) for answer in report.answers},
+            place=place,
+            in_words=in_words,
+            pictures=by_claim,
+            draws=len(report.tried.worlds),
+            moved=[
+                (c.name, value_text(c.own), _moves(c), c.task)
+                for c in (alone.choice for alone in report.tried.alone)
+            ],
+            provenance=[(key, value_text(value)) for key, value in flat(origin)],
+        )
+    )
 
 
 def _moves(choice: Choice) -> str:

@@ -19,7 +19,7 @@ from podusv_cli.scenario.sweep import Quantity
 GRAVITY = 9.81  # m/s2
 
 
-class Range(NamedTuple):
+class DoubtRange(NamedTuple):
     """How a number moves, as a study draws it: one at a time, and with all others.
 
     `scale` is what its distance from the scenario's own is measured by, in the unit of the number.
@@ -30,45 +30,45 @@ class Range(NamedTuple):
     scale: float
 
 
-Way = Callable[[float, Scenario, Key], Range | None]  # how a number of this key moves
+Way = Callable[[float, Scenario, Key], DoubtRange | None]  # how a number of this key moves
 
 
 def _times(alone: float, together: float) -> Way:
     """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
 
-    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
+    def range_times(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         ends = [_inside([own / f, own * f], key) for f in (alone, together)]
         if not own or any(low * high <= 0.0 for low, high in ends):
             return None
         ways = [tuple(sorted((low / own, high / own))) for low, high in ends]
         drawn = [Quantity(times=Distribution(log_uniform=(low, high))) for low, high in ways]
-        return Range(drawn[0], drawn[1], abs(own))
+        return DoubtRange(drawn[0], drawn[1], abs(own))
 
-    return moved
+    return range_times
 
 
 def _plus(scale: Callable[[Scenario], float], alone: float, together: float) -> Way:
     """A summand up to a share of a scale, inside the key's bounds."""
 
-    def moved(own: float, scenario: Scenario, key: Key) -> Range | None:
+    def range_plus(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         if not (unit := scale(scenario)):
             return None
         ends = [
             _inside([own - share * unit, own + share * unit], key) for share in (alone, together)
         ]
         drawn = [Quantity(plus=Distribution(uniform=(low - own, high - own))) for low, high in ends]
-        return Range(drawn[0], drawn[1], unit)
+        return DoubtRange(drawn[0], drawn[1], unit)
 
-    return moved
+    return range_plus
 
 
-def _place(own: float, scenario: Scenario, key: Key) -> Range | None:
+def _place(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
     """A summand of a coordinate; a factor of a length that has bounds, as a radius."""
     way = _times(2.0, 1.05) if limits(key.field) else _plus(_length, 5.0, 0.5)
     return way(own, scenario, key)
 
 
-def _load(own: float, scenario: Scenario, key: Key) -> Range | None:
+def _load(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
     """A factor; where there is no load along this axis, up to what drifts the hull at the speed."""
     if own or key.name not in DRIFTS:
         return LOAD(own, scenario, key)
@@ -124,20 +124,18 @@ RANGES: dict[str, dict[str, Way]] = {
     "vessel": {"": _times(1.5, 1.1)},
     "nominal": {"": _times(1.5, 1.1)},
     "start": {
-        "m": _plus(_length, 5.0, 0.5), "rad": _plus(_radian, math.pi, 0.2),
-        "m/s": _plus(_speed, 1.0, 0.1), "rad/s": _plus(_turning, 1.0, 0.1),
+        "m": _plus(_length, 5.0, 0.5),
+        "rad": _plus(_radian, math.pi, 0.2),
+        "m/s": _plus(_speed, 1.0, 0.1),
+        "rad/s": _plus(_turning, 1.0, 0.1),
     },
-    "path": {
-        "m": _place, "rad": _plus(_radian, math.pi, 0.2), "": _times(2.0, 1.05),
-    },
-    "disturbance": {
-        "rad": _plus(_radian, math.pi, math.pi), "N": _load, "N m": _load, "": LOAD,
-    },
+    "path": {"m": _place, "rad": _plus(_radian, math.pi, 0.2), "": _times(2.0, 1.05)},
+    "disturbance": {"rad": _plus(_radian, math.pi, math.pi), "N": _load, "N m": _load, "": LOAD},
     "actuator": {"N": LIMIT, "N m": LIMIT, "": _times(2.0, 1.25)},
     "measurement": {"": _times(3.0, 1.25)},
     "estimator": {"": _times(3.0, 1.25)},
     "controller": {"": _times(3.0, 1.25)},
-}  # fmt: skip
+}
 
 
 def _whole(own: float) -> tuple[float, ...]:
@@ -151,5 +149,6 @@ TRIED: dict[str, Callable[[Any], tuple[Any, ...]]] = {
     "simulation.step": lambda own: (own / 2.0,),
     "simulation.duration": lambda own: (own / 2.0, own * 1.5),
     "control.period": lambda own: (own / 2.0, own * 2.0) if own else (SAMPLED,),
-    "vessel.coriolis": _whole, "nominal.coriolis": _whole,
-}  # fmt: skip
+    "vessel.coriolis": _whole,
+    "nominal.coriolis": _whole,
+}

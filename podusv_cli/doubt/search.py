@@ -8,12 +8,12 @@ from typing import Any
 
 from podusv_cli.core.about import Claim
 from podusv_cli.core.errors import PodusvError
-from podusv_cli.doubt.alone import TriedChoice, explored
+from podusv_cli.doubt.alone import TriedChoice, explore_choice
 from podusv_cli.doubt.answer import Tried
 from podusv_cli.doubt.choices import Choice
-from podusv_cli.doubt.compared import ClaimNumber, compared
+from podusv_cli.doubt.compared import ClaimNumber, compared_numbers
 from podusv_cli.doubt.judged import Judge, Judged
-from podusv_cli.doubt.together import Draws, drawn
+from podusv_cli.doubt.together import Draws, draw_worlds
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import Job, run_shares
 from podusv_cli.scenario.doubt import Doubt
@@ -22,17 +22,23 @@ BATCH = 10  # draws that a process makes before it tells
 
 
 def search(
-    claims: Mapping[str, Claim], moving: Sequence[Choice], judge: Judge, doubt: Doubt,
-    workers: int = 0, progress: Callable[[str, float], None] | None = None,
-) -> Tried:  # fmt: skip
+    claims: Mapping[str, Claim],
+    moving: Sequence[Choice],
+    judge: Judge,
+    doubt: Doubt,
+    workers: int = 0,
+    progress: Callable[[str, float], None] | None = None,
+) -> Tried:
     """Try every choice alone, and draw all at once; shorter after an interrupt.
 
     `judge` says what the claims answer in a world. `workers` is the number of processes, 0 for as
     many as there are cores. `progress` is called with what is tried and its fraction that is done.
     """
     base = judge({})
-    numbers = {name: compared(claim.expect, claim.tolerance) for name, claim in claims.items()}
-    draws = drawn(moving, doubt.seed, doubt.draws)
+    numbers = {
+        name: compared_numbers(claim.expect, claim.tolerance) for name, claim in claims.items()
+    }
+    draws = draw_worlds(moving, doubt.seed, doubt.draws)
     tell = progress or (lambda what, fraction: None)
     alone = _results_of(
         [partial(_explore_choice, choice, judge, base, numbers) for choice in moving],
@@ -66,7 +72,7 @@ def _explore_choice(
     tell: Callable[[float], None],
 ) -> TriedChoice:
     with interrupts_enabled():
-        return explored(choice, judge, base, numbers)
+        return explore_choice(choice, judge, base, numbers)
 
 
 def _judge_draws(

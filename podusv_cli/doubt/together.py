@@ -41,7 +41,7 @@ class Draws:
         return together(self.choices, self.values[draw])
 
 
-def drawn(choices: Sequence[Choice], seed: int, count: int) -> Draws:
+def draw_worlds(choices: Sequence[Choice], seed: int, count: int) -> Draws:
     """Draws of all numbers and rows among the choices but those that make another task.
 
     A draw depends on the seed, the choice's name and the draw's number alone.
@@ -62,10 +62,12 @@ def _values(choice: Choice, shares: Vector) -> list[Any]:
     return [way.value(choice.own, d) for d in way.distribution.at(shares).tolist()]
 
 
-def explained(
-    draws: Draws, turned: npt.NDArray[np.bool_], known: npt.NDArray[np.bool_],
+def explain_turns(
+    draws: Draws,
+    turned: npt.NDArray[np.bool_],
+    known: npt.NDArray[np.bool_],
     acting: Mapping[str, bool],
-) -> list[Explained]:  # fmt: skip
+) -> list[Explained]:
     """The parts of choices in which more draws turn than chance has it, the clearest first.
 
     Of the draws in which the claim's answer is known. The band is that of the clearest of all
@@ -81,7 +83,7 @@ def explained(
     chance = [abs(_differences(parts, shuffle(turned))).max() for _ in range(PERMUTATIONS)]
     clear = [tuple(at) for at in np.argwhere(abs(differences) > np.quantile(chance, LEVEL))]
     order = sorted(clear, key=lambda at: -abs(differences[at]))
-    return [_told(draws.choices[rows[c]], p, parts[p, :, c], turned) for p, c in order]
+    return [_describe_part(draws.choices[rows[c]], p, parts[p, :, c], turned) for p, c in order]
 
 
 def _differences(parts: Any, turned: Any) -> Any:
@@ -92,17 +94,17 @@ def _differences(parts: Any, turned: Any) -> Any:
         return np.nan_to_num(here / inside - there / outside)
 
 
-def _told(choice: Choice, part: int, inside: Any, turned: Any) -> Explained:
+def _describe_part(choice: Choice, part: int, inside: Any, turned: Any) -> Explained:
     shares = float(turned[inside].mean()), float(turned[~inside].mean())
     more = shares[0] > shares[1]
     word = (("below", "above"), ("near", "far from"))[part][more]
     return Explained(choice, word, *(shares if more else shares[::-1]))
 
 
-def counted(
+def count_turns(
     claim: str, worlds: Sequence[Judged], base: Judged
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Which draws turn a claim's verdict, and in which its answer is known."""
-    turned = np.array([world.turned(claim, base) for world in worlds], bool)
+    turned = np.array([world.turns(claim, base) for world in worlds], bool)
     known = np.array([world.answers.get(claim) is not None for world in worlds], bool)
     return turned, known

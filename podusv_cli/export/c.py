@@ -17,7 +17,7 @@ from podusv_cli.export.law import (
     STEP,
     TARGET_NUMBERS,
     ExportedLaw,
-    Number,
+    ExportedNumber,
 )
 
 if TYPE_CHECKING:
@@ -26,9 +26,14 @@ if TYPE_CHECKING:
 IN_A_LINE = 4
 # Vectors of the loop that a law by itself has, as the C file calls them
 VECTORS = {
-    "law": "(double *)constants", "law_table": "(double *)table", "s": "law->state", "row": "row",
-    "stages": "law->stages", "held": "law->held", "work": "law->work",
-}  # fmt: skip
+    "law": "(double *)constants",
+    "law_table": "(double *)table",
+    "s": "law->state",
+    "row": "row",
+    "stages": "law->stages",
+    "held": "law->held",
+    "work": "law->work",
+}
 ASSUMED = {
     "saturated": "the demand before, cut at {0} N and {1} N m, acts",
     "demand": "the demand before acts",
@@ -38,10 +43,10 @@ ASSUMED = {
 def sources(law: ExportedLaw) -> dict[str, str]:
     """The text of law.h and law.c."""
     about = template_values(law)
-    return {name: rendered(name, about) for name in ("law.h", "law.c")}
+    return {name: render_file(name, about) for name in ("law.h", "law.c")}
 
 
-def rendered(name: str, about: Mapping[str, Any]) -> str:
+def render_file(name: str, about: Mapping[str, Any]) -> str:
     """A file of this name from its template."""
     return _environment().get_template(f"{name}.j2").render(about)
 
@@ -51,10 +56,13 @@ def _environment() -> Environment:
     from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
 
     return Environment(
-        loader=PackageLoader("podusv_cli.export"), undefined=StrictUndefined,
+        loader=PackageLoader("podusv_cli.export"),
+        undefined=StrictUndefined,
         autoescape=lambda template: template is not None and ".xml" in template,
-        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
-    )  # fmt: skip
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
 
 
 def template_values(law: ExportedLaw) -> dict[str, Any]:
@@ -63,19 +71,30 @@ def template_values(law: ExportedLaw) -> dict[str, Any]:
     of_path = ("path", "path_table") if layout.shown else ()  # which shows the law another target
     shown = {name: f"(double *){name}" for name in of_path}
     return {
-        "label": law.loop.controller.label, "name": _comment(law.scenario.name),
-        "version": __version__, "period": f"{law.period:.15g}", "signals": law.signals,
-        "memory": law.memory, "layout": layout, "texts": _texts(law), "parts": list(PARTS.values()),
-        "step": STEP, "h": literal(law.grid.step), "every": layout.hold_every, "tau": layout.tau,
-        "demand": layout.demand, "assumed": _assumed(law),
+        "label": law.loop.controller.label,
+        "name": _comment(law.scenario.name),
+        "version": __version__,
+        "period": f"{law.period:.15g}",
+        "signals": law.signals,
+        "memory": law.memory,
+        "layout": layout,
+        "texts": _texts(law),
+        "parts": list(PARTS.values()),
+        "step": STEP,
+        "h": literal(law.grid.step),
+        "every": layout.hold_every,
+        "tau": layout.tau,
+        "demand": layout.demand,
+        "assumed": _assumed_loads(law),
         "sizes": {name: len(getattr(vectors, name)) for name in ("stages", "held", "work")},
         "vectors": [VECTORS.get(name, shown.get(name, "&unused")) for name in vectors._fields],
         "arrays": {
-            "constants": _lines(vectors.law), "table": _lines(vectors.law_table),
+            "constants": _lines(vectors.law),
+            "table": _lines(vectors.law_table),
             "start": _lines(vectors.s),
             **{name: _lines(getattr(vectors, name)) for name in shown},
         },
-    }  # fmt: skip
+    }
 
 
 def literal(number: float) -> str:
@@ -90,7 +109,7 @@ def _lines(numbers: Vector) -> list[list[str]]:
     return [words[i : i + IN_A_LINE] for i in range(0, len(words), IN_A_LINE)]
 
 
-def _assumed(law: ExportedLaw) -> list[str]:
+def _assumed_loads(law: ExportedLaw) -> list[str]:
     """The loads that act where nobody knows them: the demand, cut where the actuator cuts it."""
     demands = [f"row[{law.layout.demand + i}]" for i in range(len(DEMAND_NUMBERS))]
     return [
@@ -106,22 +125,28 @@ def _texts(law: ExportedLaw) -> Mapping[str, str]:
     cut = any(map(math.isfinite, law.limits))
     assumed = ASSUMED["saturated" if cut else "demand"]
     return {
-        "state": _list(STATE_NUMBERS), "target": _list(TARGET_NUMBERS),
-        "loads": _list(LOAD_NUMBERS), "demand": _list(DEMAND_NUMBERS),
+        "state": _list(STATE_NUMBERS),
+        "target": _list(TARGET_NUMBERS),
+        "loads": _list(LOAD_NUMBERS),
+        "demand": _list(DEMAND_NUMBERS),
         "signals": f"What the law says beside: {_list(law.signals) or 'nothing'}",
         "memory": f"What it remembers: {_list(law.memory) or 'nothing'}",
         "assumed": assumed.format(*(f"{x:g}" for x in law.limits)),
-    }  # fmt: skip
+    }
 
 
-def _list(numbers: Sequence[Number]) -> str:
+def _list(numbers: Sequence[ExportedNumber]) -> str:
     return ",\n           ".join(
         _comment(f"{number.name} [{number.unit}] {number.meaning}") for number in _few(numbers)
     )
 
 
-def _few(numbers: Sequence[Number], most: int = 40) -> Iterable[Number]:
-    return numbers if len(numbers) <= most else [*numbers[:most], Number("...", "", "and so on")]
+def _few(numbers: Sequence[ExportedNumber], most: int = 40) -> Iterable[ExportedNumber]:
+    return (
+        numbers
+        if len(numbers) <= most
+        else [*numbers[:most], ExportedNumber("...", "", "and so on")]
+    )
 
 
 def _comment(text: str) -> str:

@@ -41,7 +41,7 @@ class Checked:
     differs: str = ""
 
 
-class Number(BaseModel):
+class NumberEntry(BaseModel):
     """What is read of a number in law.json; there is more."""
 
     model_config = ConfigDict(strict=True, frozen=True)
@@ -52,10 +52,10 @@ class About(BaseModel):
     """What is read of law.json; there is more."""
 
     model_config = ConfigDict(strict=True, frozen=True)
-    inputs: list[Number] = Field(min_length=INPUTS, max_length=INPUTS)
-    demand: list[Number] = Field(min_length=DEMAND, max_length=DEMAND)
-    signals: list[Number]
-    memory: list[Number]
+    inputs: list[NumberEntry] = Field(min_length=INPUTS, max_length=INPUTS)
+    demand: list[NumberEntry] = Field(min_length=DEMAND, max_length=DEMAND)
+    signals: list[NumberEntry]
+    memory: list[NumberEntry]
     period: PositiveFloat
     platforms: list[str]
     of_run: bool
@@ -74,7 +74,7 @@ def check(folder: Path, *, trusted: bool = True) -> list[Checked]:
     where the folder is no export, where it is not `trusted`, and without a compiler for this
     machine; StorageError where a file was altered.
     """
-    listed = _listed(folder)
+    listed = _files_in_manifest(folder)
     about = json_files.read_as(folder / ABOUT, About)
     samples = _samples(folder, about)
     if not trusted:
@@ -87,9 +87,9 @@ def check(folder: Path, *, trusted: bool = True) -> list[Checked]:
     with TemporaryDirectory(ignore_cleanup_errors=True) as place:
         if "law.c" in listed:
             library = _library(folder, Path(place), about, listed)
-            results.append(_compared("library", samples, about, library))
+            results.append(_compare_samples("library", samples, about, library))
         if FMU in listed and find_spec("fmpy"):
-            results.append(_compared(FMU, samples, about, _fmu(unit, Path(place), about)))
+            results.append(_compare_samples(FMU, samples, about, _fmu(unit, Path(place), about)))
     if not results:
         raise UsageError(
             f"{folder} was exported with --no-c, and FMPy, which steps its {FMU}, is not there; "
@@ -98,7 +98,7 @@ def check(folder: Path, *, trusted: bool = True) -> list[Checked]:
     return results
 
 
-def _listed(folder: Path) -> Collection[str]:
+def _files_in_manifest(folder: Path) -> Collection[str]:
     """The files of an exported law, which are as its manifest has them."""
     for name in (ABOUT, manifest.NAME):
         if not (folder / name).is_file():
@@ -127,7 +127,7 @@ def _samples(folder: Path, about: About) -> Vector:
         ) from None
 
 
-def _compared(what: str, samples: Vector, about: About, step: Step) -> Checked:
+def _compare_samples(what: str, samples: Vector, about: About, step: Step) -> Checked:
     given, names = 1 + INPUTS, about.columns
     whose = "the run" if about.of_run else "the law by itself in podusv"
     for row in samples:
@@ -183,9 +183,11 @@ def _fmu(path: Path, place: Path, about: About) -> Step:
     if not (place / "binaries" / this_machine()).is_dir():
         raise UsageError(f"{path} has no library for this machine")
     slave = FMU2Slave(
-        guid=description.guid, unzipDirectory=str(place),
-        modelIdentifier=description.coSimulation.modelIdentifier, instanceName="law",
-    )  # fmt: skip
+        guid=description.guid,
+        unzipDirectory=str(place),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="law",
+    )
     slave.instantiate()
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()

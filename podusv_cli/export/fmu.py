@@ -47,9 +47,12 @@ def variables(law: ExportedLaw, first: Sequence[float]) -> list[Variable]:
 
 
 def fmu(
-    law: ExportedLaw, text: str, platforms: Mapping[str, objects.Platform], first: Sequence[float],
+    law: ExportedLaw,
+    text: str,
+    platforms: Mapping[str, objects.Platform],
+    first: Sequence[float],
     say: Callable[[str], None] = lambda line: None,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """The archive with a library for each platform, of the law's module `text`.
 
     `first` as in `variables`; `say` is called before each platform. Raises UsageError where a
@@ -60,14 +63,18 @@ def fmu(
     sources = c.sources(law)
     content = "".join([text, *sources.values(), *starts])
     about = {
-        **c.template_values(law), "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
+        **c.template_values(law),
+        "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],
         "units": sorted({variable.unit for variable in shown} - {"", "1"}),
-        "variables": shown, "starts": starts, "loads": law.needs_loads,
+        "variables": shown,
+        "starts": starts,
+        "loads": law.needs_loads,
         "outputs": [i for i, variable in enumerate(shown, 1) if variable.causality == "output"],
-        "exact_period": c.literal(law.period), "stop": repr(law.scenario.simulation.duration),
-    }  # fmt: skip
-    files = {**sources, "fmu.c": c.rendered("fmu.c", about)}
-    members = {"modelDescription.xml": c.rendered("modelDescription.xml", about).encode()}
+        "exact_period": c.literal(law.period),
+        "stop": repr(law.scenario.simulation.duration),
+    }
+    files = {**sources, "fmu.c": c.render_file("fmu.c", about)}
+    members = {"modelDescription.xml": c.render_file("modelDescription.xml", about).encode()}
     for name, platform in platforms.items():
         inside = {file: part.encode() for file, part in files.items()}
         inside["law.o"] = objects.object_file(text, platform)

@@ -30,14 +30,20 @@ from podusv_cli.scenario.model import Scenario
 
 # What a part of the loop is called in the object file
 PARTS = {
-    "path": "podusv_target", "law": "podusv_law_rates", "sample": "podusv_law_sample",
+    "path": "podusv_target",
+    "law": "podusv_law_rates",
+    "sample": "podusv_law_sample",
     "after_saturation": "podusv_law_loads",
-}  # fmt: skip
+}
 STEP = "podusv_law_demand"
 PROTOTYPE = CFUNCTYPE(
-    None, *(signatures.PROTOTYPES[part] for part in PARTS),
-    signatures.WHOLE, signatures.NUMBER, POINTER(signatures.VECTOR), POINTER(signatures.WHOLE),
-)  # fmt: skip
+    None,
+    *(signatures.PROTOTYPES[part] for part in PARTS),
+    signatures.WHOLE,
+    signatures.NUMBER,
+    POINTER(signatures.VECTOR),
+    POINTER(signatures.WHOLE),
+)
 NOT_SAMPLED = (
     "the law acts continuously in this scenario, and a computer on a boat takes samples; set "
     "control.period to the time between two of them, as --set control.period=0.1 [s]"
@@ -45,7 +51,7 @@ NOT_SAMPLED = (
 NO_LAW = "the controller gives recorded commands to propellers, which is no law; export a law"
 
 
-class Number(NamedTuple):
+class ExportedNumber(NamedTuple):
     """A number that goes in or comes out: its name, unit and meaning."""
 
     name: str
@@ -53,25 +59,27 @@ class Number(NamedTuple):
     meaning: str
 
 
-def _number(signal: Signal) -> Number:
-    return Number(signal.name, signal.unit, signal.meaning)
+def _number(signal: Signal) -> ExportedNumber:
+    return ExportedNumber(signal.name, signal.unit, signal.meaning)
 
 
 _LOGGED = {signal.name: _number(signal) for signal in LOOP}
 _MOTION = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s2"))
 TARGET_NUMBERS = tuple(
-    Number(name, unit, f"{what} of the target, {way}")
+    ExportedNumber(name, unit, f"{what} of the target, {way}")
     for name, ((what, unit), way) in zip(TARGET, product(_MOTION, ("north", "east")), strict=True)
 )
 STATE_NUMBERS = tuple(map(_number, STATE))
 DEMAND_NUMBERS = tuple(_LOGGED[name] for name in DEMAND)
 LOAD_NUMBERS = tuple(
-    Number(name, unit, f"{what} that acted since the sample before")
+    ExportedNumber(name, unit, f"{what} that acted since the sample before")
     for name, unit, what in zip(
-        ("tau_u", "tau_v", "tau_r"), ("N", "N", "N m"),
-        ("surge force", "sway force", "yaw moment"), strict=True,
+        ("tau_u", "tau_v", "tau_r"),
+        ("N", "N", "N m"),
+        ("surge force", "sway force", "yaw moment"),
+        strict=True,
     )
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,17 +109,24 @@ class ExportedLaw:
         first = len(TARGET) + 1
         end = first + signals + len(DEMAND) + len(LOAD_NUMBERS)
         layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
-            states=len(STATE) + memory, memory=len(STATE), place=len(STATE) + memory,
-            signals=first, demand=first + signals, tau=first + signals + len(DEMAND),
-            columns=end + len(plan.row["shown"]), shown=end if whole.shown else 0,
+            states=len(STATE) + memory,
+            memory=len(STATE),
+            place=len(STATE) + memory,
+            signals=first,
+            demand=first + signals,
+            tau=first + signals + len(DEMAND),
+            columns=end + len(plan.row["shown"]),
+            shown=end if whole.shown else 0,
             hold_every=whole.hold_every,
-            sample_every=whole.sample_every, update_first=whole.update_first,
+            sample_every=whole.sample_every,
+            update_first=whole.update_first,
             wants_loads=whole.wants_loads,
-        )  # fmt: skip
+        )
         vectors = plan.vectors()._replace(
             s=np.concatenate([np.zeros(len(STATE)), plan.first_memory]),
-            row=np.zeros(layout.columns), stages=np.zeros(5 * layout.states),
-        )  # fmt: skip
+            row=np.zeros(layout.columns),
+            stages=np.zeros(5 * layout.states),
+        )
         return cls(scenario, plan, layout, vectors)
 
     @property
@@ -145,9 +160,9 @@ class ExportedLaw:
             yield "path", nothing, ()
 
     @property
-    def _given(self) -> tuple[Signal, ...]:
+    def _given_state(self) -> tuple[Signal, ...]:
         """The state that the law is given: the vessel's own, or the estimate."""
-        return self.loop.estimated()[: len(STATE)] or STATE
+        return self.loop.estimate_signals()[: len(STATE)] or STATE
 
     @property
     def _slots(self) -> Slots:
@@ -159,15 +174,17 @@ class ExportedLaw:
         return self.loop.actuator.limits()
 
     @cached_property
-    def signals(self) -> tuple[Number, ...]:
+    def signals(self) -> tuple[ExportedNumber, ...]:
         """What the law says beside its demand."""
         return tuple(map(_number, self.loop.controller.signals))
 
     @cached_property
-    def memory(self) -> tuple[Number, ...]:
+    def memory(self) -> tuple[ExportedNumber, ...]:
         """Every number that the law remembers, in order."""
         return tuple(
-            Number(number.name if size == 1 else f"{number.name}[{i}]", number.unit, number.meaning)
+            ExportedNumber(
+                number.name if size == 1 else f"{number.name}[{i}]", number.unit, number.meaning
+            )
             for number, size in self._slots
             for i in range(size)
         )
@@ -187,14 +204,20 @@ class ExportedLaw:
     def as_json(self, platforms: Sequence[str], library: Sequence[str]) -> dict[str, Any]:
         """What law.json says; `library` are functions that the law calls of another library."""
         about = {
-            "inputs": (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS), "demand": DEMAND_NUMBERS,
-            "signals": self.signals, "memory": self.memory,
-        }  # fmt: skip
+            "inputs": (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS),
+            "demand": DEMAND_NUMBERS,
+            "signals": self.signals,
+            "memory": self.memory,
+        }
         return {
-            "format": 1, "law": self.loop.controller.label, "scenario": self.scenario.name,
-            "period": self.period, "platforms": list(platforms), "library": list(library),
+            "format": 1,
+            "law": self.loop.controller.label,
+            "scenario": self.scenario.name,
+            "period": self.period,
+            "platforms": list(platforms),
+            "library": list(library),
             **{name: [number._asdict() for number in numbers] for name, numbers in about.items()},
-        }  # fmt: skip
+        }
 
     def samples(self, log: Recording) -> Vector:
         """A row for each sample of a run: time, inputs, demand, signals, memory.
@@ -204,7 +227,7 @@ class ExportedLaw:
         """
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)
-        state = [log[number.name][rows] for number in self._given]
+        state = [log[number.name][rows] for number in self._given_state]
         loads = [np.where(rows > 0, log[number.name][before], 0.0) for number in LOAD_NUMBERS]
         said = [log[number.name][rows] for number in (*DEMAND_NUMBERS, *self.signals)]
         memory = [log[number.name][rows].reshape(len(rows), -1) for number, _ in self._slots]
@@ -221,13 +244,13 @@ class ExportedLaw:
         step, given = routine(self.pieces[STEP]), len(STATE) + len(TARGET)
         pointers, sizes = signatures.pointers(c), signatures.whole_numbers(n)
 
-        def stepped(sample: int, inputs: Vector) -> list[float]:
+        def step_law(sample: int, inputs: Vector) -> list[float]:
             c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
             c.row[n.tau : n.tau + len(LOAD_NUMBERS)] = inputs[given:]
             step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)
             return [*c.row[n.demand : n.tau], *c.row[n.signals : n.demand], *c.s[n.memory :]]
 
-        return stepped
+        return step_law
 
     def by_itself(self, samples: Vector) -> Vector:
         """These samples with what comes out of the law by itself."""
@@ -245,7 +268,7 @@ class ExportedLaw:
         path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
-            x = np.array([log[number.name][row] for number in self._given])
+            x = np.array([log[number.name][row] for number in self._given_state])
             place = np.array([log[signal.name][row] for signal in path.places])
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target

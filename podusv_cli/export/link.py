@@ -17,9 +17,11 @@ from podusv_cli.export.objects import Platform
 # The arithmetic of the C files is that of the run: no product is merged with a sum.
 OPTIONS = ("-shared", "-O2", "-ffp-contract=off")
 MACHINES = {
-    ("Linux", "x86_64"): "linux64", ("Linux", "aarch64"): "aarch64-linux",
-    ("Windows", "AMD64"): "win64", ("Darwin", "x86_64"): "darwin64",
-}  # fmt: skip
+    ("Linux", "x86_64"): "linux64",
+    ("Linux", "aarch64"): "aarch64-linux",
+    ("Windows", "AMD64"): "win64",
+    ("Darwin", "x86_64"): "darwin64",
+}
 NO_ZIG = (
     "there is no linker for {0}: install a C compiler, or zig with pip install "
     "'podusv[export]'; --no-fmu exports without a linker"
@@ -38,9 +40,12 @@ def shared_library(files: Mapping[str, bytes], name: str, platform: Platform) ->
         sources = [file for file in files if not file.endswith(".h")]
         out = f"law{platform.library}"
         done = subprocess.run(
-            [*command, *OPTIONS, "-o", out, *sources, "-lm"], cwd=folder, capture_output=True,
-            text=True, check=False,
-        )  # fmt: skip
+            [*command, *OPTIONS, "-o", out, *sources, "-lm"],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if done.returncode:
             raise UsageError(f"the law cannot be linked for {name}: {done.stderr.strip()[-500:]}")
         return (Path(folder) / out).read_bytes()

@@ -14,9 +14,18 @@ from podusv_cli.engine.machine.compile import Piece
 
 # Functions that give a number and round correctly everywhere
 EXACT = {
-    "sqrt", "fabs", "ceil", "floor", "trunc", "rint", "copysign", "maxnum", "minnum", "fma",
+    "sqrt",
+    "fabs",
+    "ceil",
+    "floor",
+    "trunc",
+    "rint",
+    "copysign",
+    "maxnum",
+    "minnum",
+    "fma",
     "vector",
-}  # fmt: skip
+}
 INTERNAL = "internal"  # linkage of what no other object file sees
 
 
@@ -44,15 +53,21 @@ PLATFORMS: Mapping[str, Platform] = {
         "aarch64-unknown-linux-gnu", "generic", zig="aarch64-linux-gnu", library=".so"
     ),
     "armv7": Platform(
-        "armv7-unknown-linux-gnueabihf", "generic", "+vfp3", zig="arm-linux-gnueabihf",
+        "armv7-unknown-linux-gnueabihf",
+        "generic",
+        "+vfp3",
+        zig="arm-linux-gnueabihf",
         library=".so",
     ),
     "thumbv7em": Platform("thumbv7em-unknown-none-eabihf", "cortex-m7"),
     "riscv64": Platform(
-        "riscv64-unknown-linux-gnu", "generic-rv64", "+m,+a,+f,+d,+c", zig="riscv64-linux-gnu",
+        "riscv64-unknown-linux-gnu",
+        "generic-rv64",
+        "+m,+a,+f,+d,+c",
+        zig="riscv64-linux-gnu",
         library=".so",
     ),
-}  # fmt: skip
+}
 
 
 def together(pieces: Mapping[str, Piece]) -> str:

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Collection
 from typing import NoReturn
 
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 
 LONGEST = 500  # characters of an expression
 LARGEST = 1e300  # of numbers written down
@@ -23,11 +23,20 @@ FOREIGN = re.compile(r"(?<![\w.])(?:0[xobXOB]\w+|[0-9.]*[0-9](?:\.?[eE][+-]?[0-9
 # The functions of each language, by the section of a scenario that it is for.
 FUNCTIONS = {
     "claims": (
-        "max", "min", "mean", "final", "variation", "integral", "rms_above", "decay", "abs",
-        "hypot", "rate",
+        "max",
+        "min",
+        "mean",
+        "final",
+        "variation",
+        "integral",
+        "rms_above",
+        "decay",
+        "abs",
+        "hypot",
+        "rate",
     ),
     "sweep.claims": ("share", "failures", "quantile", "median"),
-}  # fmt: skip
+}
 
 
 class ExpressionError(ValueError):
@@ -71,7 +80,7 @@ def refuse(node: ast.AST, why: str) -> NoReturn:
     raise ExpressionError(f"{ast.unparse(node)!r}: {why}")
 
 
-def known(name: str, names: Collection[str], what: str) -> str:
+def known_name(name: str, names: Collection[str], what: str) -> str:
     """The name, if it is one of these. Raises ExpressionError with the nearest that is."""
     if name in names:
         return name
@@ -80,7 +89,7 @@ def known(name: str, names: Collection[str], what: str) -> str:
         raise ExpressionError(
             f"unknown {what} {name!r}; it belongs to {homes[0]} (allowed here: {allowed})"
         )
-    raise ExpressionError(unknown(f"{what} {name!r}", name, sorted(names), "podusv list"))
+    raise ExpressionError(unknown_word(f"{what} {name!r}", name, sorted(names), "podusv list"))
 
 
 def function(node: ast.Call) -> str:

@@ -12,8 +12,10 @@ from podusv_cli.core.escaping import markdown, markdown_cell, markdown_code
 Answer = Literal["reproduced", "not reproduced", "cannot tell"]
 # In JSON, and in words on claims that were published
 ANSWERS: dict[bool | None, Answer] = {
-    True: "reproduced", False: "not reproduced", None: "cannot tell",
-}  # fmt: skip
+    True: "reproduced",
+    False: "not reproduced",
+    None: "cannot tell",
+}
 # In words on somebody's own claims
 OF_OWN: dict[bool | None, str] = {True: "holds", False: "fails", None: "cannot tell"}
 OWN = "ours"  # begins the source of a claim that was not published
@@ -111,9 +113,13 @@ def by_answer(verdicts: Sequence[AnyVerdict]) -> list[Answered[AnyVerdict]]:
     numbered = [*enumerate(verdicts, 1)]
     kinds = [kind for kind in (True, False) if kind in {v.published for v in verdicts}]
     groups = [
-        Answered(answer, words(answer, published=kind),
-                 [row for row in numbered if (row[1].answer, row[1].published) == (answer, kind)])
-        for kind in kinds for answer in (True, False)
-    ]  # fmt: skip
+        Answered(
+            answer,
+            words(answer, published=kind),
+            [row for row in numbered if (row[1].answer, row[1].published) == (answer, kind)],
+        )
+        for kind in kinds
+        for answer in (True, False)
+    ]
     open_ = [row for row in numbered if row[1].answer is None]
     return [*groups, Answered(None, ANSWERS[None], open_)]

@@ -19,8 +19,11 @@ import numpy as np
 from podusv_cli.expressions.reading import literal, refuse
 
 ARITHMETIC: dict[type[ast.operator], Callable[..., Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: np.divide,
-}  # fmt: skip
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: np.divide,
+}
 
 
 class Condition(NamedTuple):
@@ -30,7 +33,7 @@ class Condition(NamedTuple):
     no: Any
 
     @classmethod
-    def known(cls, held: Any) -> Self:
+    def known_everywhere(cls, held: Any) -> Self:
         """A condition that is unknown nowhere."""
         return cls(held, np.logical_not(held))
 
@@ -96,7 +99,7 @@ class Walk(Logic):
     def link(self, sign: ast.cmpop, left: ast.expr, a: Any, right: ast.expr, b: Any) -> Condition:
         """Whether one side compares so with the next."""
 
-    def calculated(self, operation: Callable[..., Any], parts: Sequence[Any]) -> Any:
+    def calculate(self, operation: Callable[..., Any], parts: Sequence[Any]) -> Any:
         """The result of an operation."""
         return operation(*parts)
 
@@ -114,15 +117,19 @@ class Walk(Logic):
             case ast.Constant():
                 return np.float64(literal(node))
             case ast.UnaryOp(op=ast.USub(), operand=part):
-                return self.calculated(operator.neg, [self.value(part)])
+                return self.calculate(operator.neg, [self.value(part)])
             case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
                 parts = [self.value(left), self.value(right)]
-                return self.calculated(ARITHMETIC[type(sign)], parts)
+                return self.calculate(ARITHMETIC[type(sign)], parts)
             case ast.BinOp():
                 refuse(node, "calculate with + - * / only")
         return self.quantity(node)
 
 
 SIGNS: dict[type[ast.cmpop], str] = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
-}  # fmt: skip
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+}

@@ -31,9 +31,23 @@ NEAR = 12.0  # lengths, the close-up's width
 PALE = 0.25
 # Raw pictures in, H.264 out that every browser plays; the same bytes for the same pictures.
 ENCODE = (
-    "-i", "-", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-threads", "1", "-map_metadata", "-1",
-    "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart",
-)  # fmt: skip
+    "-i",
+    "-",
+    "-c:v",
+    "libx264",
+    "-pix_fmt",
+    "yuv420p",
+    "-threads",
+    "1",
+    "-map_metadata",
+    "-1",
+    "-fflags",
+    "+bitexact",
+    "-flags:v",
+    "+bitexact",
+    "-movflags",
+    "+faststart",
+)
 
 
 def file_name() -> str:
@@ -79,9 +93,10 @@ def _mp4(frames: Iterator[Image.Image]) -> bytes:
         place = Path(folder, MP4)
         subprocess.run(
             ["ffmpeg", "-loglevel", "error", *raw, *ENCODE, str(place)],
-            input=b"".join(picture.tobytes() for picture in pictures), check=True,
+            input=b"".join(picture.tobytes() for picture in pictures),
+            check=True,
             capture_output=True,
-        )  # fmt: skip
+        )
         return place.read_bytes()
 
 

@@ -30,8 +30,8 @@ def chase(runs: Sequence[Shown], frames: int = FRAMES) -> dict[str, Any]:
     (west, east), (south, north) = bounds(moving)
     half = max(run.length for run in moving) / 2  # a hull reaches beyond its track
     return {
-        "box": _rounded((west - half, south - half, east + half, north + half)),
-        "end": _rounded([max(run.end for run in moving)], DIGITS["time"])[0],
+        "box": _round_numbers((west - half, south - half, east + half, north + half)),
+        "end": _round_numbers([max(run.end for run in moving)], DIGITS["time"])[0],
         "runs": [_track(run, frames) for run in moving],
     }
 
@@ -65,19 +65,21 @@ def _track(run: Shown, frames: int) -> dict[str, Any]:
         "length": run.length,
         "beam": run.about.beam,
         "standoff": run.about.standoff,
-        "counts": _rounded([run.counts_to], DIGITS["time"])[0],
+        "counts": _round_numbers([run.counts_to], DIGITS["time"])[0],
         "ending": "" if run.whole else run.recording.message.partition(":")[0] or stopped,
-        "legs": [_rounded(axis) for axis in legs.T],
-        "distance": _rounded(np.abs(run.signal(away)[rows]), MILLIMETRES + 1) if away else [],
+        "legs": [_round_numbers(axis) for axis in legs.T],
+        "distance": _round_numbers(np.abs(run.signal(away)[rows]), MILLIMETRES + 1) if away else [],
         **{
-            name: _rounded(run.signal(name)[rows], DIGITS.get(name, MILLIMETRES))
+            name: _round_numbers(run.signal(name)[rows], DIGITS.get(name, MILLIMETRES))
             for name in names
             if run.has(name)
         },
     }
 
 
-def _rounded(numbers: Sequence[float] | Vector, digits: int = MILLIMETRES) -> list[float | None]:
+def _round_numbers(
+    numbers: Sequence[float] | Vector, digits: int = MILLIMETRES
+) -> list[float | None]:
     """The numbers in the room that the page has for them; None for none."""
     within = np.round(np.clip(numbers, -FAR, FAR), digits).tolist()
     return [None if math.isnan(x) else x for x in within]

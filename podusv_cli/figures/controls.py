@@ -26,11 +26,14 @@ HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in column
 
 
 @figure(
-    "controls", place=3, signals=("tau_u", "tau_r"), source="the paper's figures 5 to 7",
+    "controls",
+    place=3,
+    signals=("tau_u", "tau_r"),
+    source="the paper's figures 5 to 7",
     caption="surge force and yaw moment: what acts on the hull, with the actuator's limits, and in "
     "panels of their own what the law demands where the actuator limits it; the first moments, the "
     "whole run, the settled part" + PEAKS,
-)  # fmt: skip
+)
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
     """Surge force and yaw moment on the hull, and what the law demands where this differs."""
     spans = _spans(runs)
@@ -41,7 +44,7 @@ def controls(runs: Sequence[Shown], columns: int) -> Figure:
     for (load, kind, part), axes in np.ndenumerate(cells):
         _panel(axes, runs, (load, kind), list(spans.values())[part])
         if kind == kinds - 1 and part == 0:
-            _claimed(axes, runs, LOADS[load][1])
+            _draw_claimed_peak(axes, runs, LOADS[load][1])
         if columns == 1 or part == 0:
             axes.set_ylabel(axis_label(runs, LOADS[load][kind]))
     for axes in cells[-1, -1] if columns == 2 else cells[:, -1, -1]:
@@ -91,7 +94,7 @@ def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span
         compress(axes, runs, name)
 
 
-def _claimed(axes: Axes, runs: Sequence[Shown], name: str) -> None:
+def _draw_claimed_peak(axes: Axes, runs: Sequence[Shown], name: str) -> None:
     """Lines at the early peak of the demand that a claim names."""
     for peak in {run.peaks[name] for run in runs if name in run.peaks}:
         for side in (peak, -peak):

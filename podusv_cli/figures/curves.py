@@ -39,7 +39,7 @@ class Beyond(SymmetricalLogLocator):
         return [tick for tick in ticks if tick == 0.0 or abs(tick) > 0.5 * self.linear]
 
 
-def thinned(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
+def thin_curve(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
     """At most about `points` samples that keep every extreme: the least and largest of each bin."""
     if len(t) <= points:
         return t, y
@@ -90,7 +90,7 @@ def _widen(axes: Axes, size: float) -> None:
 
 def _way(y: Vector) -> float:
     """How far a signal goes up and down, as far as a page can show it."""
-    _, few = thinned(np.arange(len(y), dtype=float), y)
+    _, few = thin_curve(np.arange(len(y), dtype=float), y)
     return float(np.sum(np.abs(np.diff(few, axis=0))))
 
 
@@ -140,7 +140,7 @@ def mark(line: Line2D, run: Shown, t: Vector | None = None) -> None:
     """
     instants = np.asarray(line.get_xdata() if t is None else t)
     if len(instants) and run.marker:
-        at = instants[0] + run.places * (instants[-1] - instants[0])
+        at = instants[0] + run.look.places * (instants[-1] - instants[0])
         rows = np.minimum(np.searchsorted(instants, at), len(instants) - 1)
         line.set(marker=run.marker, markevery=rows.tolist(), **MARK)
         line.recache(always=True)  # else matplotlib counts from the first point within the axes
@@ -154,7 +154,7 @@ def differ(run: Shown, name: str, other: str) -> bool:
 
 def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any) -> Line2D:
     """Plot a curve over time, thinned; the vertical scale fits it only where it is `fitted`."""
-    t, y = thinned(*curve)
+    t, y = thin_curve(*curve)
     if fitted:
         return axes.plot(t, y, **look)[0]
     line = Line2D(t, y, **look)

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core import registry
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.figures.sheet import Sheet
 from podusv_cli.figures.shown import Shown
@@ -27,7 +27,7 @@ def _place(sheet: Sheet) -> tuple[int, str]:
 @cache
 def figures_with(plugins: Plugins) -> dict[str, Sheet]:
     """All figures by name, in order, with those of these plug-ins."""
-    sheets = registry.named("podusv_cli.figures", Sheet, plugins).values()
+    sheets = registry.find_by_name("podusv_cli.figures", Sheet, plugins).values()
     return {sheet.name: sheet for sheet in sorted(sheets, key=_place)}
 
 
@@ -43,12 +43,12 @@ def figures_of(plugins: Iterable[Plugins]) -> dict[str, Sheet]:
     return figures_with(tuple(dict.fromkeys(p for several in plugins for p in several)))
 
 
-def chosen(names: Sequence[str], runs: Sequence[Shown], extras: Extras) -> list[Sheet]:
+def choose_sheets(names: Sequence[str], runs: Sequence[Shown], extras: Extras) -> list[Sheet]:
     """The figures of these names or `ALL` that fit; without names, the `USUAL` and plug-ins' own.
 
     One that is named and that no run has signals for is missing among the `extras`.
     """
-    known = figures_of(run.plugins for run in runs)
+    known = figures_of(shown.run.plugins for shown in runs)
     fitting = {name: sheet for name, sheet in known.items() if sheet.fits(runs)}
     for name in (name for name in names if name not in (ALL, *fitting)):
         wanted = ", ".join(known[name].signals)
@@ -72,9 +72,14 @@ def draw(
 
 
 def draw_in_parallel(
-    runs: Sequence[Shown], sheets: Iterable[Sheet], formats: Sequence[str], extras: Extras,
-    look: Look = SCREEN, progress: Progress = lambda fraction: None, workers: int = 0,
-) -> dict[str, bytes]:  # fmt: skip
+    runs: Sequence[Shown],
+    sheets: Iterable[Sheet],
+    formats: Sequence[str],
+    extras: Extras,
+    look: Look = SCREEN,
+    progress: Progress = lambda fraction: None,
+    workers: int = 0,
+) -> dict[str, bytes]:
     """The same as `draw`, in processes of their own, each of which draws several figures.
 
     A figure that fails is missing among the `extras`. `progress` is called with the fraction of
@@ -86,7 +91,7 @@ def draw_in_parallel(
         own = Extras()
         with interrupts_enabled():
             drawn = partial(draw, runs, [sheet], formats, look)
-            files = own.made(f"figure {sheet.name}", lambda: dict(drawn()))
+            files = own.make_or_record(f"figure {sheet.name}", lambda: dict(drawn()))
         return files or {}, own.missing
 
     outcomes = run_shares([partial(job, sheet) for sheet in sheets], progress, workers)
@@ -109,4 +114,4 @@ def check_names(
     for what, names, known in (("figure", figures, named), ("format", formats, FORMATS)):
         for name in names:
             if name not in known:
-                raise UsageError(unknown(f"{what} {name!r}", name, known, "podusv list"))
+                raise UsageError(unknown_word(f"{what} {name!r}", name, known, "podusv list"))

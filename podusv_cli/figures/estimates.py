@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.figures.curves import draw_curve, draw_own, draw_run, thinned
+from podusv_cli.figures.curves import draw_curve, draw_own, draw_run, thin_curve
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown, shortened, unit
+from podusv_cli.figures.shown import Shown, shorten, unit
 from podusv_cli.figures.style import WIDTHS, legend, new_figure
 
 PANEL_HEIGHT = 1.15  # inches
@@ -30,12 +30,14 @@ OUTAGE: dict[str, Any] = {"color": "#444444", "alpha": 0.15, "linewidth": 0.0, "
 
 
 @figure(
-    "estimates", place=8, signals=tuple(f"{state.name}_est" for state in STATE),
+    "estimates",
+    place=8,
+    signals=tuple(f"{state.name}_est" for state in STATE),
     caption="what the law is given in place of the true state: dots what the sensors deliver, "
     "curves the estimate; of a run alone both beside the truth, broad and pale, and how far they "
     "are from it; of several runs how far, each in its own column on common axes; shaded, the "
     "outages of the sensor",
-)  # fmt: skip
+)
 def estimates(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each quantity of the state: values and errors of one run, errors of several."""
     having = [run for run in runs if run.has("x_est")]
@@ -71,15 +73,16 @@ def _small_multiples(runs: Sequence[Shown], columns: int) -> Figure:
         for place, state in enumerate(STATE):
             axes = figure.add_subplot(
                 cells[block * len(STATE) + place, column],
-                sharex=first.get(0), sharey=first.get(place),
-            )  # fmt: skip
+                sharex=first.get(0),
+                sharey=first.get(place),
+            )
             first.setdefault(place, axes)
             _draw(axes, run, state.name, fitted=run in fitted, error=True)
             _shade([axes], [run], place)
             axes.tick_params(labelbottom=place == len(STATE) - 1, labelleft=column == 0)
             axes.set_ylabel("" if column else _error_label(state).replace(" $", "\n$"))
         axes.set_xlabel(TIME)
-        axes.figure.axes[-len(STATE)].set_title(shortened(run.name, longest), loc="left")
+        axes.figure.axes[-len(STATE)].set_title(shorten(run.name, longest), loc="left")
     legend(figure)
     return figure
 
@@ -97,7 +100,7 @@ def _draw(axes: Axes, run: Shown, name: str, *, fitted: bool, error: bool) -> No
     measured = f"{name}_m"
     if run.has(measured):
         fresh = _fresh(run.signal(measured))
-        dots = thinned(t[fresh], (run.signal(measured) - less)[fresh])
+        dots = thin_curve(t[fresh], (run.signal(measured) - less)[fresh])
         draw_curve(axes, dots, fitted=fitted, color=run.color, label="_measured", **MEASURED)
     draw_run(axes, run, (t, run.signal(f"{name}_est") - less), fitted=fitted, **ESTIMATE)
 

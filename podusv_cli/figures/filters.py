@@ -18,10 +18,12 @@ ERRORS = ("y_u", "y_r")
 
 
 @figure(
-    "filters", place=4, signals=("alpha_u", "alpha_r"),
+    "filters",
+    place=4,
+    signals=("alpha_u", "alpha_r"),
     caption="virtual controls and the filter: thin what goes in, alpha of (21) and (30), thick"
     " what comes out, beta of (22) and (31); below, the filter's error y = beta - alpha" + PEAKS,
-)  # fmt: skip
+)
 def filters(runs: Sequence[Shown], columns: int) -> Figure:
     """Virtual control thin behind the filter's output; below or beside, what lies between them.
 

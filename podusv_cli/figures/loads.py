@@ -19,9 +19,11 @@ SEA = ("b_u", "b_v", "b_r")
 
 
 @figure(
-    "loads", place=7, signals=("b_u", "b_v", "b_r", "saturated"),
+    "loads",
+    place=7,
+    signals=("b_u", "b_v", "b_r", "saturated"),
     caption="disturbance, and when the actuator limits the law",
-)  # fmt: skip
+)
 def loads(runs: Sequence[Shown], columns: int) -> Figure:
     """The disturbance over time, once where all runs have the same; below, who is limited when."""
     held = constants(runs, SEA)

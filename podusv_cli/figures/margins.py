@@ -26,9 +26,12 @@ def sensitivities(laws: Mapping[str, LoopMargins], columns: int = 2) -> Figure:
                 color, linestyle, _ = nth_style(place)
                 loop = law.loops[axis]
                 axes.plot(
-                    loop.omega, getattr(loop, name), color=color, linestyle=linestyle,
+                    loop.omega,
+                    getattr(loop, name),
+                    color=color,
+                    linestyle=linestyle,
                     label=escaping.figure(label),
-                )  # fmt: skip
+                )
             axes.axhline(1.0, zorder=0, **TARGET_LOOK)
             axes.set(xscale="log", yscale="log", ylim=(FLOOR, None), title=axis)
         row[0].set_ylabel(title)

@@ -107,9 +107,14 @@ class Page(Figure):
         taken = (-(-len(names) // count) * ROW * size + GAP) * POINT
         edge = EDGE / self.get_figheight()
         self.legend(
-            handles, names, ncols=count, loc="lower center" if below else "upper center",
-            bbox_to_anchor=(0.5, edge if below else 1.0 - edge), borderaxespad=0.0, borderpad=0.0,
-        )  # fmt: skip
+            handles,
+            names,
+            ncols=count,
+            loc="lower center" if below else "upper center",
+            bbox_to_anchor=(0.5, edge if below else 1.0 - edge),
+            borderaxespad=0.0,
+            borderpad=0.0,
+        )
         self.keys.append((handles, names, below))
         self.foot, self.head = (taken, self.head) if below else (self.foot, taken)
 
@@ -141,8 +146,10 @@ class Page(Figure):
             high = tops[row.start], bottoms[row.stop - 1]
             axes.set_position((0.1, 1.0 - high[1] / height, 0.8, (high[1] - high[0]) / height))
         beside = [_numbers(axes, MOST * width) for axes in panels]
-        labels = [max(n, SIDE) + _lines(axes.yaxis.label, axes.get_ylabel())
-                  for axes, n in zip(panels, beside, strict=True)]  # fmt: skip
+        labels = [
+            max(n, SIDE) + _lines(axes.yaxis.label, axes.get_ylabel())
+            for axes, n in zip(panels, beside, strict=True)
+        ]
         left, right = _most(columns, labels, [SIDE] * len(panels), grid.ncols)
         starts, ends = _spread(
             width, np.asarray(grid.get_width_ratios()), (EDGE, EDGE), left, right
@@ -170,9 +177,12 @@ def _most(
 
 
 def _spread(
-    size: float, ratios: Vector, edges: tuple[float, float], before: Sequence[float],
+    size: float,
+    ratios: Vector,
+    edges: tuple[float, float],
+    before: Sequence[float],
     after: Sequence[float],
-) -> tuple[Vector, Vector]:  # fmt: skip
+) -> tuple[Vector, Vector]:
     """Where rows or columns of these ratios begin and end [inches]."""
     free = max(size - sum(edges) - sum(before) - sum(after), 0.2 * size)
     own = free * ratios / np.sum(ratios)
@@ -248,11 +258,11 @@ def _texts(axis: Axis) -> list[str]:
         (axis.get_minorticklocs(), axis.get_minor_formatter()),
     ):
         texts = formatter.format_ticks(list(locations))
-        shown += [t for t, seen in zip(texts, _seen(axis, locations), strict=True) if seen]
+        shown += [t for t, seen in zip(texts, _visible_ticks(axis, locations), strict=True) if seen]
     return [*shown, axis.get_major_formatter().get_offset()]  # which depends on the numbers
 
 
-def _seen(axis: Axis, locations: Locations) -> Any:
+def _visible_ticks(axis: Axis, locations: Locations) -> Any:
     """Which ticks lie on the axis."""
     change = axis.get_transform().transform
     low, high = sorted(change(np.asarray(axis.get_view_interval(), float)))
@@ -277,8 +287,11 @@ class Panel(Axes):
     def _init_axis(self) -> None:  # where matplotlib has projections give their axes
         self.xaxis, self.yaxis = Across(self, clear=False), Up(self, clear=False)
         for place, axis in (
-            ("bottom", self.xaxis), ("top", self.xaxis), ("left", self.yaxis), ("right", self.yaxis)
-        ):  # fmt: skip
+            ("bottom", self.xaxis),
+            ("top", self.xaxis),
+            ("left", self.yaxis),
+            ("right", self.yaxis),
+        ):
             self.spines[place].register_axis(axis)
 
 
@@ -299,7 +312,7 @@ class _Stamped(Axis, ABC):
                 continue
             found = self.get_majorticklocs() if which is self.major else self.get_minorticklocs()
             texts = which.formatter.format_ticks(list(found)) if which.formatter else []
-            seen = _seen(self, found) if len(found) else []
+            seen = _visible_ticks(self, found) if len(found) else []
             if not any(seen):
                 continue
             ticks = self.get_major_ticks(1) if which is self.major else self.get_minor_ticks(1)
@@ -321,10 +334,10 @@ class _Stamped(Axis, ABC):
         if tick.gridline.get_visible():
             along = np.repeat(places, 3)
             across = np.tile([0.0, 1.0, np.nan], len(places))
-            tick.gridline.set_data(*self.ordered(along, across))
+            tick.gridline.set_data(*self.order(along, across))
             tick.gridline.draw(renderer)
         if tick.tick1line.get_visible():
-            tick.tick1line.set_data(*self.ordered(places, flat))
+            tick.tick1line.set_data(*self.order(places, flat))
             tick.tick1line.draw(renderer)
         if tick.label1.get_visible():
             for place, text in zip(places, texts, strict=True):
@@ -334,7 +347,7 @@ class _Stamped(Axis, ABC):
                     tick.label1.draw(renderer)
 
     @abstractmethod
-    def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
+    def order(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """Horizontal and vertical positions."""
 
     @abstractmethod
@@ -349,7 +362,7 @@ class _Stamped(Axis, ABC):
 class Across(_Stamped, XAxis):
     """The horizontal axis of a panel."""
 
-    def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
+    def order(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """As they are."""
         return along, across
 
@@ -366,7 +379,7 @@ class Across(_Stamped, XAxis):
 class Up(_Stamped, YAxis):
     """The vertical axis of a panel."""
 
-    def ordered(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
+    def order(self, along: Vector, across: Vector) -> tuple[Vector, Vector]:
         """The other way round."""
         return across, along
 
@@ -381,7 +394,7 @@ class Up(_Stamped, YAxis):
         )
 
 
-class _Plain(Formatter):
+class _PlainTicks(Formatter):
     """Numbers at ticks as plain text; set as formulas, they take a quarter of the drawing time."""
 
     def __call__(self, x: float, pos: int | None = None) -> str:
@@ -392,14 +405,15 @@ class _Plain(Formatter):
         return exponent(super().get_offset())
 
 
-class PlainNumbers(_Plain, ScalarFormatter):
+class PlainNumbers(_PlainTicks, ScalarFormatter):
     """Of a linear axis."""
 
 
-class PlainPowers(_Plain, LogFormatterSciNotation):
+class PlainPowers(_PlainTicks, LogFormatterSciNotation):
     """Of a logarithmic axis."""
 
 
 PLAIN: dict[type, type[Formatter]] = {
-    ScalarFormatter: PlainNumbers, LogFormatterSciNotation: PlainPowers,
-}  # fmt: skip
+    ScalarFormatter: PlainNumbers,
+    LogFormatterSciNotation: PlainPowers,
+}

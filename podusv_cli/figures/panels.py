@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from podusv_cli.figures.curves import compress, draw_signal
 from podusv_cli.figures.page import Page
-from podusv_cli.figures.scales import resolved
+from podusv_cli.figures.scales import smallest_distance
 from podusv_cli.figures.sheet import Family, Sheet, figure
 from podusv_cli.figures.shown import Shown, axis_label, constants
 from podusv_cli.figures.style import legend, new_figure
@@ -78,7 +78,7 @@ def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
 def distance_axis(axes: Axes, runs: Sequence[Shown]) -> None:
     """A logarithmic axis for z_e, not below what the runs resolve, with a line at each standoff."""
     axes.set_yscale("log")
-    bottom, floor = axes.get_ylim()[0], resolved(runs)
+    bottom, floor = axes.get_ylim()[0], smallest_distance(runs)
     axes.set_ylim(bottom=max(bottom, floor))
     kept = sorted({run.about.standoff for run in runs} - {0.0})
     for standoff in kept:
@@ -87,28 +87,47 @@ def distance_axis(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _sheet(
-    name: str, place: int, caption: str, *signals: str,
-    scales: Mapping[str, Scale] = MappingProxyType({}), compressed: bool = False, source: str = "",
-) -> Sheet:  # fmt: skip
+    name: str,
+    place: int,
+    caption: str,
+    *signals: str,
+    scales: Mapping[str, Scale] = MappingProxyType({}),
+    compressed: bool = False,
+    source: str = "",
+) -> Sheet:
     family = signals_over_time(*signals, scales=scales, compressed=compressed)
     return figure(name, caption=caption, signals=signals, place=place, source=source)(family)
 
 
 errors = figure(
-    "errors", place=2, signals=("x_e", "y_e", "z_e"), source="the paper's figure 4",
+    "errors",
+    place=2,
+    signals=("x_e", "y_e", "z_e"),
+    source="the paper's figure 4",
     caption="tracking errors (18); the distance on a logarithmic axis, down to what the run "
     "resolves, with the standoff that the law keeps",
-)(signals_over_time("x_e", "y_e", "z_e", "psi_e", scales={"z_e": distance_axis}))  # fmt: skip
+)(signals_over_time("x_e", "y_e", "z_e", "psi_e", scales={"z_e": distance_axis}))
 following = _sheet(
-    "path", 2, "cross-track error of the active leg, the way along it, and its number",
-    "e_ct", "along_leg", "leg",
-)  # fmt: skip
+    "path",
+    2,
+    "cross-track error of the active leg, the way along it, and its number",
+    "e_ct",
+    "along_leg",
+    "leg",
+)
 adaptation = _sheet(
-    "adaptation", 5,
+    "adaptation",
+    5,
     "norms of the network weights, estimated bounds, network outputs, largest node output" + PEAKS,
-    "W_norm_u", "W_norm_r", "b_hat_u", "b_hat_r", "f_hat_u", "f_hat_r", "activation",
+    "W_norm_u",
+    "W_norm_r",
+    "b_hat_u",
+    "b_hat_r",
+    "f_hat_u",
+    "f_hat_r",
+    "activation",
     compressed=True,
-)  # fmt: skip
+)
 velocities = _sheet(
     "velocities", 6, "velocities and heading" + PEAKS, "u", "v", "r", "psi", compressed=True
 )

@@ -20,19 +20,20 @@ PANEL_HEIGHT = 1.5  # inches
 
 
 @figure(
-    "pods", place=10, signals=("n", "delta", "power"),
+    "pods",
+    place=10,
+    signals=("n", "delta", "power"),
     caption="propeller speeds, propulsion angles and power; a column for each pod, thin what was "
     "asked of it",
-)  # fmt: skip
+)
 def pods(runs: Sequence[Shown], columns: int) -> Figure:
     """A row for each of speed, angle and power, a column for each pod; actual over commanded."""
     having = [run for run in runs if run.has("delta")]
     count = max(run.recording["delta"].shape[1] for run in having)
     held = constants(having, [name for name, _ in ROWS])
     rows = [
-        names for names in ROWS
-        if names[0] not in held and any(run.has(names[0]) for run in having)
-    ]  # fmt: skip
+        names for names in ROWS if names[0] not in held and any(run.has(names[0]) for run in having)
+    ]
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * len(rows))
     panels = figure.subplots(len(rows), count, sharex=True, sharey="row", squeeze=False)
     for line, names in zip(panels, rows, strict=True):

@@ -57,15 +57,17 @@ def mean_size(run: Shown, name: str) -> float:
     return size / values.size if np.isfinite(size) else 0.0
 
 
-def resolved(runs: Sequence[Shown]) -> float:
+def smallest_distance(runs: Sequence[Shown]) -> float:
     """The smallest distance [m] worth showing: a step's way, or less where a vessel stays nearer.
 
     How near a vessel comes in passing depends on where the steps happen to fall.
     """
-    return min(_resolved(run) for run in runs if run.has("u"))  # a measured track may have none
+    return min(
+        _smallest_distance_of(run) for run in runs if run.has("u")
+    )  # a measured track may have none
 
 
-def _resolved(run: Shown) -> float:
+def _smallest_distance_of(run: Shown) -> float:
     stride = -(-len(run.recording["time"]) // SAMPLES)
     z_e, u = (np.abs(run.signal(name)[::stride]) for name in ("z_e", "u"))
     way = run.about.step * float(np.median(u))

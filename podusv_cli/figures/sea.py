@@ -23,11 +23,13 @@ WAVES = 20  # in the panel of single waves
 
 
 @figure(
-    "sea", place=7, signals=SIGNALS,
+    "sea",
+    place=7,
+    signals=SIGNALS,
     caption="waves, wind and current where the vessel is: elevation of the sea over the last "
     f"{WAVES} waves and over the whole run, speed of the wind, speed and direction of the "
     "current",
-)  # fmt: skip
+)
 def sea(runs: Sequence[Shown], columns: int) -> Figure:
     """A panel for each signal over the whole run; above them, the last waves one by one."""
     held = constants(runs, SIGNALS)

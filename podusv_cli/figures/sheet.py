@@ -42,14 +42,14 @@ def figure(
 
     Figures are shown in the order of their places, those of one place by name.
     """
-    return lambda family: Sheet(name, caption, signals, place, _lettered(family), source)
+    return lambda family: Sheet(name, caption, signals, place, _letter_panels(family), source)
 
 
-def _lettered(family: Family) -> Family:
+def _letter_panels(family: Family) -> Family:
     """The family with (a), (b), ... above its panels, ahead of titles on the left."""
 
     @wraps(family)
-    def drawn(runs: Sequence[Shown], columns: int) -> Figure:
+    def draw_lettered(runs: Sequence[Shown], columns: int) -> Figure:
         figure = family(runs, columns)
         if len(figure.axes) > 1:
             letters = chain(ascii_lowercase, map("".join, product(ascii_lowercase, repeat=2)))
@@ -57,4 +57,4 @@ def _lettered(family: Family) -> Family:
                 axes.set_title(f"({letter}) {axes.get_title(loc='left')}".rstrip(), loc="left")
         return figure
 
-    return drawn
+    return draw_lettered

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from podusv_cli.core import derived_signals as derived
 from podusv_cli.core import escaping, quantities
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.plugins import Plugins
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
-from podusv_cli.figures import signals as derived
 from podusv_cli.figures.looks import nth_style
 
 MARKS = 24  # on the curves of a panel together
@@ -24,23 +24,58 @@ FEWEST, MOST = 3, 8  # on a curve
 ALONE = 9  # places of a run that is shown alone, both ends among them
 
 
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """A run with the name, colour, line style and marker under which every figure shows it.
+class RunLook(NamedTuple):
+    """Colour, line style and marker of a run's curves.
 
-    `plugins` have signals that follow from the log. `places` are fractions of a curve, in time,
-    where its markers stand. `peaks` are those of signals that a claim about the runs names.
+    `places` are fractions of a curve, in time, where its markers stand.
     """
 
-    label: str
-    recording: Recording
-    about: RunAbout
-    plugins: Plugins
     color: str
     linestyle: Any
     marker: str
     places: Vector
-    peaks: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A run with the look under which every figure shows it.
+
+    `peaks` are those of signals that a claim about the runs names.
+    """
+
+    run: PastRun
+    look: RunLook
+    peaks: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def label(self) -> str:
+        """The run's, without characters that do not show."""
+        return visible(self.run.label)
+
+    @property
+    def recording(self) -> Recording:
+        """The run's log."""
+        return self.run.recording
+
+    @property
+    def about(self) -> RunAbout:
+        """What the run says about itself."""
+        return self.run.about
+
+    @property
+    def color(self) -> str:
+        """Of its curves."""
+        return self.look.color
+
+    @property
+    def linestyle(self) -> Any:
+        """Of its curves, as `Axes.plot` takes it."""
+        return self.look.linestyle
+
+    @property
+    def marker(self) -> str:
+        """On its curves; empty for a run that is shown alone."""
+        return self.look.marker
 
     @property
     def name(self) -> str:
@@ -83,22 +118,22 @@ class Shown:
     @property
     def whole(self) -> bool:
         """Whether the run reached its end."""
-        return self.recording.status == "finished"
+        return self.run.finished
 
     def has(self, name: str) -> bool:
         """Whether the run has the signal, logged or derivable."""
-        return derived.has(self.recording, name, self.plugins)
+        return self.run.has(name)
 
     @property
     def signals(self) -> list[str]:
         """The signals over time that the run has, logged and derivable."""
-        known = derived.derived_with(self.plugins)
+        known = derived.derived_with(self.run.plugins)
         derivable = [name for name in known if self.has(name)]
         return [*dict.fromkeys([*self.recording.signals, *derivable])]
 
     def signal(self, name: str) -> Vector:
         """A logged or derived signal."""
-        return derived.signal(self.recording, name, self.plugins)
+        return self.run.signal(name)
 
     def during(self, name: str, span: tuple[float, float] | None) -> tuple[Vector, Vector]:
         """Time and a signal, all of it or that of a part [s]."""
@@ -120,8 +155,8 @@ def about(runs: Sequence[Shown], name: str) -> Signal:
     """What a signal is, by the first of the runs that have it, else as podusv derives it."""
     having = [run for run in runs if run.has(name)]
     if not having:
-        return derived.DERIVED[name].signal
-    return derived.about(having[0].recording, name, having[0].plugins)
+        return derived.derived_with(())[name].signal
+    return derived.about(having[0].recording, name, having[0].run.plugins)
 
 
 def axis_label(runs: Sequence[Shown], name: str) -> str:
@@ -150,10 +185,10 @@ def label(signal: Signal) -> str:
 
 def unit(signal: Signal) -> str:
     """Unit of a signal with its powers raised."""
-    return quantities.raised(signal.unit)
+    return quantities.raise_powers(signal.unit)
 
 
-def shortened(text: str, most: int) -> str:
+def shorten(text: str, most: int) -> str:
     """A text, or as much of it as so many letters and three dots are."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
@@ -169,18 +204,17 @@ def places(place: int, count: int) -> Vector:
     return np.asarray((np.arange(marks) + (place + 0.5) / count) / marks)
 
 
-def dressed(
-    runs: Sequence[tuple[str, Recording, RunAbout, Plugins]],
-    peaks: Mapping[str, float] | None = None,
-) -> list[Shown]:
-    """Labelled recordings with their looks, in order; without those too short to draw.
+def dress_runs(runs: Sequence[PastRun], peaks: Mapping[str, float] | None = None) -> list[Shown]:
+    """Runs with their looks, in order; without those too short to draw.
 
     A run alone has no markers. `peaks` are those of signals as claims about the runs name them.
     """
     count = len(runs)
-    shown = [
-        Shown(visible(label), log, about, plugins, *nth_style(i), places(i, count), peaks or {})
-        for i, (label, log, about, plugins) in enumerate(runs)
-        if len(log["time"]) > 1
+    looks = [RunLook(*nth_style(i), places(i, count)) for i in range(count)]
+    if count == 1:
+        looks = [look._replace(marker="") for look in looks]
+    return [
+        Shown(run, look, peaks or {})
+        for run, look in zip(runs, looks, strict=True)
+        if len(run.recording["time"]) > 1
     ]
-    return shown if count > 1 else [replace(run, marker="") for run in shown]

@@ -33,14 +33,16 @@ class Sketch:
     draw: Callable[[], Figure]
 
 
-def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, bytes], list[Picture]]:
+def render_sketches(
+    sketches: Iterable[Sketch], extras: Extras
+) -> tuple[dict[str, bytes], list[Picture]]:
     """PNG pictures of figures, drawn in processes of their own: by file name, and of a report.
 
     A figure that cannot be drawn is missing among the `extras`.
     """
     files: dict[str, bytes] = {}
     pictures: list[Picture] = []
-    wanted = extras.made("the list of figures", lambda: list(sketches)) or []
+    wanted = extras.make_or_record("the list of figures", lambda: list(sketches)) or []
     outcomes = (
         () if extras.interrupted else run_shares([partial(_images, sketch) for sketch in wanted])
     )
@@ -57,9 +59,7 @@ def rendered(sketches: Iterable[Sketch], extras: Extras) -> tuple[dict[str, byte
 
 def _images(sketch: Sketch, tell: Callable[[float], None]) -> tuple[bytes, bytes]:
     """The figure as a PNG, and as one for a phone where its panels fit there."""
-    with (
-        interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings()
-    ):  # fmt: skip
+    with interrupts_enabled(), house_style(), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of numbers near the end of all, as diverged runs have
         figure = sketch.draw()
         whole = image(figure, "png")

@@ -24,11 +24,13 @@ HEIGHT = 2.4  # inches
 
 
 @figure(
-    "spectrum", place=8, signals=tuple(DEMANDS),
+    "spectrum",
+    place=8,
+    signals=tuple(DEMANDS),
     caption="rms of the settled demand in each harmonic, and of the disturbance on the same axis "
     "(of the first run); Hann's window spreads a line over three harmonics; a line that the "
     "disturbance and the path do not have comes from the law",
-)  # fmt: skip
+)
 def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
     """Demands in surge and yaw over angular frequency, of runs that got to their settled part."""
     whole = [run for run in runs if run.counts_to > run.steady_from]

@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import Locator
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.figures.curves import draw_run, thinned
+from podusv_cli.figures.curves import draw_run, thin_curve
 from podusv_cli.figures.panels import TIME
 from podusv_cli.figures.scales import scaling
 from podusv_cli.figures.sheet import figure
@@ -26,10 +26,17 @@ from podusv_cli.theory.lyapunov import TERMS, V_DOT, V
 POINTS = 600  # of a stack; every column is a mean, so that no extreme stands for its surroundings
 FAR = 100.0  # a bound this many times above all of V is left out of the picture and told in words
 LAYERS = {
-    "z_e": "#0072B2", r"\psi_e": "#56B4E9", "u_e": "#D55E00", "r_e": "#E69F00", "y_u": "#009E73",
-    "y_r": "#8FD1BA", r"\tilde W_u": "#CC79A7", r"\tilde W_r": "#E6B8D2", r"\tilde b_u": "#555555",
+    "z_e": "#0072B2",
+    r"\psi_e": "#56B4E9",
+    "u_e": "#D55E00",
+    "r_e": "#E69F00",
+    "y_u": "#009E73",
+    "y_r": "#8FD1BA",
+    r"\tilde W_u": "#CC79A7",
+    r"\tilde W_r": "#E6B8D2",
+    r"\tilde b_u": "#555555",
     r"\tilde b_r": "#AAAAAA",
-}  # fmt: skip
+}
 SUM = "SI"  # V adds numbers of different units, as (46) has it
 MIXED = f"${V.symbol}$ [{SUM}]"
 THIN = 0.6  # points: bounds, each in its run's line style
@@ -38,11 +45,13 @@ SIDE_TICKS = 4  # at most, on either side of 0
 
 
 @figure(
-    "stability", place=8, signals=("V",),
+    "stability",
+    place=8,
+    signals=("V",),
     caption="Lyapunov function (46): its value with the ultimate bound, its rate with what (49) "
     "says it stays below, and its terms as parts of it, stacked; of a single run the value is "
     "stacked, too; the terms have different units, and (46) adds their numbers in SI units",
-)  # fmt: skip
+)
 def stability(runs: Sequence[Shown], columns: int) -> Figure:
     """V with its ultimate bound, V' with what it should stay below, and V's terms, run by run.
 
@@ -76,8 +85,8 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
     terms = [_means(run.signal(term.name)) for term in TERMS]
     axes.stackplot(_means(run.recording["time"]), terms, colors=LAYERS.values(), linewidth=0.0)
     value = run.signal("V")
-    axes.plot(*thinned(run.recording["time"], value), **OUTLINE, label="$V$")
-    _compress(axes, _settled(run, "V") or float(np.max(value)))
+    axes.plot(*thin_curve(run.recording["time"], value), **OUTLINE, label="$V$")
+    _compress(axes, _settled_size(run, "V") or float(np.max(value)))
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel(MIXED + ", stacked")
 
@@ -125,7 +134,7 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
         near = np.where(np.abs(limit) <= FAR * largest, limit, np.nan)
         add = axes.add_line if run in kept else axes.add_artist  # which leaves the scale as it is
         add(Line2D(run.recording["time"], near, **_thin(run)))
-    _compress(axes, max([*(_settled(run, "V_dot") for run in kept), 1e-9]))
+    _compress(axes, max([*(_settled_size(run, "V_dot") for run in kept), 1e-9]))
     axes.axhline(0.0, color="#444444", linewidth=0.5)
     axes.autoscale_view()
 
@@ -156,7 +165,7 @@ class _Decades(Locator):
         return [tick for tick in ticks if vmin <= tick <= vmax]
 
 
-def _settled(run: Shown, name: str) -> float:
+def _settled_size(run: Shown, name: str) -> float:
     """The largest size of a signal in the run's settled end, 0 where it did not get there."""
     settled = run.recording["time"] >= run.recording["window_start"][-1]
     return float(np.max(np.abs(run.signal(name)[settled]), initial=0.0))

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.quantities import lettered
-from podusv_cli.figures.scales import linear_up_to, resolved, scaling
+from podusv_cli.core.quantities import letters_of_symbol
+from podusv_cli.figures.scales import linear_up_to, scaling, smallest_distance
 from podusv_cli.figures.shown import Shown, about
-from podusv_cli.pages.page import raised
+from podusv_cli.pages.page import raise_powers_markup
 
 PIECES = 300  # of a run; a curve keeps the least and the largest number of each
 MOST, CURVES = 20, 200  # signals of many runs, and curves of all signals of a few
@@ -26,15 +26,15 @@ NEXT = ("x_e", "y_e")  # which follow from the log
 def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
     """The scalar signals that a run has, with meaning, symbol, unit and scale; {} where is none.
 
-    Every curve is over the whole run, thinned by `thinned` and encoded by `encoded`; null where a
-    run lacks the signal. `first` is how many signals readers look at first.
+    Every curve is over the whole run, thinned by `thin_trace` and encoded by `encode_trace`; null
+    where a run lacks the signal. `first` is how many signals readers look at first.
     """
     runs = [run for run in runs if len(run.recording["time"])]
     shown = names or _scalar(runs)[: max(MOST, CURVES // max(1, len(runs)))]
     if not shown:
         return {}
     return {
-        "signals": [_described(runs, name) for name in shown],
+        "signals": [_describe_signal(runs, name) for name in shown],
         "first": sum(name in FIRST for name in shown) or 1,
         "runs": [
             {
@@ -46,12 +46,13 @@ def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
                 "counts": run.counts_to,
                 "whole": run.whole,
                 "curves": [
-                    encoded(*thinned(run.signal(name))) if run.has(name) else None for name in shown
+                    encode_trace(*thin_trace(run.signal(name))) if run.has(name) else None
+                    for name in shown
                 ],
             }
             for run in runs
         ],
-    }  # fmt: skip
+    }
 
 
 def _scalar(runs: Sequence[Shown]) -> list[str]:
@@ -61,18 +62,20 @@ def _scalar(runs: Sequence[Shown]) -> list[str]:
     return [name for name in dict.fromkeys([*first, *names]) if name != "time"]
 
 
-def _described(runs: Sequence[Shown], name: str) -> dict[str, Any]:
+def _describe_signal(runs: Sequence[Shown], name: str) -> dict[str, Any]:
     signal = about(runs, name)
     return {
-        "name": name, "meaning": NUMBERED.sub("", signal.meaning), "unit": raised(signal.unit),
-        "symbol": lettered(signal.symbol),
-    } | _scale([run for run in runs if run.has(name)], name)  # fmt: skip
+        "name": name,
+        "meaning": NUMBERED.sub("", signal.meaning),
+        "unit": raise_powers_markup(signal.unit),
+        "symbol": letters_of_symbol(signal.symbol),
+    } | _scale([run for run in runs if run.has(name)], name)
 
 
 def _scale(runs: Sequence[Shown], name: str) -> dict[str, Any]:
     """Where the axis is logarithmic, as in figures: beyond `linear`, of a `floor` only there."""
     if name == DISTANCE:
-        return {"linear": resolved(runs), "floor": True}
+        return {"linear": smallest_distance(runs), "floor": True}
     numbers = np.concatenate([run.signal(name) for run in scaling(runs)], dtype=float)
     finite = numbers[np.isfinite(numbers)]
     counts = np.array_equal(finite, np.rint(finite))  # such as 0 or 1, or the number of a leg
@@ -80,7 +83,7 @@ def _scale(runs: Sequence[Shown], name: str) -> dict[str, Any]:
     return {"linear": None if counts else linear_up_to(runs, name, peak), "floor": False}
 
 
-def thinned(numbers: Vector) -> tuple[Vector, Vector]:
+def thin_trace(numbers: Vector) -> tuple[Vector, Vector]:
     """The least and the largest number of each of PIECES pieces, in the order in which they come.
 
     Shapes (2 PIECES,): the numbers, and where in its piece each is, from 0 to 255. Where there are
@@ -100,7 +103,7 @@ def thinned(numbers: Vector) -> tuple[Vector, Vector]:
     return numbers[(first + within).ravel()], (255 * within // sizes).ravel()
 
 
-def encoded(numbers: Vector, places: Vector) -> dict[str, str]:
+def encode_trace(numbers: Vector, places: Vector) -> dict[str, str]:
     """In base 64: four bytes a number, the least significant first, and a byte a place.
 
     What is beyond any number of four bytes is none.

@@ -19,7 +19,7 @@ from podusv_cli.figures.curves import AFTER, CUT, draw_run
 from podusv_cli.figures.page import Page
 from podusv_cli.figures.scales import Span, scaling
 from podusv_cli.figures.sheet import figure
-from podusv_cli.figures.shown import Shown, shortened
+from podusv_cli.figures.shown import Shown, shorten
 from podusv_cli.figures.style import WIDTHS, legend, new_figure, remark
 from podusv_cli.figures.tracks import Target, bounds, rows_of, targets
 
@@ -68,14 +68,17 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 
 
 @figure(
-    "trajectory", place=1, signals=("x", "y"), source="the paper's figure 3",
+    "trajectory",
+    place=1,
+    signals=("x", "y"),
+    source="the paper's figure 3",
     caption="tracks and target or path, on a map, with hulls enlarged where its title says so, and "
     "close up, with hulls to scale: on a path where a run is farthest from the path once it has "
     "come to a leg, else at the end and, where runs were farther apart before, at their largest "
     "gap; curves are the distance of each run from the path, of a run alone from the target, else "
     "from the first run at the same time; of tracks that coincide, the first is the broadest; x "
     "marks where a run ended early",
-)  # fmt: skip
+)
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
     east, north = bounds(runs)
@@ -112,9 +115,11 @@ def _sheet(
         figure = new_figure(columns, HIGH_MAP + 0.9)
         rest = (WIDTHS[columns] - width - 0.6) / asides
         cells = figure.add_gridspec(
-            1 + distances, 1 + asides, width_ratios=(width, *[rest] * asides),
+            1 + distances,
+            1 + asides,
+            width_ratios=(width, *[rest] * asides),
             height_ratios=(1.5, 1.0)[: 1 + distances],
-        )  # fmt: skip
+        )
         places = [cells[:, 0], *(cells[0, 1 + place] for place in range(asides))]
         last = cells[1, 1:] if distances else None
     else:
@@ -123,9 +128,11 @@ def _sheet(
         rows = [height, 1.6, 1.1] if distances and not beside else [height, 1.6]
         figure = new_figure(columns, sum(rows) + 0.6 * len(rows))
         cells = figure.add_gridspec(
-            len(rows), asides + beside, height_ratios=rows,
+            len(rows),
+            asides + beside,
+            height_ratios=rows,
             width_ratios=[1.0] * asides + [2.0] * beside,
-        )  # fmt: skip
+        )
         places = [cells[0, :], *(cells[1, place] for place in range(asides))]
         last = (cells[1, asides] if beside else cells[2, :]) if distances else None
     whole, *others = (figure.add_subplot(place) for place in places)
@@ -143,7 +150,7 @@ def distances(axes: Axes, runs: Sequence[Shown]) -> None:
         axes.set_title("from the path" if name == DEVIATION else "from the target", loc="left")
     else:
         curves = {run: _between(first, run) for run in others}
-        words = escaping.figure(shortened(first.label, NAME))
+        words = escaping.figure(shorten(first.label, NAME))
         axes.set_title(f"from {words}", loc="left")
     if not curves:
         remark(axes, "one run, and no target")
@@ -177,7 +184,7 @@ def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
     _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)), runs)
     scale = enlargement(runs)
     for run in runs:
-        for t in run.start + run.places * (run.end - run.start):
+        for t in run.start + run.look.places * (run.end - run.start):
             _draw_hull(axes, run, float(t), scale)
     starts = {(run.recording["y"][0], run.recording["x"][0]) for run in runs}
     axes.plot(*zip(*sorted(starts), strict=True), **MARK, marker="o", markersize=3.5, label="start")

@@ -21,11 +21,13 @@ PANELS = ("node_distance", "activation", "y_u", "y_r")
 
 
 @figure(
-    "validity", place=9, signals=("V",),
+    "validity",
+    place=9,
+    signals=("V",),
     caption="where the proof's assumptions hold: distance to the nearest network centre (line: 2 "
     "widths, beyond which the network says next to nothing), largest node output, filter errors, "
     "and the sway speed with its bound (51)",
-)  # fmt: skip
+)
 def validity(runs: Sequence[Shown], columns: int) -> Figure:
     """Distance to the nearest node, largest node output, filter errors, sway with its bound."""
     runs = [run for run in runs if run.has("V")]
@@ -55,8 +57,13 @@ def _sway(axes: Axes, runs: Sequence[Shown]) -> None:
         ):
             if start <= end and np.isfinite(bound):
                 for side in (bound, -bound):
-                    axes.plot([start, end], [side, side], color=run.color,
-                              linewidth=THIN, linestyle=run.linestyle)  # fmt: skip
+                    axes.plot(
+                        [start, end],
+                        [side, side],
+                        color=run.color,
+                        linewidth=THIN,
+                        linestyle=run.linestyle,
+                    )
     axes.plot([], [], color="#444444", linewidth=THIN, label="thin: bound of $|v|$")
     axes.set_ylabel(axis_label(runs, "v"))
     axes.set_xlabel(TIME)

@@ -12,10 +12,10 @@ from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import Sentences, warn_after_run, warn_before_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import median, reference
 from podusv_cli.findings.sizing import other_numbers
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.reference import median, reference
 
 ROOM = 2.0  # acceptance radii; a shorter leg is left before it is followed
 AMPLE = 1.2  # of length over speed: a duration that leaves time to speed up and to turn
@@ -27,10 +27,12 @@ def _lengths(path: Path) -> Vector:
 
 
 @warn_before_run(
-    "short-leg", about="path.points", meaning="a leg is over before the vessel can be on it",
+    "short-leg",
+    about="path.points",
+    meaning="a leg is over before the vessel can be on it",
     condition=f"a leg is shorter than {ROOM:g} acceptance radii",
     remedy="take a smaller acceptance radius, or fewer waypoints",
-)  # fmt: skip
+)
 def short_leg(case: Case) -> Sentences:
     """The circles of a leg's two waypoints overlap."""
     path = case.scenario.path
@@ -46,11 +48,13 @@ def short_leg(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "legs-too-long", about="simulation.duration", meaning="the run ends before the legs can",
+    "legs-too-long",
+    about="simulation.duration",
+    meaning="the run ends before the legs can",
     condition="at the path's speed, straight from the start to the waypoints' circles and from one "
     "to the next takes longer than the run",
     remedy="simulate longer, or ask for more speed",
-)  # fmt: skip
+)
 def legs_too_long(case: Case) -> Sentences:
     """Even without any turn the last waypoint comes after the end."""
     scenario, circles = case.scenario, np.array(case.scenario.path.circles())
@@ -69,11 +73,13 @@ def legs_too_long(case: Case) -> Sentences:
 
 
 @warn_after_run(
-    "never-arrives", about="path", meaning="legs are left at the end",
+    "never-arrives",
+    about="path",
+    meaning="legs are left at the end",
     condition="not all legs are done by the end of the run",
     remedy="simulate longer, take a larger acceptance radius, or path.switch: passed",
     needs=("leg", "e_ct", "along_leg"),
-)  # fmt: skip
+)
 def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
     """A run that follows its path ends on its way, or round a waypoint that it missed."""
     lengths, leg = _lengths(scenario.path), int(log["leg"][-1])

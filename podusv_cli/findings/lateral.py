@@ -12,8 +12,8 @@ from podusv_cli.components.controllers.momentum_vector import MomentumVector
 from podusv_cli.components.controllers.velocity_steering import VelocitySteering
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.finding import Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import STANDING, sway_share
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.reference import STANDING, sway_share
 from podusv_cli.theory.lateral import (
     growth,
     momentum_vector_gains,
@@ -44,11 +44,14 @@ LOOPS: dict[type[Any], tuple[Growth, str]] = {
 
 
 @warn_before_run(
-    "sway-answers-yaw", about="controller", meaning="sway answers yaw more than the law bears",
+    "sway-answers-yaw",
+    about="controller",
+    meaning="sway answers yaw more than the law bears",
     condition="on a straight line at the target's speed, told exactly, the law's linear loop has a "
     "root in the right half plane",
-    remedy="take momentum_vector, there a larger trust, or more speed", law=VelocitySteering,
-)  # fmt: skip
+    remedy="take momentum_vector, there a larger trust, or more speed",
+    law=VelocitySteering,
+)
 def sway_answers_yaw(case: Case) -> Sentences:
     """The linear loop of docs/theory.md grows at the run's typical speed and sway."""
     scenario, (u, v, _) = case.scenario, case.reference.working.tolist()

@@ -11,7 +11,6 @@ from podusv_cli.components.actuators.base import SATURATION
 from podusv_cli.components.controllers.velocity_loop import Cause, Loop
 from podusv_cli.core.errors import LawError, NotConvergedError
 from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
 from podusv_cli.findings.stability import (
     bursts,
     delay_margin,
@@ -21,6 +20,7 @@ from podusv_cli.findings.stability import (
     rk4_growth,
     sampled_growth,
 )
+from podusv_cli.scenario.case import Case
 from podusv_cli.theory.loop_margins import loop_margins
 
 UNSTABLE = 1.0 + 1e-6
@@ -75,22 +75,27 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
 def _stiff(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
-        f"stiff-{cause}", about="simulation.step", meaning=f"{what} too fast for RK4's step",
-        condition=f"RK4 makes {loop} grow", remedy=f"take a shorter step, or smaller {gains}",
-    )(partial(_too_fast, cause=cause))  # fmt: skip
+        f"stiff-{cause}",
+        about="simulation.step",
+        meaning=f"{what} too fast for RK4's step",
+        condition=f"RK4 makes {loop} grow",
+        remedy=f"take a shorter step, or smaller {gains}",
+    )(partial(_too_fast, cause=cause))
 
 
-def _sampled(cause: Cause) -> FindingKind:
+def _sampling_finding(cause: Cause) -> FindingKind:
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
-        f"sampled-{cause}", about="control.period", meaning=f"{what} too fast for the period",
+        f"sampled-{cause}",
+        about="control.period",
+        meaning=f"{what} too fast for the period",
         condition=f"{loop} grows over one period",
         remedy=f"take a shorter period, or smaller {gains}",
-    )(partial(_sampled_too_fast, cause=cause))  # fmt: skip
+    )(partial(_sampled_too_fast, cause=cause))
 
 
 stiff_adaptation, stiff_derivative, stiff_loop = map(_stiff, LOOPS)
-sampled_adaptation, sampled_derivative, sampled_loop = map(_sampled, LOOPS)
+sampled_adaptation, sampled_derivative, sampled_loop = map(_sampling_finding, LOOPS)
 
 
 def _margin(case: Case) -> float:
@@ -104,11 +109,13 @@ def _margin(case: Case) -> float:
 
 
 @warn_before_run(
-    "delayed-loop", about="actuator.command", meaning="a velocity loop too fast for the delay",
+    "delayed-loop",
+    about="actuator.command",
+    meaning="a velocity loop too fast for the delay",
     condition="the delay exceeds the delay margin of both demands (podusv margins); without a "
     "steady motion, a velocity loop that is stable without the delay grows with it",
     remedy="take a shorter delay, or smaller gains",
-)  # fmt: skip
+)
 def delayed_loop(case: Case) -> Sentences:
     """The delay of the actuator's command makes the law's loop unstable.
 
@@ -135,10 +142,12 @@ def delayed_loop(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "stiff-start", about="simulation.step", meaning="start error makes the bound too stiff",
+    "stiff-start",
+    about="simulation.step",
+    meaning="start error makes the bound too stiff",
     condition="RK4 makes the error, marched from t = 0 with its bound, grow",
     remedy="take a shorter step, a smaller bound gain, or a start nearer to the target's velocity",
-)  # fmt: skip
+)
 def stiff_start(case: Case) -> Sentences:
     """The start error drives the estimated bound so high that RK4 becomes unstable.
 

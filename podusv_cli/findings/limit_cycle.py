@@ -20,18 +20,20 @@ SPREAD = 2  # harmonics to either side of a line that Hann's window and a broken
 
 
 @warn_after_run(
-    "limit-cycle", about="controller", meaning="the vessel swings about its target for ever",
+    "limit-cycle",
+    about="controller",
+    meaning="the vessel swings about its target for ever",
     condition=f"{PERIODS} periods or more of a swing above {VISIBLE:.0%} of a hull length in the "
     "steady window, which neither dies away nor follows a load or the target",
     remedy="take smaller gains; see whether a delay, a limit or the hull's sway drives it",
-)  # fmt: skip
+)
 def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     """The distance along or across the target's course swings at one frequency, and goes on."""
     late = steady_rows(scenario, log)
     if log.status != "finished" or late.sum() < 8 * PERIODS or not scenario.controller.aims():
         return
     time, x, y = (log[name][late] for name in ("time", "x", "y"))
-    errors = _turned(x - log["x_d"][late], y - log["y_d"][late], _course(log, late))
+    errors = _rotate_to_course(x - log["x_d"][late], y - log["y_d"][late], _course(log, late))
     name, swing = max(
         zip(("along", "across"), errors, strict=True), key=lambda part: float(part[1].std())
     )
@@ -41,7 +43,7 @@ def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
     earlier, size = (0.5 * float(np.ptp(part)) for part in (swing[:half], swing[half:]))
     pure = at >= PERIODS and power[near].sum() >= PURE * power.sum()
     visible = size >= VISIBLE * scenario.vessel.length
-    if pure and visible and size >= DECAY * earlier and not _forced(scenario, log, late, near):
+    if pure and visible and size >= DECAY * earlier and not _is_forced(scenario, log, late, near):
         crossings = time[np.flatnonzero(np.diff(np.signbit(swing - swing.mean())))]
         period = 2.0 * (crossings[-1] - crossings[0]) / (len(crossings) - 1)
         yield (
@@ -52,7 +54,7 @@ def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
         )
 
 
-def _forced(scenario: Scenario, log: Recording, rows: Mask, near: slice) -> bool:
+def _is_forced(scenario: Scenario, log: Recording, rows: Mask, near: slice) -> bool:
     """Whether loads, or turns of the target, are large enough at these harmonics for the swing.
 
     Mean squares of b/sqrt(m), for loads b and inertias m of the three axes, are compared with those
@@ -70,7 +72,7 @@ def _forced(scenario: Scenario, log: Recording, rows: Mask, near: slice) -> bool
         motion += inertia * mean_square(np.gradient(log[axis][rows], time))
         load += mean_square(log[f"b_{axis}"][rows]) / inertia
     x, y = (np.gradient(np.gradient(log[name][rows], time), time) for name in ("x_d", "y_d"))
-    load += hull.m11 * sum(map(mean_square, _turned(x, y, _course(log, rows))))
+    load += hull.m11 * sum(map(mean_square, _rotate_to_course(x, y, _course(log, rows))))
     return load > FORCED**2 * motion
 
 
@@ -79,7 +81,7 @@ def _course(log: Recording, rows: Mask) -> Vector:
     return np.arctan2(np.gradient(log["y_d"][rows]), np.gradient(log["x_d"][rows]))
 
 
-def _turned(x: Vector, y: Vector, course: Vector) -> tuple[Vector, Vector]:
+def _rotate_to_course(x: Vector, y: Vector, course: Vector) -> tuple[Vector, Vector]:
     """A vector in the earth's frame as along and across a course."""
     cosine, sine = np.cos(course), np.sin(course)
     return x * cosine + y * sine, y * cosine - x * sine

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from podusv_cli.components.estimators.base import mean_squared_innovation
 from podusv_cli.core.finding import Sentences, rows_where, times_of, warn_after_run
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, blocks
 from podusv_cli.findings.sea import SENSORS
 from podusv_cli.findings.span import counted_rows, steady_rows
-from podusv_cli.metrics.consistency import mean_square
 from podusv_cli.scenario.model import Scenario
 
 PLACES = {
@@ -23,13 +23,14 @@ REVERSALS = 3  # of a zig-zag with two overshoots
 
 
 @warn_after_run(
-    "saturated", about="actuator",
+    "saturated",
+    about="actuator",
     meaning=f"the actuator limits the law for over {LONG:.0%} of the run",
     condition=f"limited during more than {LONG:.0%} of the run; of its steady window where the "
     "law's memory does not wind up, as an approach or a turn at the limits is then over for good",
     remedy="switch anti-windup on where it is off, or take smaller gains or a stronger actuator",
-)  # fmt: skip
-def saturated(scenario: Scenario, log: Recording) -> Sentences:
+)
+def warn_of_saturation(scenario: Scenario, log: Recording) -> Sentences:
     """The actuator limits the law for long, where that lasts or leaves something behind."""
     if "saturated" not in log:
         return
@@ -75,11 +76,13 @@ def _switching(scenario: Scenario) -> list[str]:
 
 
 @warn_after_run(
-    "outside-envelope", about="vessel", meaning="the hull leaves what its numbers hold for",
+    "outside-envelope",
+    about="vessel",
+    meaning="the hull leaves what its numbers hold for",
     condition=f"for over {LONG:.0%} of the run the speed, the drift angle or the yaw rate through "
     "the water exceeds vessel.envelope",
     remedy="ask for less speed or turn, or take a vessel that was measured there",
-)  # fmt: skip
+)
 def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
     """The run is an extrapolation of what was measured, or fitted, of the hull."""
     envelope = scenario.vessel.envelope
@@ -108,13 +111,14 @@ def _through_water(log: Recording) -> tuple[Vector, Vector, Vector]:
 
 
 @warn_after_run(
-    "inconsistent-filter", about="estimator",
+    "inconsistent-filter",
+    about="estimator",
     meaning="innovations are not as large as the filter believes",
     condition="over the steady window the mean squared innovation over its variance (NIS) of a "
     f"sensor exceeds {DOUBTFUL:g} or is below {TIMID:g}, 1 is consistent, and is so by chance less "
     f"than once in {1.0 / CHANCE:.0f} runs (chi-squared with as many degrees as values)",
     remedy="give the filter the noise that sensors have, with what waves add to it",
-)  # fmt: skip
+)
 def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     """The estimator's own measure of a sensor's noise says that it is told wrong."""
     late = np.flatnonzero(steady_rows(scenario, log))
@@ -127,7 +131,7 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
     )
     for sensor, places in SENSORS.items():
         square, count = squares[places].sum(), counts[places].sum()
-        nis = mean_square(squares[places], counts[places])
+        nis = mean_squared_innovation(squares[places], counts[places])
         told = (
             f"innovations of the {sensor} are {np.sqrt(nis):.2g} times what it believes (NIS "
             f"{nis:.3g} of {count:.0f} values)"
@@ -146,11 +150,13 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
 
 
 @warn_after_run(
-    "moves-away", about="controller", meaning="the vessel ends further away than it started",
+    "moves-away",
+    about="controller",
+    meaning="the vessel ends further away than it started",
     condition="the mean distance over the steady window exceeds that at the start by a hull length",
     remedy="check signs and units of the law and of the nominal vessel, or take larger gains",
     needs=("z_e",),
-)  # fmt: skip
+)
 def moves_away(scenario: Scenario, log: Recording) -> Sentences:
     """The law does not track: the distance to the target has grown over the run."""
     late = steady_rows(scenario, log)
@@ -167,11 +173,13 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
 
 
 @warn_after_run(
-    "never-settles", about="controller", meaning="the vessel is not at its target at the end",
+    "never-settles",
+    about="controller",
+    meaning="the vessel is not at its target at the end",
     condition="the mean of |z_e - standoff| over the steady window exceeds metrics.settling_radius",
     remedy="simulate longer where it still comes nearer; else larger gains or integral action",
     needs=("z_e",),
-)  # fmt: skip
+)
 def never_settles(scenario: Scenario, log: Recording) -> Sentences:
     """The run ends without having come to its target; `moves-away` says so of a worse one."""
     late = steady_rows(scenario, log)
@@ -229,11 +237,13 @@ UNFINISHED = {"zig-zag": _reversals, "turning circle": _turn, "stopping": _way}
 
 
 @warn_after_run(
-    "trial-unfinished", about="controller", meaning="the trial has not led to all of its numbers",
+    "trial-unfinished",
+    about="controller",
+    meaning="the trial has not led to all of its numbers",
     condition="a zig-zag reverses fewer than three times, a circle turns by less than 180 deg, or "
     "a hull with thrust astern still goes ahead at the end",
     remedy="simulate longer; a hull that keeps turning the first way is unstable for this trial",
-)  # fmt: skip
+)
 def trial_unfinished(scenario: Scenario, log: Recording) -> Sentences:
     """A manoeuvring trial ends before its last number is there, or never reverses."""
     trial = scenario.controller.trial()

@@ -8,22 +8,23 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from podusv_cli.core.finding import Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 
 @warn_before_run(
-    "unkept-module", about="plugins",
+    "unkept-module",
+    about="plugins",
     meaning="a plug-in file imports a module that the run folder does not keep",
     condition="an imported module lies in the folder of the plug-in's file, or below it",
     remedy="write what is imported into the plug-in's file, or install it as a package",
-)  # fmt: skip
+)
 def unkept_module(case: Case) -> Sentences:
     """A module beside a plug-in's file, which `rerun` and others who get the folder lack."""
     for plugin in case.scenario.plugged:
         if not plugin.path:
             continue
         folder = Path(plugin.path).parent
-        for name in dict.fromkeys(_imported(plugin.text)):
+        for name in dict.fromkeys(_imports_in(plugin.text)):
             file = getattr(sys.modules.get(name), "__file__", None)
             if file and _is_beside(Path(file).resolve(), folder):
                 yield (
@@ -32,7 +33,7 @@ def unkept_module(case: Case) -> Sentences:
                 )
 
 
-def _imported(text: str) -> Iterator[str]:
+def _imports_in(text: str) -> Iterator[str]:
     """The modules that a text names in its imports, with the packages that they are in."""
     for node in ast.walk(ast.parse(text)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

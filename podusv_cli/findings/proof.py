@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.theory.bounds import Condition, ultimate_bound
+from podusv_cli.theory.bounds import GainCondition, ultimate_bound
 
 
 def argument(scenario: Scenario) -> str:
@@ -46,5 +46,5 @@ def _summary(law: PolarBackstepping, scenario: Scenario) -> str:
     )
 
 
-def _short(condition: Condition) -> str:
+def _short(condition: GainCondition) -> str:
     return f"{condition.name} = {condition.value:g} fails: it must exceed {condition.limit:.3g}"

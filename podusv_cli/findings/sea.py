@@ -7,24 +7,28 @@ import math
 from podusv_cli.core.finding import At, Sentences, warn_before_run
 from podusv_cli.core.signal import STATE
 from podusv_cli.core.steps import misfit
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 GRAVITY = 9.81
 BREAKS = 1.0 / 7.0  # height over length at which waves break
 MODEL = 2.0  # m; gusts were measured for what is larger
 LONG = 90  # components that a run needs, 100 periods of a peak; shorter seas scatter anyhow
 SENSORS = {  # by name, which numbers of the state each measures
-    "position": slice(0, 2), "heading": slice(2, 3), "velocity": slice(3, 5),
+    "position": slice(0, 2),
+    "heading": slice(2, 3),
+    "velocity": slice(3, 5),
     "yaw rate": slice(5, 6),
-}  # fmt: skip
+}
 FAR = 2.0  # factor between what an estimator assumes and what a sensor does
 
 
 @warn_before_run(
-    "late-load", about="disturbance", meaning="a load sets in after the run",
+    "late-load",
+    about="disturbance",
+    meaning="a load sets in after the run",
     condition="the time of a step is not before the end of the run",
     remedy="take an earlier time, or simulate longer",
-)  # fmt: skip
+)
 def late_load(case: Case) -> Sentences:
     """The run ends before a load sets in."""
     end = case.scenario.simulation.duration
@@ -38,10 +42,12 @@ def late_load(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "load-between-steps", about="disturbance", meaning="a load jumps between two steps",
+    "load-between-steps",
+    about="disturbance",
+    meaning="a load jumps between two steps",
     condition="the time of a step without a ramp is no whole number of simulation.step",
     remedy="take a whole number of steps, or a ramp",
-)  # fmt: skip
+)
 def load_between_steps(case: Case) -> Sentences:
     """RK4 is of first order in the step in which the load jumps."""
     for key, part in case.scenario.disturbances().items():
@@ -51,10 +57,12 @@ def load_between_steps(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "late-outage", about="measurement", meaning="an outage begins after the run",
+    "late-outage",
+    about="measurement",
+    meaning="an outage begins after the run",
     condition="an outage does not begin before the end of the run",
     remedy="let the outage begin earlier, or simulate longer",
-)  # fmt: skip
+)
 def late_outage(case: Case) -> Sentences:
     """The run ends before a sensor is lost."""
     end, each = case.scenario.simulation.duration, case.scenario.measurement.outages_of_each()
@@ -66,10 +74,12 @@ def late_outage(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "dead-zone", about="actuator.command", meaning="the dead zone swallows all that can be given",
+    "dead-zone",
+    about="actuator.command",
+    meaning="the dead zone swallows all that can be given",
     condition="the dead zone is not smaller than the actuator's limit",
     remedy="take a smaller dead zone",
-)  # fmt: skip
+)
 def dead_zone(case: Case) -> Sentences:
     """A demand within the actuator's limit gives nothing."""
     actuator = case.scenario.actuator
@@ -87,11 +97,12 @@ def dead_zone(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "estimator-noise", about="estimator",
+    "estimator-noise",
+    about="estimator",
     meaning="the filter assumes another noise than sensors have",
     condition=f"a sigma differs by more than a factor of {FAR:g} from its sensor's noise",
     remedy="leave the sigma out, or write null: it is then the sensor's own noise",
-)  # fmt: skip
+)
 def estimator_noise(case: Case) -> Sentences:
     """An estimator trusts a sensor too much or too little. Waves are noise to it, too."""
     assumed = case.scenario.estimator.assumed_noise()
@@ -112,10 +123,12 @@ def estimator_noise(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "estimator-delay", about="estimator", meaning="the filter assumes another age of positions",
+    "estimator-delay",
+    about="estimator",
+    meaning="the filter assumes another age of positions",
     condition="the filter's delay differs from that of the position's sensor",
     remedy="give the estimator the sensor's delay",
-)  # fmt: skip
+)
 def estimator_delay(case: Case) -> Sentences:
     """The estimate is off along the motion by the difference times the speed."""
     key, assumed = case.scenario.estimator.assumed_delay()
@@ -129,10 +142,12 @@ def estimator_delay(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "steep-waves", about="disturbance", meaning="waves steeper than waves can stand",
+    "steep-waves",
+    about="disturbance",
+    meaning="waves steeper than waves can stand",
     condition="Hs exceeds a seventh of the length of waves of the peak's period",
     remedy="take lower or longer waves; at model scale, times go by the root of the scale",
-)  # fmt: skip
+)
 def steep_waves(case: Case) -> Sentences:
     """Waves break from a seventh of their length on: g T^2/(2 pi)/7 in deep water."""
     for key, part in case.scenario.disturbances().items():
@@ -147,11 +162,13 @@ def steep_waves(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "few-components", about="disturbance", meaning="a sea of too few cosines for its run",
+    "few-components",
+    about="disturbance",
+    meaning="a sea of too few cosines for its run",
     condition="the components, weighted by the square of their energy, are further apart than "
     f"1/duration, in a run that needs {LONG} of them or more",
     remedy="take more components",
-)  # fmt: skip
+)
 def few_components(case: Case) -> Sentences:
     """The variance of such a sum scatters between seeds otherwise than that of a sea."""
     duration = case.scenario.simulation.duration
@@ -167,10 +184,12 @@ def few_components(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "same-waves", about="disturbance", meaning="two seas of a list have the same phases",
+    "same-waves",
+    about="disturbance",
+    meaning="two seas of a list have the same phases",
     condition="two entries of a kind that sums cosines have the same seed",
     remedy="give each entry a seed of its own",
-)  # fmt: skip
+)
 def same_waves(case: Case) -> Sentences:
     """Random numbers depend on kind and seed, so swell and wind sea rise and fall together."""
     first = dict[tuple[str, object], str]()
@@ -186,10 +205,12 @@ def same_waves(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "model-gusts", about="disturbance", meaning="a spectrum of the open sea on a model",
+    "model-gusts",
+    about="disturbance",
+    meaning="a spectrum of the open sea on a model",
     condition=f"a spectrum of gusts, or Torsethaugen's, and a vessel shorter than {MODEL:g} m",
     remedy="take another spectrum or none, or simulate at full scale",
-)  # fmt: skip
+)
 def model_gusts(case: Case) -> Sentences:
     """These spectra hold at full scale and do not scale with the vessel."""
     length = case.scenario.vessel.length

@@ -9,8 +9,8 @@ from podusv_cli.components.facts import Facts
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import At, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import median
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.reference import median
 
 # Of the rule's number, what a number of the scenario's own may be at least and at most.
 USUAL = {"U": (0.5, 2.0), "N_m": (0.3, 3.0), "k_psi": (0.2, 100.0)}
@@ -52,13 +52,15 @@ def _why(name: str, number: float, rule: float, facts: Facts) -> str:
 
 
 @warn_before_run(
-    "gains-for-another-hull", about="controller", meaning="a gain belongs to another hull",
+    "gains-for-another-hull",
+    about="controller",
+    meaning="a gain belongs to another hull",
     condition=f"U outside {USUAL['U'][0]:g} to {USUAL['U'][1]:g} times (a small one only below "
     f"{AMPLE:g} times the path's speed), N_m outside {USUAL['N_m'][0]:g} to {USUAL['N_m'][1]:g} "
     f"times what follows from hull and actuator, or k_psi below {USUAL['k_psi'][0]:g} times that "
     f"or above {BEARABLE:g} c/T_r",
     remedy="leave the key out, or write null: it then follows from hull and actuator",
-)  # fmt: skip
+)
 def gains_for_another_hull(case: Case) -> Sentences:
     """Speed, moment or pace are not those of this hull with this actuator."""
     law, asked = case.scenario.controller, float(case.reference.speed.max())
@@ -74,10 +76,12 @@ def gains_for_another_hull(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "slow-steering", about="controller", meaning="the hull is faster than the law steers it",
+    "slow-steering",
+    about="controller",
+    meaning="the hull is faster than the law steers it",
     condition=f"the gain of the heading times the length, over the path's speed, is below {AGILE}",
     remedy="slow the target down, shorten the actuator's lag or the period, or take a larger gain",
-)  # fmt: skip
+)
 def slow_steering(case: Case) -> Sentences:
     """A hull goes more than its length while the law turns it."""
     key, gain = case.scenario.controller.steering()

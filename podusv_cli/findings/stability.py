@@ -129,7 +129,7 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
     """The law's gain whose halving slows a loop most; the loop's own key where several do."""
     law, about = scenario.controller, axes(scenario, nu)
 
-    def slowed(key: str) -> float:
+    def slow_gain(key: str) -> float:
         halved = law.model_copy(update={key: 0.5 * getattr(law, key)})
         own = [
             slower.fastest
@@ -139,7 +139,7 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
         return min(own, default=np.inf)
 
     gains = [key for key in type(law).model_fields if isinstance(getattr(law, key), float)]
-    return min(sorted(gains, key=lambda key: key != loop.key), key=slowed, default=loop.key)
+    return min(sorted(gains, key=lambda key: key != loop.key), key=slow_gain, default=loop.key)
 
 
 def bursts(loop: Loop, bound: AdaptedBound, error: float, step: float) -> bool:

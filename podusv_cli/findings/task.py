@@ -12,8 +12,8 @@ from podusv_cli.components.controllers.base import Approach
 from podusv_cli.components.vessels.plant import sway_force
 from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
 from podusv_cli.core.kernel import bundle
-from podusv_cli.findings.finding import Case
-from podusv_cli.findings.reference import FASTEST, STANDING, drift, median
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.reference import FASTEST, STANDING, drift, median
 
 OPPOSITE = 1e-6  # rad
 RUNAWAY = 1.0  # in target speeds; with faster sway a hull may circle the target
@@ -68,9 +68,12 @@ def path_breaks(case: Case, what: str) -> Sentences:
 
 def _path_break(code: str, what: str, remedy: str) -> FindingKind:
     return warn_before_run(
-        code, about="path", meaning=f"the target's {what} jumps",
-        condition=f"the {what} differs before and after a break of the path", remedy=remedy,
-    )(partial(path_breaks, what=what))  # fmt: skip
+        code,
+        about="path",
+        meaning=f"the target's {what} jumps",
+        condition=f"the {what} differs before and after a break of the path",
+        remedy=remedy,
+    )(partial(path_breaks, what=what))
 
 
 path_jump = _path_break("path-jump", "position", "let the parts of the path meet")
@@ -81,10 +84,12 @@ path_bend = _path_break(
 
 
 @warn_before_run(
-    "opposite-start", about="start.psi", meaning="rounding decides to which side the vessel turns",
+    "opposite-start",
+    about="start.psi",
+    meaning="rounding decides to which side the vessel turns",
     condition=f"the start's heading is opposite to the target's course to {OPPOSITE:g} rad",
     remedy="start a thousandth of a radian to one side",
-)  # fmt: skip
+)
 def opposite_start(case: Case) -> Sentences:
     """Half a turn lies ahead, to either side alike, of a vessel that does not turn yet."""
     start, law = case.scenario.start, case.scenario.controller
@@ -100,10 +105,12 @@ def opposite_start(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "path-runs-on", about="path", meaning="the target goes straight on after the last waypoint",
+    "path-runs-on",
+    about="path",
+    meaning="the target goes straight on after the last waypoint",
     condition="the run lasts longer than the way through the points",
     remedy="set path.after to stop or loop, or simulate no longer",
-)  # fmt: skip
+)
 def path_runs_on(case: Case) -> Sentences:
     """The target leaves the given course before the run ends."""
     end, duration = case.scenario.path.runs_on_from(), case.scenario.simulation.duration
@@ -115,10 +122,12 @@ def path_runs_on(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "sway-drift", about="path", meaning="the sway load drifts the hull faster than the target",
+    "sway-drift",
+    about="path",
+    meaning="the sway load drifts the hull faster than the target",
     condition="no heading balances sway damping and mean load at the target's speed",
     remedy="check the sway damping, the load and the speed",
-)  # fmt: skip
+)
 def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
@@ -136,10 +145,12 @@ def sway_drift(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "sway-unstable", about="controller.k_ze", meaning="pointing at the target makes sway grow",
+    "sway-unstable",
+    about="controller.k_ze",
+    meaning="pointing at the target makes sway grow",
     condition=f"m11 k_ze exceeds the sway damping, and sway grows beyond {RUNAWAY:g} target speed",
     remedy="take a smaller k_ze, or a hull with more sway damping",
-)  # fmt: skip
+)
 def sway_unstable(case: Case) -> Sentences:
     """The sway of a hull that points at the target grows: m11 k_ze > d, the linear sway damping.
 
@@ -198,10 +209,12 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
 
 
 @warn_before_run(
-    "thrust-short", about="actuator", meaning="keeping up takes more than the actuator gives",
+    "thrust-short",
+    about="actuator",
+    meaning="keeping up takes more than the actuator gives",
     condition=f"less than {DELIVERED:.1%} of the force or moment along the path is delivered",
     remedy="raise the actuator's limit, or slow the target down",
-)  # fmt: skip
+)
 def thrust_short(case: Case) -> Sentences:
     """Following takes more surge force or yaw moment than the actuator delivers."""
     if not case.scenario.controller.aims():
@@ -238,10 +251,12 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
 
 
 @warn_before_run(
-    "slow-law", about="controller.U", meaning="the law's largest speed is below the target's",
+    "slow-law",
+    about="controller.U",
+    meaning="the law's largest speed is below the target's",
     condition="U is below the median speed of the target along the path",
     remedy="take a larger U, or slow the target down",
-)  # fmt: skip
+)
 def slow_law(case: Case) -> Sentences:
     """The law asks for less speed than the target has."""
     most, speed = case.scenario.controller.most(), median(case.reference.speed)
@@ -254,10 +269,12 @@ def slow_law(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "moment-short", about="controller.N_m", meaning="the law counts on more moment than there is",
+    "moment-short",
+    about="controller.N_m",
+    meaning="the law counts on more moment than there is",
     condition=f"less than {ROUNDED:.0%} of N_m is delivered to a hull at rest",
     remedy="give the law the moment that the actuator has",
-)  # fmt: skip
+)
 def moment_short(case: Case) -> Sentences:
     """Surge yields to yaw only beyond a moment that the actuator cannot give."""
     moment, actuator = case.scenario.controller.most().moment, case.scenario.actuator
@@ -271,10 +288,12 @@ def moment_short(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "stiff-actuator", about="simulation.step", meaning="a pod's lag too short for RK4's step",
+    "stiff-actuator",
+    about="simulation.step",
+    meaning="a pod's lag too short for RK4's step",
     condition=f"the step exceeds {STABLE:g} times the shortest lag",
     remedy="take a shorter step, or a longer lag",
-)  # fmt: skip
+)
 def stiff_actuator(case: Case) -> Sentences:
     """An actuator's lag is too short for RK4, which is unstable for steps above 2.78 lags."""
     lag, step = case.scenario.actuator.shortest_lag(), case.scenario.simulation.step

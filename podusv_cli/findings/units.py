@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.finding import At, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 WATER = 1000.0  # kg/m3
 SLENDER = (0.4, 30.0)  # length over beam
@@ -25,16 +25,16 @@ NORTH, EAST = 90.0, 180.0  # deg, the largest latitude and longitude
 DEGREE = 111e3  # m, of latitude
 
 
-class Unit(NamedTuple):
+class UnitGuess(NamedTuple):
     """A unit that was perhaps meant, and what one of it is in podusv's."""
 
     name: str
     factor: float
 
 
-METRES = (Unit("mm", 1e-3), Unit("cm", 1e-2), Unit("ft", 0.3048))
-KILOGRAMS = (Unit("t", 1e3), Unit("g", 1e-3))
-DEGREES = Unit("deg", math.pi / 180.0)
+METRES = (UnitGuess("mm", 1e-3), UnitGuess("cm", 1e-2), UnitGuess("ft", 0.3048))
+KILOGRAMS = (UnitGuess("t", 1e3), UnitGuess("g", 1e-3))
+DEGREES = UnitGuess("deg", math.pi / 180.0)
 RANGES = (
     f"length over beam outside {SLENDER[0]:g} to {SLENDER[1]:g}, m over 1000 kg/m3 length beam^2 "
     f"outside {BULK[0]:g} to {BULK[1]:g}, sqrt(I_z/m) over length outside {GYRATION[0]:g} to "
@@ -44,9 +44,12 @@ RANGES = (
 
 
 @warn_before_run(
-    "other-unit", about="vessel", meaning="a value fits the others in another unit only",
-    condition=RANGES, remedy="give the value in podusv's unit",
-)  # fmt: skip
+    "other-unit",
+    about="vessel",
+    meaning="a value fits the others in another unit only",
+    condition=RANGES,
+    remedy="give the value in podusv's unit",
+)
 def other_unit(case: Case) -> Sentences:
     """Ratios of values of hull, sensors, path and start that no boat has."""
     scenario = case.scenario
@@ -70,8 +73,8 @@ def _within(number: float, limits: tuple[float, float]) -> bool:
     return limits[0] <= number <= limits[1]
 
 
-def _meant(
-    number: float, units: tuple[Unit, ...], ratio: float, limits: tuple[float, float]
+def _guess_unit(
+    number: float, units: tuple[UnitGuess, ...], ratio: float, limits: tuple[float, float]
 ) -> str:
     """`; in mm it is 4 m?`: the first unit in which the ratio, linear in the number, is usual."""
     fits = [unit for unit in units if _within(ratio * unit.factor, limits)]
@@ -86,12 +89,12 @@ def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
     slender, bulk = L / B, m / (WATER * L * B * B)
     radius = math.sqrt(vessel.I_z / m)
     if not _within(slender, SLENDER):
-        meant = _meant(L, METRES, slender, SLENDER)
+        meant = _guess_unit(L, METRES, slender, SLENDER)
         yield "length", f"{L:g} m over a beam of {B:g} m{meant or '; check both, in metres'}"
     elif not _within(bulk, BULK):
         both = [unit for unit in METRES if _within(bulk / unit.factor**3, BULK)]
         scaled = f"; are length and beam in {both[0].name}? write them in metres" if both else ""
-        if meant := _meant(m, KILOGRAMS, bulk, BULK):
+        if meant := _guess_unit(m, KILOGRAMS, bulk, BULK):
             yield "m", f"{m:g} kg for a hull of {L:g} m by {B:g} m{meant} (kg)"
         else:
             yield "length", f"{L:g} m by {B:g} m for a hull of {m:g} kg{scaled or '; check all'}"

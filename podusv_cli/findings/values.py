@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.finding import At, Sentences, warn_before_run
-from podusv_cli.findings.finding import Case
+from podusv_cli.scenario.case import Case
 
 DAMPING = ("X_uu", "X_uuu", "Y_vv", "N_rr")  # a positive linear one is refused by the model
 ADDED_MASS = {"X_udot": "m11", "Y_vdot": "m22", "N_rdot": "m33"}  # and the inertia it belongs to
@@ -16,10 +16,12 @@ TURN = 2.0 * math.pi
 
 
 @warn_before_run(
-    "damping-sign", about="vessel", meaning="nonlinear damping drives the motion",
+    "damping-sign",
+    about="vessel",
+    meaning="nonlinear damping drives the motion",
     condition="X_uu, X_uuu, Y_vv or N_rr is positive",
     remedy="make the coefficient negative, as damping is published",
-)  # fmt: skip
+)
 def damping_sign(case: Case) -> Sentences:
     """A nonlinear damping coefficient is positive, so it accelerates the motion."""
     for where, _, _, number in _positive(case, DAMPING):
@@ -31,10 +33,12 @@ def damping_sign(case: Case) -> Sentences:
 
 
 @warn_before_run(
-    "added-mass-sign", about="vessel", meaning="added mass makes the hull lighter",
+    "added-mass-sign",
+    about="vessel",
+    meaning="added mass makes the hull lighter",
     condition="X_udot, Y_vdot or N_rdot is positive",
     remedy="make the coefficient negative; papers that print positive added masses add them",
-)  # fmt: skip
+)
 def added_mass_sign(case: Case) -> Sentences:
     """An added mass is positive, so it is taken from the inertia (M = M_RB - diag(X_udot, ...))."""
     for where, vessel, name, number in _positive(case, ADDED_MASS):
@@ -62,10 +66,12 @@ def _positive(case: Case, names: Iterable[str]) -> Iterator[tuple[str, Vessel, s
 
 
 @warn_before_run(
-    "large-angle", about="start.psi", meaning="an angle is beyond a whole turn",
+    "large-angle",
+    about="start.psi",
+    meaning="an angle is beyond a whole turn",
     condition="an angle of start, path or disturbance beyond 2 pi",
     remedy="give the angle in radians",
-)  # fmt: skip
+)
 def large_angle(case: Case) -> Sentences:
     """An angle of the start, the path or a disturbance exceeds a whole turn."""
     parts = {"start": case.scenario.start, "path": case.scenario.path}

@@ -17,9 +17,9 @@ from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.fit.estimate import Directions, Estimate
-from podusv_cli.identify.fit.problem import Problem, channels
-from podusv_cli.identify.fit.records import Log
+from podusv_cli.identify.fit.estimate import Directions, HullEstimate
+from podusv_cli.identify.fit.problem import FitProblem, channels
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.judge import FreeRun, Score
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
@@ -68,7 +68,7 @@ class Force:
 
 
 @dataclass(frozen=True)
-class Axis:
+class DampingAxis:
     """A damping force of the hull over its own velocity, the other two being 0."""
 
     name: str
@@ -79,16 +79,17 @@ class Axis:
 
 
 AXES = (
-    Axis("X(u)", "N", "u", "m/s", surge_force), Axis("Y(v)", "N", "v", "m/s", sway_force),
-    Axis("N(r)", "N m", "r", "rad/s", yaw_moment),
-)  # fmt: skip
+    DampingAxis("X(u)", "N", "u", "m/s", surge_force),
+    DampingAxis("Y(v)", "N", "v", "m/s", sway_force),
+    DampingAxis("N(r)", "N m", "r", "rad/s", yaw_moment),
+)
 
 
 @dataclass(frozen=True)
-class Curve:
+class ForceCurve:
     """A force over speed; `after` and `before` are the two ends of 95 % of the hulls."""
 
-    axis: Axis
+    axis: DampingAxis
     speeds: Vector
     value: Vector
     after: Vector
@@ -111,13 +112,13 @@ class Whiteness:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Identification:
     """A hull from logs, and all that is known of its errors."""
 
-    problem: Problem
-    estimate: Estimate
+    problem: FitProblem
+    estimate: HullEstimate
     directions: Directions
-    judged: Sequence[tuple[Log, str, Sequence[FreeRun]]]
+    judged: Sequence[tuple[FilterLog, str, Sequence[FreeRun]]]
     scores: Sequence[Score]
 
     @cached_property
@@ -139,7 +140,7 @@ class Answer:
         """u, v, r of the filter at all rows of all logs, without its first seconds."""
         tracks = []
         for log in self.problem.logs:
-            track = self.problem.followed(log, [self.estimate.y]).track[:, 3:MOVING, 0]
+            track = self.problem.follow(log, [self.estimate.y]).track[:, 3:MOVING, 0]
             tracks.append(track[log.times >= log.times[0] + min(WARM, 0.5 * log.duration)])
         return np.concatenate(tracks)
 
@@ -150,10 +151,11 @@ class Answer:
         speed = np.quantile(np.hypot(u, v), OUTERMOST)
         drift = np.where(np.hypot(u, v) > 0.1 * speed, np.arctan2(np.abs(v), np.abs(u)), 0.0)
         return Envelope(
-            source="the logs", speed=float(max(speed, 1e-6)),
+            source="the logs",
+            speed=float(max(speed, 1e-6)),
             drift=float(max(np.quantile(drift, OUTERMOST), 1e-3)),
             yaw_rate=float(max(np.quantile(np.abs(r), OUTERMOST), 1e-6)),
-        )  # fmt: skip
+        )
 
     @cached_property
     def parameters(self) -> list[Parameter]:
@@ -177,7 +179,7 @@ class Answer:
     def onward(self) -> list[Vessel]:
         """Hulls that move under one thrust, that of the estimate, as the draws do under theirs."""
         thrust = self.problem.thrust(self.estimate.y)
-        return [self.problem.scaled(y, thrust) for y in self._draws]
+        return [self.problem.scale_by_thrust(y, thrust) for y in self._draws]
 
     @cached_property
     def _draws(self) -> list[Vector]:
@@ -189,10 +191,10 @@ class Answer:
         """
         ways, sd = self.directions, self.problem.sd
         centre = self.estimate.y[: len(sd)]
-        determined, open_ways = np.split(ways.basis, [ways.known], axis=1)
+        determined, open_ways = np.split(ways.basis, [ways.determined_count], axis=1)
 
         def point(normal: Vector) -> Vector:
-            near, far = np.split(ways.widths * normal, [ways.known])
+            near, far = np.split(ways.widths * normal, [ways.determined_count])
             off = np.expm1(sd * (open_ways @ far)) / sd
             off += determined @ (near - determined.T @ off)
             with np.errstate(invalid="ignore", divide="ignore"):  # a number that would change sign
@@ -242,13 +244,13 @@ class Answer:
         return found
 
     @cached_property
-    def curves(self) -> list[Curve]:
+    def curves(self) -> list[ForceCurve]:
         """Damping forces from rest to beyond the speeds of the logs."""
         found = []
         for place, axis in enumerate(AXES):
             covered = np.quantile(np.abs(self.motion[:, place]), (COVERED[0], COVERED[-1]))
             speeds = np.linspace(0.0, BEYOND * covered[1], POINTS)
-            found.append(Curve(axis, speeds, *self._damping(place, speeds), covered))
+            found.append(ForceCurve(axis, speeds, *self._damping(place, speeds), covered))
         return found
 
     def _damping(self, place: int, speeds: Vector) -> tuple[Vector, Vector, Vector]:
@@ -270,8 +272,8 @@ class Answer:
         """Of every sensor along every log."""
         return [w for log in self.problem.logs for w in self._whiteness(log)]
 
-    def _whiteness(self, log: Log) -> Iterator[Whiteness]:
-        followed = self.problem.followed(log, [self.estimate.y])
+    def _whiteness(self, log: FilterLog) -> Iterator[Whiteness]:
+        followed = self.problem.follow(log, [self.estimate.y])
         normal = followed.innovations[:, 0] / np.sqrt(followed.variances[:, 0])
         of = channels(log)
         for i, signal in enumerate(STATE):

@@ -13,7 +13,7 @@ from podusv_cli.core import escaping
 from podusv_cli.figures.looks import nth_style
 from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
-from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.answer import Identification
 from podusv_cli.identify.judge import WHO, FreeRun
 
 MEASURED: dict[str, Any] = {
@@ -28,7 +28,7 @@ HEIGHT = 2.6  # inches
 DRAWN = 1.6  # of the measured track: how far from its middle others are drawn
 
 
-def sketches(answer: Answer) -> Iterator[Sketch]:
+def sketches(answer: Identification) -> Iterator[Sketch]:
     """For every log its free run from the first start, measured and predicted; then the forces."""
     for i, (log, role, runs) in enumerate(answer.judged, 1):
         if runs:
@@ -64,9 +64,11 @@ def free_run(run: FreeRun) -> Figure:
         colour = nth_style(i)[0]
         near = np.max(np.abs(pose[:, :2] - middle_of_track), axis=1) <= reach
         track.plot(
-            np.where(near, pose[:, 1], np.nan), np.where(near, pose[:, 0], np.nan),
-            color=colour, label=escaping.figure(who),
-        )  # fmt: skip
+            np.where(near, pose[:, 1], np.nan),
+            np.where(near, pose[:, 0], np.nan),
+            color=colour,
+            label=escaping.figure(who),
+        )
         heading.plot(since, np.degrees(pose[:, 2]), color=colour)
     middle, side = np.degrees(np.median(psi)), np.degrees(np.ptp(psi))
     heading.set_ylim(middle - side - 10.0, middle + side + 10.0)
@@ -77,7 +79,7 @@ def free_run(run: FreeRun) -> Figure:
     return figure
 
 
-def forces(answer: Answer) -> Figure:
+def forces(answer: Identification) -> Figure:
     """X(u), Y(v), N(r) with intervals."""
     figure = new_figure(COLUMNS, HEIGHT)
     for axes, curve in zip(figure.subplots(1, 3), answer.curves, strict=True):

@@ -13,11 +13,11 @@ import numpy as np
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.fit.records import FEWEST, POSE, Log, complete, log_of
-from podusv_cli.identify.logs.checks import checked
-from podusv_cli.identify.logs.commands import acted
+from podusv_cli.identify.fit.records import FEWEST, POSE, FilterLog, complete, log_of
+from podusv_cli.identify.logs.checks import check_log
+from podusv_cli.identify.logs.commands import with_actuator_state
 from podusv_cli.identify.logs.frames import LAT, LON
-from podusv_cli.identify.logs.reading import CLOCK, Named, Table, tables
+from podusv_cli.identify.logs.reading import CLOCK, LogTable, NamedQuantities, tables
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.scenario.identify import LogFile
 from podusv_cli.scenario.model import Scenario
@@ -26,20 +26,20 @@ LONG = 3.0  # times a lag, from which on rows of commands are long
 GAP, ROWS = 2.0, 10.0  # s without a row, and usual distances of rows: a gap that ends a piece
 
 
-def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
+def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
     """The logs of a file, one for each piece without a gap. Raises UsageError, StorageError."""
     wanted, actuator = scenario.identify, scenario.actuator
     assert wanted is not None
     signals = (*STATE, *actuator.replayed, *actuator.lagged)
     _all_taken(wanted.columns, {signal.name for signal in (*signals, CLOCK, LAT, LON)})
-    boots = tables(path, signals, Named(wanted.columns, wanted.frame), name=given.name)
+    boots = tables(path, signals, NamedQuantities(wanted.columns, wanted.frame), name=given.name)
     found = []
     for boot in boots if given.span is None else _within(boots, given.span):
-        at_rows = acted(boot, actuator)
+        at_rows = with_actuator_state(boot, actuator)
         complete(at_rows, actuator)  # says what is missing before anything else is looked at
-        doubts = [*checked(at_rows, actuator, scenario.facts.U), *_long_rows(boot, actuator)]
+        doubts = [*check_log(at_rows, actuator, scenario.facts.U), *_long_rows(boot, actuator)]
         part = replace(boot, warnings=(*boot.warnings, *doubts))
-        found += [acted(piece.finer(wanted.step), actuator) for piece in pieces(part)]
+        found += [with_actuator_state(piece.finer(wanted.step), actuator) for piece in pieces(part)]
     longest = max(found, key=lambda piece: piece.times[-1] - piece.times[0])
     delay, lines = (
         (given.delay, []) if given.delay is not None else Clocks(scenario, longest).delay()
@@ -51,7 +51,7 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[Log]:
     return [log_of(piece, actuator, wanted.step, delay) for piece in found]
 
 
-def _long_rows(log: Table, actuator: Actuator) -> list[str]:
+def _long_rows(log: LogTable, actuator: Actuator) -> list[str]:
     """A sentence where rows are so long beside a lag that what acts between them is not known."""
     names = {signal.name for signal in (*actuator.replayed, *actuator.lagged)}
     acts = [np.isfinite(values) for name, values in log.columns.items() if name in names]
@@ -66,7 +66,7 @@ def _long_rows(log: Table, actuator: Actuator) -> list[str]:
     ]
 
 
-def _within(boots: Sequence[Table], span: tuple[float, float]) -> list[Table]:
+def _within(boots: Sequence[LogTable], span: tuple[float, float]) -> list[LogTable]:
     """What each of the tables has in a span [s]. Raises LogFault where none has anything."""
     inside = [boot for boot in boots if np.any((boot.times >= span[0]) & (boot.times < span[1]))]
     return [boot.part(*span) for boot in (inside or boots[:1])]
@@ -84,7 +84,7 @@ def _all_taken(columns: Mapping[str, str], taken: Collection[str]) -> None:
             )
 
 
-def pieces(log: Table) -> Iterator[Table]:
+def pieces(log: LogTable) -> Iterator[LogTable]:
     """The parts of a log between its gaps, but those that are too short to follow.
 
     Nobody knows what was commanded in a gap. The first piece has the warnings.
@@ -112,7 +112,7 @@ def pieces(log: Table) -> Iterator[Table]:
         warnings = ()
 
 
-def _long(log: Table, begin: int, end: int) -> bool:
+def _long(log: LogTable, begin: int, end: int) -> bool:
     """Whether enough of the pose is in these rows."""
     pose = [log.columns[signal.name][begin:end] for signal in STATE[:POSE]]
     return min(int(np.isfinite(values).sum()) for values in pose) >= FEWEST

@@ -10,10 +10,10 @@ import numpy as np
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.identify.fit.estimate import Search, directions, estimated
+from podusv_cli.identify.fit.estimate import HullSearch, directions, estimate_hull
 from podusv_cli.identify.fit.march import DELIVERED, VALUES
-from podusv_cli.identify.fit.problem import Problem
-from podusv_cli.identify.fit.records import Log
+from podusv_cli.identify.fit.problem import FitProblem
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.logs.reading import Whole
 
 WARM = 20.0  # s, in which the filter finds velocities and load before the first free run
@@ -49,7 +49,7 @@ class FreeRun:
             for p in self.poses
         ]
         return [
-            (_rms(np.hypot(*there[:, :2].T)), _rms(_wrapped(turned[:, 2])))
+            (_rms(np.hypot(*there[:, :2].T)), _rms(_wrap_angles(turned[:, 2])))
             for there, turned in offs
         ]
 
@@ -67,7 +67,7 @@ def _rms(errors: Vector) -> float:
     return float(np.sqrt(np.mean(errors**2))) if len(errors) else np.nan
 
 
-def _wrapped(angles: Vector) -> Vector:
+def _wrap_angles(angles: Vector) -> Vector:
     return np.array([wrap(angle) for angle in angles])
 
 
@@ -84,7 +84,7 @@ class Score:
     heading: float
 
 
-def free_runs(problem: Problem, log: Log, y: Vector) -> list[FreeRun]:
+def free_runs(problem: FitProblem, log: FilterLog, y: Vector) -> list[FreeRun]:
     """Free runs from several instants of a log: the first to its end, the others to a horizon."""
     last, every = log.times[-1] - HORIZONS[0], max(EVERY, log.duration / MOST)
     starts = np.arange(log.times[0] + min(WARM, 0.5 * log.duration), last, every)
@@ -94,24 +94,25 @@ def free_runs(problem: Problem, log: Log, y: Vector) -> list[FreeRun]:
     return [_free_run(problem, log.until(end), y, row) for row, end in zip(rows, ends, strict=True)]
 
 
-def _free_run(problem: Problem, log: Log, y: Vector, first: int) -> FreeRun:
+def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> FreeRun:
     rows = log.record.rows.copy()
     rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
     cut = log.of(rows)
     points = [y, np.zeros(len(y))]
     currents = [_current(problem, cut.until(first), point) for point in points]
-    track = problem.followed(cut, points, currents).track[first:]
+    track = problem.follow(cut, points, currents).track[first:]
     measured = np.where(
         log.record.rows[first:, DELIVERED : DELIVERED + 3] != 0.0,
-        log.record.rows[first:, VALUES : VALUES + 3], np.nan,
-    )  # fmt: skip
+        log.record.rows[first:, VALUES : VALUES + 3],
+        np.nan,
+    )
     times = log.times[first:]
     drift = (times - times[0])[:, None] * np.array([*currents[0], 0.0])
     still = _turning(times, track[0, :, 0]) + drift
     return FreeRun(times, measured, (track[:, :3, 0], track[:, :3, 1], still))
 
 
-def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
+def _current(problem: FitProblem, log: FilterLog, y: Vector) -> list[float]:
     """The current that a hull sees along a log [m/s], as far as the log determines it.
 
     On a straight track a current along it is the same as a load, and is left to that. An
@@ -122,15 +123,15 @@ def _current(problem: Problem, log: Log, y: Vector) -> list[float]:
 
     def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
         currents = [list(problem.current * e) for e in points]
-        followed = problem.followed(log, [y] * len(points), currents)
+        followed = problem.follow(log, [y] * len(points), currents)
         return followed.innovations, followed.variances
 
     blocks = np.zeros(log.record.delivered, np.int64)
-    found = estimated(Search(innovations, 2, blocks), starts=1)
+    found = estimate_hull(HullSearch(innovations, 2, blocks), starts=1)
     if found.interrupted:
         raise KeyboardInterrupt
     ways = directions(found.covariance, 2)
-    determined = ways.basis[:, : ways.known]
+    determined = ways.basis[:, : ways.determined_count]
     return list(problem.current * (determined @ (determined.T @ found.y)))
 
 
@@ -145,7 +146,7 @@ def _turning(times: Vector, state: Vector) -> Vector:
     return np.column_stack([x + since * (u * c - v * s), y + since * (u * s + v * c), heading])
 
 
-def scores(log: Log, role: str, runs: Sequence[FreeRun]) -> Iterator[Score]:
+def scores(log: FilterLog, role: str, runs: Sequence[FreeRun]) -> Iterator[Score]:
     """The errors after each horizon, over the runs that reach it."""
     for horizon in HORIZONS:
         chosen = runs[:1] if np.isinf(horizon) else runs

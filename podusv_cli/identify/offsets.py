@@ -15,10 +15,10 @@ import numpy as np
 
 from podusv_cli.identify.fit import estimate
 from podusv_cli.identify.fit.march import DELAY
-from podusv_cli.identify.fit.problem import WALKS, Problem
+from podusv_cli.identify.fit.problem import WALKS, FitProblem
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.reading import Table
+from podusv_cli.identify.logs.reading import LogTable
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.model import Scenario
 
@@ -48,7 +48,7 @@ class Clocks:
     """A log's commands against its motion, for the vessel that a scenario has."""
 
     scenario: Scenario
-    table: Table
+    table: LogTable
 
     def delay(self) -> tuple[float, list[str]]:
         """By how much later than the log says its commands act [s], and a sentence if they do.
@@ -59,7 +59,7 @@ class Clocks:
         if not likely:
             return 0.0, []
         with ThreadPoolExecutor(available_workers()) as pool:
-            none, *others = pool.map(self._fitted, (Way(), *likely))
+            none, *others = pool.map(self._fit_way, (Way(), *likely))
         if not np.isfinite(none.value):  # the fit of all logs says why
             return 0.0, []
         best = min(others, key=lambda way: way.value)
@@ -68,7 +68,7 @@ class Clocks:
         gain = none.value - best.value
         if best.mirrored or gain <= BETTER:
             return 0.0, []
-        best = self._refined(best)
+        best = self._refine_delay(best)
         line = (
             f"{self.table.name}: its commands act {best.delay:.2f} s later than it says (that "
             f"predicts its motion better, by {gain:.0f} in -2 log of the posterior); logs for "
@@ -88,10 +88,10 @@ class Clocks:
                 "of the motion is counted to port"
             )
 
-    def _refined(self, best: Way) -> Way:
+    def _refine_delay(self, best: Way) -> Way:
         """With the delay that fits best from one fit to the next."""
         for _ in range(REFINED):
-            nearer = self._fitted(Way(best.delay))
+            nearer = self._fit_way(Way(best.delay))
             if nearer.value > best.value - 1.0:
                 break
             best = nearer
@@ -101,7 +101,7 @@ class Clocks:
         """Ways that the vessel as it was given predicts much better than the log as it is."""
         with ThreadPoolExecutor(available_workers()) as pool:
             own, mirrored = (
-                [*pool.map(self._valued, [Way(d, turned) for d in DELAYS])]
+                [*pool.map(self._value_way, [Way(d, turned) for d in DELAYS])]
                 for turned in (False, True)
             )
         none = own[DELAYS.index(0.0)].value
@@ -112,7 +112,7 @@ class Clocks:
         return likely
 
     @cached_property
-    def part(self) -> Table:
+    def part(self) -> LogTable:
         """So much of the log as determines a delay: where the heading turns most."""
         times, psi = self.table.times, self.table.columns["psi"]
         known = np.flatnonzero(np.isfinite(psi))
@@ -123,30 +123,30 @@ class Clocks:
         begin = times[np.argmax(sums[ends] - sums)]
         return self.table.part(begin, begin + ENOUGH)
 
-    def _problem(self, way: Way) -> Problem:
+    def _problem(self, way: Way) -> FitProblem:
         """The filter along a log that is read so."""
         wanted, actuator = self.scenario.identify, self.scenario.actuator
         assert wanted is not None
-        read = _mirrored(self.part) if way.mirrored else self.part
-        return Problem(self.scenario, wanted, [log_of(read, actuator, wanted.step, way.delay)])
+        read = _mirror_log(self.part) if way.mirrored else self.part
+        return FitProblem(self.scenario, wanted, [log_of(read, actuator, wanted.step, way.delay)])
 
-    def _valued(self, way: Way) -> Way:
+    def _value_way(self, way: Way) -> Way:
         """With loads that hardly wander, so that the commands have to explain the motion."""
         problem = self._problem(way)
         y = np.array([QUIET * (number.name in WALKS) for number in problem.numbers])
         return replace(way, value=float(problem.search.values([y])[0]))
 
-    def _fitted(self, way: Way) -> Way:
+    def _fit_way(self, way: Way) -> Way:
         problem = self._problem(way)
         search = problem.search
         if not np.isfinite(search.values([np.zeros(search.size)])[0]):
             return replace(way, value=np.inf)
-        found = estimate.estimated(search, starts=1)
+        found = estimate.estimate_hull(search, starts=1)
         delay = way.delay + problem.values(found.y)[DELAY]
         return replace(way, delay=delay, value=found.value)
 
 
-def _mirrored(table: Table) -> Table:
+def _mirror_log(table: LogTable) -> LogTable:
     """What a boat would have done with port and starboard exchanged."""
     columns = {n: -c if n in MIRRORED else c for n, c in table.columns.items()}
     return replace(table, columns=columns)

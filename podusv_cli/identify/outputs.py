@@ -13,14 +13,14 @@ from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
-from podusv_cli.identify.answer import AXES, Answer, Force
+from podusv_cli.identify.answer import AXES, Force, Identification
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
 from podusv_cli.identify.fit.march import CURRENT, DELAY, THRUST
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.scenario.load import yaml_text
+from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.sweep import POSTERIOR
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
@@ -33,11 +33,18 @@ DIGITS = "%.9g"
 AXIS = {axis.name: axis for axis in AXES}
 # Units of numbers that neither vessel nor filter has as a key.
 OTHERS = {
-    "m11": "kg", "m22": "kg", "m33": "kg m2", THRUST: "1", DELAY: "s",
+    "m11": "kg",
+    "m22": "kg",
+    "m33": "kg m2",
+    THRUST: "1",
+    DELAY: "s",
     **dict.fromkeys(CURRENT, "m/s"),
-    "first u": "m/s", "first v": "m/s", "first load_x": "N", "first load_y": "N",
+    "first u": "m/s",
+    "first v": "m/s",
+    "first load_x": "N",
+    "first load_y": "N",
     "first load_psi": "N m",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,7 @@ class Identified:
     """A hull from logs, and where its files are."""
 
     folder: Path
-    answer: Answer
+    answer: Identification
     status: Status
     warnings: tuple[str, ...] = ()
     missing: tuple[Failure, ...] = ()
@@ -53,23 +60,27 @@ class Identified:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "status": self.status, "folder": str(self.folder),
+            "format": 1,
+            "status": self.status,
+            "folder": str(self.folder),
             "settled": self.answer.estimate.settled,
-            "known": self.answer.directions.known, "of": len(self.answer.problem.hull),
+            "known": self.answer.directions.determined_count,
+            "of": len(self.answer.problem.hull),
             "parameters": [asdict(p) for p in self.answer.parameters],
             "forces": [asdict(f) for f in self.answer.forces],
             "scores": [asdict(s) for s in self.answer.scores],
-            "open": open_words(self.answer), "warnings": list(self.warnings),
+            "open": open_words(self.answer),
+            "warnings": list(self.warnings),
             "missing": [str(part) for part in self.missing],
-        }  # fmt: skip
+        }
 
 
 def write(
-    writer: RunWriter, answer: Answer, text: str, *, warnings: Sequence[str], figures: bool
+    writer: RunWriter, answer: Identification, text: str, *, warnings: Sequence[str], figures: bool
 ) -> None:
     """All files of the folder but the manifest; `text` is the scenario's file."""
     writer.add("scenario.yaml", text.encode())
-    writer.add(IDENTIFIED, (HEADING + yaml_text(given(answer))).encode())
+    writer.add(IDENTIFIED, (HEADING + yaml_text(vessel_keys(answer))).encode())
     for name, rows in {
         "parameters.csv": [
             {"name": p.name, "unit": unit(answer, p.name), **asdict(p)} for p in answer.parameters
@@ -77,7 +88,7 @@ def write(
         "forces.csv": [force_record(f) for f in answer.forces],
         "fits.csv": [asdict(w) for w in answer.whiteness],
         "judged.csv": [score_record(s) for s in answer.scores],
-        POSTERIOR: drawn(answer),
+        POSTERIOR: rows_of_draws(answer),
     }.items():
         writer.add(name, csv_files.records(rows, DIGITS).encode())
     pictures = _pictures(answer, writer.extras) if figures else []
@@ -87,7 +98,7 @@ def write(
     writer.add("report.html", page(answer, pictures, origin, warnings).encode())
 
 
-def given(answer: Answer) -> dict[str, Any]:
+def vessel_keys(answer: Identification) -> dict[str, Any]:
     """The hull as a vessel file has it: without what is 0 or absent anyway."""
     fields = type(answer.vessel).model_fields
     return {
@@ -97,7 +108,7 @@ def given(answer: Answer) -> dict[str, Any]:
     }
 
 
-def drawn(answer: Answer) -> list[dict[str, float]]:
+def rows_of_draws(answer: Identification) -> list[dict[str, float]]:
     """A row a hull, with those of its numbers that differ between hulls."""
     rows = [hull.constants() for hull in answer.onward]
     own = {name for name in rows[0] if name in type(answer.onward[0]).model_fields}
@@ -105,14 +116,14 @@ def drawn(answer: Answer) -> list[dict[str, float]]:
     return [{name: row[name] for name in moving} for row in rows]
 
 
-def _pictures(answer: Answer, extras: Extras) -> list[Picture]:
-    from podusv_cli.figures.sketch import rendered
+def _pictures(answer: Identification, extras: Extras) -> list[Picture]:
+    from podusv_cli.figures.sketch import render_sketches
     from podusv_cli.identify.figures import sketches  # matplotlib is slow to import
 
-    return rendered(sketches(answer), extras)[1]
+    return render_sketches(sketches(answer), extras)[1]
 
 
-def unit(answer: Answer, number: str) -> str:
+def unit(answer: Identification, number: str) -> str:
     """Of a number that was looked for: the hull's, the filter's, or a log's current."""
     name = number.partition(",")[0]
     fields = {**ExtendedKalmanFilter.model_fields, **type(answer.vessel).model_fields}
@@ -123,38 +134,55 @@ def force_record(force: Force) -> dict[str, Any]:
     """A force as forces.csv has it: with the units of it and of the speed at which it is."""
     axis = AXIS[force.force]
     return {
-        "force": force.force, "unit": axis.unit, "at": force.at, "unit of at": axis.speed_unit,
-        **asdict(force), "width": force.width,
-    }  # fmt: skip
+        "force": force.force,
+        "unit": axis.unit,
+        "at": force.at,
+        "unit of at": axis.speed_unit,
+        **asdict(force),
+        "width": force.width,
+    }
 
 
 def score_record(score: Score) -> dict[str, Any]:
     """Errors as judged.csv has them, the heading's in degrees as on the page."""
     return {
-        "log": score.log, "role": score.role, "horizon [s]": score.horizon, "who": score.who,
-        "runs": score.runs, "position [m]": score.position,
+        "log": score.log,
+        "role": score.role,
+        "horizon [s]": score.horizon,
+        "who": score.who,
+        "runs": score.runs,
+        "position [m]": score.position,
         "heading [deg]": math.degrees(score.heading),
-    }  # fmt: skip
+    }
 
 
-def parameter_rows(answer: Answer) -> Iterator[list[str]]:
+def parameter_rows(answer: Identification) -> Iterator[list[str]]:
     """Of every number: name, unit, prior, estimate, interval, and whether the logs determine it."""
     for p in answer.parameters:
         determined = "yes" if p.width <= OPEN else "little" if p.width < SILENT else "no"
         yield [
-            p.name, unit(answer, p.name), f"{p.prior:.4g}", f"{p.value:.4g}",
-            f"{p.low:.4g} to {p.high:.4g}", f"{p.width:.2g}", determined,
-        ]  # fmt: skip
+            p.name,
+            unit(answer, p.name),
+            f"{p.prior:.4g}",
+            f"{p.value:.4g}",
+            f"{p.low:.4g} to {p.high:.4g}",
+            f"{p.width:.2g}",
+            determined,
+        ]
 
 
-def force_rows(answer: Answer) -> Iterator[list[str]]:
+def force_rows(answer: Identification) -> Iterator[list[str]]:
     """Of every force: where, its value, the interval, and the interval over the prior's."""
     for f in answer.forces:
         axis = AXIS[f.force]
         yield [
-            f.force, f"{f.at:.3g} {axis.speed_unit}", f"{f.value:.4g} {axis.unit}",
-            f"{f.low:.4g} to {f.high:.4g}", f"{f.width:.2g}", "yes" if f.width <= OPEN else "no",
-        ]  # fmt: skip
+            f.force,
+            f"{f.at:.3g} {axis.speed_unit}",
+            f"{f.value:.4g} {axis.unit}",
+            f"{f.low:.4g} to {f.high:.4g}",
+            f"{f.width:.2g}",
+            "yes" if f.width <= OPEN else "no",
+        ]
 
 
 def score_rows(scores: Sequence[Score]) -> Iterator[list[str]]:
@@ -180,17 +208,31 @@ SCORES = ("log", "role", "after", "runs", *WHO)
 
 
 def page(
-    answer: Answer, pictures: Sequence[Picture], origin: Mapping[str, Any], warnings: Sequence[str]
+    answer: Identification,
+    pictures: Sequence[Picture],
+    origin: Mapping[str, Any],
+    warnings: Sequence[str],
 ) -> str:
     """The page."""
     scenario = answer.problem.scenario
-    return environment("podusv_cli.identify").get_template("identify.html.j2").render(
-        title=f"The hull of {scenario.name} from its logs",
-        scenario=scenario, summary=summary(answer), open=open_words(answer), warnings=warnings,
-        parameters=(PARAMETERS, [*parameter_rows(answer)]), forces=(FORCES, [*force_rows(answer)]),
-        scores=(SCORES, [*score_rows(answer.scores)]), whiteness=answer.whiteness,
-        widths=[f"{width:.2g}" for width in answer.directions.widths],
-        known=answer.directions.known, least=OPEN, little=SILENT,
-        pictures=list(enumerate(pictures, 1)),
-        provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.identify")
+        .get_template("identify.html.j2")
+        .render(
+            title=f"The hull of {scenario.name} from its logs",
+            scenario=scenario,
+            summary=summary(answer),
+            open=open_words(answer),
+            warnings=warnings,
+            parameters=(PARAMETERS, [*parameter_rows(answer)]),
+            forces=(FORCES, [*force_rows(answer)]),
+            scores=(SCORES, [*score_rows(answer.scores)]),
+            whiteness=answer.whiteness,
+            widths=[f"{width:.2g}" for width in answer.directions.widths],
+            known=answer.directions.determined_count,
+            least=OPEN,
+            little=SILENT,
+            pictures=list(enumerate(pictures, 1)),
+            provenance=[(key, value_text(value)) for key, value in flat(origin) if value != []],
+        )
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from podusv_cli.identify.answer import AXES, Answer
+from podusv_cli.identify.answer import AXES, Identification
 from podusv_cli.identify.fit.estimate import OPEN
 from podusv_cli.identify.fit.march import DELAY, THRUST
 from podusv_cli.identify.judge import WHO
@@ -24,14 +24,14 @@ MOST = 4  # directions that are named
 SHARE = 0.3  # of a direction, from which on a number is named
 
 
-def summary(answer: Answer) -> list[str]:
+def summary(answer: Identification) -> list[str]:
     """What came out, a sentence each, what matters most first."""
     hull, logs = answer.problem.hull, answer.problem.logs
-    lines = [*_judged(answer), *_forces(answer)]
+    lines = [*_judge_in_words(answer), *_forces(answer)]
     seconds = sum(log.duration for log in logs)
     lines.append(
         f"{len(logs)} {'logs' if len(logs) > 1 else 'log'} of {seconds:.0f} s in all: "
-        f"{answer.directions.known} of {len(hull)} directions of the hull's numbers are "
+        f"{answer.directions.determined_count} of {len(hull)} directions of the hull's numbers are "
         f"determined, each to less than {OPEN:g} of what was known before."
     )
     if not answer.estimate.settled:
@@ -42,7 +42,7 @@ def summary(answer: Answer) -> list[str]:
     return [*lines, *(note for log, _, _ in answer.judged for note in log.notes)]
 
 
-def _judged(answer: Answer) -> list[str]:
+def _judge_in_words(answer: Identification) -> list[str]:
     """How well the hull predicts the logs that were not fitted."""
     if all(log.role == "fit" for log in answer.problem.wanted.logs):
         return ["No log was kept for judging (role: judge): how well it predicts is not known."]
@@ -56,7 +56,7 @@ def _judged(answer: Answer) -> list[str]:
     ]
 
 
-def _forces(answer: Answer) -> list[str]:
+def _forces(answer: Identification) -> list[str]:
     """How well each damping force is known."""
     lines = []
     for axis in AXES:
@@ -79,11 +79,11 @@ def _forces(answer: Answer) -> list[str]:
     return lines
 
 
-def open_words(answer: Answer) -> list[str]:
+def open_words(answer: Identification) -> list[str]:
     """Each direction that the logs leave open, by its numbers; what would determine the inertia."""
     ways, hull = answer.directions, answer.problem.hull
     named: dict[str, float] = {}
-    for i in range(ways.known, len(hull)):
+    for i in range(ways.determined_count, len(hull)):
         shares = ways.basis[:, i]
         own = sorted(hull[j].name for j in np.flatnonzero(np.abs(shares) >= SHARE))
         named.setdefault(", ".join(own), min(float(ways.widths[i]), 1.0))
@@ -98,7 +98,7 @@ def open_words(answer: Answer) -> list[str]:
     return [*lines, *([f"inertia: {MANOEUVRES['m']}"] if inertia else [])]
 
 
-def worse_words(answer: Answer) -> list[str]:
+def worse_words(answer: Identification) -> list[str]:
     """A sentence for each log that was not fitted and that the prior predicts better."""
     by = {(s.log, s.horizon, s.who): s for s in answer.scores if s.role == "judge"}
     names = dict.fromkeys(
@@ -113,7 +113,7 @@ def worse_words(answer: Answer) -> list[str]:
     ]
 
 
-def thrust_words(answer: Answer) -> list[str]:
+def thrust_words(answer: Identification) -> list[str]:
     """A sentence where thrust was looked for, since a hull has no place for it."""
     return [
         f"thrust is {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) times what the actuator's numbers "
@@ -125,7 +125,7 @@ def thrust_words(answer: Answer) -> list[str]:
     ]
 
 
-def early_words(answer: Answer) -> list[str]:
+def early_words(answer: Identification) -> list[str]:
     """A sentence where commands act before the log says that they were given, for certain.
 
     A command that is held from row to row, and in truth goes on changing, is half a row late there.
@@ -141,7 +141,7 @@ def early_words(answer: Answer) -> list[str]:
     ]
 
 
-def far_words(answer: Answer) -> list[str]:
+def far_words(answer: Identification) -> list[str]:
     """A sentence where numbers end far from what was known before: the vessel is another one."""
     far = [
         f"{p.name} {p.value:.4g} (before {p.prior:.4g})"

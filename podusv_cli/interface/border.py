@@ -31,18 +31,18 @@ def interrupt_with(runs: pd.DataFrame) -> KeyboardInterrupt:
     return stop
 
 
-def explained(function: Callable[Given, Result]) -> Callable[Given, Result]:
+def with_short_traceback(function: Callable[Given, Result]) -> Callable[Given, Result]:
     """The function, whose errors of podusv's own have a traceback of one frame.
 
     Notebooks and pytest leave that frame out, too. Interrupts and bugs keep theirs.
     """
 
     @wraps(function)
-    def called(*given: Given.args, **named: Given.kwargs) -> Result:
+    def call_shortened(*given: Given.args, **named: Given.kwargs) -> Result:
         __tracebackhide__ = True
         try:
             return function(*given, **named)
         except PodusvError as error:
             raise error.with_traceback(None) from None
 
-    return called
+    return call_shortened

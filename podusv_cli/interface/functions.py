@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -20,13 +19,11 @@ from podusv_cli.doubt.check import doubt_faults
 from podusv_cli.doubt.outputs import table
 from podusv_cli.engine.running import batch
 from podusv_cli.engine.running.check import check_law
-from podusv_cli.findings.finding import Case, postflight
 from podusv_cli.interface.border import ParameterError, interrupt_with
 from podusv_cli.interface.hulls import IdentifiedHull
 from podusv_cli.interface.parameters import check_words, columns, in_si, scenarios
 from podusv_cli.interface.results import Comparison, Run
-from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
-from podusv_cli.process.extras import Extras
+from podusv_cli.interface.scenarios import CHECKS, Changes, Source, load_scenario
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
@@ -36,14 +33,14 @@ from podusv_cli.workflows import compare as comparing
 from podusv_cli.workflows import doubt as doubting
 from podusv_cli.workflows import identify as identifying
 from podusv_cli.workflows import run as running
-from podusv_cli.workflows.execute import Stopwatch, monitored, simulated, summary
 from podusv_cli.workflows.gather import (
     Members,
     from_folder,
     from_scenario,
-    gathered,
-    measured,
+    gather_logs,
+    join_members,
 )
+from podusv_cli.workflows.in_memory import run_in_memory
 from podusv_cli.workflows.measured import is_log
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.members import from_folder as members_of
@@ -71,24 +68,19 @@ def simulate(source: Source, changes: Changes | None = None) -> Run:
     >>> float(run.metrics["iae"].round()), run["z_e"].shape
     (71.0, (3001,))
     """
-    given = loaded(source, changes)
-    scenario, extras = _single(given), Extras()
-    case = Case(scenario, given.plan(scenario))
-    recording = simulated(case, Stopwatch())
-    whole, _ = monitored(case, recording)
-    findings = [*case.findings(), *postflight(case.scenario, whole)]
-    numbers = summary(case, recording, extras)
-    warned = tuple(map(str, (*findings, *extras.missing)))
-    return Run(
-        whole.controller, case.about, whole, numbers, warned,
-        given=case.scenario,
-    )  # fmt: skip
+    given = load_scenario(source, changes)
+    case = given.case(_single(given))
+    return Run(run_in_memory(case), case.scenario)
 
 
 def run(
-    source: Source, changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
-) -> Run:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
+) -> Run:
     """Simulate a scenario into a run folder, as `podusv run` does it.
 
     `out` is the folder, by default `results/<name>/<time>-<digest>`; a finished one is replaced
@@ -99,10 +91,11 @@ def run(
     >>> run.status, sorted(path.name for path in run.folder.iterdir())[:3]
     ('finished', ['about.json', 'log.h5', 'manifest.json'])
     """
-    given = loaded(source, changes)
+    given = load_scenario(source, changes)
     single = _single(given)
     done = running.run_loaded(given, request(out, force, figures))
-    return replace(open_run(done.folder), given=single)
+    made = open_run(done.folder).past
+    return Run(replace(made, plugins=single.plugged), single)
 
 
 def open_run(folder: str | os.PathLike[str]) -> Run:
@@ -117,14 +110,18 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
     if len(members) > 1:
         names = ", ".join(f"{folder}/{member.label}" for member in members)
         raise UsageError(f"{folder} is a comparison; open one of its runs: {names}")
-    return _opened(members[0])
+    return _open_member(members[0])
 
 
 def compare(
-    sources: Source | Run | Iterable[Source | Run], changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+    sources: Source | Run | Iterable[Source | Run],
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
     align: Literal["", "start", "place"] = "",
-) -> Comparison:  # fmt: skip
+) -> Comparison:
     """Simulate scenarios and compare them with finished runs, as `podusv compare` does it.
 
     One scenario with `controllers`, several scenarios, run folders, runs that have a folder, or any
@@ -145,21 +142,26 @@ def compare(
     given = _several(sources)
     files = [_file(source) for source in given]
     items, options = _items(given, files, changes, align), request(out, force, figures)
-    runs = gathered(items)
+    runs = join_members(items)
     done = comparing.compare_gathered(runs, [f for f in files if f], options)
     verdicts = [verdict.as_json() for verdict in done.result.verdicts]
     claims = pd.DataFrame(verdicts).set_index("claim") if verdicts else pd.DataFrame()
     failed = {label: text for label, text in done.result.endings.items() if text}
     scenarios = {member.label: member.case.scenario for member in runs.members if member.case}
-    compared = _compared(done, scenarios)
+    compared = _runs_compared(done, scenarios)
     return Comparison(done.folder, compared, done.result.table.frame(), claims, failed)
 
 
 def optimum(
-    source: Source, changes: Changes | None = None, *, minimise: Literal["iae", "ise"] = "iae",
-    step: float = 0.1, out: str | os.PathLike[str] | None = None, force: bool = False,
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    minimise: Literal["iae", "ise"] = "iae",
+    step: float = 0.1,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
     figures: bool = True,
-) -> Run:  # fmt: skip
+) -> Run:
     """The motion of least error, found with everything known beforehand, repeated as a run.
 
     `step` [s] is that of the finest of three grids. Needs CasADi (podusv[optimum]). Raises
@@ -174,14 +176,19 @@ def optimum(
     """
     from podusv_cli.workflows import optimum as finding
 
-    done = finding.optimum_of(loaded(source, changes), request(out, force, figures), minimise, step)
+    done = finding.optimum_of(
+        load_scenario(source, changes), request(out, force, figures), minimise, step
+    )
     return open_run(done.folder)
 
 
 def simulate_many(
-    source: Source, parameters: Mapping[str, Sequence[Any] | npt.NDArray[Any]], *,
-    workers: int = 0, side_by_side: bool | None = None,
-) -> pd.DataFrame:  # fmt: skip
+    source: Source,
+    parameters: Mapping[str, Sequence[Any] | npt.NDArray[Any]],
+    *,
+    workers: int = 0,
+    side_by_side: bool | None = None,
+) -> pd.DataFrame:
     """Simulate a scenario once for each entry of the parameters; a row a run.
 
     `parameters` are dotted keys of numbers or words, each with one value a run; `vessel.m` changes
@@ -208,7 +215,7 @@ def simulate_many(
     0      50.0  finished
     1      60.0  finished
     """
-    base = loaded(source)
+    base = load_scenario(source)
     scenario = _single(base)
     given = in_si(scenario, columns(parameters))
     if workers < 0:
@@ -242,7 +249,7 @@ def verify(
     >>> bool(found.loc[("pid", "iae"), "converged"])
     True
     """
-    done = verification.verify(loaded(source, changes).scenario, tolerance)
+    done = verification.verify(load_scenario(source, changes).scenario, tolerance)
     rows = {
         (label, name): (e.values[0], e.order, e.relative, e.converged(tolerance))
         for label, run in done.runs.items()
@@ -255,10 +262,14 @@ def verify(
 
 
 def doubt(
-    source: Source, changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
     workers: int = 0,
-) -> pd.DataFrame:  # fmt: skip
+) -> pd.DataFrame:
     """What the verdicts on a scenario's claims hang on, as `podusv doubt` finds it.
 
     A row a claim: `verdict`, the `word` for what it hangs on, how many draws `kept` or `turned` it,
@@ -272,16 +283,20 @@ def doubt(
     >>> podusv.doubt("podusv:own_vessel.yaml", short, out="doubts").loc["A", "verdict"]
     'not reproduced'
     """
-    given = loaded(source, changes, (*CHECKS, doubt_faults))
+    given = load_scenario(source, changes, (*CHECKS, doubt_faults))
     done = doubting.doubt_of(given, replace(request(out, force, figures), workers=workers))
     head, *rows = table(done.answers)
     return pd.DataFrame(rows, columns=list(head)).set_index("claim")
 
 
 def identify(
-    source: Source, changes: Changes | None = None, *,
-    out: str | os.PathLike[str] | None = None, force: bool = False, figures: bool = True,
-) -> IdentifiedHull:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    force: bool = False,
+    figures: bool = True,
+) -> IdentifiedHull:
     """The hull of a boat from the logs that a scenario names, as `podusv identify` finds it.
 
     Raises UsageError without logs and for logs that cannot be used, ScenarioError, StorageError.
@@ -290,7 +305,7 @@ def identify(
     >>> hull = podusv.identify("otter.yaml", out="hull")  # doctest: +SKIP
     >>> hull.forces[["force", "at", "value", "low", "high"]]  # doctest: +SKIP
     """
-    done = identifying.identify_of(loaded(source, changes), request(out, force, figures))
+    done = identifying.identify_of(load_scenario(source, changes), request(out, force, figures))
     return IdentifiedHull(done.folder, done.answer)
 
 
@@ -311,26 +326,29 @@ def request(out: Any, force: bool, figures: bool) -> Request:
     return Request(out=Path(out) if out is not None else None, force=force, figures=figures)
 
 
-def _opened(member: Member) -> Run:
-    run = member.run
-    assert run is not None  # the members of a folder are finished
-    numbers = {n: math.nan if x is None else float(x) for n, x in run.metrics.items()}
-    warned = tuple(map(str, json_files.read_as(run.folder / "metrics.json", _Noticed).warnings))
-    law, log = run.recording.controller, run.recording
-    return Run(law, member.about, log, numbers, warned, run.folder)
+def _open_member(member: Member) -> Run:
+    there = member.folder
+    assert there is not None  # the members of a folder are finished
+    warned = tuple(map(str, json_files.read_as(there.path / "metrics.json", _Noticed).warnings))
+    past = there.as_run(there.recording.controller, member.about, member.plugins)
+    return Run(replace(past, warnings=warned))
 
 
-def _compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
+def _runs_compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
     """The runs of a comparison that have a log, by label."""
     result = done.result
-    folders = {e.label: done.folder / e.label for e in result.entries if e.label in result.timings}
     return {
-        e.label: Run(
-            e.label, e.about, e.recording, e.metrics(), tuple(map(str, result.warnings[e.label])),
-            folders.get(e.label, e.run.folder), scenarios.get(e.label),
+        run.label: Run(
+            replace(
+                run,
+                metrics=run.compared_metrics(),
+                warnings=tuple(map(str, result.warnings[run.label])),
+                folder=done.place(run),
+            ),
+            scenarios.get(run.label),
         )
-        for e in result.entries
-    }  # fmt: skip
+        for run in result.runs
+    }
 
 
 def _several(sources: Any) -> list[Any]:
@@ -361,7 +379,7 @@ def _items(
     groups = [
         from_folder(folder)
         if folder
-        else from_scenario(loaded(source, changes), alone=len(others) == 1)
+        else from_scenario(load_scenario(source, changes), alone=len(others) == 1)
         for (source, _), folder in zip(others, folders, strict=True)
     ]
-    return [*groups, *measured(logs, groups, align)]
+    return [*groups, *gather_logs(logs, groups, align)]

@@ -16,18 +16,18 @@ from podusv_cli.engine.running.batch import BatchRun
 from podusv_cli.engine.running.lanes import LaneSorter, why_alone
 from podusv_cli.engine.running.simulate import marcher, ready
 from podusv_cli.engine.running.stepped import SteppedBatch
-from podusv_cli.interface.border import explained
+from podusv_cli.interface.border import with_short_traceback
 from podusv_cli.interface.gym_task import (
     PARTS,
+    EpisodeTask,
     Flags,
     Limits,
     Moment,
-    Task,
     Terms,
-    looked,
     moment,
     numbers,
     whole,
+    write_moment,
 )
 from podusv_cli.interface.scenarios import Changes, Source
 from podusv_cli.interface.session import DEMAND, Session
@@ -46,12 +46,12 @@ Reward = str | Callable[[Moment, Moment], Any]
 Observe = Callable[[Moment], Any]
 
 
-def demands(task: Task) -> Any:
+def demands(task: EpisodeTask) -> Any:
     """Demands (tau_u [N], tau_r [N m]) within the actuator's limits."""
     return Box(-task.limits, task.limits, dtype=np.float64)
 
 
-def observations(task: Task) -> Any:
+def observations(task: EpisodeTask) -> Any:
     """As `OBSERVED`, or as many numbers as the user's own function gives."""
     most = task.observed_bounds()
     return Box(-most, most, dtype=np.float64)
@@ -89,12 +89,18 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium's own class
 
     def __init__(
-        self, source: Source, changes: Changes | None = None, *, period: float | None = None,
-        reward: Reward = "iae", observe: Observe | None = None, limits: Limits | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        source: Source,
+        changes: Changes | None = None,
+        *,
+        period: float | None = None,
+        reward: Reward = "iae",
+        observe: Observe | None = None,
+        limits: Limits | None = None,
+    ) -> None:
         """No episode has begun."""
         terms = Terms(period, reward, observe, limits)
-        self._task = task = Task(source, changes, terms)
+        self._task = task = EpisodeTask(source, changes, terms)
         EzPickle.__init__(self, task.whole, **terms._asdict())
         self.action_space, self.observation_space = demands(task), observations(task)
         plan, compiled = task.scenario.plan(), task.scenario.simulation.compiled
@@ -111,19 +117,17 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
             raise UsageError("podusv.gym: no episode has begun; call reset first")
         return self._session
 
-    @explained
-    def reset(
-        self, *, seed: int | None = None, options: Info | None = None
-    ) -> tuple[Vector, Info]:  # fmt: skip
+    @with_short_traceback
+    def reset(self, *, seed: int | None = None, options: Info | None = None) -> tuple[Vector, Info]:
         """Begin a run; see the class. `options` change nothing."""
         seed = None if seed is None else self._task.seed(seed)
         super().reset(seed=seed)
-        scenario = self._task.drawn(seed, self.np_random)
+        scenario = self._task.draw_scenario(seed, self.np_random)
         self._session = session = Session(scenario, self._task.period, scenario.plan(), self._march)
         self._now, self._gathered = self._task.moment_of(session, np.zeros(OUTPUTS)), 0.0
         return self._task.observation(self._now), {"time": 0.0}
 
-    @explained
+    @with_short_traceback
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Info]:
         """Hold a demand for a period: observation, reward, terminated, truncated, and the time [s].
 
@@ -135,10 +139,14 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         after, before = session.step(action), self._now
         dead, cut = after.status == "diverged", after.status == "finished"
         self._now = before if dead else task.moment_of(session, numbers(action))
-        reward = float(task.gained(before, self._now)) if task.own else self._grown(not dead)
+        reward = (
+            float(task.reward_gained(before, self._now))
+            if task.own
+            else self._reward_grown(not dead)
+        )
         return task.observation(self._now), reward, dead, cut, {"time": after.time}
 
-    def _grown(self, alive: bool) -> float:
+    def _reward_grown(self, alive: bool) -> float:
         """What the metric grew by, with a minus."""
         session, task, before = self.session, self._task, self._gathered
         self._gathered = session.metric(task.metric)
@@ -160,17 +168,23 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 
     def __init__(
-        self, source: Source, changes: Changes | None = None, *, count: int = LANES,
-        period: float | None = None, reward: Reward = "iae", observe: Observe | None = None,
+        self,
+        source: Source,
+        changes: Changes | None = None,
+        *,
+        count: int = LANES,
+        period: float | None = None,
+        reward: Reward = "iae",
+        observe: Observe | None = None,
         limits: Limits | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """No episode has begun."""
         if whole(changes) >= 0:
             raise UsageError(f"podusv.gym: {changes} stands for `changes`; write count={changes}")
         if (number := whole(count)) < 1:
             raise UsageError(f"podusv.gym: count is {count!r}; give a whole number from 1 on")
         terms = Terms(period, reward, observe, limits)
-        self._task = task = Task(source, changes, terms)
+        self._task = task = EpisodeTask(source, changes, terms)
         EzPickle.__init__(self, task.whole, count=number, **terms._asdict())
         self.num_envs = count = number
         self.single_action_space, self.single_observation_space = demands(task), observations(task)
@@ -191,23 +205,26 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         # A terminated run's moment is the last one that was, and earlier than where it ended.
         self._times, self._ends, self._gathered = np.zeros((3, count))
 
-    @explained
+    @with_short_traceback
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Info | None = None
     ) -> tuple[Vector, Info]:
         """Begin a run in every environment; `options` change nothing."""
         seeds = self._seeds(seed)
         super().reset(seed=seeds[0])
-        self._marches = self._begun(range(self.num_envs), seeds)
-        return self._observed()
+        self._marches = self._begin_runs(range(self.num_envs), seeds)
+        return self._observe()
 
-    @explained
+    @with_short_traceback
     def step(self, actions: Vector) -> tuple[Vector, Vector, Flags, Flags, Info]:
         """As `Env.step`, for all environments: arrays with a row, or an entry, for each of them.
 
         Raises UsageError for demands that are not two finite numbers each; no run goes on then.
         """
-        given, ended = self._checked(actions).T, [march for march in self._marches if march.over]
+        given, ended = (
+            self._check_actions(actions).T,
+            [march for march in self._marches if march.over],
+        )
         before = self._moment() if self._task.own else None
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)
@@ -220,39 +237,39 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
             self._look(march)
         rewards = self._own_rewards(before) if before else self._rewards()
         again = [place for march in ended for place in march.places]
-        self._marches += self._begun(again, [None] * len(again))
-        seen, info = self._observed()
+        self._marches += self._begin_runs(again, [None] * len(again))
+        seen, info = self._observe()
         return seen, rewards, dead, cut, info
 
     def _own_rewards(self, before: Moment) -> Vector:
         """Those of the user's function, for runs that went on."""
         going = [place for march in self._marches for place in march.places]
         rewards = np.zeros(self.num_envs)
-        rewards[going] = self._task.gained(before, self._moment())[going]
+        rewards[going] = self._task.reward_gained(before, self._moment())[going]
         return rewards
 
     def _rewards(self) -> Vector:
         """What runs gained since they were asked last."""
         rewards = np.zeros(self.num_envs)
         for march in self._marches:
-            gathered = self._metrics.one(self._task.metric, march.seen())
+            gathered = self._metrics.one(self._task.metric, march.gathered_so_far())
             self._task.check_reward(gathered, march.alive, march.time)
             rewards[march.places] = self._gathered[march.places] - gathered
             self._gathered[march.places] = gathered
         return rewards
 
-    def _begun(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[SteppedBatch]:
+    def _begin_runs(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[SteppedBatch]:
         """Runs for these environments, in marches."""
         groups, advance = [], self._sorter.advance
         assert advance is not None
         for place, seed in zip(places, seeds, strict=True):
-            loop = self._task.drawn(seed, self.np_random).closed_loop()
+            loop = self._task.draw_scenario(seed, self.np_random).closed_loop()
             run = BatchRun.of(place, self._plan.like(loop))
-            groups.append(self._sorter.sorted(run.vectors, run))
+            groups.append(self._sorter.sort_in(run.vectors, run))
         groups += self._sorter.rest()
         self._gathered[places] = 0.0
         self._demands[:, places] = 0.0
-        begun = [SteppedBatch(self._plan, g, advance, looked, PARTS) for g in groups if g]
+        begun = [SteppedBatch(self._plan, g, advance, write_moment, PARTS) for g in groups if g]
         for march in begun:
             self._look(march)
         return begun
@@ -266,13 +283,13 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     def _moment(self) -> Moment:
         return moment(self._times.copy(), self._parts, self._demands)
 
-    def _observed(self) -> tuple[Vector, Info]:
+    def _observe(self) -> tuple[Vector, Info]:
         """What all see, and the time of every run [s]."""
         now = self._moment()
         info = {"time": self._ends.copy(), "_time": np.ones(self.num_envs, bool)}
         return self._task.observation(now).T.copy(), info
 
-    def _checked(self, actions: Vector) -> Vector:
+    def _check_actions(self, actions: Vector) -> Vector:
         if not self._marches:
             raise UsageError("podusv.gym: no episode has begun; call reset first")
         given = numbers(actions)

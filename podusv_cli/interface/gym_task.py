@@ -9,19 +9,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from podusv_cli.components.controllers.policy import INPUTS, OUTPUTS, observed
+from podusv_cli.components.controllers.policy import INPUTS, OUTPUTS, observe
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.running.simulate import marcher
-from podusv_cli.interface.scenarios import CHECKS, Changes, Source, loaded
+from podusv_cli.interface.scenarios import CHECKS, Changes, Source, load_scenario
 from podusv_cli.interface.session import Session, waiting
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.studies.making.check import gathered_metrics, sweep_faults
-from podusv_cli.studies.making.draws import SOBOL_BITS, SWEEP, drawn, draws
+from podusv_cli.studies.making.draws import SOBOL_BITS, SWEEP, draw_scenario, draws
 
 LEARNING = "learning"  # the stream of draws that no study has
 Flags = npt.NDArray[np.bool_]
@@ -53,37 +53,37 @@ class Terms(NamedTuple):
     limits: Limits | None
 
 
-PARTS = INPUTS + len(STATE) + len(TARGET)  # numbers of `looked`
+PARTS = INPUTS + len(STATE) + len(TARGET)  # numbers of `write_moment`
 
 
 @kernel
-def looked(x: Vector, target: Vector, signals: Vector) -> None:
+def write_moment(x: Vector, target: Vector, signals: Vector) -> None:
     """Write `seen`, `state` and `target` of a moment into `signals`, one after the other."""
-    observed(x, target, signals)
+    observe(x, target, signals)
     for i in range(6):
         signals[8 + i] = x[i]
         signals[14 + i] = target[i]
 
 
 def moment(time: Any, parts: Vector, demand: Vector) -> Moment:
-    """A moment of what `looked` has written; all are copies."""
+    """A moment of what `write_moment` has written; all are copies."""
     own, target = parts.copy(), INPUTS + len(STATE)  # where the target begins
     # One number, too, is numpy's: over no time a rate is NaN then, and no ZeroDivisionError.
     return Moment(np.float64(time), own[:INPUTS], own[INPUTS:target], own[target:], demand.copy())
 
 
-class Task:
+class EpisodeTask:
     """What the episodes of an environment have in common: a scenario, and what is drawn in it."""
 
     def __init__(self, source: Source, changes: Changes | None, terms: Terms) -> None:
         """Raises ScenarioError, and UsageError for what no environment can be made of."""
-        whole = loaded(source, changes, (*CHECKS, sweep_faults)).scenario
+        whole = load_scenario(source, changes, (*CHECKS, sweep_faults)).scenario
         self.whole, self.sweep = whole, whole.sweep or Sweep(draws=1)
         self._check_sweep()
         self.scenario, self.period = waiting(whole, terms.period)
         self.limits = self._limits(terms.limits)
         self.own = terms.reward if callable(terms.reward) else None
-        self.metric = "" if self.own else self._known(str(terms.reward))
+        self.metric = "" if self.own else self._check_reward(str(terms.reward))
         self._observe = terms.observe
         self.numbers = self._check_first()
 
@@ -102,16 +102,16 @@ class Task:
         if self.own is None:
             self.check_reward(session.metric(self.metric), after.status != "diverged", after.time)
         else:
-            self.gained(first, self.moment_of(session, np.zeros(OUTPUTS)))
+            self.reward_gained(first, self.moment_of(session, np.zeros(OUTPUTS)))
         return len(self.observation(first))
 
     def moment_of(self, session: Session, demand: Vector) -> Moment:
         """The next instant of a session, after this demand."""
         now, parts = session.observe(), np.zeros(PARTS)
-        looked(now.state, now.target, parts)
+        write_moment(now.state, now.target, parts)
         return moment(now.time, parts, demand)
 
-    def gained(self, before: Moment, now: Moment) -> Vector:
+    def reward_gained(self, before: Moment, now: Moment) -> Vector:
         """The user's own reward, a number or one for every run. Raises UsageError for none.
 
         Where no time is between the moments, as the run is terminated or over, what is not finite
@@ -135,7 +135,7 @@ class Task:
             )
         return np.array([_finite(part, shape, "observe", now.time) for part in parts])
 
-    def _known(self, reward: str) -> str:
+    def _check_reward(self, reward: str) -> str:
         known = gathered_metrics(self.scenario)
         if reward in self.scenario.known_metrics() and reward not in known:
             raise UsageError(
@@ -143,7 +143,7 @@ class Task:
                 "path is followed, take e_ct_integral in place of iae"
             )
         if reward not in known:
-            sentence = unknown(f"reward {reward!r}", reward, known, "podusv list")
+            sentence = unknown_word(f"reward {reward!r}", reward, known, "podusv list")
             raise UsageError(f"podusv.gym: {sentence}")
         return reward
 
@@ -193,16 +193,18 @@ class Task:
             )
         return number
 
-    def drawn(self, seed: int | None, random: np.random.Generator) -> Scenario:
+    def draw_scenario(self, seed: int | None, random: np.random.Generator) -> Scenario:
         """The scenario with the draw of a study whose number is the seed, or with one of no study.
 
         Draws of no study are independent, also where those of the study are Sobol' points.
         """
         if seed is not None:
-            return drawn(self.scenario, self.sweep.vary, next(draws(self.sweep, seed, 1, SWEEP)))
+            return draw_scenario(
+                self.scenario, self.sweep.vary, next(draws(self.sweep, seed, 1, SWEEP))
+            )
         sweep = self.sweep.model_copy(update={"design": "random"})
         draw = next(draws(sweep, int(random.integers(2**53)), 1, LEARNING))
-        return drawn(self.scenario, sweep.vary, draw)
+        return draw_scenario(self.scenario, sweep.vary, draw)
 
     def check_reward(self, gathered: Vector | float, alive: Flags | bool, time: float) -> None:
         """Raise UsageError for a metric that is not defined at this time [s].
@@ -218,7 +220,7 @@ class Task:
 
 def _finite(
     given: Any, shape: tuple[int, ...], whose: str, time: Any, idle: Flags | bool = False
-) -> Vector:  # fmt: skip
+) -> Vector:
     """Numbers of a user's function in this shape, also where they are the same for all runs.
 
     Those of `idle` runs may be none, and are 0 then.

@@ -9,8 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from podusv_cli.identify.answer import Answer
-from podusv_cli.identify.outputs import drawn, given
+from podusv_cli.identify.answer import Identification
+from podusv_cli.identify.outputs import rows_of_draws, vessel_keys
 
 
 @dataclass(frozen=True, repr=False)
@@ -18,17 +18,17 @@ class IdentifiedHull:
     """A hull that logs gave, what is known of its errors, and the folder with all of it."""
 
     folder: Path
-    _answer: Answer
+    _answer: Identification
 
     def __repr__(self) -> str:
         """How many directions of the hull's numbers the logs determine."""
-        known, whole = self._answer.directions.known, len(self._answer.problem.hull)
+        known, whole = self._answer.directions.determined_count, len(self._answer.problem.hull)
         return f"<podusv hull: {known} of {whole} directions determined, {self.folder}>"
 
     @property
     def vessel(self) -> dict[str, Any]:
         """The section `vessel` of a scenario."""
-        return given(self._answer)
+        return vessel_keys(self._answer)
 
     @cached_property
     def parameters(self) -> pd.DataFrame:
@@ -48,4 +48,4 @@ class IdentifiedHull:
     @cached_property
     def draws(self) -> pd.DataFrame:
         """Hulls that the logs leave possible, a row each: the keys of `vessel` that differ."""
-        return pd.DataFrame(drawn(self._answer))
+        return pd.DataFrame(rows_of_draws(self._answer))

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import PodusvError
-from podusv_cli.core.phrases import as_yaml, unknown
+from podusv_cli.core.phrases import as_yaml, unknown_word
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
@@ -18,7 +18,7 @@ from podusv_cli.interface.border import ParameterError
 from podusv_cli.scenario.address import (
     ValueRefused,
     content,
-    described,
+    describe_key,
     has,
     is_whole,
     no_entry,
@@ -26,7 +26,7 @@ from podusv_cli.scenario.address import (
 )
 from podusv_cli.scenario.load import values
 from podusv_cli.scenario.model import PER_RUN, Scenario
-from podusv_cli.scenario.yaml_tree import Route, bracketed, route
+from podusv_cli.scenario.yaml_tree import Route, bracketed_key, route
 
 Columns = dict[str, list[Any]]  # by key, with one value a run
 
@@ -54,14 +54,14 @@ def _column(key: str, given: Any) -> list[Any]:
 
 def in_si(scenario: Scenario, given: Columns) -> Columns:
     """The values with numbers in place of texts such as "45 deg". Raises ValueError as below."""
-    keys = {name: described(scenario, _steps(scenario, name)) for name in given}
+    keys = {name: describe_key(scenario, _steps(scenario, name)) for name in given}
     return {name: [keys[name].number(value) for value in column] for name, column in given.items()}
 
 
 def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
     """The scenario of every run. Raises ValueError for unknown keys and values out of range."""
     steps = {key: _steps(scenario, key) for key in given}
-    whole = {key for key, at in steps.items() if is_whole(described(scenario, at))}
+    whole = {key for key, at in steps.items() if is_whole(describe_key(scenario, at))}
     made = []
     for row, new in enumerate(zip(*given.values(), strict=True)):
         numbers = {
@@ -77,7 +77,7 @@ def scenarios(scenario: Scenario, given: Columns) -> list[Scenario]:
 
 def _steps(scenario: Scenario, name: str) -> Route:
     """The steps of a key. Raises ValueError where runs of a batch cannot differ in it."""
-    key = bracketed(name)
+    key = bracketed_key(name)
     steps = route(key)
     section = str(steps[0]) if steps else ""
     if section not in PER_RUN and section in Scenario.model_fields:
@@ -88,7 +88,9 @@ def _steps(scenario: Scenario, name: str) -> Route:
     if not steps or not has(scenario, key):
         known = [key for key in values(scenario) if has(scenario, key)]
         beyond = no_entry(scenario, steps)
-        raise ParameterError(f"{name}: {beyond or unknown('key', key, known, 'podusv explain')}")
+        raise ParameterError(
+            f"{name}: {beyond or unknown_word('key', key, known, 'podusv explain')}"
+        )
     if isinstance(content(scenario, steps), Component):
         raise ParameterError(f"{name}: is a section; name one of the keys in it")
     if steps[-1] in ("kind", "preset"):
@@ -113,8 +115,8 @@ def check_words(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
         check_law(plan)
         if plan.structure != first.structure:
             raise ParameterError(
-                f"row {row}: {_told(words, own)} changes how the loop is put together, and row 0 "
-                f"has {_told(words, rows[0][1])}; make a batch for each"
+                f"row {row}: {_describe_columns(words, own)} changes how the loop is put together, "
+                f"and row 0 has {_describe_columns(words, rows[0][1])}; make a batch for each"
             )
 
 
@@ -138,7 +140,7 @@ def _check_ends(scenario: Scenario, loops: Sequence[ClosedLoop], given: Columns)
                 )
 
 
-def _told(words: Columns, own: Iterable[Any]) -> str:
+def _describe_columns(words: Columns, own: Iterable[Any]) -> str:
     return ", ".join(f"{key} = {as_yaml(value)}" for key, value in zip(words, own, strict=True))
 
 

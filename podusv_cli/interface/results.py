@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from html import escape
 from os import PathLike
@@ -16,11 +16,10 @@ import pandas as pd
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.phrases import unknown
-from podusv_cli.core.plugins import Plugins, installed
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.recording import Recording
-from podusv_cli.figures import signals as derived
-from podusv_cli.interface.border import explained
+from podusv_cli.interface.border import with_short_traceback
 from podusv_cli.metrics.table import metrics_with
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
@@ -55,7 +54,7 @@ class Numbers(pd.Series):
         try:
             return super().__getitem__(name)
         except KeyError:
-            sentence = unknown(f"metric {name!r} of this run", str(name), map(str, self.index))
+            sentence = unknown_word(f"metric {name!r} of this run", str(name), map(str, self.index))
             raise KeyError(sentence) from None
 
 
@@ -68,13 +67,38 @@ class Run:
     was only simulated. `run["z_e"]` is a signal as a numpy array.
     """
 
-    label: str
-    about: RunAbout
-    recording: Recording
-    numbers: Mapping[str, float]
-    warnings: tuple[str, ...] = ()
-    folder: Path | None = None
+    past: PastRun
     given: Scenario | None = None  # of which it was made here
+
+    @property
+    def label(self) -> str:
+        """What it is called: by its law, or as a comparison calls it."""
+        return self.past.label
+
+    @property
+    def about(self) -> RunAbout:
+        """What it says about itself, as about.json has it."""
+        return self.past.about
+
+    @property
+    def recording(self) -> Recording:
+        """What was recorded, as podusv's own functions take it."""
+        return self.past.recording
+
+    @property
+    def numbers(self) -> Mapping[str, float]:
+        """Every metric by name, as plain numbers."""
+        return self.past.metrics
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The findings before and after the run, as sentences."""
+        return self.past.warnings
+
+    @property
+    def folder(self) -> Path | None:
+        """Where it lies."""
+        return self.past.folder
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -88,16 +112,6 @@ class Run:
         assert self.folder is not None  # what is in memory has its scenario
         path = self.folder / RESOLVED
         return load_stored(read_text(path), str(path)).scenario
-
-    @property
-    def _plugins(self) -> Plugins:
-        """Those that have figures, metrics and signals for it."""
-        return self.given.plugged if self.given is not None else installed()
-
-    @property
-    def _looked_at(self) -> tuple[Recording, RunAbout, Plugins]:
-        """What figures show of it."""
-        return self.recording, self.about, self._plugins
 
     @property
     def status(self) -> str:
@@ -136,12 +150,11 @@ class Run:
 
     def __getitem__(self, signal: str) -> Vector:
         """A signal that the log has or that follows from it; KeyError with those that there are."""
-        log = self.recording
-        if not derived.has(log, signal, self._plugins):
-            raise KeyError(unknown(f"signal {signal!r}", signal, log.signals))
-        return derived.signal(log, signal, self._plugins)
+        if not self.past.has(signal):
+            raise KeyError(unknown_word(f"signal {signal!r}", signal, self.recording.signals))
+        return self.past.signal(signal)
 
-    @explained
+    @with_short_traceback
     def plot(self, *names: str, columns: int = 2) -> Figure:
         """A matplotlib figure, which notebooks show; `podusv plot --help` tells of the files.
 
@@ -151,7 +164,7 @@ class Run:
         """
         return figure({self.label: self}, names, columns)
 
-    @explained
+    @with_short_traceback
     def play(self) -> Animation:
         """The run as an animation with a slider, which notebooks show. Raises UsageError."""
         return animation({self.label: self})
@@ -164,7 +177,7 @@ class Run:
 
     def _repr_html_(self) -> str:
         """The trajectory beside the metrics, what was warned of above."""
-        known = {**metrics_with(self._plugins), **self.about.metrics}
+        known = {**metrics_with(self.past.plugins), **self.about.metrics}
         rows = {n: f"{x:.5g} {known[n].unit}" for n, x in self.numbers.items() if n in known}
         table = pd.Series(rows, name=self.label, dtype=str).to_frame().to_html(border=0)
         lines = [repr(self), self.message, *self.warnings]
@@ -194,15 +207,15 @@ class Comparison:
     def __getitem__(self, label: str) -> Run:
         """The run of this label; KeyError with the labels that there are."""
         if label not in self.runs:
-            raise KeyError(unknown(f"run {label!r}", label, self.runs))
+            raise KeyError(unknown_word(f"run {label!r}", label, self.runs))
         return self.runs[label]
 
-    @explained
+    @with_short_traceback
     def plot(self, *names: str, columns: int = 2) -> Figure:
         """All runs in one matplotlib figure; as `Run.plot`."""
         return figure(self.runs, names, columns)
 
-    @explained
+    @with_short_traceback
     def play(self) -> Animation:
         """All runs as one animation; as `Run.play`."""
         return animation(self.runs)
@@ -238,9 +251,9 @@ class Animation:
 def animation(runs: Mapping[str, Run]) -> Animation:
     """Runs chasing their target. Raises UsageError where no run has two rows."""
     from podusv_cli.figures.chase import page
-    from podusv_cli.figures.shown import dressed
+    from podusv_cli.figures.shown import dress_runs
 
-    shown = dressed([(label, *run._looked_at) for label, run in runs.items()])
+    shown = dress_runs([replace(run.past, label=label) for label, run in runs.items()])
     if not shown:
         raise UsageError(f"there is nothing to show: {', '.join(map(repr, runs.values()))}")
     return Animation(page(shown))
@@ -248,10 +261,10 @@ def animation(runs: Mapping[str, Run]) -> Animation:
 
 def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> Figure:
     """One of podusv's figures of several runs, or their signals over time. Raises UsageError."""
-    from podusv_cli.figures.shown import dressed
+    from podusv_cli.figures.shown import dress_runs
     from podusv_cli.figures.style import house_style, image
 
-    shown = dressed([(label, *run._looked_at) for label, run in runs.items()])
+    shown = dress_runs([replace(run.past, label=label) for label, run in runs.items()])
     family = _family(runs, names or ("trajectory",), shown)
     with house_style():
         drawn = family(shown, columns)
@@ -265,7 +278,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
     from podusv_cli.figures.drawing import figures_of
     from podusv_cli.figures.panels import signals_over_time
 
-    figures = figures_of(run._plugins for run in runs.values())
+    figures = figures_of(run.past.plugins for run in runs.values())
     if len(names) == 1 and names[0] in figures:
         sheet = figures[names[0]]
         if not shown or not sheet.fits(shown):
@@ -276,7 +289,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
     for name in names:
         if not any(run.has(name) for run in shown):
             known = (*figures, *dict.fromkeys(signals))
-            raise UsageError(unknown(f"figure or signal {name!r}", name, known, "podusv list"))
+            raise UsageError(unknown_word(f"figure or signal {name!r}", name, known, "podusv list"))
     return signals_over_time(*names)
 
 

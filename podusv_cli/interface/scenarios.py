@@ -17,8 +17,9 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario import model, plugins
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Check, Loaded, Plugged, load_text, yaml_text
+from podusv_cli.scenario.load import Check, Loaded, Plugged, load_text
 from podusv_cli.scenario.load import load as load_file
+from podusv_cli.scenario.resolved import yaml_text
 
 Changes = Mapping[str, Any]
 Source = str | os.PathLike[str] | Mapping[str, Any] | model.Scenario
@@ -48,12 +49,10 @@ def Scenario(sections: Mapping[str, Any] | None = None, /, **more: Any) -> model
     Traceback (most recent call last):
     podusv_cli.core.errors.ScenarioError: scenario: vessel.lenght: unknown key; did you mean ...
     """
-    return loaded({**(sections or {}), **more}).scenario
+    return load_scenario({**(sections or {}), **more}).scenario
 
 
-def load(
-    source: Source, changes: Changes | None = None, *, trust: bool = False
-) -> model.Scenario:  # fmt: skip
+def load(source: Source, changes: Changes | None = None, *, trust: bool = False) -> model.Scenario:
     """The scenario of a file, a dictionary or another scenario, with some values changed.
 
     `source` may name a scenario of podusv (`podusv:mu_2017/corrected.yaml`). `changes` are what
@@ -69,24 +68,30 @@ def load(
     >>> podusv.load(scenario, {"path": {"kind": "circle", "radius": 20.0}}).path.radius
     20.0
     """
-    return loaded(source, changes, trust=trust).scenario
+    return load_scenario(source, changes, trust=trust).scenario
 
 
 CHECKS = (unknown_codes, limits(read_back=True, insist=""))
 
 
-def loaded(
-    source: Source, changes: Changes | None = None, checks: Sequence[Check] = CHECKS,
-    *, silent: bool = False, trust: bool = False,
-) -> Loaded:  # fmt: skip
+def load_scenario(
+    source: Source,
+    changes: Changes | None = None,
+    checks: Sequence[Check] = CHECKS,
+    *,
+    silent: bool = False,
+    trust: bool = False,
+) -> Loaded:
     """A scenario with its text and the origin of each value, see `load`. Raises ScenarioError.
 
     Unless it is `silent`, a UserWarning names values that a section loses with its kind.
     """
-    result = _loaded(source, assignments(changes), checks, plugins.of_files(trust))
+    result = _load_source(source, assignments(changes), checks, plugins.of_files(trust))
     if silent:
         return result
-    return result.told(lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4))
+    return result.warn_of_dropped(
+        lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4)
+    )
 
 
 def assignments(changes: Changes | None) -> list[str]:
@@ -100,11 +105,13 @@ def assignments(changes: Changes | None) -> list[str]:
 
 
 @singledispatch
-def _loaded(source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged) -> Loaded:
+def _load_source(
+    source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged
+) -> Loaded:
     return load_file(os.fspath(source), overrides, checks, plugged=plugged)
 
 
-@_loaded.register
+@_load_source.register
 def _(
     source: model.Scenario, overrides: list[str], checks: Sequence[Check], plugged: Plugged
 ) -> Loaded:
@@ -115,11 +122,13 @@ def _(
     return load_text(text, source.name, overrides, checks, files, plugged, placed=False)
 
 
-@_loaded.register
+@_load_source.register
 def _(
     source: Mapping,  # type: ignore[type-arg]
-    overrides: list[str], checks: Sequence[Check], plugged: Plugged,
-) -> Loaded:  # fmt: skip
+    overrides: list[str],
+    checks: Sequence[Check],
+    plugged: Plugged,
+) -> Loaded:
     text = yaml_text(_plain(source))
     return load_text(text, IN_PYTHON, overrides, checks, plugged=plugged, placed=False)
 

@@ -13,14 +13,14 @@ import numpy as np
 from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.simulate import Marcher, marcher, ready
-from podusv_cli.engine.running.stepped import Mark, SteppedRun
-from podusv_cli.interface.border import explained
+from podusv_cli.engine.running.stepped import MarchMark, SteppedRun
+from podusv_cli.interface.border import with_short_traceback
 from podusv_cli.interface.functions import open_run, request
 from podusv_cli.interface.results import Run
-from podusv_cli.interface.scenarios import Changes, Source, loaded
+from podusv_cli.interface.scenarios import Changes, Source, load_scenario
 from podusv_cli.scenario.address import ValueRefused, with_values
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
@@ -55,7 +55,7 @@ class Bookmark:
     """A place in a session, to come back to."""
 
     session: Session
-    mark: Mark
+    mark: MarchMark
     demands: tuple[tuple[float, float], ...]
     status: Status
 
@@ -76,7 +76,7 @@ def open_session(
     >>> session.close("straight_on", figures=False)
     <podusv run schedule: finished at 20 s, straight_on>
     """
-    scenario, period = waiting(loaded(source, changes).scenario, period)
+    scenario, period = waiting(load_scenario(source, changes).scenario, period)
     plan, compiled = scenario.plan(), scenario.simulation.compiled
     ready(plan, compiled)
     return Session(scenario, period, plan, marcher(plan, compiled))
@@ -138,22 +138,24 @@ class Session:
         """
         known, word = self._metrics.known, str(name)
         if word not in known:
-            raise UsageError(f"session: {unknown(f'metric {name!r}', word, known, 'podusv list')}")
-        return float(self._metrics.one(word, self._march.seen()[:, np.newaxis])[0])
+            raise UsageError(
+                f"session: {unknown_word(f'metric {name!r}', word, known, 'podusv list')}"
+            )
+        return float(self._metrics.one(word, self._march.gathered_so_far()[:, np.newaxis])[0])
 
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""
         march = self._march
         return Observation(march.time, march.state(), march.target(), self._status, march.loads())
 
-    @explained
+    @with_short_traceback
     def step(self, demand: Sequence[float] | Vector) -> Observation:
         """Hold a demand (tau_u [N], tau_r [N m]) for a period; the instant after it.
 
         Raises UsageError for a demand that is not two finite numbers and for a session that is
         over; the session stays where it is.
         """
-        tau_u, tau_r = self._checked(demand)
+        tau_u, tau_r = self._check_demand(demand)
         grid, march = self._march.grid, self._march
         self._demand[0], self._demand[1] = tau_u, tau_r
         self._demands.append((tau_u, tau_r))
@@ -164,7 +166,7 @@ class Session:
         self._status = ("finished" if last else "running") if fine else "diverged"
         return self.observe()
 
-    def _checked(self, demand: Sequence[float] | Vector) -> tuple[float, float]:
+    def _check_demand(self, demand: Sequence[float] | Vector) -> tuple[float, float]:
         if self._status != "running":
             raise UsageError(
                 f"session: the run has {self._status} at t = {self._march.time:g} s and takes no "
@@ -185,7 +187,7 @@ class Session:
         """The place in the run, for `restore`."""
         return Bookmark(self, self._march.mark(), tuple(self._demands), self._status)
 
-    @explained
+    @with_short_traceback
     def restore(self, place: Bookmark) -> Observation:
         """Go on from a place in this run; what came after it is forgotten.
 
@@ -207,11 +209,14 @@ class Session:
         """Every signal that is logged so far, by name; a copy, which `restore` does not change."""
         return {name: signal.copy() for name, signal in self._march.recording().signals.items()}
 
-    @explained
+    @with_short_traceback
     def close(
-        self, out: str | os.PathLike[str] | None = None, *, force: bool = False,
+        self,
+        out: str | os.PathLike[str] | None = None,
+        *,
+        force: bool = False,
         figures: bool = True,
-    ) -> Run:  # fmt: skip
+    ) -> Run:
         """Write the run as far as it went into a folder, as `podusv run` does it.
 
         The scenario in it has the demands as a law `schedule`, so `podusv rerun` repeats it. Raises
@@ -219,11 +224,13 @@ class Session:
         """
         if not self._demands:
             raise UsageError("session: nothing has been simulated yet; give it a demand with step")
-        given = scheduled(self.scenario, self.period, self._demands)
+        given = schedule_demands(self.scenario, self.period, self._demands)
         return open_run(running.run_loaded(given, request(out, force, figures)).folder)
 
 
-def scheduled(scenario: Scenario, period: float, demands: Sequence[tuple[float, float]]) -> Loaded:
+def schedule_demands(
+    scenario: Scenario, period: float, demands: Sequence[tuple[float, float]]
+) -> Loaded:
     """The scenario with a law that holds each of these demands for a period, and then ends."""
     run, every = scenario.simulation, scenario.time_grid().hold_every
     steps = min(len(demands) * every, scenario.time_grid().steps)
@@ -237,4 +244,4 @@ def scheduled(scenario: Scenario, period: float, demands: Sequence[tuple[float, 
         "log.every": min(scenario.log.every, steps),
         "controller": {"kind": "schedule", "between": "hold", "rows": "\n".join(rows)},
     }
-    return loaded(scenario, changes, silent=True)  # another law is the purpose
+    return load_scenario(scenario, changes, silent=True)  # another law is the purpose

@@ -15,12 +15,12 @@ import pandas as pd
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.interface.results import NO_XARRAY
-from podusv_cli.interface.scenarios import Changes, Source, assignments, loaded
+from podusv_cli.interface.scenarios import Changes, Source, assignments, load_scenario
 from podusv_cli.scenario.plugins import continue_with
 from podusv_cli.studies.counting.runs import STATUSES
 from podusv_cli.studies.making.store import RUNS
 from podusv_cli.studies.telling.outputs import as_frame
-from podusv_cli.studies.telling.results import Results, judged
+from podusv_cli.studies.telling.results import Results, judge_study
 from podusv_cli.workflows import studies as folders
 from podusv_cli.workflows import sweep as sweeping
 from podusv_cli.workflows.many_runs import Config
@@ -74,7 +74,7 @@ class Study(Folder):
             import xarray
         except ImportError as error:
             raise ImportError(NO_XARRAY) from error
-        runs, known = self.results.runs, self.results.known
+        runs, known = self.results.runs, self.results.known_metrics
         by_law = ("law", "cell", "draw")
 
         def whole(read: Callable[[str], Any]) -> Any:
@@ -90,7 +90,7 @@ class Study(Folder):
             "status": (by_law, words[whole(runs.status)]),
             "success": (by_law, whole(runs.success)),
         }
-        drawn = {name: ("draw", values) for name, values in runs.drawn.items()}
+        drawn = {name: ("draw", values) for name, values in runs.drawn_quantities.items()}
         axes = {"law": list(runs.laws), "cell": list(runs.cells), "draw": np.arange(runs.wanted)}
         dataset = xarray.Dataset({**metrics, **ends, **drawn}, coords=axes)
         return dataset if len(runs.cells) > 1 else dataset.squeeze("cell", drop=True)
@@ -117,7 +117,7 @@ class Study(Folder):
 
     def __repr__(self) -> str:
         """One line: the laws, how many runs there are, where they are."""
-        runs = f"{self.results.made} of {self.results.wanted} runs"
+        runs = f"{self.results.made_runs} of {self.results.wanted_runs} runs"
         return f"<podusv study of {', '.join(self.results.runs.laws)}: {runs}, {self.folder}>"
 
     def _repr_html_(self) -> str:
@@ -131,9 +131,14 @@ def _metric(runs: Any, name: str, law: str) -> Any:
 
 
 def sweep(
-    source: Source, changes: Changes | None = None, *, out: Place | None = None, workers: int = 0,
-    figures: bool = True, trust: bool = False,
-) -> Study:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: Place | None = None,
+    workers: int = 0,
+    figures: bool = True,
+    trust: bool = False,
+) -> Study:
     """Simulate all draws of a scenario with the key `sweep`, as `podusv sweep run` does it.
 
     `source` may be the folder of a study, which is continued; `trust` executes the plug-in files in
@@ -175,11 +180,11 @@ def open_study(folder: Place) -> Study:
     2
     """
     place = Path(folder)
-    store = folders.stored(place)
+    store = folders.open_store(place)
     if not (place / RUNS).exists():
         report = continue_with("sweep report", place)
         raise UsageError(f"{place} has no {RUNS} yet; it is made by: {report}")
-    return Study(place, judged(store.about, store.runs()))
+    return Study(place, judge_study(store.about, store.runs()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -202,9 +207,14 @@ class Tuning(Folder):
 
 
 def tune(
-    source: Source, changes: Changes | None = None, *, out: Place | None = None, workers: int = 0,
-    figures: bool = True, trust: bool = False,
-) -> Tuning:  # fmt: skip
+    source: Source,
+    changes: Changes | None = None,
+    *,
+    out: Place | None = None,
+    workers: int = 0,
+    figures: bool = True,
+    trust: bool = False,
+) -> Tuning:
     """Search gains for every law with equal budgets, as `podusv tune` does it.
 
     `source` has the keys `sweep` and `tune`, or is the folder of a search, which is continued.
@@ -222,9 +232,11 @@ def tune(
     done = searching.tune(config, request, lambda tally, text: None)
     answer = done.as_json()
     return Tuning(
-        done.folder, done.results.laws, pd.DataFrame(answer["gains"]).rename_axis("gain"),
+        done.folder,
+        done.results.laws,
+        pd.DataFrame(answer["gains"]).rename_axis("gain"),
         tuple(answer["remarks"]),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -247,11 +259,19 @@ class Bench(Folder):
 
 
 def bench(
-    folder: Place | None = None, changes: Changes | None = None, *, laws: Sequence[Place] = (),
-    tasks: Sequence[str] = (), vessels: Sequence[str] = (), conditions: Sequence[str] = (),
-    out: Place = "results/bench", force: bool = False, workers: int = 0, figures: bool = True,
+    folder: Place | None = None,
+    changes: Changes | None = None,
+    *,
+    laws: Sequence[Place] = (),
+    tasks: Sequence[str] = (),
+    vessels: Sequence[str] = (),
+    conditions: Sequence[str] = (),
+    out: Place = "results/bench",
+    force: bool = False,
+    workers: int = 0,
+    figures: bool = True,
     optimum: bool = False,
-) -> Bench:  # fmt: skip
+) -> Bench:
     """Run every law over every task, vessel and condition, as `podusv bench` does it.
 
     `folder` is podusv's bench by default; `laws` are scenarios with further `controllers`; `tasks`,
@@ -277,7 +297,7 @@ def _config(source: Source, changes: Changes | None) -> tuple[Config, Sequence[s
     """What the workflows load, and the changes that it does not have yet."""
     if isinstance(source, (str, os.PathLike)):
         return Path(source), assignments(changes)
-    return partial(loaded, source, changes), ()
+    return partial(load_scenario, source, changes), ()
 
 
 def _path(out: Place | None) -> Path | None:

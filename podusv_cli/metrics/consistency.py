@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from podusv_cli.components.estimators.base import mean_squared_innovation
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, ratio
@@ -39,7 +40,7 @@ def factor(packed: Vector, order: int, lower: Vector) -> bool:
 
 
 @kernel
-def squared(error: Vector, lower: Vector) -> float:
+def normalised_square(error: Vector, lower: Vector) -> float:
     """error^T P^-1 error, with the factor of P."""
     square = 0.0
     for i in range(SIX):
@@ -74,7 +75,12 @@ def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vecto
         sound = factor(tail(s, at + int(k.covariance)), order, lower)
         if t > 0.0:  # at the start the covariance is 0
             add(seen, INTEGRALS, TIME, weight)
-            add(seen, INTEGRALS, SQUARE, weight * (squared(error, lower) if sound else math.inf))
+            add(
+                seen,
+                INTEGRALS,
+                SQUARE,
+                weight * (normalised_square(error, lower) if sound else math.inf),
+            )
 
 
 def _size(layout: Measured) -> int:
@@ -83,30 +89,31 @@ def _size(layout: Measured) -> int:
 
 def _constants(layout: Measured) -> dict[str, float]:
     at, order = layout.loop.estimator.covariance
-    return {
-        "estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order),
-    }  # fmt: skip
-
-
-def mean_square(squares: Vector, counts: Vector) -> float:
-    """NIS: the mean squared innovation over its variance, from sums and numbers; NaN without."""
-    count = float(counts.sum())
-    return float(squares.sum()) / count if count else math.nan
+    return {"estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order)}
 
 
 def _nis(seen: Vector, step: float) -> float:
     gained = seen[NOW:SIZE] - seen[BEFORE:NOW]
-    return mean_square(gained[:SIX], gained[SIX:])
+    return mean_squared_innovation(gained[:SIX], gained[SIX:])
 
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 nees = Metric(
-    "nees", "1", "mean squared error of the estimate over its covariance, steady window; 6 where "
-    "the filter is consistent", OF, ratio(SQUARE, TIME), place=7,
+    "nees",
+    "1",
+    "mean squared error of the estimate over its covariance, steady window; 6 where "
+    "the filter is consistent",
+    OF,
+    ratio(SQUARE, TIME),
+    place=7,
     words="consistency of the estimate (NEES)",
-)  # fmt: skip
+)
 nis = Metric(
-    "nis", "1", "mean squared innovation over its variance, steady window; 1 where the filter is "
-    "consistent", OF, _nis, place=7,
+    "nis",
+    "1",
+    "mean squared innovation over its variance, steady window; 1 where the filter is consistent",
+    OF,
+    _nis,
+    place=7,
     words="consistency of the innovation (NIS)",
-)  # fmt: skip
+)

@@ -13,10 +13,13 @@ from podusv_cli.metrics.metric import Metric
 
 REPLAYS = 25
 law_ns = Metric(
-    "law_ns", "ns", "median processor time of one evaluation of the law over its logged states",
+    "law_ns",
+    "ns",
+    "median processor time of one evaluation of the law over its logged states",
     place=200,
-    words="time of one evaluation of the law", headline=True,
-)  # fmt: skip
+    words="time of one evaluation of the law",
+    headline=True,
+)
 low = Metric(
     "law_ns_low",
     "ns",

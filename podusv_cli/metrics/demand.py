@@ -40,22 +40,42 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 OF = Accumulator(watch, lambda layout: SIZE, _constants)
 peak_u = Metric(
-    "peak_tau_u", "N", "largest |tau_u| that the law demanded", OF, gathered(PEAK_U), place=2,
+    "peak_tau_u",
+    "N",
+    "largest |tau_u| that the law demanded",
+    OF,
+    gathered(PEAK_U),
+    place=2,
     symbol=r"\max|\tau_{u,\mathrm{cmd}}|",
     words="largest surge force demanded",
-)  # fmt: skip
+)
 peak_r = Metric(
-    "peak_tau_r", "N m", "largest |tau_r| that the law demanded", OF, gathered(PEAK_R), place=2,
+    "peak_tau_r",
+    "N m",
+    "largest |tau_r| that the law demanded",
+    OF,
+    gathered(PEAK_R),
+    place=2,
     symbol=r"\max|\tau_{r,\mathrm{cmd}}|",
     words="largest yaw moment demanded",
-)  # fmt: skip
+)
 tv_u = Metric(
-    "tv_tau_u", "N", "total variation of the demanded tau_u in the steady window", OF,
-    _variation(TV_U), place=4, symbol=r"\mathrm{TV}(\tau_{u,\mathrm{cmd}})",
+    "tv_tau_u",
+    "N",
+    "total variation of the demanded tau_u in the steady window",
+    OF,
+    _variation(TV_U),
+    place=4,
+    symbol=r"\mathrm{TV}(\tau_{u,\mathrm{cmd}})",
     words="variation of the surge demand, steady",
-)  # fmt: skip
+)
 tv_r = Metric(
-    "tv_tau_r", "N m", "total variation of the demanded tau_r in the steady window", OF,
-    _variation(TV_R), place=4, symbol=r"\mathrm{TV}(\tau_{r,\mathrm{cmd}})",
+    "tv_tau_r",
+    "N m",
+    "total variation of the demanded tau_r in the steady window",
+    OF,
+    _variation(TV_R),
+    place=4,
+    symbol=r"\mathrm{TV}(\tau_{r,\mathrm{cmd}})",
     words="variation of the yaw demand, steady",
-)  # fmt: skip
+)

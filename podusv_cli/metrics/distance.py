@@ -82,46 +82,89 @@ _of_target = partial(Accumulator, differing=("standoff",), of_target=True)
 OF = _of_target(watch, lambda layout: RADIUS + SETTLING, _constants, INTEGRALS)
 OF_SETTLED = _of_target(watch_settled, lambda layout: 2 * SETTLED, _constants, SETTLED)
 iae = Metric(
-    "iae", "m s", "integral of z_e", OF, gathered(ABSOLUTE), place=1, counts_standoff=True,
+    "iae",
+    "m s",
+    "integral of z_e",
+    OF,
+    gathered(ABSOLUTE),
+    place=1,
+    counts_standoff=True,
     symbol=r"\int z_e\,\mathrm{d}t",
     words="distance to the target, integrated",
-)  # fmt: skip
+)
 ise = Metric(
-    "ise", "m2 s", "integral of z_e^2", OF, gathered(SQUARE), place=1, counts_standoff=True,
+    "ise",
+    "m2 s",
+    "integral of z_e^2",
+    OF,
+    gathered(SQUARE),
+    place=1,
+    counts_standoff=True,
     symbol=r"\int z_e^2\,\mathrm{d}t",
     words="squared distance to the target, integrated",
-)  # fmt: skip
+)
 iae_of_optimum = Metric(
-    "iae_of_optimum", "1", "iae over that of the optimum of the same task", place=1,
+    "iae_of_optimum",
+    "1",
+    "iae over that of the optimum of the same task",
+    place=1,
     counts_standoff=True,
-    words="integrated distance over that of the optimum", headline=True,
-)  # fmt: skip
+    words="integrated distance over that of the optimum",
+    headline=True,
+)
 ise_of_optimum = Metric(
-    "ise_of_optimum", "1", "ise over that of the optimum of the same task", place=1,
+    "ise_of_optimum",
+    "1",
+    "ise over that of the optimum of the same task",
+    place=1,
     counts_standoff=True,
     words="integrated squared distance over that of the optimum",
-)  # fmt: skip
+)
 OF_OPTIMUM = {"iae": iae_of_optimum, "ise": ise_of_optimum}  # known to comparisons only
 itae = Metric(
-    "itae", "m s2", "integral of t z_e", OF, gathered(TIMED), place=1, counts_standoff=True,
+    "itae",
+    "m s2",
+    "integral of t z_e",
+    OF,
+    gathered(TIMED),
+    place=1,
+    counts_standoff=True,
     symbol=r"\int t\,z_e\,\mathrm{d}t",
     words="distance to the target times time, integrated",
-)  # fmt: skip
+)
 rmse = Metric(
-    "rmse", "m", "root of the mean of z_e^2", OF, _rmse, place=1, counts_standoff=True,
+    "rmse",
+    "m",
+    "root of the mean of z_e^2",
+    OF,
+    _rmse,
+    place=1,
+    counts_standoff=True,
     symbol=r"\mathrm{rms}(z_e)",
     words="distance to the target, rms",
-)  # fmt: skip
+)
 z_e_steady = Metric(
-    "z_e_steady", "m", "mean of z_e over the steady window", OF_SETTLED, ratio(ABSOLUTE, TIME),
-    place=1, counts_standoff=True,
+    "z_e_steady",
+    "m",
+    "mean of z_e over the steady window",
+    OF_SETTLED,
+    ratio(ABSOLUTE, TIME),
+    place=1,
+    counts_standoff=True,
     words="steady distance to the target",
-)  # fmt: skip
+)
 settling_time = Metric(
-    "settling_time", "s", "time from which z_e stays within the settling radius", OF,
-    _settling_time, place=1, happens=True, counts_standoff=True,
-    words="settled after", headline=True,
-)  # fmt: skip
+    "settling_time",
+    "s",
+    "time from which z_e stays within the settling radius",
+    OF,
+    _settling_time,
+    place=1,
+    happens=True,
+    counts_standoff=True,
+    words="settled after",
+    headline=True,
+)
 iae_e = Metric(
     "iae_e",
     "m s",
@@ -133,17 +176,31 @@ iae_e = Metric(
     headline=True,
 )
 e_steady = Metric(
-    "e_steady", "m", "mean of |z_e - standoff| over the steady window", OF_SETTLED,
-    ratio(ERROR, TIME), place=2,
-    words="steady tracking error", headline=True,
-)  # fmt: skip
+    "e_steady",
+    "m",
+    "mean of |z_e - standoff| over the steady window",
+    OF_SETTLED,
+    ratio(ERROR, TIME),
+    place=2,
+    words="steady tracking error",
+    headline=True,
+)
 cross_track_rms = Metric(
-    "cross_track_rms", "m", "rms distance from the target across its course, steady window",
-    OF_SETTLED, _rms(ACROSS), place=2,
+    "cross_track_rms",
+    "m",
+    "rms distance from the target across its course, steady window",
+    OF_SETTLED,
+    _rms(ACROSS),
+    place=2,
     words="steady error across the course, rms",
-)  # fmt: skip
+)
 along_track_rms = Metric(
-    "along_track_rms", "m", "rms distance from the target along its course, steady window",
-    OF_SETTLED, _rms(ALONG), place=2, counts_standoff=True,
+    "along_track_rms",
+    "m",
+    "rms distance from the target along its course, steady window",
+    OF_SETTLED,
+    _rms(ALONG),
+    place=2,
+    counts_standoff=True,
     words="steady error along the course, rms",
-)  # fmt: skip
+)

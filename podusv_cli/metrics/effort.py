@@ -29,22 +29,43 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 OF = Accumulator(watch, lambda layout: 2 * INTEGRALS, _constants, INTEGRALS)
 effort_u = Metric(
-    "effort_u", "N2 s", "integral of tau_u^2 on the hull", OF, gathered(EFFORT_U), place=3,
+    "effort_u",
+    "N2 s",
+    "integral of tau_u^2 on the hull",
+    OF,
+    gathered(EFFORT_U),
+    place=3,
     symbol=r"\int\tau_u^2\,\mathrm{d}t",
     words="squared surge force, integrated",
-)  # fmt: skip
+)
 effort_r = Metric(
-    "effort_r", "N2 m2 s", "integral of tau_r^2 on the hull", OF, gathered(EFFORT_R), place=3,
+    "effort_r",
+    "N2 m2 s",
+    "integral of tau_r^2 on the hull",
+    OF,
+    gathered(EFFORT_R),
+    place=3,
     symbol=r"\int\tau_r^2\,\mathrm{d}t",
     words="squared yaw moment, integrated",
-)  # fmt: skip
+)
 energy = Metric(
-    "energy", "J", "integral of |tau_u u| + |tau_v v| + |tau_r r|, tau on the hull", OF,
-    gathered(ENERGY), place=3, symbol=r"\int|\tau_u u|+|\tau_v v|+|\tau_r r|\,\mathrm{d}t",
-    words="effort: work on the hull", headline=True,
-)  # fmt: skip
+    "energy",
+    "J",
+    "integral of |tau_u u| + |tau_v v| + |tau_r r|, tau on the hull",
+    OF,
+    gathered(ENERGY),
+    place=3,
+    symbol=r"\int|\tau_u u|+|\tau_v v|+|\tau_r r|\,\mathrm{d}t",
+    words="effort: work on the hull",
+    headline=True,
+)
 saturated_fraction = Metric(
-    "saturated_fraction", "1", "part of the time in which the actuator limits the law", OF,
-    ratio(SATURATED, TIME), place=5,
-    words="share of time at the actuator's limits", headline=True,
-)  # fmt: skip
+    "saturated_fraction",
+    "1",
+    "part of the time in which the actuator limits the law",
+    OF,
+    ratio(SATURATED, TIME),
+    place=5,
+    words="share of time at the actuator's limits",
+    headline=True,
+)

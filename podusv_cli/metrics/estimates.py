@@ -13,7 +13,7 @@ SIZE = 2 * INTEGRALS
 
 
 @kernel
-def squared(given: Vector, s: Vector, square: Vector) -> None:
+def square_errors(given: Vector, s: Vector, square: Vector) -> None:
     """The squared errors of an estimate: position, heading, velocity, yaw rate."""
     x, y, psi = given[0] - s[0], given[1] - s[1], given[2] - s[2]
     u, v, r = given[3] - s[3], given[4] - s[4], given[5] - s[5]
@@ -30,8 +30,8 @@ def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     With the side after a delivery alone, the trapezoidal sum has an error of the order of the step.
     """
     before, after = scratch(4), scratch(4)
-    squared(tail(row, int(k.before)), s, before)
-    squared(tail(s, int(k.estimate)), s, after)
+    square_errors(tail(row, int(k.before)), s, before)
+    square_errors(tail(s, int(k.estimate)), s, after)
     add(seen, INTEGRALS, TIME, weight)
     for i in range(4):
         add(seen, INTEGRALS, POSITION + i, weight * 0.5 * (before[i] + after[i]))
@@ -52,10 +52,15 @@ def _rms(position: int) -> Result:
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 position = Metric(
-    "estimate_position_rms", "m", "rms distance between estimated and true position", OF,
-    _rms(POSITION), place=7,
-    words="error of the estimated position, rms", headline=True,
-)  # fmt: skip
+    "estimate_position_rms",
+    "m",
+    "rms distance between estimated and true position",
+    OF,
+    _rms(POSITION),
+    place=7,
+    words="error of the estimated position, rms",
+    headline=True,
+)
 heading = Metric(
     "estimate_heading_rms",
     "rad",
@@ -66,10 +71,14 @@ heading = Metric(
     words="error of the estimated heading, rms",
 )
 velocity = Metric(
-    "estimate_velocity_rms", "m/s", "rms error of the estimated velocity, surge and sway together",
-    OF, _rms(VELOCITY), place=7,
+    "estimate_velocity_rms",
+    "m/s",
+    "rms error of the estimated velocity, surge and sway together",
+    OF,
+    _rms(VELOCITY),
+    place=7,
     words="error of the estimated velocity, rms",
-)  # fmt: skip
+)
 yaw_rate = Metric(
     "estimate_yaw_rate_rms",
     "rad/s",

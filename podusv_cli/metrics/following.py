@@ -81,18 +81,34 @@ e_ct_max = Metric(
     headline=True,
 )
 e_ct_steady = Metric(
-    "e_ct_steady", "m", "mean of the cross-track error's size over the steady window", OF,
-    ratio(LATE_ERROR, LATE), place=1,
-    words="steady cross-track error", headline=True,
-)  # fmt: skip
+    "e_ct_steady",
+    "m",
+    "mean of the cross-track error's size over the steady window",
+    OF,
+    ratio(LATE_ERROR, LATE),
+    place=1,
+    words="steady cross-track error",
+    headline=True,
+)
 path_time = Metric(
-    "path_time", "s", "time at which all legs are done, within `acceptance` of the last waypoint",
+    "path_time",
+    "s",
+    "time at which all legs are done, within `acceptance` of the last waypoint",
     OF,
     lambda seen, step: float(seen[ARRIVED]) if seen[DONE] == 1.0 else math.nan,
-    place=1, happens=True, words="all legs done after", headline=True,
-)  # fmt: skip
+    place=1,
+    happens=True,
+    words="all legs done after",
+    headline=True,
+)
 path_done = Metric(
-    "path_done", "1", "share of the legs that are done at the end", OF,
-    lambda seen, step: float(seen[DONE]), place=1, margin=True,
-    words="share of the legs done", headline=True,
-)  # fmt: skip
+    "path_done",
+    "1",
+    "share of the legs that are done at the end",
+    OF,
+    lambda seen, step: float(seen[DONE]),
+    place=1,
+    margin=True,
+    words="share of the legs done",
+    headline=True,
+)

@@ -38,8 +38,20 @@ decay_rate = _number(
 OF_LOOP = {
     metric.name: metric
     for metric in (
-        phase_margin_u, phase_margin_r, gain_margin_u, gain_margin_r, gain_reduction_u,
-        gain_reduction_r, delay_margin_u, delay_margin_r, delay_margin, delay_margin_loads,
-        peak_S_u, peak_S_r, peak_T_u, peak_T_r, decay_rate,
+        phase_margin_u,
+        phase_margin_r,
+        gain_margin_u,
+        gain_margin_r,
+        gain_reduction_u,
+        gain_reduction_r,
+        delay_margin_u,
+        delay_margin_r,
+        delay_margin,
+        delay_margin_loads,
+        peak_S_u,
+        peak_S_r,
+        peak_T_u,
+        peak_T_r,
+        decay_rate,
     )
-}  # fmt: skip
+}

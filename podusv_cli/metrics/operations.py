@@ -13,7 +13,7 @@ import numpy as np
 
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
-from podusv_cli.core.kernel import bundle, call, scratch, transplanted
+from podusv_cli.core.kernel import bundle, call, scratch, transplant
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
 from podusv_cli.engine.loop.plan import Plan
@@ -24,14 +24,16 @@ from podusv_cli.metrics.metric import Metric
 ENDS = (1, 1 + len(TARGET), 1 + len(TARGET) + len(STATE))
 
 law_operations = Metric(
-    "law_operations", "1", "floating-point operations of one evaluation of the law",
+    "law_operations",
+    "1",
+    "floating-point operations of one evaluation of the law",
     place=200,
     words="operations of one evaluation of the law",
-)  # fmt: skip
+)
 
 
 @dataclass
-class Tally:
+class OperationTally:
     """How many operations were done so far; stands in a kernel for the module math."""
 
     count: int = 0
@@ -61,7 +63,7 @@ class Tally:
         its sine, and an exponential, count as the arithmetic that they are.
         """
         parts = {math: self, float: lambda x: x, scratch: partial(np.empty, dtype=object)}
-        return transplanted(function, parts | {arctangent: partial(self.apply, math.atan2)})
+        return transplant(function, parts | {arctangent: partial(self.apply, math.atan2)})
 
 
 @dataclass(eq=False, slots=True)
@@ -69,7 +71,7 @@ class Counted:
     """A number whose arithmetic is counted; comparisons and changes of sign are free."""
 
     number: Any
-    tally: Tally
+    tally: OperationTally
 
 
 def _plain(number: Any) -> Any:
@@ -117,16 +119,20 @@ setattr(Counted, "__array_ufunc__", _of_numpy)  # noqa: B010 - as the others
 @np.errstate(all="ignore")
 def operations(plan: Plan, recording: Recording) -> dict[str, float]:
     """The metric of this run's law, by its name."""
-    law, tally = plan.loop.controller, Tally()
+    law, tally = plan.loop.controller, OperationTally()
     rows = logged_rows(plan, recording, 3)
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
     constants = plan.law_constants
     vectors = {
-        "x": state, "memory": memory, "target": target, "table": plan.law_table,
+        "x": state,
+        "memory": memory,
+        "target": target,
+        "table": plan.law_table,
         "tau": np.zeros(len(DEMAND)),
-        "rate": np.zeros(len(memory)), "signals": np.zeros(len(law.signals)),
+        "rate": np.zeros(len(memory)),
+        "signals": np.zeros(len(law.signals)),
         "work": np.zeros(law.workspace()),
-    }  # fmt: skip
+    }
     counted = {name: tally.vector(vector) for name, vector in vectors.items()}
     k: Any = {name: tally.number(number) for name, number in constants.items()}
     call(tally.kernel(law.law), t=tally.number(t[0]), k=bundle(k), **counted)

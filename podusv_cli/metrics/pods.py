@@ -46,25 +46,41 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 at_speed_limit = Metric(
-    "at_speed_limit", "1", "part of the time with a propeller commanded to its speed limit", OF,
-    ratio(SPEED, TIME), place=6,
+    "at_speed_limit",
+    "1",
+    "part of the time with a propeller commanded to its speed limit",
+    OF,
+    ratio(SPEED, TIME),
+    place=6,
     words="share of time at a propeller's speed limit",
-)  # fmt: skip
+)
 at_angle_limit = Metric(
-    "at_angle_limit", "1", "part of the time with a pod commanded to its angle limit", OF,
-    ratio(ANGLE, TIME), place=6,
+    "at_angle_limit",
+    "1",
+    "part of the time with a pod commanded to its angle limit",
+    OF,
+    ratio(ANGLE, TIME),
+    place=6,
     words="share of time at a pod's angle limit",
-)  # fmt: skip
+)
 at_rate_limit = Metric(
-    "at_rate_limit", "1", "part of the time in which a pod turns as fast as its drive can", OF,
-    ratio(RATE, TIME), place=6,
+    "at_rate_limit",
+    "1",
+    "part of the time in which a pod turns as fast as its drive can",
+    OF,
+    ratio(RATE, TIME),
+    place=6,
     words="share of time at a pod's fastest turning",
-)  # fmt: skip
+)
 energy = Metric(
-    "energy_pod", "J", "integral of the propellers' power, where it is known", OF,
-    gathered(ENERGY), place=6,
+    "energy_pod",
+    "J",
+    "integral of the propellers' power, where it is known",
+    OF,
+    gathered(ENERGY),
+    place=6,
     words="work of the propellers",
-)  # fmt: skip
+)
 travel = Metric(
     "angle_travel",
     "rad",

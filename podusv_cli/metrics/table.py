@@ -18,7 +18,7 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop, Probe
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.metrics import spans, windows
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric, close_integrals
-from podusv_cli.metrics.windows import ERROR_RMS, NONE, Radii, Windows, named
+from podusv_cli.metrics.windows import ERROR_RMS, NONE, Radii, Windows, metrics_of_windows
 
 
 @cache
@@ -27,8 +27,11 @@ def metrics_with(plugins: Plugins, own: tuple[Windows, Radii] = NONE) -> dict[st
 
     `own` are the windows and radii that a scenario names.
     """
-    of_files = registry.named("podusv_cli.metrics", Metric, plugins).values()
-    return {m.name: m for m in sorted((*of_files, *named(*own).values()), key=lambda m: m.place)}
+    of_files = registry.find_by_name("podusv_cli.metrics", Metric, plugins).values()
+    return {
+        m.name: m
+        for m in sorted((*of_files, *metrics_of_windows(*own).values()), key=lambda m: m.place)
+    }
 
 
 METRICS = metrics_with(())
@@ -64,7 +67,7 @@ def other_kernels(
     """Placeholder of the other accumulators' kernel."""
 
 
-def chained(
+def call_both(
     t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
 ) -> None:
     """Call the first kernel, then the others."""
@@ -85,7 +88,7 @@ def _watch(parts: Parts) -> Callable[..., None]:
     if not others:
         return inner  # type: ignore[no-any-return]
     kernels = {"first_kernel": inner, "other_kernels": _watch(tuple(others))}
-    return specialise(chained, "metrics", COUNT=count, **kernels)  # type: ignore[no-any-return]
+    return specialise(call_both, "metrics", COUNT=count, **kernels)  # type: ignore[no-any-return]
 
 
 @cache
@@ -114,7 +117,7 @@ class Metrics(Probe):
         layout, sizes = replace(self.layout, loop=loop), dict(self.parts)
         constants = _asked_span(layout)
         for part, metric in self._accumulators.items():
-            size, own = _asked(part, metric, layout)
+            size, own = _ask_accumulator(part, metric, layout)
             if size != sizes.get(part, 0):
                 what = f"gathers {size} numbers in this run and {sizes.get(part, 0)} in others"
                 raise LawError(f"metric {metric}: its accumulator {what} of the same batch")
@@ -144,7 +147,7 @@ class Metrics(Probe):
         A metric that raises is left out where `failed` is told; else it raises LawError.
         """
         numbers: dict[str, float] = {}
-        for metric, runs in self._closed(seen[np.newaxis]):
+        for metric, runs in self._close_integrals(seen[np.newaxis]):
             try:
                 numbers[metric.name] = float(metric.result(runs[0], self.step))
             except Exception as error:  # a plug-in's function may raise anything
@@ -170,7 +173,7 @@ class Metrics(Probe):
         LawError for a metric that raises.
         """
         numbers: dict[str, Vector] = {}
-        for metric, runs in self._closed(seen):
+        for metric, runs in self._close_integrals(seen):
             try:
                 each = [float(metric.result(run, self.step)) for run in runs]
             except Exception as error:  # a plug-in's function may raise anything
@@ -178,7 +181,7 @@ class Metrics(Probe):
             numbers[metric.name] = np.array(each, dtype=float)
         return numbers
 
-    def _closed(self, seen: Vector) -> Iterator[tuple[Metric, Vector]]:
+    def _close_integrals(self, seen: Vector) -> Iterator[tuple[Metric, Vector]]:
         """Each metric with the gathered numbers of its accumulator, integrals closed, a row a run.
 
         `seen` has a row a run, too.
@@ -199,9 +202,12 @@ def _fault(metric: Metric, error: Exception) -> LawError:
 
 
 def metrics_probe(
-    plan: Plan, *, steady_fraction: float, settling_radius: float,
+    plan: Plan,
+    *,
+    steady_fraction: float,
+    settling_radius: float,
     known: Mapping[str, Metric] = METRICS,
-) -> Metrics:  # fmt: skip
+) -> Metrics:
     """The probe of those of the known metrics that this loop has.
 
     It serves all loops of the same structure: each has constants of its own. Raises LawError for a
@@ -209,15 +215,24 @@ def metrics_probe(
     """
     since = plan.grid.last_part(steady_fraction)
     layout = Measured(plan.loop, plan.layout, since, settling_radius, steady_fraction)
-    sizes = {part: _asked(part, metric, layout)[0] for part, metric in _accumulators(known).items()}
+    sizes = {
+        part: _ask_accumulator(part, metric, layout)[0]
+        for part, metric in _accumulators(known).items()
+    }
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
     has_end = "over_at" in _asked_span(layout)
     ahead = spans.AHEAD if has_end else 0
     metrics = Metrics(
-        _within_span(parts, has_end), ahead + sum(size for _, size in parts), differing,
-        parts=parts, step=plan.grid.step, known=known, layout=layout, ahead=ahead,
-    )  # fmt: skip
+        _within_span(parts, has_end),
+        ahead + sum(size for _, size in parts),
+        differing,
+        parts=parts,
+        step=plan.grid.step,
+        known=known,
+        layout=layout,
+        ahead=ahead,
+    )
     metrics.constants_for(plan.loop)
     return metrics
 
@@ -245,7 +260,9 @@ def _asked_span(layout: Measured) -> dict[str, float]:
         raise LawError(f"{what}: {said}") from error
 
 
-def _asked(part: Accumulator, metric: str, layout: Measured) -> tuple[int, dict[str, float]]:
+def _ask_accumulator(
+    part: Accumulator, metric: str, layout: Measured
+) -> tuple[int, dict[str, float]]:
     """How many numbers an accumulator gathers in a loop, and its constants; none for 0 numbers."""
     if part.of_target and not layout.loop.has_target:
         return 0, {}

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.interpolation import linear, passed
+from podusv_cli.core.interpolation import linear, passing_place
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.metrics.metric import Accumulator, Measured, Metric
 from podusv_cli.metrics.windows import NEAR
@@ -50,11 +50,11 @@ def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
         x, y, changed = s[0] - seen[X_0], s[1] - seen[Y_0], s[2] - seen[PSI_0]
         along, across = x * cosine + y * sine, y * cosine - x * sine
         if changed >= 0.5 * math.pi and seen[ADVANCE] == 0.0:
-            share = passed(0.5 * math.pi, seen[CHANGED], changed)
+            share = passing_place(0.5 * math.pi, seen[CHANGED], changed)
             seen[ADVANCE] = linear(share, seen[ALONG], along)
             seen[TRANSFER] = linear(share, seen[ACROSS], across)
         if changed >= math.pi and seen[TACTICAL] == 0.0:
-            share = passed(math.pi, seen[CHANGED], changed)
+            share = passing_place(math.pi, seen[CHANGED], changed)
             seen[TACTICAL] = linear(share, seen[ACROSS], across)
         seen[CHANGED], seen[ALONG], seen[ACROSS] = changed, along, across
         seen[STEADY] = 2.0 * seen[SPEED] / max(abs(s[5]), 1e-12)
@@ -72,13 +72,13 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
         # the yaw rate passes zero, and the rate is a straight line between two instants.
         beyond = -side * changed
         if seen[RATE] * s[5] < 0.0:
-            share = passed(0.0, seen[RATE], s[5])
+            share = passing_place(0.0, seen[RATE], s[5])
             beyond = max(
                 beyond, -side * (changed - 0.5 * (1.0 - share) * s[5] * (t - seen[LATEST]))
             )
         seen[LARGEST] = max(seen[LARGEST], beyond)
         if seen[INITIAL] == 0.0 and changed >= k.trial_switch:
-            share = passed(k.trial_switch, seen[REACHED], changed)
+            share = passing_place(k.trial_switch, seen[REACHED], changed)
             seen[INITIAL] = seen[WAY] - last_part(share, t, before, seen)
         seen[LATEST], seen[RATE], seen[REACHED] = t, s[5], changed
         if side * changed >= k.trial_switch:
@@ -99,7 +99,7 @@ def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
         cosine, sine = cos_sin(seen[PSI_0])
         ahead = x * cosine + y * sine
         if s[3] <= 0.0 and seen[SURGE] > 0.0:
-            share, step = passed(0.0, seen[SURGE], s[3]), t - seen[LATEST]
+            share, step = passing_place(0.0, seen[SURGE], s[3]), t - seen[LATEST]
             # The speed is that of sway there, and the way along a parabola between the instants.
             seen[TRACK] = way + 0.5 * share * step * (before + abs(s[4]))
             bend = 0.5 * share * (1.0 - share) * step * (seen[SURGE] - s[3])
@@ -126,13 +126,19 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 def _number(
     of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
-) -> Metric:  # fmt: skip
+) -> Metric:
     """A gathered number, first in tables; NaN where the trial did not get so far."""
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
-        name, unit, meaning, of, lambda seen, step: per * float(seen[position]) or math.nan,
-        place=0, headline=True, **words,
-    )  # fmt: skip
+        name,
+        unit,
+        meaning,
+        of,
+        lambda seen, step: per * float(seen[position]) or math.nan,
+        place=0,
+        headline=True,
+        **words,
+    )
 
 
 OF_TURN = Accumulator(watch_turn, _sizes("turning circle", TURNED), _constants)

@@ -75,13 +75,19 @@ def settled_from(crossed: float) -> float:
 
 
 ERROR_RMS = Metric(
-    f"error_{NAMED}_rms", "m", "rms of z_e over a window that `metrics.windows` names",
-    place=2, counts_standoff=True,
-)  # fmt: skip
+    f"error_{NAMED}_rms",
+    "m",
+    "rms of z_e over a window that `metrics.windows` names",
+    place=2,
+    counts_standoff=True,
+)
 ERROR_MAX = Metric(
-    f"error_{NAMED}_max", "m", "largest z_e in a window that `metrics.windows` names",
-    place=2, counts_standoff=True,
-)  # fmt: skip
+    f"error_{NAMED}_max",
+    "m",
+    "largest z_e in a window that `metrics.windows` names",
+    place=2,
+    counts_standoff=True,
+)
 BEYOND_MAX = Metric(
     f"e_{NAMED}_max",
     "m",
@@ -89,9 +95,13 @@ BEYOND_MAX = Metric(
     place=2,
 )
 SETTLED = Metric(
-    f"settling_time_{NAMED}", "s", "time from which z_e stays within a radius of `metrics.radii`",
-    place=2, happens=True, counts_standoff=True,
-)  # fmt: skip
+    f"settling_time_{NAMED}",
+    "s",
+    "time from which z_e stays within a radius of `metrics.radii`",
+    place=2,
+    happens=True,
+    counts_standoff=True,
+)
 
 
 def _over(to: float, at: int, number: Callable[[Vector], float]) -> Result:
@@ -107,13 +117,17 @@ def _at(position: int) -> Callable[[Vector], float]:
     return lambda own: float(own[position]) if own[LENGTH] else math.nan
 
 
-def _named(
+def _name_metric(
     template: Metric, name: str, meaning: str, of: Accumulator, result: Result, words: str
-) -> Metric:  # fmt: skip
+) -> Metric:
     return replace(
-        template, name=template.name.replace(NAMED, name), meaning=meaning, accumulator=of,
-        result=result, words=words,
-    )  # fmt: skip
+        template,
+        name=template.name.replace(NAMED, name),
+        meaning=meaning,
+        accumulator=of,
+        result=result,
+        words=words,
+    )
 
 
 def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> tuple[Metric, ...]:
@@ -121,22 +135,32 @@ def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> 
     span = f"from {start:g} s to {to:g} s"
     rms, largest, beyond = (_over(to, at, f) for f in (_rms, _at(LARGEST), _at(BEYOND)))
     return (
-        _named(ERROR_RMS, name, f"rms of z_e {span}", of, rms, f"rms distance {span}"),
-        _named(ERROR_MAX, name, f"largest z_e {span}", of, largest, f"largest distance {span}"),
-        _named(
-            BEYOND_MAX, name, f"largest |z_e - standoff| {span}", of, beyond,
+        _name_metric(ERROR_RMS, name, f"rms of z_e {span}", of, rms, f"rms distance {span}"),
+        _name_metric(
+            ERROR_MAX, name, f"largest z_e {span}", of, largest, f"largest distance {span}"
+        ),
+        _name_metric(
+            BEYOND_MAX,
+            name,
+            f"largest |z_e - standoff| {span}",
+            of,
+            beyond,
             f"largest error beyond the standoff {span}",
         ),
-    )  # fmt: skip
+    )
 
 
 def _of_radius(name: str, radius: float, of: Accumulator, at: int) -> Metric:
     """The metric of a radius whose numbers stand at this place."""
     meaning = f"time from which z_e stays within {radius:g} m"
-    return _named(
-        SETTLED, name, meaning, of, lambda seen, step: settled_from(seen[at + 1 + CROSSED]),
+    return _name_metric(
+        SETTLED,
+        name,
+        meaning,
+        of,
+        lambda seen, step: settled_from(seen[at + 1 + CROSSED]),
         f"within {radius:g} m after",
-    )  # fmt: skip
+    )
 
 
 @cache  # a probe finds an accumulator's numbers by the accumulator itself
@@ -158,7 +182,7 @@ def accumulator(windows: Windows, radii: Radii) -> Accumulator:
 
 
 @cache
-def named(windows: Windows, radii: Radii) -> dict[str, Metric]:
+def metrics_of_windows(windows: Windows, radii: Radii) -> dict[str, Metric]:
     """The metrics of these windows and radii, by name."""
     of, after = accumulator(windows, radii), EACH + WINDOW * len(windows)
     metrics = [

@@ -20,8 +20,8 @@ import numpy as np
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.errors import NotConvergedError, UsageError
-from podusv_cli.core.kernel import Vector, bundle, transplanted
-from podusv_cli.optimum.problem import Motion, Problem
+from podusv_cli.core.kernel import Vector, bundle, transplant
+from podusv_cli.optimum.problem import Motion, OptimumProblem
 from podusv_cli.process.interrupts import interrupts_caught, interrupts_deferred
 
 TOLERANCE = 1e-8  # of IPOPT
@@ -32,8 +32,9 @@ SMOOTHED = {"iae": (0.3, 0.03, 1e-3, 1e-4), "ise": (0.0,)}
 BARRIER = 1e-4  # IPOPT's parameter where it starts from an optimum of another grid or smoothing
 WARM = {
     "ipopt.warm_start_init_point": "yes",
-    "ipopt.warm_start_bound_push": 1e-6, "ipopt.warm_start_mult_bound_push": 1e-6,
-}  # fmt: skip
+    "ipopt.warm_start_bound_push": 1e-6,
+    "ipopt.warm_start_mult_bound_push": 1e-6,
+}
 STATES, UNKNOWNS = 6, 8
 Tell = Callable[[str, float], None]
 
@@ -68,7 +69,7 @@ def dynamics(k: Any) -> Any:
     `k` has the coefficients of the vessel.
     """
     ca = casadi()
-    kernel = transplanted(plant, {cos_sin: lambda a: (ca.cos(a), ca.sin(a)), float: lambda x: x})
+    kernel = transplant(plant, {cos_sin: lambda a: (ca.cos(a), ca.sin(a)), float: lambda x: x})
     x, demand, b = ca.SX.sym("x", STATES), ca.SX.sym("demand", 2), ca.SX.sym("b", 3)
     rate: list[Any] = [0.0] * STATES
     tau = [demand[0], 0.0, demand[1]]
@@ -76,8 +77,8 @@ def dynamics(k: Any) -> Any:
     return ca.Function("dynamics", [x, demand, b], [ca.vertcat(*rate)])
 
 
-def searched(
-    problem: Problem, guesses: Mapping[str, Motion], step: float, tell: Tell | None = None
+def search_optima(
+    problem: OptimumProblem, guesses: Mapping[str, Motion], step: float, tell: Tell | None = None
 ) -> tuple[list[Stage], Motion]:
     """Optima on the coarsest grid from every guess, then of the best on finer grids; the last.
 
@@ -90,17 +91,17 @@ def searched(
     stages: list[Stage] = []
     for start, guess in guesses.items():
         report = partial(_tell, tell, len(stages), count)
-        stages.append(_solved(_Program(problem, n, report), start, guess))
+        stages.append(_solve_stage(_Program(problem, n, report), start, guess))
     best = min(stages, key=lambda stage: (stage.motion is None, stage.integral))
     for grid in range(1, GRIDS):
         report = partial(_tell, tell, len(stages), count)
         program = _Program(problem, n * 2**grid, report, warm={"ipopt.mu_init": BARRIER})
-        best = _solved(program, best.start, _found(best))
+        best = _solve_stage(program, best.start, _motion_or_raise(best))
         stages.append(best)
-    return stages, _found(best)
+    return stages, _motion_or_raise(best)
 
 
-def _found(stage: Stage) -> Motion:
+def _motion_or_raise(stage: Stage) -> Motion:
     """The stage's motion. Raises NotConvergedError."""
     if stage.motion is None:
         raise NotConvergedError(
@@ -110,13 +111,13 @@ def _found(stage: Stage) -> Motion:
     return stage.motion
 
 
-def _solved(program: _Program, start: str, guess: Motion) -> Stage:
+def _solve_stage(program: _Program, start: str, guess: Motion) -> Stage:
     """The optimum on a program's grid, smoothed less and less."""
     began, iterations, motion = time.perf_counter(), 0, guess.at(program.times)
     smoothed = SMOOTHED[program.problem.minimised]
     try:
         for eps in smoothed[-2:] if program.warm else smoothed:
-            motion = program.solved(motion, eps)
+            motion = program.solve(motion, eps)
             iterations += program.iterations
     except NotConvergedError:
         iterations += program.iterations
@@ -134,9 +135,12 @@ class _Program:
     """The nonlinear program of one grid of `n` equal steps."""
 
     def __init__(
-        self, problem: Problem, n: int, told: Callable[[int], None],
+        self,
+        problem: OptimumProblem,
+        n: int,
+        told: Callable[[int], None],
         warm: Mapping[str, Any] = MappingProxyType({}),
-    ) -> None:  # fmt: skip
+    ) -> None:
         ca = casadi()
         self.step = problem.duration / n
         self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
@@ -149,13 +153,16 @@ class _Program:
         w, eps = ca.MX.sym("w", UNKNOWNS * (n + 1)), ca.MX.sym("eps")
         every = ca.reshape(w, UNKNOWNS, n + 1)
         gaps, cost, _ = self._segment.map(n)(
-            every[:, :-1], every[:, 1:], *_thirds(*self._loads), *_thirds(*self._places),
+            every[:, :-1],
+            every[:, 1:],
+            *_thirds(*self._loads),
+            *_thirds(*self._places),
             ca.repmat(eps, 1, n),
-        )  # fmt: skip
+        )
         self._nlp = {"x": w, "p": eps, "f": ca.sum2(cost), "g": ca.vec(gaps)}
         self._multipliers: dict[str, Any] = {}
 
-    def solved(self, guess: Motion, eps: float) -> Motion:
+    def solve(self, guess: Motion, eps: float) -> Motion:
         """The optimum with this smoothing [m], from a guess on the grid."""
         ca = casadi()
         low, high = self._bounds()
@@ -167,9 +174,14 @@ class _Program:
             solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
             start = np.hstack([guess.states, guess.demands]).clip(low, high).ravel()
             solution = solver(
-                x0=start, p=eps, lbx=low.ravel(), ubx=high.ravel(), lbg=0.0, ubg=0.0,
+                x0=start,
+                p=eps,
+                lbx=low.ravel(),
+                ubx=high.ravel(),
+                lbg=0.0,
+                ubg=0.0,
                 **self._multipliers,
-            )  # fmt: skip
+            )
         stats = solver.stats()
         self.iterations = int(stats["iter_count"])
         if not stats["success"]:
@@ -216,7 +228,7 @@ def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
     return ends[:, :-1], middle, ends[:, 1:]
 
 
-def _segment(problem: Problem, h: float) -> Any:
+def _segment(problem: OptimumProblem, h: float) -> Any:
     """A CasADi function of one segment: its gaps, its share of the integral, its middle place."""
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     before, after = ca.SX.sym("before", UNKNOWNS), ca.SX.sym("after", UNKNOWNS)

@@ -8,17 +8,17 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.optimum.collocation import STATES, casadi, dynamics
-from podusv_cli.optimum.problem import Motion, Problem
+from podusv_cli.optimum.problem import Motion, OptimumProblem
 
 BANDWIDTH = 1.0  # rad/s, about that with which the vessel is held to the motion
 MOST_ROWS = 3500  # that fit into a resolved scenario
 HEADER = "t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r"
 
 
-def schedule(problem: Problem, motion: Motion) -> str:
+def schedule(problem: OptimumProblem, motion: Motion) -> str:
     """The rows of the law `schedule` that repeats the motion."""
     gains = _gains(problem, motion).reshape(len(motion.times), -1)
-    chosen = _chosen(motion.demands)
+    chosen = _choose_rows(motion.demands)
     rows = np.column_stack([motion.times, motion.demands, motion.states])
     lines = (
         ", ".join([*(f"{x:.10g}" for x in rows[i]), *(f"{x:.4g}" for x in gains[i])])
@@ -27,7 +27,7 @@ def schedule(problem: Problem, motion: Motion) -> str:
     return "\n".join([HEADER, *lines, ""])
 
 
-def _chosen(demands: Vector) -> list[int]:
+def _choose_rows(demands: Vector) -> list[int]:
     """The rows that a schedule has: all, or every so many and those where the demand bends most."""
     last, half = len(demands) - 1, MOST_ROWS // 2
     if last < MOST_ROWS:
@@ -37,7 +37,7 @@ def _chosen(demands: Vector) -> list[int]:
     return sorted({*range(0, last, -(-last // half)), *sharpest.tolist(), last})
 
 
-def _gains(problem: Problem, motion: Motion) -> Vector:
+def _gains(problem: OptimumProblem, motion: Motion) -> Vector:
     """The gains of the linear-quadratic regulator along the motion, (2, 6) at each of its times.
 
     From the end backwards, over matrices that are discretised by the trapezoidal rule. The weights
@@ -56,7 +56,7 @@ def _gains(problem: Problem, motion: Motion) -> Vector:
     return gains
 
 
-def _slopes(problem: Problem, motion: Motion) -> tuple[Vector, Vector]:
+def _slopes(problem: OptimumProblem, motion: Motion) -> tuple[Vector, Vector]:
     """The rates' derivatives by state and by demand at each of the motion's times."""
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate((STATES, 2, 3))]

@@ -41,7 +41,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Problem:
+class OptimumProblem:
     """The integral that is minimised over the motions of a closed loop's vessel."""
 
     loop: ClosedLoop
@@ -57,7 +57,7 @@ class Problem:
         return self.loop.path.targets(times)[:, :2]
 
 
-def problem(scenario: Scenario, minimised: Minimised) -> Problem:
+def problem(scenario: Scenario, minimised: Minimised) -> OptimumProblem:
     """The problem of a scenario. Raises UsageError for one that cannot be solved here."""
     loop = scenario.closed_loop()
     kinds = {
@@ -83,7 +83,7 @@ def problem(scenario: Scenario, minimised: Minimised) -> Problem:
             raise UsageError(
                 f"{scenario.name}: {key}.kind: {kind} does not fit; podusv optimum knows {known}"
             )
-    return Problem(loop, scenario.simulation.duration, minimised)
+    return OptimumProblem(loop, scenario.simulation.duration, minimised)
 
 
 def _passes_on(loop: ClosedLoop) -> bool:

@@ -47,16 +47,24 @@ def environment(package: str) -> Environment:
 
     loader = ChoiceLoader([PackageLoader(package), PackageLoader("podusv_cli.pages")])
     made = Environment(
-        loader=loader, autoescape=True, finalize=_shown, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        loader=loader,
+        autoescape=True,
+        finalize=_show_value,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.filters |= {
-        "png": _png, "sentence": sentence, "raised": raised, "number": _number, "label": _label
-    }  # fmt: skip
+        "png": _png,
+        "sentence": sentence,
+        "raised": raise_powers_markup,
+        "number": _number,
+        "label": _label,
+    }
     return made
 
 
-def _shown(value: Any) -> Any:
+def _show_value(value: Any) -> Any:
     """What a template shows in place of a value; markup of the template itself as it is."""
     return value if hasattr(value, "__html__") else lines(value)
 
@@ -68,7 +76,7 @@ def sentence(text: str) -> str:
     return f"{start}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 
-def raised(unit: str) -> str:
+def raise_powers_markup(unit: str) -> str:
     """The unit with its powers raised."""
     return re.sub(r"(?<=[A-Za-z])\d", lambda power: power[0].translate(quantities.RAISED), unit)
 

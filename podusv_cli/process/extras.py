@@ -27,7 +27,7 @@ class Failure:
         return f"{self.what} {self.problem}: {self.why}"
 
     @property
-    def traced(self) -> str:
+    def sentence_with_trace(self) -> str:
         """The sentence, and where the traceback is if there is one."""
         return f"{self}; missing.json in the folder has the traceback" if self.trace else str(self)
 
@@ -44,7 +44,7 @@ class Extras:
         self.interrupted = interrupted
         self.missing: list[Failure] = []
 
-    def made(self, what: str, work: Callable[[], Result]) -> Result | None:
+    def make_or_record(self, what: str, work: Callable[[], Result]) -> Result | None:
         """What the work returns, or None where it fails; `what` names it in the message."""
         try:
             return work()

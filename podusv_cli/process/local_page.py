@@ -22,12 +22,15 @@ GLANCE = 0.2  # s between two looks at signals
 MOST = 65536  # bytes of a question
 TEXT = "text/plain; charset=utf-8"
 HEADERS = {
-    "Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Frame-Options": "DENY",
-    "X-Content-Type-Options": "nosniff", "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Frame-Options": "DENY",
+    "X-Content-Type-Options": "nosniff",
+    "Cross-Origin-Resource-Policy": "same-origin",
     "Content-Security-Policy": "default-src 'none'; script-src 'unsafe-inline'; style-src "
     "'unsafe-inline'; connect-src 'self'; img-src data:; form-action 'none'; base-uri 'none'; "
     "frame-ancestors 'none'",
-}  # fmt: skip
+}
 Answer = Callable[[str, Mapping[str, Any]], Mapping[str, Any]]  # of the question's name, and it
 _Told = tuple[int, bytes, str]  # code, content, type
 _Job = tuple[str, Mapping[str, Any], "SimpleQueue[_Told]"]
@@ -70,7 +73,7 @@ class _Handler(BaseHTTPRequestHandler):
         if kind != "application/json" or (origin and origin[7:] not in self.server.hosts):
             self._refuse(403, "only the page itself may ask, in JSON")
             return
-        asked = _parsed(self.rfile.read(size))
+        asked = _parse_question(self.rfile.read(size))
         if not isinstance(asked, dict):
             self._refuse(400, "a question must be a JSON object")
             return
@@ -131,10 +134,10 @@ def serve(
                 name, asked, waiting = server.jobs.get(timeout=GLANCE)
             except Empty:  # a signal that comes as the wait begins would else wait for a question
                 continue
-            waiting.put(_told(answer(name, asked)))
+            waiting.put(_encode_answer(answer(name, asked)))
 
 
-def _parsed(question: bytes) -> Any:
+def _parse_question(question: bytes) -> Any:
     """What a question says; None where it is no JSON, or nested too deeply to be read."""
     try:
         return json.loads(question)
@@ -142,7 +145,7 @@ def _parsed(question: bytes) -> Any:
         return None
 
 
-def _told(answer: Mapping[str, Any]) -> _Told:
+def _encode_answer(answer: Mapping[str, Any]) -> _Told:
     """An answer as JSON; a sentence where it has a number that JSON has not, or no such value."""
     try:
         text = json.dumps(answer, separators=(",", ":"), allow_nan=False)

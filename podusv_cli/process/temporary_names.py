@@ -26,7 +26,7 @@ def temporary_name(final: str = "") -> str:
     return f"{shown}.podusv-{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part"
 
 
-def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
+def find_abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
     """Unfinished files and folders of ended processes, and their final names ("" if unknown).
 
     Those of other machines are left out, since it is unknown here whether their process runs.
@@ -40,7 +40,7 @@ def abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
 
 def remove_abandoned_files(folder: Path) -> None:
     """Delete the unfinished files that killed processes left in `folder`."""
-    for path, final in abandoned(folder):
+    for path, final in find_abandoned(folder):
         if not final:
             with suppress(OSError):
                 path.unlink()

@@ -105,8 +105,11 @@ def run_shares(
             by_job |= zip(share, run_all([jobs[n] for n in share], workers=workers), strict=True)
         else:
             outcomes = whole.result or [whole] * len(share)
-            by_job |= zip(share, (replace(o, interrupted=whole.interrupted or o.interrupted)
-                                 for o in outcomes), strict=True)  # fmt: skip
+            by_job |= zip(
+                share,
+                (replace(o, interrupted=whole.interrupted or o.interrupted) for o in outcomes),
+                strict=True,
+            )
     return [by_job[number] for number in range(len(jobs))]
 
 
@@ -123,9 +126,11 @@ def _one_by_one(jobs: Sequence[Job], tell: Progress) -> list[Outcome]:
 
 
 def run_each(
-    jobs: Iterable[tuple[int, Job]], done: Callable[[int, Outcome], None],
-    progress: Report = lambda position, fraction: None, workers: int = 0,
-) -> bool:  # fmt: skip
+    jobs: Iterable[tuple[int, Job]],
+    done: Callable[[int, Outcome], None],
+    progress: Report = lambda position, fraction: None,
+    workers: int = 0,
+) -> bool:
     """The same for numbered jobs that are taken one by one as processes become free.
 
     `done` is called with a job's number and outcome, and may add jobs to those that are still to be
@@ -150,9 +155,11 @@ class _Pool:
     """Jobs that wait, running processes by their pipe, and where outcomes go."""
 
     def __init__(
-        self, jobs: Iterator[tuple[int, Job]], done: Callable[[int, Outcome], None],
+        self,
+        jobs: Iterator[tuple[int, Job]],
+        done: Callable[[int, Outcome], None],
         progress: Report,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._jobs, self._done, self._progress = jobs, done, progress
         self._tries = Counter[int]()
         self._again: list[tuple[int, Job]] = []

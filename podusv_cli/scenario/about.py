@@ -13,7 +13,7 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.settings import changed, parts, settings
+from podusv_cli.scenario.settings import changed_settings, parts, settings
 
 
 def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
@@ -39,30 +39,40 @@ def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
         metrics={n: m.about for n, m in scenario.known_metrics().items() if n not in METRICS},
         path_end=scenario.passed_by(1.0),
         path_steady=scenario.passed_by(1.0 - scenario.metrics.steady_fraction),
-        trial=not law.aims(), standoff=approach.standoff if approach else 0.0,
-        polar=isinstance(law, PolarBackstepping), optimum_of=law.optimum_of(),
-        duration=scenario.simulation.duration, step=scenario.simulation.step,
-        every=scenario.time_grid().log_every, steady_from=scenario.steady_from(),
+        trial=not law.aims(),
+        standoff=approach.standoff if approach else 0.0,
+        polar=isinstance(law, PolarBackstepping),
+        optimum_of=law.optimum_of(),
+        duration=scenario.simulation.duration,
+        step=scenario.simulation.step,
+        every=scenario.time_grid().log_every,
+        steady_from=scenario.steady_from(),
         settling_radius=scenario.metrics.settling_radius,
-        said={name: _said(part) for name, part in (parts(scenario) | {"controller": law}).items()},
-        settings=tuple(changed(scenario)), law=tuple(settings(law, scenario.facts)),
-        log_columns=identify.columns, log_frame=identify.frame,
-    )  # fmt: skip
+        said={
+            name: _describe_part(part)
+            for name, part in (parts(scenario) | {"controller": law}).items()
+        },
+        settings=tuple(changed_settings(scenario)),
+        law=tuple(settings(law, scenario.facts)),
+        log_columns=identify.columns,
+        log_frame=identify.frame,
+    )
 
 
 def _of_parts(scenario: Scenario) -> dict[str, Any]:
     """What figures and claims ask of hull, path, actuator and sensors."""
     vessel, path, actuator = scenario.vessel, scenario.path, scenario.actuator
     return {
-        "length": vessel.length, "beam": vessel.beam,
+        "length": vessel.length,
+        "beam": vessel.beam,
         "follows": path.follows,
         "waypoints": tuple(map(tuple, path.waypoints())),
         "circles": tuple(map(tuple, path.circles())),
         "limits": tuple(x if math.isfinite(x) else None for x in actuator.limits()),
         "underactuated": actuator.input_rank() < 3,
         "outages": scenario.measurement.outages_of_each(),
-    }  # fmt: skip
+    }
 
 
-def _said(part: Component) -> str:
+def _describe_part(part: Component) -> str:
     return (inspect.getdoc(type(part)) or "").partition("\n")[0]

@@ -17,7 +17,7 @@ from podusv_cli.core.escaping import visible
 from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import Key, keys_of
 from podusv_cli.scenario.model import PER_RUN, Scenario
-from podusv_cli.scenario.yaml_tree import Route, dotted, entries_of, route
+from podusv_cli.scenario.yaml_tree import Route, dotted_key, entries_of, route
 
 
 class ValueRefused(PodusvError):
@@ -55,7 +55,7 @@ def _inside(whole: Any, step: str | int) -> Any:
     raise LookupError(step)
 
 
-def described(scenario: Scenario, steps: Route) -> Key:
+def describe_key(scenario: Scenario, steps: Route) -> Key:
     """What the models say of a key that the scenario has."""
     way: list[str | int] = []
     for end, step in enumerate(steps, 1):
@@ -71,18 +71,18 @@ def has(scenario: Scenario, key: str) -> bool:
         content(scenario, steps)
     except LookupError:
         return False
-    return bool(steps) and dotted(steps) == key and steps[0] in PER_RUN
+    return bool(steps) and dotted_key(steps) == key and steps[0] in PER_RUN
 
 
 def no_entry(scenario: Scenario, steps: Route) -> str:
     """What a list on the way has, where the step behind it is none of its places; else empty."""
     for end in range(1, len(steps)):
-        if not has(scenario, dotted(steps[:end])):
+        if not has(scenario, dotted_key(steps[:end])):
             return ""
         whole, step = content(scenario, steps[:end]), steps[end]
         if isinstance(whole, tuple) and not (isinstance(step, int) and step < len(whole)):
             kinds = [getattr(part, "kind", None) for part in whole]
-            return entries_of(dotted(steps[:end]), kinds)
+            return entries_of(dotted_key(steps[:end]), kinds)
     return ""
 
 
@@ -156,12 +156,12 @@ def _refusal(
     place = next((steps for steps in new if complaint["loc"][: len(steps)] == steps), None)
     if place is None:
         reason = complaint.get("ctx", {}).get("error", complaint["msg"])
-        numbers = ", ".join(f"{dotted((*at, *s))} = {_on_a_line(x)}" for s, x in new.items())
-        return ValueRefused(f"{dotted(at)}: {reason}, with {numbers}")
-    key = described(scenario, (*at, *place))
+        numbers = ", ".join(f"{dotted_key((*at, *s))} = {_on_a_line(x)}" for s, x in new.items())
+        return ValueRefused(f"{dotted_key(at)}: {reason}, with {numbers}")
+    key = describe_key(scenario, (*at, *place))
     number = new[place]
     advice = key.advice(number) if isinstance(number, str) else ""
-    text = f"{dotted(key.path)} = {_on_a_line(number)}; must be {key.wanted}{advice}"
+    text = f"{dotted_key(key.path)} = {_on_a_line(number)}; must be {key.expectation}{advice}"
     return ValueRefused(text, (*at, *place))
 
 

@@ -21,11 +21,13 @@ TIMED = ("simulation", "control", "actuator", "controller", "controllers")  # se
 
 def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
     """Key and message for every pair of values that contradict each other; plans no loop."""
-    parts = [*_defaults(scenario), *_unanswered(scenario), *_summands(scenario)]
+    parts = [*_defaults(scenario), *_conflicts_of_laws(scenario), *_summands(scenario)]
     return parts or [
-        *_recorded(scenario), *of_numbers(scenario), *_names(scenario),
+        *_conflicts_of_commands(scenario),
+        *of_numbers(scenario),
+        *_names(scenario),
         *scenario.metrics.conflicts(),
-    ]  # fmt: skip
+    ]
 
 
 def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
@@ -60,9 +62,12 @@ def _of_times(scenario: Scenario) -> Conflicts:
 def _defaults(scenario: Scenario) -> Conflicts:
     """Parts whose classes have a default that they do not allow themselves."""
     others = {
-        "path": scenario.path, "actuator": scenario.actuator, "measurement": scenario.measurement,
-        "estimator": scenario.estimator, **scenario.disturbances(),
-    }  # fmt: skip
+        "path": scenario.path,
+        "actuator": scenario.actuator,
+        "measurement": scenario.measurement,
+        "estimator": scenario.estimator,
+        **scenario.disturbances(),
+    }
     for key, part in {**others, **scenario.laws()}.items():
         if fault := wrong_default(part):
             yield key, f"{describe(part)}: {fault}"
@@ -84,7 +89,7 @@ def _summands(scenario: Scenario) -> Conflicts:
             yield key, text
 
 
-def _recorded(scenario: Scenario) -> Conflicts:
+def _conflicts_of_commands(scenario: Scenario) -> Conflicts:
     """Commands over time that the actuator does not take."""
     for key, law in scenario.laws().items():
         if recorded := law.commands():
@@ -94,7 +99,7 @@ def _recorded(scenario: Scenario) -> Conflicts:
                 yield f"{key}.rows", str(error)
 
 
-def _unanswered(scenario: Scenario) -> Conflicts:
+def _conflicts_of_laws(scenario: Scenario) -> Conflicts:
     """Laws that fail when they are asked what they declare: their own fault, whatever it is."""
     for key, law in scenario.laws().items():
         try:

@@ -13,16 +13,23 @@ from podusv_cli.scenario.address import is_whole
 from podusv_cli.scenario.explain import choices_of
 from podusv_cli.scenario.keys import NO_DEFAULT, Key, keys_of, limits
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import Route, dotted, route
+from podusv_cli.scenario.yaml_tree import Route, dotted_key, route
 
 REACH = 30.0  # from its number, a logarithmic slider reaches so many times up and down
 WIDE = 3.0  # a linear one so many times the number's size
 # The size of a number that is 0 and has no default, by its unit; in metres the hull's length.
 SIZES = {"m/s": 1.0, "rad": math.pi, "rad/s": 1.0, "s": 1.0, "N": 10.0, "N m": 10.0}
 AFTER = (
-    "vessel", "actuator", "disturbance", "path", "start", "measurement", "estimator", "control",
+    "vessel",
+    "actuator",
+    "disturbance",
+    "path",
+    "start",
+    "measurement",
+    "estimator",
+    "control",
     "simulation",
-)  # fmt: skip
+)
 # How a loop dies: these stand together, before all others.
 LOOP = "sampling, delay and noise"
 LINK = ("command", "delay")  # of an actuator; a scenario may lack the section
@@ -35,7 +42,7 @@ STEPPED = ("period", "delay", "duration")  # names of times that are whole numbe
 
 
 @dataclass(frozen=True)
-class Control:
+class Knob:
     """A value at a key: its meaning, and a slider from `low` to `high` or the words it may be.
 
     `log`: the slider is even in the number's logarithm. `quantum` is what it is a multiple of.
@@ -57,7 +64,7 @@ class Control:
     choices: tuple[str, ...] = ()
 
 
-def controls(scenario: Scenario, laws: Sequence[str]) -> list[Control]:
+def controls(scenario: Scenario, laws: Sequence[str]) -> list[Knob]:
     """Those of a loop's timing, of these laws (`controller`, `controllers.pid`), then of AFTER."""
     ruled = {*scenario.keys_by_rule()}
     seas = list(scenario.disturbances())
@@ -72,19 +79,19 @@ def controls(scenario: Scenario, laws: Sequence[str]) -> list[Control]:
     return [*first, *(control for control in found if not _is_of_loop(control))]
 
 
-def _is_of_loop(control: Control) -> bool:
+def _is_of_loop(control: Knob) -> bool:
     """Whether it is a time or a noise between the vessel and its law."""
     of_sensor = control.part.startswith("measurement.") and control.name in OF_SENSORS
     return control.key in FIRST or of_sensor
 
 
-def _put_first(control: Control) -> Control:
+def _put_first(control: Knob) -> Knob:
     """The control under LOOP, where a sensor's value is called by the sensor, too."""
     sensor = control.part.partition(".")[2] if control.part.startswith("measurement.") else ""
     return replace(control, part=LOOP, name=f"{sensor} {control.name}".strip())
 
 
-def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Control]:
+def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Knob]:
     component: Any = scenario
     way: Route = ()
     for step in at:
@@ -98,22 +105,22 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
         if isinstance(content, Component):
             yield from _of_part(scenario, f"{part}.{name}", (*at, name), ruled)
         elif found := _control(scenario, part, (*at, name), key.keys[name], content):
-            yield Control(**found, by_rule=(*at, name) in ruled)
+            yield Knob(**found, by_rule=(*at, name) in ruled)
         elif (*at, name) == PLACES and 0 < len(content or ()) <= MOST_PLACES:
             yield from _of_waypoints((*at, name), content)
         elif name == LINK[0] and part == "actuator" and content is None:
             delay = key.keys[name].keys[LINK[1]]
             if found := _control(scenario, part, (*at, *LINK), delay, delay.default):
-                yield Control(**found)
+                yield Knob(**found)
 
 
-def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Control]:
+def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob]:
     """North and east of each point, within as much as the points are apart."""
     reach = max(max(axis) - min(axis) for axis in zip(*points, strict=True)) or 1.0
     for row, point in enumerate(points):
         for column, (name, now) in enumerate(zip(("north", "east"), point, strict=True)):
-            yield Control(
-                key=dotted((*at, row, column)),
+            yield Knob(
+                key=dotted_key((*at, row, column)),
                 part="waypoints",
                 name=f"waypoint {row + 1} {name}",
                 meaning="",
@@ -128,13 +135,17 @@ def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Cont
 def _control(
     scenario: Scenario, part: str, at: Route, key: Key, content: Any
 ) -> dict[str, Any] | None:
-    place, default, section = dotted(at), key.default, str(at[0]).removesuffix("s")
+    place, default, section = dotted_key(at), key.default, str(at[0]).removesuffix("s")
     words = {
-        "key": place, "part": part, "name": key.name, "value": content, "unit": key.unit,
+        "key": place,
+        "part": part,
+        "name": key.name,
+        "value": content,
+        "unit": key.unit,
         "range": key.range,
         "meaning": (key.field and key.field.description) or f"which {section} it is",
         "default": "" if default is NO_DEFAULT else as_yaml(default),
-    }  # fmt: skip
+    }
     choices = choices_of(key) or (("true", "false") if bool in key.types else ())
     if choices and key.name != "preset":
         shown = str(content).lower() if isinstance(content, bool) else content
@@ -174,5 +185,7 @@ def _span(key: Key, now: float, usual: float, length: float) -> dict[str, Any]:
         return {"low": ends[0], "high": ends[1], "log": True}
     if key.path[0] == "vessel" and key.unit == "m":
         size /= 2.0 * WIDE  # of a point within the hull
-    return {"low": max(now - WIDE * size, low if low is not None else -math.inf),
-            "high": min(now + WIDE * size, high if high is not None else math.inf)}  # fmt: skip
+    return {
+        "low": max(now - WIDE * size, low if low is not None else -math.inf),
+        "high": min(now + WIDE * size, high if high is not None else math.inf),
+    }

@@ -61,7 +61,7 @@ class Bounded(Component):
         """
         low, high = 0.0, 1.0
         for _ in range(HALVINGS // LEVELS):
-            edges = _halved(low, high)
+            edges = _halving_places(low, high)
             below = self.whole(edges[1:-1]) <= x
             first, last = 0, len(below) + 1
             while last - first > 1 and low < (middle := edges[(first + last) // 2]) < high:
@@ -74,7 +74,7 @@ class Bounded(Component):
     @model_validator(mode="after")
     def _leaves_something(self) -> Self:
         if self.within is not None:
-            _ordered("within", self.within)
+            _check_order("within", self.within)
             left = self.shares[1] - self.shares[0]
             if left < LEAST:
                 raise ValueError(
@@ -108,7 +108,7 @@ class LogNormal(Bounded):
         return self.median * exponential(self.sigma * standard_normal(u))
 
 
-def _halved(low: float, high: float) -> Vector:
+def _halving_places(low: float, high: float) -> Vector:
     """All places that LEVELS halvings can come to, with both ends: 2^LEVELS + 1 in order."""
     edges = np.array([low, high])
     for _ in range(LEVELS):
@@ -118,7 +118,7 @@ def _halved(low: float, high: float) -> Vector:
     return edges
 
 
-def _ordered(name: str, bounds: tuple[float, ...]) -> None:
+def _check_order(name: str, bounds: tuple[float, ...]) -> None:
     low, high = bounds[0], bounds[-1]
     if not low < high:
         raise ValueError(f"{name}: {low:.15g} is not below {high:.15g}")
@@ -128,7 +128,7 @@ def _ordered(name: str, bounds: tuple[float, ...]) -> None:
 
 def _corners(name: str, corners: tuple[float, ...]) -> None:
     low, mode, high = corners
-    _ordered(name, corners)
+    _check_order(name, corners)
     if not low <= mode <= high:
         raise ValueError(f"{name}: write [low, mode, high]; {mode:g} is not between the others")
 
@@ -146,7 +146,7 @@ def _uniform(bounds: Interval, u: Vector) -> Numbers:
 
 
 def _rising(name: str, bounds: Interval) -> None:
-    _ordered(name, bounds)
+    _check_order(name, bounds)
     if bounds[0] <= 0.0:
         raise ValueError(f"{name}: {bounds[0]:g} is not above 0")
 
@@ -182,7 +182,7 @@ def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
 def _whole(name: str, bounds: tuple[int, int]) -> None:
     if max(map(abs, bounds)) > LARGEST:
         raise ValueError(f"{name}: whole numbers must lie between -2^53 and 2^53")
-    _ordered(name, bounds)
+    _check_order(name, bounds)
 
 
 def _angle(word: str, u: Vector) -> Numbers:
@@ -199,7 +199,7 @@ def _sound(name: str, content: Any) -> None:
 
 # For every key of `Distribution`: what else has to hold, and the values for u.
 WAYS: dict[str, tuple[Callable[[str, Any], None], Callable[[Any, Vector], Numbers]]] = {
-    "uniform": (_ordered, _uniform),
+    "uniform": (_check_order, _uniform),
     "log_uniform": (_rising, _log_uniform),
     "normal": (_sound, _at),
     "lognormal": (_sound, _at),
@@ -237,18 +237,18 @@ class Distribution(Component):
     angle: Literal["all"] | None = value(None, "rad", "all: every direction is equally likely")
 
     @property
-    def given(self) -> list[str]:
+    def given_keys(self) -> list[str]:
         """The keys that say how to draw."""
         return [name for name in WAYS if getattr(self, name) is not None]
 
     def at(self, u: Vector) -> Numbers:
         """The value for every u."""
-        (name,) = self.given
+        (name,) = self.given_keys
         return WAYS[name][1](getattr(self, name), u)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        given = self.given
+        given = self.given_keys
         if len(given) != 1:
             ways = [n for n in type(self).model_fields if n not in ("keys", "rows")]
             found = f"found {' and '.join(given)}" if given else "found none"

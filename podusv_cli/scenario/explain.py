@@ -17,7 +17,7 @@ from podusv_cli.scenario.keys import NAME, NO_DEFAULT, NUMBER, Key, either, keys
 from podusv_cli.scenario.model import BASES, Scenario, scenario_class
 from podusv_cli.scenario.named_files import ANY_FILE
 from podusv_cli.scenario.presets import preset_names, preset_text, with_presets
-from podusv_cli.scenario.yaml_tree import dotted, route, with_dotted_key
+from podusv_cli.scenario.yaml_tree import dotted_key, route, with_dotted_key
 
 ALONE = ("path", "actuator", "measurement", "estimator")  # sections with kinds that are no list
 BOOLEANS = {"true or false": ("true", "false")}
@@ -33,7 +33,7 @@ class UnknownKeyError(PodusvError):
 
 
 @dataclass(frozen=True)
-class Row:
+class ExplainRow:
     """A key, kind or signal in words; empty where there is nothing to say.
 
     `type` is what a value may be, or says what `choices` are: the "kinds" of a section or the
@@ -59,7 +59,7 @@ class Row:
         return " ".join(filter(None, (self.type, self.range, unit)))
 
 
-EXTENDS = Row(
+EXTENDS = ExplainRow(
     "extends",
     "scenario that this one changes: a file name relative to it, podusv:NAME.yaml for one "
     "that comes with podusv (`podusv init` lists them), or a list of these: a later one, "
@@ -70,7 +70,7 @@ EXTENDS = Row(
 
 def explain(
     name: str | None = None, others: Iterable[str] = (), plugins: Plugins = ()
-) -> list[Row]:
+) -> list[ExplainRow]:
     """Rows for a key, a kind, a section, a signal, a preset or, with None, all sections.
 
     `controller` gives its kinds, `controller.pid` that kind's keys, `controller.k_ze` or just
@@ -86,7 +86,7 @@ def explain(
         NUMBER if str(step).isdecimal() else step for step in with_dotted_key(route(name))
     )
     keys = top.follow(place) if place else []
-    rows = _with_contents(keys) or _named(name, top, plugins)
+    rows = _with_contents(keys) or _rows_named(name, top, plugins)
     if not rows:
         known = [*names(plugins), *others]
         raise UnknownKeyError(f"{name}: no such name{did_you_mean(name, known)}")
@@ -119,12 +119,12 @@ def names(plugins: Plugins = ()) -> list[str]:
     top = keys_of(scenario_class(plugins))
     places = [place for key in top.all() for place in (key.path, key.route, key.route[-1:])]
     presets = [n for _, given in with_presets(top).values() for n in preset_names(given, plugins)]
-    return [*map(dotted, places), *(signal.name for signal in signals(plugins)), *presets]
+    return [*map(dotted_key, places), *(signal.name for signal in signals(plugins)), *presets]
 
 
 def assignments(plugins: Plugins = ()) -> dict[str, str]:
     """What `--set` takes, and the key's meaning: `control.period=`, `path.kind=line`, ..."""
-    return dict(_assigned("", keys_of(scenario_class(plugins))))
+    return dict(_assignments_below("", keys_of(scenario_class(plugins))))
 
 
 def assignments_in(scenario: Scenario) -> dict[str, str]:
@@ -132,26 +132,26 @@ def assignments_in(scenario: Scenario) -> dict[str, str]:
     top = keys_of(type(scenario))
     parts = {name: getattr(scenario, name) for name in ALONE}
     parts |= {**scenario.disturbances(), **scenario.laws()}
-    plain = dict(_assigned("", top, of_kinds=False))
+    plain = dict(_assignments_below("", top, of_kinds=False))
     for place, part in parts.items():
         kinds = top.follow(route(place))[0].kinds
-        plain |= _assigned(place, kinds[part.kind])
+        plain |= _assignments_below(place, kinds[part.kind])
     return plain
 
 
-def _assigned(place: str, of: Key, *, of_kinds: bool = True) -> Iterator[tuple[str, str]]:
+def _assignments_below(place: str, of: Key, *, of_kinds: bool = True) -> Iterator[tuple[str, str]]:
     """What `--set` takes below a key, at a place of this name where it has one; and the meaning."""
     for key in of.all():
         given = key.path[len(of.path) :]
         if key.keys or not key.field or not {NAME, NUMBER}.isdisjoint(given):
             continue
         if of_kinds or not key.kind:
-            name = f"{place}.{dotted(given)}".removeprefix(".")
+            name = f"{place}.{dotted_key(given)}".removeprefix(".")
             for word in choices_of(key) or BOOLEANS.get(key.type_in_words, ("",)):
                 yield f"{name}={word}", _meaning(key)
 
 
-def _with_contents(keys: list[Key]) -> list[Row]:
+def _with_contents(keys: list[Key]) -> list[ExplainRow]:
     """Keys and kinds, then the keys in them."""
     inside = [inner for key in keys for inner in (*key.keys.values(), *key.item_keys)]
     rows = _rows(row for key in inside for row in (key, *key.item_keys))
@@ -171,22 +171,22 @@ def signals(plugins: Plugins = ()) -> tuple[Signal, ...]:
     return tuple(registry.signals(*rooms, plugins=plugins))
 
 
-def _signals(name: str, plugins: Plugins) -> list[Row]:
+def _signals(name: str, plugins: Plugins) -> list[ExplainRow]:
     named = [signal for signal in signals(plugins) if signal.name == name]
-    return [Row(name, signal.meaning, "signal", signal.unit) for signal in named]
+    return [ExplainRow(name, signal.meaning, "signal", signal.unit) for signal in named]
 
 
-def _named(name: str, top: Key, plugins: Plugins) -> list[Row]:
+def _rows_named(name: str, top: Key, plugins: Plugins) -> list[ExplainRow]:
     """Whatever has this name, wherever it is: signals, keys, kinds, presets."""
     keys = [key for key in top.all() if key.name == name]
     return [*_signals(name, plugins), *_with_contents(keys), *_presets(name, top)]
 
 
-def _presets(name: str, top: Key) -> list[Row]:
+def _presets(name: str, top: Key) -> list[ExplainRow]:
     """Every preset of this name: where its numbers come from, and what they hold for."""
     plugins = top.scenario.plugged
     return [
-        Row(
+        ExplainRow(
             name,
             f"{preset_text(presets, name, 'source', plugins)} "
             f"Validity: {preset_text(presets, name, 'validity', plugins)}",
@@ -197,31 +197,35 @@ def _presets(name: str, top: Key) -> list[Row]:
     ]
 
 
-def _rows(keys: Iterable[Key]) -> list[Row]:
+def _rows(keys: Iterable[Key]) -> list[ExplainRow]:
     """A row for each key, one for all kinds in which it is the same."""
-    kinds: dict[Row, list[str]] = {}
+    kinds: dict[ExplainRow, list[str]] = {}
     for key in keys:
         kinds.setdefault(_row(key), []).append("" if key.is_kind else key.kind)
     return [replace(row, kinds=tuple(filter(None, of_kinds))) for row, of_kinds in kinds.items()]
 
 
-def _row(key: Key) -> Row:
+def _row(key: Key) -> ExplainRow:
     if key.is_kind:
-        return Row(dotted(key.route), summary(key.model), "keys", choices=tuple(key.keys))
-    path, meaning = dotted(key.path), _meaning(key)
+        return ExplainRow(
+            dotted_key(key.route), summary(key.model), "keys", choices=tuple(key.keys)
+        )
+    path, meaning = dotted_key(key.path), _meaning(key)
     if key.keys:
-        return Row(path, meaning, "kinds" if key.kinds else "keys", choices=tuple(key.keys))
+        return ExplainRow(path, meaning, "kinds" if key.kinds else "keys", choices=tuple(key.keys))
     choices = choices_of(key)
     named = key.name in ("preset", "kind")
     words = [*choices, *([ANY_FILE] if key.name == "preset" else [])]
     kind = either(words) if named else key.type_in_words
     others = tuple(key.other_units)
-    return Row(path, meaning, kind, key.unit, key.range, _default(key), choices, others=others)
+    return ExplainRow(
+        path, meaning, kind, key.unit, key.range, _default(key), choices, others=others
+    )
 
 
 def _meaning(key: Key) -> str:
     if key.field is None:
-        return f"one of `{dotted(key.path[:-1])}`"
+        return f"one of `{dotted_key(key.path[:-1])}`"
     return key.field.description or f"which {key.path[-2]} it is"
 
 

@@ -58,30 +58,42 @@ class Identify(Component):
         (), "", "the logs; podusv compare with a measured track needs none", strict=False
     )
     columns: dict[str, str] = value(
-        {}, "", "what a log calls a quantity, with its unit where that is not podusv's: "
+        {},
+        "",
+        "what a log calls a quantity, with its unit where that is not podusv's: "
         '{psi: "heading [deg]"}, with a minus before the name if its sign is the other one; a '
         "column called as podusv does needs no entry",
-    )  # fmt: skip
+    )
     frame: Literal["ned", "enu"] = value(
-        "ned", "", "axes of the logs: ned as podusv (x north, y east, psi from north towards east; "
-        "v, r to starboard), or enu (x east, y north, psi from east towards north; v, r to port)"
-    )  # fmt: skip
+        "ned",
+        "",
+        "axes of the logs: ned as podusv (x north, y east, psi from north towards east; "
+        "v, r to starboard), or enu (x east, y north, psi from east towards north; v, r to port)",
+    )
     free: tuple[str, ...] = value(
-        GROUPS, "", "numbers of the vessel that are looked for, or groups of them: "
-        f"{', '.join(GROUPS)}; all others stay as the vessel has them", strict=False,
-    )  # fmt: skip
+        GROUPS,
+        "",
+        "numbers of the vessel that are looked for, or groups of them: "
+        f"{', '.join(GROUPS)}; all others stay as the vessel has them",
+        strict=False,
+    )
     prior: Positive = value(
         0.5, "", "relative standard deviation of the vessel's own numbers, before the logs are read"
     )
     priors: dict[str, Positive] = value({}, "", "the same of single numbers, in place of `prior`")
     noise: dict[str, Positive] = value(
-        {}, "m or rad or m/s or rad/s", "standard deviations of sensors that are known, by the "
+        {},
+        "m or rad or m/s or rad/s",
+        "standard deviations of sensors that are known, by the "
         f"names of the ekf: {', '.join(SENSORS)}; all others follow from the logs",
-    )  # fmt: skip
+    )
     current: float | None = value(
-        None, "m/s", "standard deviation of the current north and east, which every log has its "
-        "own of; null: a tenth of the speed at full thrust; 0: no current", ge=0,
-    )  # fmt: skip
+        None,
+        "m/s",
+        "standard deviation of the current north and east, which every log has its "
+        "own of; null: a tenth of the speed at full thrust; 0: no current",
+        ge=0,
+    )
     step: Positive = value(0.05, "s", "longest step of the filter along a log")
     draws: int = value(
         200, "", "hulls that are drawn from what the logs leave open", ge=2, le=10**5

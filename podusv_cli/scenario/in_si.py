@@ -18,10 +18,10 @@ def in_si(root: Node, top: Key) -> Node:
     """
     default = root.mapping.get("controller")
     usual = default.word("kind") if default else ""
-    return _converted(root, top, usual)
+    return _convert_node(root, top, usual)
 
 
-def _converted(node: Node, key: Key, usual: str) -> Node:
+def _convert_node(node: Node, key: Key, usual: str) -> Node:
     """`usual` is the kind of `controllers` that have none of their own."""
     if isinstance(node.content, dict):
         return replace(node, content=dict(_entries(node, key, usual)))
@@ -39,13 +39,13 @@ def _entries(node: Node, key: Key, usual: str) -> Iterator[tuple[str, Node]]:
         below = section.keys.get(name) or key.item(name)
         if below and key.path in OF_KEYS and (named := _words(entry.mapping.get("keys"))):
             below = below.of_keys(*named)
-        yield name, _converted(entry, below, usual) if below else entry
+        yield name, _convert_node(entry, below, usual) if below else entry
 
 
 def _items(items: tuple[Node, ...], key: Key, usual: str) -> Iterator[Node]:
     for place, item in enumerate(items):
         below = key.item(place)
-        yield _converted(item, below, usual) if below else item
+        yield _convert_node(item, below, usual) if below else item
 
 
 def _has_text(node: Node) -> bool:

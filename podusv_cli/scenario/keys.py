@@ -26,8 +26,11 @@ from podusv_cli.scenario.yaml_tree import Route, route
 NAME, NUMBER = "NAME", "NUMBER"  # stand for the names in a mapping, the positions in a list
 NO_DEFAULT = PydanticUndefined  # the default of a field that has none
 BOUNDS = {
-    "gt": (">", "above"), "ge": (">=", "not below"), "lt": ("<", "below"), "le": ("<=", "not above")
-}  # fmt: skip
+    "gt": (">", "above"),
+    "ge": (">=", "not below"),
+    "lt": ("<", "below"),
+    "le": ("<=", "not above"),
+}
 PATTERNS_IN_WORDS = {PATTERN: NAME_IN_WORDS}
 NOUNS: dict[Any, tuple[str, str]] = {
     float: ("a number", "numbers"),
@@ -40,9 +43,12 @@ NOUNS: dict[Any, tuple[str, str]] = {
 SHOWN_KEYS = 6
 # Sections whose entries are about the keys that they are named after, and where these keys are.
 OF_KEYS: dict[Route, Route] = {
-    ("sweep", "vary"): (), ("sweep", "grid"): (), ("doubt", "vary"): (),
-    ("tune", "space"): ("controller",), ("identify", "noise"): ("estimator",),
-}  # fmt: skip
+    ("sweep", "vary"): (),
+    ("sweep", "grid"): (),
+    ("doubt", "vary"): (),
+    ("tune", "space"): ("controller",),
+    ("identify", "noise"): ("estimator",),
+}
 OF_KEY = "unit of the key"
 
 
@@ -103,7 +109,7 @@ class Key:
         return f"{noun(self.annotation)} {pattern}".rstrip()
 
     @property
-    def wanted(self) -> str:
+    def expectation(self) -> str:
         """What the value must be, with range and unit: `a number above 0 [s]`."""
         ranges = " and ".join(f"{words} {limit:g}" for _, words, limit in self._bounds)
         unit = f"[{self.unit}]" if self.unit else ""
@@ -137,11 +143,16 @@ class Key:
         parts = {} if self.section else sections(self.annotation)
         return {
             kind: replace(
-                self, annotation=part, field=None, route=(*self.route, kind), kind=kind, model=part,
+                self,
+                annotation=part,
+                field=None,
+                route=(*self.route, kind),
+                kind=kind,
+                model=part,
                 unit_of_section=self._inner_unit,
             )
             for kind, part in parts.items()
-        }  # fmt: skip
+        }
 
     @cached_property
     def keys(self) -> dict[str, Key]:
@@ -164,9 +175,16 @@ class Key:
         if name in model.rules:
             default = None
         return Key(
-            (*self.path, name), field.annotation, field, default, (*self.route, name), self.kind,
-            model, self.scenario, self._inner_unit,
-        )  # fmt: skip
+            (*self.path, name),
+            field.annotation,
+            field,
+            default,
+            (*self.route, name),
+            self.kind,
+            model,
+            self.scenario,
+            self._inner_unit,
+        )
 
     def item(self, step: str | int) -> Key | None:
         """The item of a list at a position, or the entry of a mapping of names."""
@@ -179,9 +197,14 @@ class Key:
                 types = parts[1:]
             if types:
                 inner = replace(
-                    self, path=(*self.path, step), route=(*self.route, step), annotation=types[0],
-                    field=None, default=NO_DEFAULT, unit_of_section=self._unit_of(types[0], step),
-                )  # fmt: skip
+                    self,
+                    path=(*self.path, step),
+                    route=(*self.route, step),
+                    annotation=types[0],
+                    field=None,
+                    default=NO_DEFAULT,
+                    unit_of_section=self._unit_of(types[0], step),
+                )
                 return inner.of_keys(str(step)) if self.path in OF_KEYS else inner
         return None
 
@@ -202,9 +225,10 @@ class Key:
         several = bool(targets) and get_args(self.annotation)[1:] == (Ellipsis,)
         inner = (targets[0].annotation, Ellipsis) if several else ()
         return replace(
-            self, unit_of_section=" or ".join(units) or OF_KEY,
+            self,
+            unit_of_section=" or ".join(units) or OF_KEY,
             annotation=types.GenericAlias(tuple, inner) if several else self.annotation,
-        )  # fmt: skip
+        )
 
     @cached_property
     def _numeric(self) -> bool:
@@ -214,7 +238,7 @@ class Key:
     @property
     def other_units(self) -> list[str]:
         """The units that its numbers may be written with, beside its own."""
-        return [*units.allowed(self.unit)][1:] if self.unit and self._numeric else []
+        return [*units.units_allowed_for(self.unit)][1:] if self.unit and self._numeric else []
 
     def number(self, content: Any) -> Any:
         """What a number with a unit is in podusv's, where the key takes it; else the content."""

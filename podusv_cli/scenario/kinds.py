@@ -7,22 +7,22 @@ from dataclasses import replace
 
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.scenario.keys import Key
-from podusv_cli.scenario.yaml_tree import Node, Route, bracketed, dotted, merge, plain
+from podusv_cli.scenario.yaml_tree import Node, Route, bracketed_key, dotted_key, merge, plain
 
 
-def kept(root: Node, top: Key, dropped: list[str]) -> Node:
+def merge_kept(root: Node, top: Key, dropped: list[str]) -> Node:
     """The tree whose sections have what they keep of those that they stand in place of.
 
     `top` are the scenario's keys. For each section that keeps not everything, or numbers that may
     be defaults of the other kind, a sentence with the values is appended to `dropped`.
     """
-    return _kept(root, top, (), dropped)
+    return _merge_node(root, top, (), dropped)
 
 
-def _kept(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
+def _merge_node(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
     if node.instead_of:
-        base = _kept(node.instead_of, key, at, dropped)
-        dropped += [*_lost(base, node, key, at), *_sized_for_another(base, node, key, at)]
+        base = _merge_node(node.instead_of, key, at, dropped)
+        dropped += [*_lost_keys(base, node, key, at), *_sized_for_another(base, node, key, at)]
         node = over(base, replace(node, instead_of=None), key)
     item = key.item(0)
     if isinstance(node.content, tuple):
@@ -30,13 +30,13 @@ def _kept(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
             return node
         parts = enumerate(node.content)
         return replace(
-            node, content=tuple(_kept(part, item, (*at, i), dropped) for i, part in parts)
+            node, content=tuple(_merge_node(part, item, (*at, i), dropped) for i, part in parts)
         )
     section = key.kinds.get(node.word("kind"), key)
     for name, entry in node.mapping.items():
         below = section.keys.get(name) or key.item(name)
         if below and (entry.mapping or isinstance(entry.content, tuple)):
-            node = node.with_entry(name, _kept(entry, below, (*at, name), dropped))
+            node = node.with_entry(name, _merge_node(entry, below, (*at, name), dropped))
     return node
 
 
@@ -50,11 +50,11 @@ def over(base: Node, own: Node, key: Key) -> Node:
     new = key.kinds.get(own.word("kind") or base.word("kind"))
     if not new or not isinstance(own.content, dict):
         return own
-    taken = {name: part for name, part in base.mapping.items() if _taken(name, base, new, key)}
+    taken = {name: part for name, part in base.mapping.items() if _is_taken(name, base, new, key)}
     return merge(replace(base, content=taken), own, by_kind=False)
 
 
-def _taken(name: str, base: Node, new: Key, key: Key) -> bool:
+def _is_taken(name: str, base: Node, new: Key, key: Key) -> bool:
     """Whether a kind takes a value that was given to a section of maybe another kind."""
     old = key.kinds.get(base.word("kind"))
     if name == "kind" or not old or old.kind == new.kind:
@@ -66,7 +66,7 @@ def _taken(name: str, base: Node, new: Key, key: Key) -> bool:
     return alike and not _usual(base.mapping[name], old, name)
 
 
-def _lost(base: Node, own: Node, key: Key, at: Route) -> list[str]:
+def _lost_keys(base: Node, own: Node, key: Key, at: Route) -> list[str]:
     """What a section does not keep of another one, in a sentence; defaults are not told."""
     old, new = (key.kinds.get(node.word("kind")) for node in (base, own))
     if not old or not new or new.model.stands_alone:
@@ -74,10 +74,12 @@ def _lost(base: Node, own: Node, key: Key, at: Route) -> list[str]:
     lost = {
         name: part
         for name, part in base.mapping.items()
-        if not (_taken(name, base, new, key) or name in own.mapping or _usual(part, old, name))
+        if not (_is_taken(name, base, new, key) or name in own.mapping or _usual(part, old, name))
     }
     return (
-        [f"{_changed(own, at)} in place of {old.kind}, which loses {_told(lost)}"] if lost else []
+        [f"{_describe_change(own, at)} in place of {old.kind}, which loses {_join_names(lost)}"]
+        if lost
+        else []
     )
 
 
@@ -96,22 +98,22 @@ def _sized_for_another(base: Node, own: Node, key: Key, at: Route) -> list[str]:
         for name, part in base.mapping.items()
         if name in {*old.model.rules} & {*new.model.rules}
         and name not in own.mapping
-        and _taken(name, base, new, key)
+        and _is_taken(name, base, new, key)
     }
     if not sized:
         return []
     return [
-        f"{_changed(own, at)} keeps {_told(sized)}, which may have been defaults of {old.kind}; "
-        f"null takes those of {new.kind}"
+        f"{_describe_change(own, at)} keeps {_join_names(sized)}, which may have been defaults "
+        f"of {old.kind}; null takes those of {new.kind}"
     ]
 
 
-def _changed(own: Node, at: Route) -> str:
+def _describe_change(own: Node, at: Route) -> str:
     """Where a section has another kind, and which."""
-    return f"{own.mapping['kind'].mark}: {bracketed(dotted(at))}: kind {own.word('kind')}"
+    return f"{own.mapping['kind'].mark}: {bracketed_key(dotted_key(at))}: kind {own.word('kind')}"
 
 
-def _told(parts: Mapping[str, Node]) -> str:
+def _join_names(parts: Mapping[str, Node]) -> str:
     return ", ".join(f"{name}: {as_yaml(plain(part))}" for name, part in parts.items())
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial, reduce
 
-from podusv_cli.core.phrases import found
+from podusv_cli.core.phrases import describe_found
 from podusv_cli.scenario.named_files import ELSEWHERE
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.scenario.yaml_text import MAX_DEPTH, MAX_NODES, plain_node, read, read_text
@@ -17,8 +17,8 @@ from podusv_cli.scenario.yaml_tree import (
     Mark,
     Node,
     Route,
-    bracketed,
-    dotted,
+    bracketed_key,
+    dotted_key,
     merge,
     steps_of,
     with_dotted_key,
@@ -28,7 +28,7 @@ from podusv_cli.scenario.yaml_tree import (
 FLOW = ("[", "{", "'", '"')  # what lists, mappings and text in quotes start with
 
 
-def composed(
+def compose_layers(
     text: str, source: str, overrides: Sequence[str], faults: list[Fault], *, placed: bool = True
 ) -> Node | None:
     """The tree of a scenario's text over what it extends, with the overrides on top.
@@ -46,7 +46,7 @@ def composed(
 def self_contained(
     text: str, source: str, overrides: Sequence[str], faults: list[Fault], most: int
 ) -> Node | None:
-    """As `composed` for a text of at most `most` values that extends no file."""
+    """As `compose_layers` for a text of at most `most` values that extends no file."""
     node = _mapping(text, source, faults, most=most)
     if node and (above := node.mapping.get("extends")):
         faults.append(Fault(above.mark, "extends", ELSEWHERE))
@@ -106,13 +106,17 @@ def extended_files(node: Node) -> tuple[Node, ...]:
 
 
 def _mapping(
-    text: str, source: str, faults: list[Fault], placed: bool = True, most: int = MAX_NODES,
+    text: str,
+    source: str,
+    faults: list[Fault],
+    placed: bool = True,
+    most: int = MAX_NODES,
     above: tuple[str, ...] = (),
-) -> Node | None:  # fmt: skip
+) -> Node | None:
     node = read(text, source, faults, placed=placed, most=most, above=above)
     if node and not isinstance(node.content, dict):
         # The text is not shown: the file may be one that the user may not read.
-        what = "text" if isinstance(node.content, str) else found(node.content, node.text)
+        what = "text" if isinstance(node.content, str) else describe_found(node.content, node.text)
         faults.append(
             Fault(node.mark, "", f"a scenario is a mapping of keys to values, found {what}")
         )
@@ -130,10 +134,10 @@ def _named_alike(node: Node, at: Route, faults: list[Fault]) -> Node:
         return node
     alike: dict[str, Node] = {}
     for key, entry in node.mapping.items():
-        if bracketed(key) in alike:
-            text = f"given twice, as {bracketed(key)} too"
-            faults.append(Fault(entry.key_mark or entry.mark, dotted((*at, key)), text))
-        alike[bracketed(key)] = entry
+        if bracketed_key(key) in alike:
+            text = f"given twice, as {bracketed_key(key)} too"
+            faults.append(Fault(entry.key_mark or entry.mark, dotted_key((*at, key)), text))
+        alike[bracketed_key(key)] = entry
     return replace(node, content=alike)
 
 
@@ -143,7 +147,7 @@ def _read_base(
     """Name and text of the file that `extends` names, or None and a fault."""
     if not isinstance(above.content, str):
         if not above.faulty:
-            what = found(above.content, above.text)
+            what = describe_found(above.content, above.text)
             faults.append(Fault(above.mark, "extends", f"must be a file name, found {what}"))
         return None
     path = relative_to(sources[-1], above.content)

@@ -60,9 +60,9 @@ class Size:
         return PROCESS + (WORKED if self.scratch else self.content)
 
     @property
-    def needed(self) -> float:
+    def bytes_needed(self) -> float:
         """Bytes that have to be free on the disk for this run."""
-        return needed([self], 1)
+        return disk_needed([self], 1)
 
     def __str__(self) -> str:
         """Time, memory and disk in words."""
@@ -89,7 +89,7 @@ def estimate(scenario: Scenario, plan: Plan) -> Size:
     return Size(grid.steps, grid.rows, content, seconds, scratch, compress)
 
 
-def needed(sizes: Sequence[Size], at_once: int) -> float:
+def disk_needed(sizes: Sequence[Size], at_once: int) -> float:
     """Bytes that have to be free on the disk for these runs, `at_once` of them made at a time."""
     scratch = sorted(size.scratch for size in sizes)[-at_once:]
     return sum(size.least for size in sizes) + sum(scratch)

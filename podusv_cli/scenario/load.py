@@ -1,39 +1,37 @@
-"""Loading scenario files, and writing resolved.yaml."""
+"""Loading scenario files."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import chain
 from operator import attrgetter
 from typing import Any
 
-import yaml
-
-from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario import plugins
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.conflicts import clashes, contradictions
 from podusv_cli.scenario.keys import keys_of
-from podusv_cli.scenario.kinds import kept
-from podusv_cli.scenario.layers import composed, self_contained
+from podusv_cli.scenario.kinds import merge_kept
+from podusv_cli.scenario.layers import compose_layers, self_contained
 from podusv_cli.scenario.messages import check
 from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.named_files import with_contents, without_files
 from podusv_cli.scenario.presets import complete, stands_in
-from podusv_cli.scenario.yaml_text import MAX_NODES, read_text, resolve
+from podusv_cli.scenario.resolved import plain_data, yaml_text
+from podusv_cli.scenario.yaml_text import MAX_NODES, read_text
 from podusv_cli.scenario.yaml_tree import (
     Fault,
     Mark,
     Node,
     Route,
-    dotted,
+    dotted_key,
     find,
     follow,
     merge,
@@ -44,10 +42,9 @@ from podusv_cli.scenario.yaml_tree import (
 
 # Values; several times those of one file, since a scenario may extend files with long lists.
 MOST_RESOLVED = 3 * MAX_NODES
-HEADING = "# A complete scenario, every value written out; it runs again to the same log.\n"
 
 
-# From a tree to the tree with its plug-ins in order, and these; see `plugins.loaded`.
+# From a tree to the tree with its plug-ins in order, and these; see `plugins.load_plugins`.
 Plugged = Callable[[Node, list[Fault]], tuple[Node, Plugins]]
 LOOKED_AT: Plugged = partial(plugins.used_of, ())
 
@@ -71,10 +68,10 @@ class Loaded:
     def origins(self) -> dict[str, str]:
         """Of every dotted key: "configs/a.yaml:12:5", "--set a.b=v", "default", `BY_RULE`, ..."""
         origins = {}
-        for at, _ in _leaves(_data(self.scenario), ()):
+        for at, _ in _leaves(plain_data(self.scenario), ()):
             node = find(self.filled, at)
-            origins[dotted(at)] = str(node.mark) if node else "default"
-        return origins | {dotted(steps): BY_RULE for steps in self.scenario.keys_by_rule()}
+            origins[dotted_key(at)] = str(node.mark) if node else "default"
+        return origins | {dotted_key(steps): BY_RULE for steps in self.scenario.keys_by_rule()}
 
     @cached_property
     def contradictions(self) -> list[tuple[str, str]]:
@@ -92,44 +89,57 @@ class Loaded:
         return next(alike, None) or single.plan()
 
     @cached_property
+    def cases(self) -> dict[str, Case]:
+        """The case of each law's run, by label; none where values contradict."""
+        singles = self.scenario.singles()
+        return {
+            label: Case(singles[label], plan, self.scenario.identify)
+            for label, plan in self.plans.items()
+        }
+
+    def case(self, single: Scenario) -> Case:
+        """That of one run, with the plan that `plan` has for it."""
+        return Case(single, self.plan(single), self.scenario.identify)
+
+    @cached_property
     def clashes(self) -> list[tuple[str, str]]:
         """Key and message for every law of which two signals would have one name."""
         return list(clashes(self.scenario, self.plans))
 
-    def checked(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
+    def check(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
         """This. Raises ScenarioError with the faults and with all that the checks find."""
         for key, text in chain(self.contradictions, *map(self._faults_by, checks)):
             steps = route(key) if isinstance(key, str) else key
             mark = follow(self.filled, steps)[-1].mark
-            faults.append(Fault(mark, key if isinstance(key, str) else dotted(key), text))
+            faults.append(Fault(mark, key if isinstance(key, str) else dotted_key(key), text))
         if faults:
-            raise ScenarioError(_ordered(faults, self.root.mark.source))
+            raise ScenarioError(_order_faults(faults, self.root.mark.source))
         return self
 
     def _faults_by(self, check: Check) -> Sequence[tuple[str | Route, str]]:
         """What a check finds; one that is asked for again, as of a study's only cell, has told."""
-        if check not in self._found:
-            self._found[check] = check(self)
-        return self._found[check]
+        if check not in self._faults_found:
+            self._faults_found[check] = check(self)
+        return self._faults_found[check]
 
     @cached_property
-    def _found(self) -> dict[Check, Sequence[tuple[str | Route, str]]]:
+    def _faults_found(self) -> dict[Check, Sequence[tuple[str | Route, str]]]:
         return {}
 
-    def told(self, warn: Callable[[str], object]) -> Loaded:
+    def warn_of_dropped(self, warn: Callable[[str], object]) -> Loaded:
         """This, after a warning of all that was dropped."""
         for lost in self.dropped:
             warn(f"warning: {lost}")
         return self
 
-    def changed(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
+    def merge_over(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
         """The scenario of the same tree with another merged over it. Raises ScenarioError."""
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
-        root = kept(root, keys_of(type(self.scenario)), [])
-        scenario, filled = _made(root, self.scenario.plugged, faults)
+        root = merge_kept(root, keys_of(type(self.scenario)), [])
+        scenario, filled = _build_scenario(root, self.scenario.plugged, faults)
         changed = replace(self, scenario=scenario, filled=filled, root=root)
-        return changed.checked(faults, (CLASHES, *checks)).scenario
+        return changed.check(faults, (CLASHES, *checks)).scenario
 
 
 # What is wrong with what is loaded: key and message. A key as its steps where names have dots.
@@ -138,9 +148,12 @@ CLASHES: Check = attrgetter("clashes")
 
 
 def load(
-    path: str | os.PathLike[str], overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str] = (), plugged: Plugged = plugins.loaded,
-) -> Loaded:  # fmt: skip
+    path: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    files: Sequence[str] = (),
+    plugged: Plugged = plugins.load_plugins,
+) -> Loaded:
     """The scenario of a file, with overrides such as `vessel.m=24`.
 
     `checks` are made after the scenario's own; `files` are plug-ins beside the scenario's, and
@@ -151,33 +164,43 @@ def load(
     source = os.fspath(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
-        raise ScenarioError(_ordered(faults, source))
+        raise ScenarioError(_order_faults(faults, source))
     return load_text(text, source, overrides, checks, files, plugged)
 
 
 def load_text(
-    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str | Plugin] = (), plugged: Plugged = plugins.loaded, *, placed: bool = True,
-) -> Loaded:  # fmt: skip
+    text: str,
+    source: str,
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    files: Sequence[str | Plugin] = (),
+    plugged: Plugged = plugins.load_plugins,
+    *,
+    placed: bool = True,
+) -> Loaded:
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
     Messages give lines of the text only where `placed`. Raises ScenarioError with everything that
     is wrong.
     """
     faults: list[Fault] = []
-    root = composed(text, source, overrides, faults, placed=placed)
+    root = compose_layers(text, source, overrides, faults, placed=placed)
     if root is None:
-        raise ScenarioError(_ordered(faults, source))
-    root, known, dropped = _known(root, plugged, files, source, faults)
-    scenario, filled = _made(root, known, faults)
+        raise ScenarioError(_order_faults(faults, source))
+    root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
+    scenario, filled = _build_scenario(root, known, faults)
     loaded = Loaded(scenario, filled, text, root, dropped)
-    return loaded.checked(faults, (CLASHES, *checks))
+    return loaded.check(faults, (CLASHES, *checks))
 
 
 def load_stored(
-    text: str, source: str, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    files: Sequence[str | Plugin] = (), plugged: Plugged = LOOKED_AT,
-) -> Loaded:  # fmt: skip
+    text: str,
+    source: str,
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    files: Sequence[str | Plugin] = (),
+    plugged: Plugged = LOOKED_AT,
+) -> Loaded:
     """The scenario in the folder of a run, study or search: it refers to no file but its plug-ins.
 
     Unless `plugged` loads these, components are those of podusv and of installed packages. Raises
@@ -186,23 +209,25 @@ def load_stored(
     """
     faults: list[Fault] = []
     root = self_contained(text, source, overrides, faults, MOST_RESOLVED)
-    _undamaged(faults, source)
+    _raise_damage(faults, source)
     if root is None or faults:
-        raise ScenarioError(_ordered(faults, source))
-    root, known, dropped = _known(root, plugged, files, source, faults)
+        raise ScenarioError(_order_faults(faults, source))
+    root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
     with_contents(root, keys_of(scenario_class(known)), faults, without_files)
-    _undamaged(faults, source)
-    scenario, filled = _made(root, known, faults)
-    return Loaded(scenario, filled, text, root, dropped).checked(faults, checks)
+    _raise_damage(faults, source)
+    scenario, filled = _build_scenario(root, known, faults)
+    return Loaded(scenario, filled, text, root, dropped).check(faults, checks)
 
 
-def _undamaged(faults: list[Fault], source: str) -> None:
+def _raise_damage(faults: list[Fault], source: str) -> None:
     """Raise StorageError with the first fault in the file called `source`."""
-    for fault in _ordered([fault for fault in faults if fault.mark.source == source], source)[:1]:
+    for fault in _order_faults([fault for fault in faults if fault.mark.source == source], source)[
+        :1
+    ]:
         raise StorageError(f"{fault} (the file is damaged, or podusv did not write it)")
 
 
-def _known(
+def _resolve_plugins(
     root: Node, plugged: Plugged, files: Sequence[str | Plugin], source: str, faults: list[Fault]
 ) -> tuple[Node, Plugins, tuple[str, ...]]:
     """The tree with its plug-ins and with what sections keep of other kinds; what is dropped.
@@ -212,24 +237,24 @@ def _known(
     before, dropped = len(faults), list[str]()
     root, known = plugged(plugins.with_given(root, files), faults)
     if len(faults) > before:
-        raise ScenarioError(_ordered(faults, source))
-    return kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
+        raise ScenarioError(_order_faults(faults, source))
+    return merge_kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
 
 
-def _made(root: Node, known: Plugins, faults: list[Fault]) -> tuple[Scenario, Node]:
+def _build_scenario(root: Node, known: Plugins, faults: list[Fault]) -> tuple[Scenario, Node]:
     """The scenario of a tree, and the tree with what is filled in."""
     top, source = keys_of(scenario_class(known)), root.mark.source
     root = complete(root, top, faults)
     scenario = check(root, top, faults)
     if scenario is None:
-        raise ScenarioError(_ordered(faults, source))
+        raise ScenarioError(_order_faults(faults, source))
     if stands_in(root):  # the very same law says so, see `Scenario.open_choice`
         first = next(iter(scenario.controllers.values()))
         scenario = scenario.model_copy(update={"controller": first})
     return scenario, root
 
 
-def _ordered(faults: list[Fault], first: str) -> list[Fault]:
+def _order_faults(faults: list[Fault], first: str) -> list[Fault]:
     """The faults file by file, the file called `first` ahead, in the order of lines.
 
     Those without a line come last: what is missing may be there under a wrong name.
@@ -245,13 +270,7 @@ def _ordered(faults: list[Fault], first: str) -> list[Fault]:
 
 def values(scenario: Scenario) -> dict[str, Any]:
     """Every value of a scenario by its dotted key, in the order of the fields."""
-    return {dotted(route): content for route, content in _leaves(_data(scenario), ())}
-
-
-def _data(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data; studies only where there are some, since runs have none."""
-    data = scenario.model_dump()
-    return {k: v for k, v in data.items() if k not in BESIDE_RUNS or v is not None}
+    return {dotted_key(route): content for route, content in _leaves(plain_data(scenario), ())}
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
@@ -262,11 +281,6 @@ def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
             yield (*above, name), content
 
 
-def resolved_yaml(scenario: Scenario) -> str:
-    """The scenario as a file with every value in it; loading it gives an equal scenario."""
-    return HEADING + yaml_text(_data(scenario))
-
-
 def tree_yaml(loaded: Loaded) -> str:
     """The scenario as one file that can be changed like the given one.
 
@@ -275,51 +289,3 @@ def tree_yaml(loaded: Loaded) -> str:
     """
     root = with_contents(loaded.root, keys_of(type(loaded.scenario)), [])
     return yaml_text({"name": loaded.scenario.name} | plain(root))
-
-
-def yaml_text(data: Mapping[str, Any]) -> str:
-    """Plain data as YAML that podusv reads back to the same values."""
-    with suppress(UnicodeEncodeError):  # libyaml has no lone surrogates
-        return _dumped(data, _Fast)
-    return _dumped(data, _Dumper)
-
-
-def _dumped(data: Mapping[str, Any], dumper: Any) -> str:
-    text = yaml.dump(data, Dumper=dumper, sort_keys=False, allow_unicode=True, width=1 << 30)
-    return str(text)
-
-
-class _Dumper(yaml.SafeDumper):
-    """Blocks for mappings, brackets for lists of scalars, quotes around all text but words."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-class _Fast(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """The same text by libyaml, which PyYAML can lack."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    is_word = text.replace("_", "").isalnum() and isinstance(resolve(text), str) and text.isascii()
-    style = None if is_word else '"'
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
-
-
-def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
-    flat = not any(isinstance(part, tuple) for part in items)
-    return dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=flat)
-
-
-def _kind_first(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.MappingNode:
-    ordered = sorted(data.items(), key=lambda entry: entry[0] != "kind")
-    return dumper.represent_mapping("tag:yaml.org,2002:map", ordered, flow_style=False)
-
-
-for _dumper in (_Dumper, _Fast):
-    _dumper.add_representer(str, _text)
-    _dumper.add_representer(tuple, _list)
-    _dumper.add_representer(dict, _kind_first)

@@ -8,11 +8,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from podusv_cli.core.errors import SizingError
-from podusv_cli.core.phrases import did_you_mean, found, hint, unknown, without_case
+from podusv_cli.core.phrases import describe_found, did_you_mean, hint, unknown_word, without_case
 from podusv_cli.scenario.keys import NAME, NUMBER, Key, either, limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.presets import stands_in
-from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, follow, plain
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted_key, follow, plain
 
 MOST_PLACES = 4  # of a key, in a message
 
@@ -53,11 +53,11 @@ def with_defaults(key: Key | None, data: Any) -> Any:
 def _faults(root: Node, top: Key, error: ValidationError) -> Iterator[Fault]:
     for complaint in error.errors(include_url=False):
         key = _key(top, complaint["loc"])
-        if not _copied(root, key.path):
+        if not _is_copied(root, key.path):
             yield from SENTENCES.get(complaint["type"], _wrong)(root, key, complaint)
 
 
-def _copied(root: Node, route: Route) -> bool:
+def _is_copied(root: Node, route: Route) -> bool:
     """Whether a value was copied from another section, where it has a message already."""
     if stands_in(root) and route[:1] != ("nominal",):
         return route[:1] == ("controller",)
@@ -75,7 +75,7 @@ def _key(top: Key, location: Route) -> Key:
     return key
 
 
-def _explained(root: Node, route: Route) -> bool:
+def _is_explained(root: Node, route: Route) -> bool:
     """Whether an earlier fault explains that something is missing here."""
     return any(node.faulty for node in follow(root, route))
 
@@ -84,13 +84,17 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     name = str(complaint["loc"][-1])
     route = (*section.path, name)
     node = follow(root, route)[-1]
-    hint = _joined(section, name) or _elsewhere(section, name) or did_you_mean(name, section.keys)
+    hint = (
+        _hint_of_blank(section, name)
+        or _elsewhere(section, name)
+        or did_you_mean(name, section.keys)
+    )
     several = _several(section, follow(root, section.path)[-1])
     hints = several or f"{hint} (allowed: {', '.join(section.keys)})"
-    yield Fault(node.key_mark or node.mark, dotted(route), f"unknown key{hints}")
+    yield Fault(node.key_mark or node.mark, dotted_key(route), f"unknown key{hints}")
 
 
-def _joined(section: Key, name: str) -> str:
+def _hint_of_blank(section: Key, name: str) -> str:
     """`; write a blank after the colon: x: 1`, for `{x:1}`."""
     key, _, number = name.partition(":")
     return f"; write a blank after the colon: {key}: {number}" if key in section.keys else ""
@@ -117,7 +121,7 @@ def _elsewhere(section: Key, name: str) -> str:
         for key in section.top.all()
         if without_case(str(key.path[-1])) == without_case(name)
     )
-    places = dict.fromkeys(dotted(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
+    places = dict.fromkeys(dotted_key(path) for path in alike if {NAME, NUMBER}.isdisjoint(path))
     return f"; did you mean {either([repr(p) for p in places][:MOST_PLACES])}?" if places else ""
 
 
@@ -136,32 +140,32 @@ def _home(name: str, kinds: dict[str, Key]) -> str:
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
     if isinstance(key.path[-1], int):
         yield from _wrong(root, _key(key.top, complaint["loc"][:-1]), complaint)
-    elif not _explained(root, key.path):
+    elif not _is_explained(root, key.path):
         mark = follow(root, key.path)[-1].mark
-        yield Fault(mark, dotted(key.path), f"missing; must be {key.wanted}")
+        yield Fault(mark, dotted_key(key.path), f"missing; must be {key.expectation}")
 
 
 def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     route = (*section.path, "kind")
-    if not _explained(root, route):
+    if not _is_explained(root, route):
         node = follow(root, section.path)[-1]
         homes = filter(None, (_home(name, section.kinds) for name in node.mapping))
         several = _several(section, node)
         text = f"missing (allowed: {', '.join(section.kinds)}){several or next(homes, '')}"
-        yield Fault(node.mark, dotted(route), text)
+        yield Fault(node.mark, dotted_key(route), text)
 
 
 def _unknown_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
     route = (*section.path, "kind")
     node = follow(root, route)[-1]
-    what = f"kind {found(node.content, node.text)}"
-    yield Fault(node.mark, dotted(route), unknown(what, str(node.content), section.kinds))
+    what = f"kind {describe_found(node.content, node.text)}"
+    yield Fault(node.mark, dotted_key(route), unknown_word(what, str(node.content), section.kinds))
 
 
 def _impossible(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
-    if not _explained(root, key.path):
+    if not _is_explained(root, key.path):
         mark = follow(root, key.path)[-1].mark
-        yield Fault(mark, dotted(key.path), str(complaint["ctx"]["error"]))
+        yield Fault(mark, dotted_key(key.path), str(complaint["ctx"]["error"]))
 
 
 def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
@@ -170,9 +174,11 @@ def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
         isinstance(node.content, dict) and key.section
     ):  # that may be a number, too: what is in it is told
         return
-    what = found(node.content, node.text)
+    what = describe_found(node.content, node.text)
     yield Fault(
-        node.mark, dotted(key.path), f"must be {key.wanted}, found {what}{_hint(node, key)}"
+        node.mark,
+        dotted_key(key.path),
+        f"must be {key.expectation}, found {what}{_hint(node, key)}",
     )
 
 

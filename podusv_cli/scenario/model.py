@@ -22,7 +22,7 @@ from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.about import BESIDE_RUNS, Claim, at_target
 from podusv_cli.core.component import Component, value
-from podusv_cli.core.plugins import Plugins, from_file, installed
+from podusv_cli.core.plugins import Plugins, from_file, installed_plugins
 from podusv_cli.core.registry import any_of
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
@@ -71,9 +71,13 @@ Summands = Annotated[
 ]
 # The sections whose kinds are components, found in the room and in plug-ins called `<section>s`.
 BASES: dict[str, type[Component]] = {
-    "path": Path, "disturbance": Disturbance, "actuator": Actuator, "measurement": Measurement,
-    "estimator": Estimator, "controller": Controller,
-}  # fmt: skip
+    "path": Path,
+    "disturbance": Disturbance,
+    "actuator": Actuator,
+    "measurement": Measurement,
+    "estimator": Estimator,
+    "controller": Controller,
+}
 # The sections in which runs of one compiled loop may differ.
 PER_RUN = ("vessel", "nominal", "start", *BASES)
 DISTURBANCE = "what the sea does; those of a list add up"
@@ -140,7 +144,7 @@ class Scenario(Component):
         if not any(plugin.text for plugin in self.plugged):
             return super().__reduce_ex__(protocol)
         files = tuple((plugin.path, plugin.text) for plugin in self.plugged if plugin.text)
-        return _unpickled, (files, self.as_given(), self.open_choice)
+        return _unpickle, (files, self.as_given(), self.open_choice)
 
     @property
     def open_choice(self) -> bool:
@@ -201,22 +205,28 @@ class Scenario(Component):
         seas = tuple(sea.sized(facts) for sea in self.disturbances().values())
         return self.model_copy(
             update={
-                "path": self.path.sized(facts), "estimator": self.estimator.sized(facts),
-                "controller": law, "controllers": several,
+                "path": self.path.sized(facts),
+                "estimator": self.estimator.sized(facts),
+                "controller": law,
+                "controllers": several,
                 "disturbance": seas if isinstance(self.disturbance, tuple) else seas[0],
             }
-        )  # fmt: skip
+        )
 
     def keys_by_rule(self) -> list[tuple[str | int, ...]]:
         """The steps of every key whose number `in_numbers` gave."""
         seas = self.disturbance
         parts: list[tuple[tuple[str | int, ...], Component]] = [
-            (("path",), self.path), (("estimator",), self.estimator),
+            (("path",), self.path),
+            (("estimator",), self.estimator),
             (("controller",), self.controller),
             *((("controllers", label), self.controllers[label]) for label in self.controllers),
-            *(((("disturbance", i), sea) for i, sea in enumerate(seas)) if isinstance(seas, tuple)
-              else [(("disturbance",), seas)]),
-        ]  # fmt: skip
+            *(
+                ((("disturbance", i), sea) for i, sea in enumerate(seas))
+                if isinstance(seas, tuple)
+                else [(("disturbance",), seas)]
+            ),
+        ]
         return [(*at, name) for at, part in parts if part.rules for name in part.by_rule]
 
     def as_given(self) -> dict[str, Any]:
@@ -233,11 +243,16 @@ class Scenario(Component):
         """The closed loop of vessel, path, disturbance, actuator, measurement and law."""
         start = self.start
         return ClosedLoop(
-            vessel=self.vessel, nominal=self.nominal, path=self.path, disturbance=self.sea,
-            actuator=self.actuator, controller=self.controller,
-            measurement=self.measurement, estimator=self.estimator,
+            vessel=self.vessel,
+            nominal=self.nominal,
+            path=self.path,
+            disturbance=self.sea,
+            actuator=self.actuator,
+            controller=self.controller,
+            measurement=self.measurement,
+            estimator=self.estimator,
             start=(start.x, start.y, start.psi, start.u, start.v, start.r),
-        )  # fmt: skip
+        )
 
     @property
     def sea(self) -> Disturbance:
@@ -265,9 +280,11 @@ class Scenario(Component):
     def metrics_of(self, plan: Plan) -> Metrics:
         """What gathers the numbers of all metrics in such a run."""
         return metrics_probe(
-            plan, known=self.known_metrics(), steady_fraction=self.metrics.steady_fraction,
+            plan,
+            known=self.known_metrics(),
+            steady_fraction=self.metrics.steady_fraction,
             settling_radius=self.metrics.settling_radius,
-        )  # fmt: skip
+        )
 
     def probe(self, grid: TimeGrid | None = None) -> Metrics:
         """What gathers the numbers of all metrics, over another grid than the run's where given."""
@@ -287,7 +304,7 @@ class Scenario(Component):
 
     def known_metrics(self) -> dict[str, Metric]:
         """All metrics by name, with those of plug-ins, and of windows and radii named here."""
-        known = metrics_with(self.plugged, self.metrics.named())
+        known = metrics_with(self.plugged, self.metrics.windows_and_radii())
         return {name: metric for name, metric in known.items() if NAMED not in name}
 
     def steady_from(self) -> float:
@@ -301,9 +318,11 @@ class Scenario(Component):
     def at_target(self, numbers: Mapping[str, float]) -> bool:
         """Whether a run with these metrics ends at its target, see `core.about.at_target`."""
         return at_target(
-            numbers, follows=self.path.follows, trial=not self.controller.aims(),
+            numbers,
+            follows=self.path.follows,
+            trial=not self.controller.aims(),
             radius=self.metrics.settling_radius,
-        )  # fmt: skip
+        )
 
     def disturbances(self) -> dict[str, Disturbance]:
         """The disturbance, or each of several, by its key."""
@@ -354,10 +373,12 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
     return made
 
 
-def _unpickled(
+def _unpickle(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
-    made = scenario_class((*(from_file(*one) for one in files), *installed()))(**data).in_numbers()
+    made = scenario_class((*(from_file(*one) for one in files), *installed_plugins()))(
+        **data
+    ).in_numbers()
     if open_choice:
         made = made.model_copy(update={"controller": next(iter(made.controllers.values()))})
     return made

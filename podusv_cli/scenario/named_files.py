@@ -10,23 +10,16 @@ from functools import partial
 from typing import Any
 
 from podusv_cli.core.component import Component
-from podusv_cli.core.timed_rows import Line, columns, lines_of
+from podusv_cli.core.timed_rows import TextLine, columns, lines_of
 from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.scenario.yaml_text import (
-    MAX_NODES,
-    read,
-    read_bytes,
-    read_text,
-    resolve,
-    text_node,
-)
+from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_bytes, read_text, resolve, text_node
 from podusv_cli.scenario.yaml_tree import (
     Fault,
     Mark,
     Node,
     Route,
-    dotted,
+    dotted_key,
     merge,
     plain,
     without_misfits,
@@ -56,13 +49,15 @@ def with_contents(root: Node, top: Key, faults: list[Fault], fill: Fill | None =
     for name, entry in root.mapping.items():
         if key := top.keys.get(name):
             kind = usual.get(name, "")
-            root = root.with_entry(name, _filled(entry, key, (name,), fill or _read, faults, kind))
+            root = root.with_entry(
+                name, _fill_section(entry, key, (name,), fill or _read, faults, kind)
+            )
     return root
 
 
-def _filled(
+def _fill_section(
     node: Node, key: Key, at: Route, fill: Fill, faults: list[Fault], usual: str = ""
-) -> Node:  # fmt: skip
+) -> Node:
     """A section with what files hold, the sections in it first; `usual` is a kind not given."""
     section = key.kinds.get(node.word("kind") or usual, key)
     if isinstance(node.content, tuple):
@@ -70,14 +65,17 @@ def _filled(
             return node
         parts = enumerate(node.content)
         return replace(
-            node, content=tuple(_filled(part, item, (*at, i), fill, faults) for i, part in parts)
+            node,
+            content=tuple(_fill_section(part, item, (*at, i), fill, faults) for i, part in parts),
         )
     own = section.keys if section.section else {}
     for name, entry in node.mapping.items():
         below = own.get(name) or key.item(name)
         if below and (entry.mapping or isinstance(entry.content, tuple)):
-            node = node.with_entry(name, _filled(entry, below, (*at, name), fill, faults, usual))
-    return fill(node, dotted(at), section.section, faults) if section.section else node
+            node = node.with_entry(
+                name, _fill_section(entry, below, (*at, name), fill, faults, usual)
+            )
+    return fill(node, dotted_key(at), section.section, faults) if section.section else node
 
 
 def _read(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
@@ -95,9 +93,7 @@ def _read(given: Node, section: str, model: type[Component], faults: list[Fault]
     return _over_file(given, section, model, faults)
 
 
-def _in_folder(
-    name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
-) -> str | None:  # fmt: skip
+def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
     """The text of a file in a folder that podusv finished."""
     manifest = os.path.join(folder, "manifest.json")
     if not os.path.isfile(manifest) or not os.path.isfile(os.path.join(folder, name)):
@@ -150,7 +146,7 @@ def _with_source(whole: Node, base: Node, given: Node) -> Node:
 
 def _read_in(
     given: Node, section: str, key: str, taker: str, read: Read, form: Form, faults: list[Fault]
-) -> Node:  # fmt: skip
+) -> Node:
     """The content of the file that one key names, under the key `taker` in place of the name."""
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):
@@ -207,7 +203,7 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
         yield replace(row, content=tuple(cells[i] for i in order if i < len(cells)))
 
 
-def _row(line: Line, mark: Mark, faults: list[Fault]) -> Node:
+def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
     numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.

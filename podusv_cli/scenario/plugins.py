@@ -11,8 +11,8 @@ from pathlib import Path as File
 from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.core.foreign import in_folder
-from podusv_cli.core.phrases import did_you_mean, found, quoted
-from podusv_cli.core.plugins import Plugin, Plugins, from_file, installed
+from podusv_cli.core.phrases import describe_found, did_you_mean, quote
+from podusv_cli.core.plugins import Plugin, Plugins, from_file, installed_plugins
 from podusv_cli.scenario.keys import keys_of
 from podusv_cli.scenario.model import BASES, Scenario, scenario_class
 from podusv_cli.scenario.presets import preset_names
@@ -31,9 +31,9 @@ def with_given(root: Node, files: Sequence[str | Plugin]) -> Node:
     """
     if not files:
         return root
-    entries = [_given(file) for file in files]
+    entries = [_node_of(file) for file in files]
     own = root.mapping.get(KEY)
-    listed = tuple(node for node, _ in _listed(own)) if own else ()
+    listed = tuple(node for node, _ in _list_entries(own)) if own else ()
     return root.with_entry(KEY, Node((*listed, *entries), own.mark if own else entries[0].mark))
 
 
@@ -51,15 +51,15 @@ def on_hand(files: Sequence[str]) -> Plugins:
 
 def from_files(files: Sequence[str], faults: list[Fault]) -> Plugins:
     """The plug-ins in these files of the command line, and all that are installed."""
-    given = (_file(_given(file), faults) for file in files)
-    return (*(plugin for plugin in given if plugin), *installed())
+    given = (_file(_node_of(file), faults) for file in files)
+    return (*(plugin for plugin in given if plugin), *installed_plugins())
 
 
-def _given(file: str | Plugin) -> Node:
+def _node_of(file: str | Plugin) -> Node:
     return Node(file, Mark(f"--plugin {file}"), text=str(file))
 
 
-def _listed(own: Node) -> list[tuple[Node, Node]]:
+def _list_entries(own: Node) -> list[tuple[Node, Node]]:
     """The name of each plug-in, and what is required of it: a list, a mapping, or one name."""
     if isinstance(own.content, dict):
         marks = ((name, node.key_mark or node.mark) for name, node in own.content.items())
@@ -68,7 +68,7 @@ def _listed(own: Node) -> list[tuple[Node, Node]]:
     return [(node, Node({}, node.mark)) for node in several]
 
 
-def loaded(
+def load_plugins(
     root: Node, faults: list[Fault], *, trusted: bool = False, own: bool = True
 ) -> tuple[Node, Plugins]:
     """The tree with plug-ins as they stand in resolved.yaml, and the plug-ins.
@@ -82,15 +82,15 @@ def loaded(
     given = root.mapping.get(KEY) or Node({}, root.mark)
     entries: dict[str, Node] = {}
     known: dict[str, Plugin] = {}
-    for name, wanted in [] if given.faulty else _listed(given):
+    for name, wanted in [] if given.faulty else _list_entries(given):
         allowed = trusted or (own and not _is_foreign(name.mark))
         if plugin := _plugin(name, wanted, faults, allowed):
             place = next(n for n in _names(plugin) if known.setdefault(n, plugin) == plugin)
-            entries[place] = _required(plugin, name.mark, wanted)
-    plugins = tuple(dict.fromkeys((*known.values(), *installed())))
+            entries[place] = _resolved_entry(plugin, name.mark, wanted)
+    plugins = tuple(dict.fromkeys((*known.values(), *installed_plugins())))
     try:
         scenario_class(plugins)
-        entries = {p.name: _required(p, given.mark) for p in _used(root)} | entries
+        entries = {p.name: _resolved_entry(p, given.mark) for p in _plugins_used(root)} | entries
     except LawError as error:
         faults.append(Fault(given.mark, KEY, str(error)))
     return (root.with_entry(KEY, replace(given, content=entries)) if entries else root), plugins
@@ -98,19 +98,20 @@ def loaded(
 
 def of_files(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
     """What loads plug-ins of scenarios on the command line, some of them `trusted` alone."""
-    return partial(loaded, trusted=trusted)
+    return partial(load_plugins, trusted=trusted)
 
 
 def of_folder(trusted: bool) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
     """What loads plug-ins that the folder of a run, study or search keeps, where `trusted`."""
-    return partial(loaded, trusted=trusted, own=False)
+    return partial(load_plugins, trusted=trusted, own=False)
 
 
 def without_own(known: Plugins) -> Callable[[Node, list[Fault]], tuple[Node, Plugins]]:
     """What takes in none of the plug-ins that a tree names, but these."""
     return lambda root, faults: (
-        replace(root, content={k: e for k, e in root.mapping.items() if k != KEY}), known
-    )  # fmt: skip
+        replace(root, content={k: e for k, e in root.mapping.items() if k != KEY}),
+        known,
+    )
 
 
 def _is_foreign(mark: Mark) -> bool:
@@ -119,7 +120,7 @@ def _is_foreign(mark: Mark) -> bool:
     return any(in_folder(source) for source in sources if not is_shipped(source))
 
 
-def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
+def _resolved_entry(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
     """The plug-in's entry in resolved.yaml."""
     entry = given or Node({}, mark)
     for name in ("version", "sha256"):
@@ -128,7 +129,7 @@ def _required(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
     return entry
 
 
-def _used(root: Node) -> Iterator[Plugin]:
+def _plugins_used(root: Node) -> Iterator[Plugin]:
     """The installed packages that have a component or a vessel which the scenario names."""
     vessels = {
         root.mapping[key].word("preset") for key in ("vessel", "nominal") if key in root.mapping
@@ -138,7 +139,7 @@ def _used(root: Node) -> Iterator[Plugin]:
     foreign = [
         (section, kind) for section, kind in named if kind not in kinds_of(Scenario, section)
     ]
-    for plugin in installed() if foreign or vessels else ():
+    for plugin in installed_plugins() if foreign or vessels else ():
         if vessels & set(preset_names(VESSELS, (plugin,))) or any(
             kind in kinds_of(scenario_class((plugin,)), section) for section, kind in foreign
         ):
@@ -157,7 +158,7 @@ def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plu
     if isinstance(name.content, Plugin):
         return name.content
     if not isinstance(name.content, str):
-        what = found(name.content, name.text)
+        what = describe_found(name.content, name.text)
         text = f"must be a list of files like my_law.py and installed packages, found {what}"
         faults.append(Fault(name.mark, KEY, text))
         return None
@@ -175,9 +176,9 @@ def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plu
 
 
 def _package(name: Node, faults: list[Fault]) -> Plugin | None:
-    packages = {plugin.name: plugin for plugin in installed()}
+    packages = {plugin.name: plugin for plugin in installed_plugins()}
     if name.content not in packages:
-        what = f"{quoted(name.content)} is no file (these end in .py) and no installed package"
+        what = f"{quote(name.content)} is no file (these end in .py) and no installed package"
         hint = did_you_mean(name.content, packages)
         faults.append(Fault(name.mark, KEY, f"{what} with entry points of podusv{hint}"))
     return packages.get(name.content)

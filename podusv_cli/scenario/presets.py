@@ -11,7 +11,7 @@ from pathlib import Path
 
 from podusv_cli.components.vessels.vessel import COEFFICIENTS, VESSELS, Vessel
 from podusv_cli.core.component import Component, Presets
-from podusv_cli.core.phrases import found, quoted, unknown
+from podusv_cli.core.phrases import describe_found, quote, unknown_word
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.scenario.in_si import in_si
 from podusv_cli.scenario.keys import SCENARIO, Key
@@ -20,15 +20,22 @@ from podusv_cli.scenario.named_files import ANY_FILE, with_contents
 from podusv_cli.scenario.sections import NAME, NAME_IN_WORDS
 from podusv_cli.scenario.shipped import PREFIX
 from podusv_cli.scenario.yaml_text import read
-from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted, merge, without_misfits
+from podusv_cli.scenario.yaml_tree import Fault, Node, Route, dotted_key, merge, without_misfits
 
 # Sections whose entries have names of the user's. An entry that is null takes out an inherited one,
 # and a section that is null all of them.
 NAMED: tuple[Route, ...] = (
-    ("controllers",), ("claims",), ("sweep", "vary"), ("sweep", "grid"), ("sweep", "claims"),
-    ("tune", "space"), ("doubt", "vary"), ("identify", "columns"), ("identify", "priors"),
+    ("controllers",),
+    ("claims",),
+    ("sweep", "vary"),
+    ("sweep", "grid"),
+    ("sweep", "claims"),
+    ("tune", "space"),
+    ("doubt", "vary"),
+    ("identify", "columns"),
+    ("identify", "priors"),
     ("identify", "noise"),
-)  # fmt: skip
+)
 EMPTIED: tuple[Route, ...] = (*NAMED, ("sweep", "keep"))  # null is a section with nothing in it
 BESIDE_NAMED = {named[:end] for named in NAMED for end in range(len(named) + 1)}
 
@@ -87,7 +94,7 @@ def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Preset
     """Every class of components that has presets, and these, by `section.kind`."""
     sections = [inner for key in top.keys.values() for inner in (key, *key.kinds.values())]
     return {
-        dotted(key.route): (key.section, key.section.presets)
+        dotted_key(key.route): (key.section, key.section.presets)
         for key in sections
         if key.section and key.section.presets and key.path != ("nominal",)
     }
@@ -136,7 +143,7 @@ def _name(root: Node, faults: list[Fault]) -> Node:
     stem = Path(root.mark.source.removeprefix(PREFIX)).stem
     usable = re.fullmatch(NAME, stem)
     if not usable:
-        text = f"cannot be the file's name {quoted(stem)}; give one {NAME_IN_WORDS}"
+        text = f"cannot be the file's name {quote(stem)}; give one {NAME_IN_WORDS}"
         faults.append(Fault(root.mark, "name", text))
     return root.with_entry("name", Node(stem if usable else None, root.mark, faulty=not usable))
 
@@ -216,8 +223,8 @@ def _over_preset(
     if preset.content in names:
         base = preset_file(presets, str(preset.content), faults, plugins)
         return merge(base, without_misfits(base, given, faults, (key,))) if base else given
-    what = f"{presets.noun} {found(preset.content, preset.text)}"
-    text = unknown(what, str(preset.content), [*names, ANY_FILE])
+    what = f"{presets.noun} {describe_found(preset.content, preset.text)}"
+    text = unknown_word(what, str(preset.content), [*names, ANY_FILE])
     faults.append(Fault(preset.mark, f"{key}.preset", text))
     wrong = given.with_entry("preset", replace(preset, content=None, faulty=True))
     return replace(wrong, faulty=True)

@@ -34,7 +34,7 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
     """
     top = keys_of(scenario_class(plugins))
     made = top.scenario.model_json_schema()
-    definitions = {name: _converted(part) for name, part in made["$defs"].items()}
+    definitions = {name: _convert_schema(part) for name, part in made["$defs"].items()}
     for model in _filled_from_outside(top):
         for part in definitions[_name(model, definitions)]["properties"].values():
             part.pop("default", None)
@@ -46,7 +46,7 @@ def json_schema(codes: Sequence[str], plugins: Plugins = ()) -> dict[str, Any]:
         named = {"enum": ["", *preset_names(presets, plugins)]}
         file = {"pattern": rf"({'|'.join(map(re.escape, YAML))})$"}
         properties["preset"]["anyOf"] = [named, file]
-    scenario = _converted(made)
+    scenario = _convert_schema(made)
     scenario["properties"]["silence"]["items"]["enum"] = list(codes)
     for part in scenario["properties"]["disturbance"]["anyOf"]:
         if part.get("type") == "array":
@@ -90,7 +90,7 @@ def _filled_from_outside(top: Key) -> set[type[Component]]:
     return {Vessel} | {type(whole) for whole in wholes if whole != type(whole)()}
 
 
-def _converted(schema: dict[str, Any]) -> dict[str, Any]:
+def _convert_schema(schema: dict[str, Any]) -> dict[str, Any]:
     """A schema of pydantic's dialect (2020-12) in draft-07."""
     made = {word: _inside(word, part) for word, part in schema.items() if word not in DROPPED}
     if "description" in made:
@@ -148,10 +148,10 @@ def _choices(part: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _inside(word: str, part: Any) -> Any:
     if word in ("properties", "patternProperties"):
-        return {name: _converted(schema) for name, schema in part.items()}
+        return {name: _convert_schema(schema) for name, schema in part.items()}
     if word == "$ref":
         return part.replace("#/$defs/", "#/definitions/")
     if isinstance(part, list) and word != "enum":
-        return [_converted(schema) if isinstance(schema, dict) else schema for schema in part]
+        return [_convert_schema(schema) if isinstance(schema, dict) else schema for schema in part]
     is_schema = isinstance(part, dict) and word != "default"
-    return _converted(part) if is_schema else part
+    return _convert_schema(part) if is_schema else part

@@ -57,14 +57,19 @@ class Control(Component):
     """When the law acts."""
 
     period: float = value(
-        0.0, "s", "0: continuously; else the law is evaluated once a period, a whole number of "
-        "steps, and its output held", ge=0,
-    )  # fmt: skip
+        0.0,
+        "s",
+        "0: continuously; else the law is evaluated once a period, a whole number of "
+        "steps, and its output held",
+        ge=0,
+    )
     update: Literal["after", "before"] = value(
-        "after", "", "of sampled control: whether the law's memory (weights, integrals, filters) "
+        "after",
+        "",
+        "of sampled control: whether the law's memory (weights, integrals, filters) "
         "takes a sample after the demand is formed from it, or before; it is integrated over a "
         "period with the sample held",
-    )  # fmt: skip
+    )
 
 
 class Log(Component):
@@ -96,14 +101,16 @@ class MetricSettings(Component):
         1.0, "m", "settled when the distance to the target stays below this", gt=0
     )
     windows: dict[str, Window] = value(
-        {}, "s", "parts of the run as [from, to], by name: `line` adds the metrics error_line_rms "
+        {},
+        "s",
+        "parts of the run as [from, to], by name: `line` adds the metrics error_line_rms "
         "and error_line_max",
-    )  # fmt: skip
+    )
     radii: dict[str, float] = value(
         {}, "m", "further settling radii, by name: `near` adds the metric settling_time_near"
     )
 
-    def named(self) -> tuple[Windows, Radii]:
+    def windows_and_radii(self) -> tuple[Windows, Radii]:
         """Windows and radii, as metrics take them."""
         return tuple(self.windows.items()), tuple(self.radii.items())
 

@@ -17,9 +17,18 @@ from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.yaml_tree import plain
 
 SECTIONS = (
-    "vessel", "nominal", "start", "path", "disturbance", "actuator", "measurement", "estimator",
-    "simulation", "control", "metrics",
-)  # fmt: skip
+    "vessel",
+    "nominal",
+    "start",
+    "path",
+    "disturbance",
+    "actuator",
+    "measurement",
+    "estimator",
+    "simulation",
+    "control",
+    "metrics",
+)
 WHICH = ("kind", "preset")  # are told although they equal the default or preset
 
 
@@ -28,10 +37,10 @@ def settings(part: Component, facts: Facts | None = None) -> list[SettingAbout]:
 
     With the facts of hull and actuator also with defaults that follow from these.
     """
-    return list(_settings(part, _preset(part) or _sized(part, facts)))
+    return list(_settings(part, _preset(part) or _with_defaults(part, facts)))
 
 
-def changed(scenario: Scenario) -> list[SettingAbout]:
+def changed_settings(scenario: Scenario) -> list[SettingAbout]:
     """What the scenario says itself, controllers apart."""
     facts = scenario.facts
     return [
@@ -63,7 +72,7 @@ def _preset(part: Component) -> Component | None:
     return type(part)(**{**plain(node), "preset": name}) if node else None
 
 
-def _sized(part: Component, facts: Facts | None) -> Component | None:
+def _with_defaults(part: Component, facts: Facts | None) -> Component | None:
     """The part with every default, those that follow from the facts too; None without any.
 
     It is read only, and not checked: legs have no points by default.
@@ -90,10 +99,13 @@ def _settings(
             meaning = summary(type(part)) if name == "kind" else field.description or ""
             other = content != default and f".{name}" not in PROSE
             yield SettingAbout(
-                key=f"{prefix}{name}", value=value_text(content), unit=unit_of(field, unit),
+                key=f"{prefix}{name}",
+                value=value_text(content),
+                unit=unit_of(field, unit),
                 default=value_text(None if field.is_required() and not base else default),
-                meaning=meaning, changed=other or (name in WHICH and bool(content)),
-            )  # fmt: skip
+                meaning=meaning,
+                changed=other or (name in WHICH and bool(content)),
+            )
 
 
 def _inside(content: Any) -> dict[str, Component]:

@@ -32,7 +32,7 @@ def names(form: str = "yaml") -> tuple[str, ...]:
 
 
 @cache
-def renamed() -> dict[str, str]:
+def renamed_folders() -> dict[str, str]:
     """New names of folders by their old ones, which scenarios of users still have."""
     words = (folder() / RENAMED).read_text("utf-8").split()
     return dict(zip(words[::2], words[1::2], strict=True))
@@ -41,7 +41,7 @@ def renamed() -> dict[str, str]:
 def present(name: str) -> str:
     """A shipped scenario's present name."""
     first, slash, rest = name.removeprefix(PREFIX).partition("/")
-    return f"{PREFIX}{renamed().get(first, first)}{slash}{rest}"
+    return f"{PREFIX}{renamed_folders().get(first, first)}{slash}{rest}"
 
 
 def is_shipped(name: str) -> bool:

@@ -9,15 +9,15 @@ from pydantic import field_validator, model_validator
 
 from podusv_cli.core.about import Keep, StudyClaim
 from podusv_cli.core.component import OF_SECTION, Component, value
-from podusv_cli.core.timed_rows import Named, named_rows
+from podusv_cli.core.timed_rows import NamedRows, named_rows
 from podusv_cli.scenario.distributions import WAYS, Distribution
-from podusv_cli.scenario.yaml_tree import bracketed
+from podusv_cli.scenario.yaml_tree import bracketed_key
 
 POSTERIOR = "posterior.csv"  # hulls that logs leave possible, in a folder of `podusv identify`
 
 
 @lru_cache(maxsize=16)  # a study asks for it at every draw
-def _lines(text: str) -> Named:
+def _lines(text: str) -> NamedRows:
     return named_rows(text, "`rows`")
 
 
@@ -32,21 +32,25 @@ class Quantity(Distribution):
     plus: Distribution | None = value(None, OF_SECTION, "a summand to the scenario's own value")
     seed: bool = value(False, "", "true: a whole number from 0 to 2^53 - 1, as seed of something")
     identified: str | None = value(
-        None, "", "folder of `podusv identify`, beside the scenario; the hulls that its logs leave "
+        None,
+        "",
+        "folder of `podusv identify`, beside the scenario; the hulls that its logs leave "
         "possible (posterior.csv) are read into `rows`",
-    )  # fmt: skip
+    )
     rows: str = value(
-        "", "", "lines of numbers with commas, the first of names: a draw takes one line, and each "
+        "",
+        "",
+        "lines of numbers with commas, the first of names: a draw takes one line, and each "
         "key below the quantity (or below each of `keys`) its number there",
-    )  # fmt: skip
+    )
 
     @field_validator("keys")
     @classmethod
     def _in_one_form(cls, keys: tuple[str, ...]) -> tuple[str, ...]:
-        return tuple(map(bracketed, keys))
+        return tuple(map(bracketed_key, keys))
 
     @property
-    def given(self) -> list[str]:
+    def given_keys(self) -> list[str]:
         """The keys that say how to draw."""
         return [name for name in (*WAYS, "times", "plus", "seed", "rows") if self._says(name)]
 
@@ -62,7 +66,7 @@ class Quantity(Distribution):
         return self.times or self.plus or self
 
     @property
-    def lines(self) -> Named:
+    def lines(self) -> NamedRows:
         """The numbers of `rows`, under the names of keys. Raises ValueError."""
         return _lines(self.rows)
 
@@ -102,7 +106,7 @@ class Quantity(Distribution):
     def _of_numbers(self) -> Self:
         words = [word for word in self.distribution.choice or () if isinstance(word, (str, bool))]
         if self.relative and words:
-            raise ValueError(f"{self.given[0]}: needs numbers, choice has {words[0]!r}")
+            raise ValueError(f"{self.given_keys[0]}: needs numbers, choice has {words[0]!r}")
         return self
 
 

@@ -33,20 +33,20 @@ class Range(Component):
     keep: bool = value(False, "", "true: stays as it is")
 
     @property
-    def given(self) -> list[str]:
+    def given_keys(self) -> list[str]:
         """The keys that are given."""
         return [n for n in type(self).model_fields if getattr(self, n) not in (None, False)]
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        if len(self.given) != 1:
-            found = " and ".join(self.given) or "none"
+        if len(self.given_keys) != 1:
+            found = " and ".join(self.given_keys) or "none"
             raise ValueError(
                 f"must have one of {', '.join(type(self).model_fields)}; found {found}"
             )
         bounds = self.log or self.uniform or self.integers
         if bounds and not (bounds[0] < bounds[1] and math.isfinite(bounds[1] - bounds[0])):
-            raise ValueError(f"{self.given[0]}: {bounds[0]:g} is not below {bounds[1]:g}")
+            raise ValueError(f"{self.given_keys[0]}: {bounds[0]:g} is not below {bounds[1]:g}")
         if self.log and self.log[0] <= 0.0:
             raise ValueError(f"log: {self.log[0]:g} is not above 0; write uniform: [low, high]")
         if self.choice is not None and len(set(self.choice)) < 2:
@@ -69,9 +69,7 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
             500, "", "other draws, on which found gains are reported", ge=1, le=10**7
         )
         objective: str = value(
-            "median(iae)",
-            "",
-            "what is to be small, as an expression over draws",
+            "median(iae)", "", "what is to be small, as an expression over draws"
         )
         subject_to: tuple[str, ...] = value((), "", "inequalities over draws that have to hold")
         space: dict[str, float | Range] = value(
@@ -89,9 +87,12 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
         )
 
         training_sets: int = value(
-            1, "", "sets of `train` draws; every law is searched `repeats` times on each", ge=1,
+            1,
+            "",
+            "sets of `train` draws; every law is searched `repeats` times on each",
+            ge=1,
             le=100,
-        )  # fmt: skip
+        )
 
         @property
         def searches(self) -> int:

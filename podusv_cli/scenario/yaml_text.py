@@ -22,10 +22,10 @@ from typing import Any
 
 import yaml
 
-from podusv_cli.core.phrases import found, quoted
+from podusv_cli.core.phrases import describe_found, quote
 from podusv_cli.core.units import NUMBER
 from podusv_cli.scenario.shipped import PREFIX, file_of, names
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted_key
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 32
@@ -69,7 +69,7 @@ OPENING = ("unexpected end of stream", "but got '<stream end>'")
 
 def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | None:
     """What a file holds, or None and a fault at `mark`."""
-    named = "" if mark == Mark(path) else f"{quoted(path)} "
+    named = "" if mark == Mark(path) else f"{quote(path)} "
     try:
         with open(file_of(path), "rb", opener=_nonblocking_opener) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -79,7 +79,7 @@ def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | 
         reason = str((isinstance(error, OSError) and error.strerror) or error)
         reason = reason[:1].lower() + reason[1:]
         if isinstance(error, FileNotFoundError):
-            reason += _meant(path)
+            reason += _guess_path(path)
             if named:
                 reason += f"; looked in {os.path.dirname(os.path.abspath(path))}"
         faults.append(Fault(mark, key, f"{named}cannot be read: {reason}"))
@@ -90,7 +90,7 @@ def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | 
     return data
 
 
-def _meant(path: str) -> str:
+def _guess_path(path: str) -> str:
     """`; did you mean 'base.yaml'?` for a file that is not there, "" where nothing is like it."""
     folder, name = os.path.split(path)
     near: list[str] = []
@@ -99,10 +99,10 @@ def _meant(path: str) -> str:
     whole = [os.path.join(folder, name + end) for end in ENDINGS if name + end in near]
     shipped = [name for name in names() if name in (PREFIX + path, f"{PREFIX}{path}.yaml")]
     if exact := [*whole, *shipped]:
-        return f"; did you mean {quoted(exact[0])}?"
+        return f"; did you mean {quote(exact[0])}?"
     stems = {os.path.splitext(file)[0]: file for file in near}
     close = get_close_matches(os.path.splitext(name)[0], stems, n=1)
-    return f"; did you mean {quoted(os.path.join(folder, stems[close[0]]))}?" if close else ""
+    return f"; did you mean {quote(os.path.join(folder, stems[close[0]]))}?" if close else ""
 
 
 def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
@@ -160,9 +160,14 @@ def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: 
 
 
 def read(
-    text: str, source: str, faults: list[Fault], *, placed: bool = True, most: int = MAX_NODES,
+    text: str,
+    source: str,
+    faults: list[Fault],
+    *,
+    placed: bool = True,
+    most: int = MAX_NODES,
     above: tuple[str, ...] = (),
-) -> Node | None:  # fmt: skip
+) -> Node | None:
     """The tree of a single YAML document of at most `most` values; None if that is not possible.
 
     Every fault is appended to `faults`. Marks have lines only where `placed`, and then the files
@@ -202,9 +207,14 @@ class _Reader:
     """Reads one document from the parser's events."""
 
     def __init__(
-        self, text: str, source: str, faults: list[Fault], placed: bool, most: int,
+        self,
+        text: str,
+        source: str,
+        faults: list[Fault],
+        placed: bool,
+        most: int,
         above: tuple[str, ...],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._text, self._source, self._placed, self._most = text, source, placed, most
         self._above = above
         self._events = _events(text)
@@ -266,7 +276,7 @@ class _Reader:
         return self._mark(event.start_mark.line, event.start_mark.column)
 
     def _fault(self, event: Any, route: Route, text: str) -> None:
-        self._faults.append(Fault(self._start(event), dotted(route), text))
+        self._faults.append(Fault(self._start(event), dotted_key(route), text))
 
     def _node(self, event: Any, route: Route) -> Node:
         self._nodes += 1
@@ -280,7 +290,7 @@ class _Reader:
         if event.anchor:
             self._fault(event, route, f"anchor &{event.anchor}; scenarios have no anchors")
         if event.tag:
-            self._fault(event, route, f"tag {quoted(event.tag)}; scenarios have no tags")
+            self._fault(event, route, f"tag {quote(event.tag)}; scenarios have no tags")
         if isinstance(event, yaml.ScalarEvent):
             return self._scalar(event, route)
         is_list = isinstance(event, yaml.SequenceStartEvent)
@@ -289,7 +299,7 @@ class _Reader:
     def _scalar(self, event: Any, route: Route) -> Node:
         mark = self._start(event)
         take = text_node if event.style else plain_node
-        node = take(event.value, mark, dotted(route), self._faults)
+        node = take(event.value, mark, dotted_key(route), self._faults)
         return replace(node, faulty=node.faulty or bool(event.tag))
 
     def _list(self, event: Any, route: Route) -> Node:
@@ -319,7 +329,7 @@ class _Reader:
         if is_word and isinstance(node.content, str) and not advice:
             return node.content
         if not node.faulty:
-            what = found(node.content, node.text)
+            what = describe_found(node.content, node.text)
             self._fault(event, route, f"keys are words, found {what}{advice}")
         return None
 

@@ -11,9 +11,21 @@ LONGEST_PLACE = 9  # digits of a place in a list; Python refuses to read thousan
 Route = tuple[str | int, ...]
 # The keys of a quantity that a study draws, and those of them that say how it is drawn.
 QUANTITY = {
-    "uniform", "log_uniform", "normal", "lognormal", "triangular", "choice", "integers", "angle",
-    "times", "plus", "seed", "identified", "rows", "keys",
-}  # fmt: skip
+    "uniform",
+    "log_uniform",
+    "normal",
+    "lognormal",
+    "triangular",
+    "choice",
+    "integers",
+    "angle",
+    "times",
+    "plus",
+    "seed",
+    "identified",
+    "rows",
+    "keys",
+}
 NAMED_BY_KEYS = (
     ("sweep", "vary"),
     ("sweep", "grid"),
@@ -61,7 +73,8 @@ class Node:
 
     `key_mark` is the position of its key. `text` is a scalar as written. `faulty` says that a
     fault was reported here: a scalar or list has no content, a mapping may lack keys. `instead_of`
-    is the section of another kind that it stands in place of; `kinds.kept` says what it keeps.
+    is the section of another kind that it stands in place of; `kinds.merge_kept` says what it
+    keeps.
     """
 
     content: Any
@@ -91,7 +104,7 @@ class Node:
         return replace(self, content={**self.mapping, key: entry})
 
 
-def dotted(route: Route) -> str:
+def dotted_key(route: Route) -> str:
     """`network.nodes[0]` for ("network", "nodes", 0)."""
     parts = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in route)
     return printable(parts).removeprefix(".")
@@ -108,7 +121,7 @@ def steps_of(key: str) -> tuple[str, ...]:
     return tuple(re.sub(r"\[(\d+)\]", r".\1", key).split("."))
 
 
-def bracketed(key: str) -> str:
+def bracketed_key(key: str) -> str:
     """`disturbance[2].seed`, also for `disturbance.2.seed`."""
     return re.sub(r"\.(\d+)(?=\.|\[|$)", r"[\1]", key)
 
@@ -121,7 +134,7 @@ def with_dotted_key(steps: Route) -> Route:
     # `seed` may be the end of a name.
     ends = (i for i, step in enumerate(rest) if step in (QUANTITY | RANGE) - {"seed"})
     end = next(ends, len(rest))
-    return (*above, *filter(None, [bracketed(dotted(rest[:end]))]), *rest[end:])
+    return (*above, *filter(None, [bracketed_key(dotted_key(rest[:end]))]), *rest[end:])
 
 
 def printable(text: str) -> str:
@@ -145,7 +158,7 @@ def _items(content: Any) -> tuple[Node, ...]:
     return content if isinstance(content, tuple) else ()
 
 
-def placed(key: str, node: Node, root: Node) -> Node:
+def tree_with(key: str, node: Node, root: Node) -> Node:
     """The tree that has nothing but a value at a key; it stands where `root` does."""
     for step in reversed(route(key)):
         node = Node({str(step): node}, node.mark)
@@ -211,8 +224,8 @@ def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) 
         for key in wrong:
             mark = top.mapping[key].key_mark or top.mapping[key].mark
             kinds = [entry.word("kind") for entry in entries]
-            place = bracketed(dotted((*at, key)))
-            faults.append(Fault(mark, place, entries_of(bracketed(dotted(at)), kinds)))
+            place = bracketed_key(dotted_key((*at, key)))
+            faults.append(Fault(mark, place, entries_of(bracketed_key(dotted_key(at)), kinds)))
         if wrong:
             return base
     if not top.mapping or _another_kind(base, top):

@@ -38,13 +38,17 @@ def write(
     """
     remove_abandoned_files(out.parent)
     part, top = out.with_name(temporary_name()), folder.resolve().name
-    if why := next(filter(None, (misnamed(f"{top}/{name}") for name in names)), ""):
+    if why := next(filter(None, (name_fault(f"{top}/{name}") for name in names)), ""):
         raise StorageError(f"{folder} is not packed: {why}; rename it")
     size = sum((folder / name).stat().st_size for name in names)
     try:
         with files.new_file(part, size) as file, zipfile.ZipFile(file, "w") as archive:
             for name in sorted({*names, *made}):
-                with BytesIO(made[name]) if name in made else files.opened(folder / name) as source:
+                with (
+                    BytesIO(made[name])
+                    if name in made
+                    else files.open_regular(folder / name) as source
+                ):
                     _add(archive, f"{top}/{name}", source)
         with files.storage_errors(f"cannot write {out}"):
             os.replace(part, out)
@@ -54,7 +58,7 @@ def write(
     return out.stat().st_size
 
 
-def misnamed(name: str) -> str:
+def name_fault(name: str) -> str:
     """Why a file is not unpacked under this name; "" if it is.
 
     It has to be below one folder, and to be seen: a folder `.git` or `.ssh` that is suddenly there
@@ -144,7 +148,7 @@ class Archive:
     def _check(self, entry: zipfile.ZipInfo) -> None:
         """Raise StorageError for what is no plain file below one folder."""
         name = entry.filename
-        if why := misnamed(name):
+        if why := name_fault(name):
             raise self.fault(why)
         kind = stat.S_IFMT(entry.external_attr >> 16)
         if kind not in (0, stat.S_IFREG):
@@ -174,9 +178,9 @@ class Archive:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Archive]:
+def open_archive(path: Path) -> Iterator[Archive]:
     """An archive, open for reading. Raises StorageError for one that must not be unpacked."""
-    with files.opened(path) as file:
+    with files.open_regular(path) as file:
         try:
             archive = zipfile.ZipFile(file)
         except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:

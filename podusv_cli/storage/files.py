@@ -210,7 +210,7 @@ def _create(path: Path, content: bytes) -> None:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[BufferedReader]:
+def open_regular(path: Path) -> Iterator[BufferedReader]:
     """A regular file, open for reading; raises StorageError for a link, pipe or device."""
     # Without O_NONBLOCK, opening a named pipe would wait for its writer.
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
@@ -230,7 +230,7 @@ def file_size(file: BufferedReader) -> int:
 
 def read_text(path: Path) -> str:
     """A UTF-8 text of at most LARGEST_TEXT bytes; raises StorageError."""
-    with opened(path) as file:
+    with open_regular(path) as file:
         size = file_size(file)
         if size > LARGEST_TEXT:
             raise StorageError(f"cannot read {path}: {size} bytes, at most {LARGEST_TEXT} allowed")
@@ -243,6 +243,6 @@ def read_text(path: Path) -> str:
 
 def fingerprint(path: Path) -> tuple[str, int]:
     """SHA-256 in hex, and size in bytes; raises StorageError."""
-    with opened(path) as file:
+    with open_regular(path) as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         return digest, file.tell()

@@ -13,9 +13,15 @@ from podusv_cli.storage import files
 
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
 DAMAGE = (
-    OSError, RuntimeError, ValueError, LookupError, TypeError, AttributeError, MemoryError,
+    OSError,
+    RuntimeError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    MemoryError,
     OverflowError,
-)  # fmt: skip
+)
 
 
 @contextmanager
@@ -29,7 +35,7 @@ def readable(path: Path, kind: str) -> Iterator[None]:
 
 
 @contextmanager
-def opened(path: Path, kind: str) -> Iterator[h5py.File]:
+def open_hdf5(path: Path, kind: str) -> Iterator[h5py.File]:
     """A regular file with all of its data in itself.
 
     Whatever h5py raises in the block is a StorageError that calls the file no `kind`.
@@ -45,7 +51,7 @@ def _descriptor(path: Path) -> Iterator[str]:
 
     HDF5 reads it by itself, as it may close it when Python has ended and cannot be called.
     """
-    with files.opened(path) as raw:
+    with files.open_regular(path) as raw:
         yield f"/dev/fd/{raw.fileno()}"
 
 

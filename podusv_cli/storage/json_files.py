@@ -1,18 +1,15 @@
-"""JSON files: indented by two spaces, with null for numbers that are not finite."""
+"""JSON files, read with every doubt about them."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numpy as np
 from pydantic import BaseModel, ValidationError
 
-from podusv_cli.core import escaping
 from podusv_cli.core.errors import StorageError
 from podusv_cli.storage.files import read_text
 
@@ -20,39 +17,21 @@ LONGEST = 300  # digits of an integer that is a finite float
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def encode(content: Mapping[str, Any]) -> bytes:
-    """UTF-8 text with a final newline. TypeError for values that JSON does not know."""
-    text = json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False)
-    return f"{escaping.json(text)}\n".encode()
-
-
-def plain(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The content as JSON gives it back."""
-    return dict(json.loads(encode(content)))
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 def read(path: Path) -> dict[str, Any]:
     """Read a JSON object; raises StorageError for anything that podusv does not write."""
-    return parsed(read_text(path), path)
+    return parse_json(read_text(path), path)
 
 
-def parsed(text: str, path: Path) -> dict[str, Any]:
+def parse_json(text: str, path: Path) -> dict[str, Any]:
     """As `read`, of the text of the file at `path`."""
     try:
         content = json.loads(
-            text, object_pairs_hook=_object,
-            parse_float=_finite, parse_int=_whole, parse_constant=_finite,
-        )  # fmt: skip
+            text,
+            object_pairs_hook=_object,
+            parse_float=_finite,
+            parse_int=_whole,
+            parse_constant=_finite,
+        )
     except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise StorageError(f"cannot read {path}: not valid JSON ({reason})") from error
@@ -69,7 +48,9 @@ def read_as(path: Path, model: type[Model]) -> Model:
 def parsed_as(text: str, path: Path, model: type[Model]) -> Model:
     """As `read_as`, of the text of the file at `path`."""
     try:
-        return model.model_validate_json(json.dumps(parsed(text, path)))  # a list is a tuple, too
+        return model.model_validate_json(
+            json.dumps(parse_json(text, path))
+        )  # a list is a tuple, too
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))

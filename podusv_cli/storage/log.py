@@ -35,8 +35,10 @@ ROWS = 4096  # written of all arrays in turn, since the engine stores a row's nu
 # The newest format that HDF5 1.8 reads, and so does any MATLAB. Every array begins at a multiple of
 # 8 bytes, so that it can be used where it lies when the file is mapped into memory.
 FILE: dict[str, Any] = {
-    "libver": ("v108", "v108"), "alignment_threshold": 1, "alignment_interval": 8,
-}  # fmt: skip
+    "libver": ("v108", "v108"),
+    "alignment_threshold": 1,
+    "alignment_interval": 8,
+}
 UNDATED = {"track_order": True, "track_times": False}
 _COMPRESSED = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
 

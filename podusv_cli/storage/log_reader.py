@@ -22,7 +22,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.core.signal import Signal
 from podusv_cli.storage import hdf5
-from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, file_size, opened
+from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, file_size, open_regular
 from podusv_cli.storage.log import PROVENANCE, RESOLVED
 from podusv_cli.storage.manifest import other_format
 
@@ -36,7 +36,7 @@ def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
     `seen` is not logged and stays None. Raises StorageError, also if the file or its numbers take
     more than `largest` bytes.
     """
-    with _opened(path, largest) as (file, raw):
+    with _open_log(path, largest) as (file, raw):
         datasets = {n: d for n, d in file.items() if isinstance(d, h5py.Dataset)}
         datasets = {name: d for name, d in datasets.items() if d.dtype == NUMBERS}
         total = sum(NUMBERS.itemsize * dataset.size for dataset in datasets.values())
@@ -59,16 +59,16 @@ def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
 
 def resolved_yaml(path: Path) -> str:
     """The complete scenario of a log file. Raises StorageError."""
-    with _opened(path) as (file, _):
+    with _open_log(path) as (file, _):
         return _text(file[PROVENANCE][RESOLVED][()])
 
 
 @contextmanager
-def _opened(
+def _open_log(
     path: Path, largest: float = LARGEST_FILE
 ) -> Iterator[tuple[h5py.File, BufferedReader]]:
     """A log with the known format, and its open file; errors in the block become StorageError."""
-    with opened(path) as raw:
+    with open_regular(path) as raw:
         if file_size(raw) > largest:
             sizes = f"{file_size(raw)} bytes, at most {largest} allowed"
             raise StorageError(f"cannot read {path}: {sizes}{ELSEWHERE}")

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.storage import files as atomic
@@ -46,7 +47,7 @@ def write(folder: Path, status: Status) -> Manifest:
     manifest = Manifest(
         podusv_format=FORMAT, status=status, files={name: _entry(folder / name) for name in names}
     )
-    atomic.write_bytes(folder / NAME, json_files.encode(manifest.model_dump()))
+    atomic.write_bytes(folder / NAME, json_text.encode(manifest.model_dump()))
     return manifest
 
 
@@ -59,13 +60,13 @@ def demand(folder: Path) -> None:
 
 def read(folder: Path) -> Manifest:
     """The manifest of a folder; the files are not checked. Raises StorageError."""
-    return parsed(atomic.read_text(folder / NAME), folder)
+    return parse_manifest(atomic.read_text(folder / NAME), folder)
 
 
-def parsed(text: str, folder: Path) -> Manifest:
+def parse_manifest(text: str, folder: Path) -> Manifest:
     """As `read`, of the text of the folder's manifest."""
     path = folder / NAME
-    content = json_files.parsed(text, path)
+    content = json_files.parse_json(text, path)
     if misfit := other_format(content.get("podusv_format")):
         raise StorageError(f"{path}: {misfit}")
     try:

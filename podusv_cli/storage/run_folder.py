@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,9 +16,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from podusv_cli.core import json_text
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import StorageError
-from podusv_cli.core.plugins import Plugin
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.plugins import Plugin, Plugins
 from podusv_cli.core.quantities import bytes_in_words
 from podusv_cli.core.recording import Recording, Status
 from podusv_cli.process.extras import Extras
@@ -43,10 +46,10 @@ def default_folder(root: Path, name: str, resolved_yaml: str) -> Path:
 
 def free_folder(folder: Path) -> Path:
     """The folder, or where that is taken the same name with a number appended."""
-    return next(path for path in _numbered(folder) if not os.path.lexists(path))
+    return next(path for path in _numbered_folders(folder) if not os.path.lexists(path))
 
 
-def _numbered(folder: Path) -> Iterator[Path]:
+def _numbered_folders(folder: Path) -> Iterator[Path]:
     yield folder
     for number in count(2):
         yield folder.with_name(f"{folder.name}-{number}")
@@ -69,9 +72,14 @@ class RunWriter:
     """
 
     def __init__(
-        self, final: Path, *, force: bool = False, named: bool = True, needed: float = 0.0,
+        self,
+        final: Path,
+        *,
+        force: bool = False,
+        named: bool = True,
+        needed: float = 0.0,
         argv: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
         self.final, self._force, self._named = final, force and named, named
         self._argv, self._began, self.extras = argv, datetime.now(UTC), Extras()
@@ -95,7 +103,7 @@ class RunWriter:
 
     def add_json(self, name: str, content: Mapping[str, Any]) -> None:
         """Write a new JSON file, null for numbers that are not finite."""
-        self.add(name, json_files.encode(content))
+        self.add(name, json_text.encode(content))
 
     def add_origin(self, plugins: Iterable[Plugin] = (), **more: Any) -> dict[str, Any]:
         """Write provenance.json; what is in it, for a page."""
@@ -134,7 +142,7 @@ class RunWriter:
         return self._staging.final
 
     def _publish_beside(self) -> Path:
-        for path in islice(_numbered(self.final), 1, None):
+        for path in islice(_numbered_folders(self.final), 1, None):
             with suppress(Taken):
                 _check_replaceable(path, force=False)
                 self._staging.final = path
@@ -202,13 +210,31 @@ def check_free_space(final: Path, needed: float, remedy: str) -> None:
 
 
 @dataclass(frozen=True)
-class FinishedRun:
-    """A run as its finished folder has it. `metrics` has None where a number was not finite.
+class UnreadLog:
+    """A log.h5 that is read when it is first asked for, once for all who share it."""
+
+    path: Path
+
+    @cached_property
+    def recording(self) -> Recording:
+        """Its content. Raises StorageError."""
+        from podusv_cli.storage import log_reader  # h5py is slow to import
+
+        return log_reader.read_log(self.path)
+
+    def __getstate__(self) -> dict[str, Path]:
+        """Its place alone: another process reads the file itself, instead of taking its numbers."""
+        return {"path": self.path.absolute()}
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """The files of a finished run folder. `metrics` has None where a number was not finite.
 
     `about` is None where an older podusv wrote the folder.
     """
 
-    folder: Path
+    path: Path
     status: Status
     metrics: dict[str, float | None]
     provenance: dict[str, Any]
@@ -219,29 +245,27 @@ class FinishedRun:
     @property
     def has_log(self) -> bool:
         """Whether its log is there; a folder may be packed without."""
-        return (self.folder / LOG).exists()
+        return (self.path / LOG).exists()
 
     @cached_property
+    def log(self) -> UnreadLog:
+        """Its log, read on first use."""
+        return UnreadLog(self.path / LOG)
+
+    @property
     def recording(self) -> Recording:
-        """The content of log.h5, read on first use. Raises StorageError."""
-        from podusv_cli.storage import log_reader  # h5py is slow to import
+        """The content of log.h5. Raises StorageError."""
+        return self.log.recording
 
-        return log_reader.read_log(self.folder / LOG)
-
-
-@dataclass(frozen=True)
-class InMemory(FinishedRun):
-    """A run that lies in no folder."""
-
-    kept: Recording = field(kw_only=True)
-
-    @cached_property
-    def recording(self) -> Recording:
-        """What was recorded."""
-        return self.kept
+    def as_run(self, label: str, about: RunAbout, plugins: Plugins = ()) -> PastRun:
+        """The run in it under a label; `about` may be made of the scenario, see `about`."""
+        numbers = {n: math.nan if x is None else float(x) for n, x in self.metrics.items()}
+        return PastRun(
+            label, about, self.log, numbers, plugins=plugins, folder=self.path, theory=self.theory
+        )
 
 
-def open_run(folder: Path, *, optional: str = "") -> FinishedRun:
+def open_run(folder: Path, *, optional: str = "") -> RunFolder:
     """Open a run folder whose files are unchanged since it was finished.
 
     Raises StorageError naming the first fault. The file `optional` may be missing.
@@ -250,8 +274,8 @@ def open_run(folder: Path, *, optional: str = "") -> FinishedRun:
     missing = [name for name in NEEDED if name not in contents.files]
     if missing:
         raise StorageError(f"{folder} is not the folder of a run: it has no {missing[0]}")
-    return FinishedRun(
-        folder=folder,
+    return RunFolder(
+        path=folder,
         status=contents.status,
         metrics=_metrics(folder / "metrics.json"),
         provenance=json_files.read(folder / PROVENANCE),

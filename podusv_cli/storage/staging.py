@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError
-from podusv_cli.process.temporary_names import abandoned, temporary_name
+from podusv_cli.process.temporary_names import find_abandoned, temporary_name
 from podusv_cli.storage import files
 
 _TAKEN = (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR)
@@ -77,12 +77,12 @@ class Staging:
             raise Taken(text) from error
 
     def _replace(self) -> None:
-        if not self._exchanged():
+        if not self._exchange():
             with suppress(FileNotFoundError):
                 os.rename(self.final, _old(self._box))
             self._rename()
 
-    def _exchanged(self) -> bool:
+    def _exchange(self) -> bool:
         try:
             exchange(self.folder, self.final)
         except OSError as error:
@@ -105,7 +105,7 @@ def exchange(one: Path, other: Path) -> None:
 
 def remove_abandoned(parent: Path) -> None:
     """Delete unfinished folders of killed processes; restore folders that they were replacing."""
-    for box, final in abandoned(parent):
+    for box, final in find_abandoned(parent):
         if final:
             _remove_box(box, parent / final)
 

@@ -26,9 +26,11 @@ WITHOUT_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP)  # what such a file 
 
 @contextmanager
 def sole_writer(
-    folder: Path, what: str = RUNS, patience: float = 0.0,
+    folder: Path,
+    what: str = RUNS,
+    patience: float = 0.0,
     warn: Callable[[str], None] = lambda text: None,
-) -> Iterator[None]:  # fmt: skip
+) -> Iterator[None]:
     """Make the folder, and keep other processes from writing into it during the block.
 
     The lock is one of the operating system, which ends with its process. `warn` is told where
@@ -39,7 +41,7 @@ def sole_writer(
     _check_plain(folder)
     path = folder / what
     with storage_errors(f"cannot lock {folder}"), interrupts_enabled():
-        lock = _locked(path, patience, warn)
+        lock = _lock_folder(path, patience, warn)
     try:
         with suppress(OSError):  # a full disk, where only the message lacks these words
             path.write_text(f"{os.getpid()} {platform.node()}")
@@ -49,7 +51,7 @@ def sole_writer(
         lock.release()
 
 
-def _locked(path: Path, patience: float, warn: Callable[[str], None]) -> BaseFileLock:
+def _lock_folder(path: Path, patience: float, warn: Callable[[str], None]) -> BaseFileLock:
     from filelock import FileLock, Timeout  # 30 ms, for commands that write a study
 
     lock = FileLock(path, fallback_to_soft=False)  # a soft one outlives a process that is killed

@@ -32,9 +32,11 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.components.paths.base import Path as AnyPath
 from podusv_cli.components.paths.line import Line
+from podusv_cli.core import derived_signals as derived
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
 from podusv_cli.core.kernel import Vector, bundle, call
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
@@ -43,9 +45,8 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.figures import signals as derived
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.style import house_style, image
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.metrics.table import metrics_probe, metrics_with
@@ -124,14 +125,14 @@ def keeps_its_declaration(component: Component) -> None:
 def is_finite(component: Component) -> None:
     """At random states every output is written and finite, and nothing that is only to be read."""
     for seed in range(STATES):
-        for out in evaluated(component, seed):
+        for out in evaluate_component(component, seed):
             assert np.isfinite(out).all(), f"at random state {seed} it writes {out}"
 
 
 def remembers_nothing(component: Component) -> None:
     """The same state gives the same bits, whatever was evaluated in between."""
-    first = [evaluated(component, seed) for seed in range(STATES)]
-    again = [evaluated(component, seed) for seed in reversed(range(STATES))][::-1]
+    first = [evaluate_component(component, seed) for seed in range(STATES)]
+    again = [evaluate_component(component, seed) for seed in reversed(range(STATES))][::-1]
     for seed, (one, other) in enumerate(zip(first, again, strict=True)):
         for a, b in zip(one, other, strict=True):
             np.testing.assert_array_equal(a, b, f"random state {seed}")
@@ -148,9 +149,12 @@ def repeats_itself(component: Component) -> None:
 
 
 CHECKS: tuple[Check, ...] = (
-    keeps_its_declaration, is_finite, remembers_nothing, runs_alike_compiled_and_plain,
+    keeps_its_declaration,
+    is_finite,
+    remembers_nothing,
+    runs_alike_compiled_and_plain,
     repeats_itself,
-)  # fmt: skip
+)
 
 
 def has_a_number(metric: Metric) -> None:
@@ -205,7 +209,7 @@ def picture(sheet: Sheet, count: int, columns: int) -> bytes:
     waves = {name: np.sin(run["time"]) for name in sheet.signals if name not in known}
     about = {name: Signal(name, "1", "a wave") for name in waves}
     run = replace(run, signals={**run.signals, **waves}, about={**run.about, **about})
-    shown = dressed([(f"run {n}", run, about_of(scenario), ()) for n in range(count)])
+    shown = dress_runs([PastRun(f"run {n}", about_of(scenario), run) for n in range(count)])
     with house_style():
         return image(sheet.family(shown, columns), "png")
 
@@ -221,14 +225,19 @@ def _compare(one: Recording, other: Recording, *, rtol: float, atol: float) -> N
 def loop_with(component: Component) -> ClosedLoop:
     """A closed loop of podusv's own parts, with this one in its place."""
     parts: dict[str, Any] = {
-        "path": Line(), "disturbance": Calm(), "actuator": Ideal(), "controller": Pid(),
+        "path": Line(),
+        "disturbance": Calm(),
+        "actuator": Ideal(),
+        "controller": Pid(),
         "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
-    }  # fmt: skip
+    }
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
     return ClosedLoop(
-        vessel=usual_vessel(), nominal=usual_vessel(), start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
+        vessel=usual_vessel(),
+        nominal=usual_vessel(),
+        start=(-5.0, -2.0, 0.1, 0.3, 0.0, 0.0),
         **parts | {place: component},
-    )  # fmt: skip
+    )
 
 
 def run_with(component: Component, compiled: bool) -> Recording:
@@ -236,7 +245,7 @@ def run_with(component: Component, compiled: bool) -> Recording:
     return simulate(loop_with(component), TimeGrid(STEP, STEPS), compiled=compiled)
 
 
-def evaluated(component: Component, seed: int) -> list[Vector]:
+def evaluate_component(component: Component, seed: int) -> list[Vector]:
     """What the component's kernel writes at a random state; NaN where it writes nothing."""
     random = np.random.default_rng(seed)
     t = float(random.uniform(0.0, 300.0))
@@ -266,9 +275,18 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
         call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())
     tau, rate, signals = outputs
     call(
-        law.law, t=t, x=x, memory=_to_read(memory), target=target, k=k, table=law.table(), tau=tau,
-        rate=rate, signals=signals, work=np.full(law.workspace(), np.nan),
-    )  # fmt: skip
+        law.law,
+        t=t,
+        x=x,
+        memory=_to_read(memory),
+        target=target,
+        k=k,
+        table=law.table(),
+        tau=tau,
+        rate=rate,
+        signals=signals,
+        work=np.full(law.workspace(), np.nan),
+    )
     return outputs
 
 
@@ -284,9 +302,15 @@ def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[V
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     out, hull = np.full(3 + len(sea.signals), np.nan), usual_vessel()
     call(
-        sea.evaluate, t=t, x=x, k=bundle(sea.constants_with(hull)), table=sea.table_for(hull, t),
-        b=out, again=0.0, stage=0.0,
-    )  # fmt: skip
+        sea.evaluate,
+        t=t,
+        x=x,
+        k=bundle(sea.constants_with(hull)),
+        table=sea.table_for(hull, t),
+        b=out,
+        again=0.0,
+        stage=0.0,
+    )
     return [out]
 
 
@@ -296,9 +320,17 @@ def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -
     k = bundle(actuator.constants())
     tau, rate, signals = outputs
     call(
-        actuator.drive, t=t, x=x, state=state, demand=demand, k=k, table=actuator.table(), tau=tau,
-        rate=rate, signals=signals,
-    )  # fmt: skip
+        actuator.drive,
+        t=t,
+        x=x,
+        state=state,
+        demand=demand,
+        k=k,
+        table=actuator.table(),
+        tau=tau,
+        rate=rate,
+        signals=signals,
+    )
     return outputs
 
 
@@ -328,6 +360,10 @@ def _estimator(estimator: Any, t: float, x: Vector, target: Vector, random: Any)
 
 
 CALLS = (
-    (Controller, _law), (AnyPath, _path), (Disturbance, _sea), (Actuator, _actuator),
-    (Measurement, _measurement), (Estimator, _estimator),
-)  # fmt: skip
+    (Controller, _law),
+    (AnyPath, _path),
+    (Disturbance, _sea),
+    (Actuator, _actuator),
+    (Measurement, _measurement),
+    (Estimator, _estimator),
+)

@@ -32,7 +32,7 @@ def usual_vessel() -> Vessel:
     return Vessel(**{**(plain(node) if node else {}), "preset": "paper_nonlinear"})
 
 
-def guarded(numbers: Vector) -> Vector:
+def guard(numbers: Vector) -> Vector:
     """The numbers, and behind them room that must not be written."""
     return np.concatenate([numbers, np.full(MARGIN, BEYOND)])
 
@@ -48,11 +48,11 @@ def pose_at(t: float) -> Vector:
     return np.sin(rates * t + places) * [9.0, 9.0, 3.0, 1.0, 0.3, 0.5]
 
 
-def watched(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> list[Vector]:
+def watch_sensors(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> list[Vector]:
     """What is seen at each instant, while nothing else is written."""
     k = bundle(sensors.constants_with(STEP, 0))
     table = sensors.table_for(STEP, table_of)
-    seen, given, before = guarded(sensors.first(pose_at(0.0), STEP)), np.zeros(3), table.copy()
+    seen, given, before = guard(sensors.first(pose_at(0.0), STEP)), np.zeros(3), table.copy()
     rows = []
     for instant in range(steps):
         x = pose_at(instant * STEP)
@@ -76,7 +76,7 @@ def watched(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> 
 
 def marks_what_it_delivers(sensors: Measurement) -> None:
     """Marks are 0 or 1, a value changes only where it is marked, all that is measured comes."""
-    rows, known = np.array(watched(sensors)), np.array(sensors.measured(), float)
+    rows, known = np.array(watch_sensors(sensors)), np.array(sensors.measured(), float)
     values, fresh = rows[:, VALUE:FRESH], rows[:, FRESH:KNOWN]
     assert np.isin(fresh, (0.0, 1.0)).all(), "a mark of delivery is neither 0 nor 1"
     assert (rows[:, KNOWN:OWN] == known).all(), "the marks of what is measured change"
@@ -90,7 +90,7 @@ def marks_what_it_delivers(sensors: Measurement) -> None:
 
 def measures_the_vessel(sensors: Measurement) -> None:
     """What is delivered follows the true state, or it measures something else."""
-    rows = np.array(watched(sensors))
+    rows = np.array(watch_sensors(sensors))
     true = np.array([pose_at(instant * STEP) for instant in range(STEPS)])
     for i, state in enumerate(STATE):
         came = rows[:, FRESH + i] == 1.0
@@ -101,7 +101,7 @@ def measures_the_vessel(sensors: Measurement) -> None:
 
 def errs_alike_in_a_longer_run(sensors: Measurement) -> None:
     """Errors are functions of seed and sample, the same again and in a run of twice the length."""
-    first, again, longer = (watched(sensors, STEPS, n) for n in (STEPS, STEPS, 2 * STEPS))
+    first, again, longer = (watch_sensors(sensors, STEPS, n) for n in (STEPS, STEPS, 2 * STEPS))
     np.testing.assert_array_equal(first, again, "the same run again")
     np.testing.assert_array_equal(first, longer, "a run of twice the length")
 
@@ -114,7 +114,7 @@ class EstimatorUnderTest:
         nominal = usual_vessel()
         self.estimator, self.table = estimator, estimator.table()
         self.k = bundle(estimator.constants_with(nominal))
-        self.state = guarded(estimator.start(x, nominal))
+        self.state = guard(estimator.start(x, nominal))
         self.rate = np.full(len(self.state), np.nan)
         self.rate[-MARGIN:] = BEYOND
 
@@ -171,7 +171,7 @@ def comes_to_what_is_measured(estimator: Estimator) -> None:
     """At rest beside the place where it starts, with all measured or no more than it needs."""
     for known in (ALL, estimator.needs()):
         away = np.array([0.4, -0.3, 0.2, 0.0, 0.0, 0.0])
-        estimate = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), away, known)
+        estimate = settle_estimate(EstimatorUnderTest(estimator, np.zeros(SIX)), away, known)
         left = np.abs(estimate - away)
         assert (left[:3] <= NEAR * np.abs(away[:3])).all(), f"pose off by {left[:3]}"
         assert (left[3:] <= NEAR).all(), f"at rest with velocities {estimate[3:]}"
@@ -180,13 +180,13 @@ def comes_to_what_is_measured(estimator: Estimator) -> None:
 def takes_headings_by_the_nearest_turn(estimator: Estimator) -> None:
     """A measured heading that is a whole turn away is no error."""
     turned = np.array([0.0, 0.0, 2.0 * math.pi, 0.0, 0.0, 0.0])
-    estimate = settled(EstimatorUnderTest(estimator, np.zeros(SIX)), turned, ALL)
+    estimate = settle_estimate(EstimatorUnderTest(estimator, np.zeros(SIX)), turned, ALL)
     off = math.remainder(estimate[2], 2.0 * math.pi)
     assert abs(off) < NEAR, f"heading off by {off:.3g} rad"
     assert abs(estimate[5]) < NEAR, f"it yaws with {estimate[5]:.3g} rad/s"
 
 
-def settled(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) -> Vector:
+def settle_estimate(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) -> Vector:
     """The estimate after `PATIENCE` with x = `place` measured at 10 Hz."""
     new, old = (delivery(place, known, fresh) for fresh in (1.0, 0.0))
     tau, steps = np.zeros(3), round(PATIENCE / STEP)
@@ -197,9 +197,13 @@ def settled(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) 
 
 ALL = (True,) * SIX
 MEASUREMENT_CHECKS: tuple[Callable[[Any], None], ...] = (
-    marks_what_it_delivers, measures_the_vessel, errs_alike_in_a_longer_run,
-)  # fmt: skip
+    marks_what_it_delivers,
+    measures_the_vessel,
+    errs_alike_in_a_longer_run,
+)
 ESTIMATOR_CHECKS: tuple[Callable[[Any], None], ...] = (
-    starts_at_the_truth, waits_for_a_delivery, comes_to_what_is_measured,
+    starts_at_the_truth,
+    waits_for_a_delivery,
+    comes_to_what_is_measured,
     takes_headings_by_the_nearest_turn,
-)  # fmt: skip
+)

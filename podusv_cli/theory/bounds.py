@@ -42,7 +42,7 @@ class Observed:
 
 
 @dataclass(frozen=True)
-class Condition:
+class GainCondition:
     """A gain and the limit that it must exceed; NaN where a form has no such condition."""
 
     name: str
@@ -83,7 +83,7 @@ class UltimateBound:
 
     corrected: Bound
     printed: Bound
-    conditions: tuple[Condition, ...]
+    conditions: tuple[GainCondition, ...]
 
 
 @dataclass(frozen=True)
@@ -133,14 +133,16 @@ def ultimate_bound(
         _Axis(law.k_psie, law.k_re - 0.5, vessel.m33, A[1], cross),
     )
     return UltimateBound(
-        _corrected(law, axes, observed), _printed(law, axes, observed), _conditions(law, axes)
+        _corrected_bound(law, axes, observed),
+        _printed_bound(law, axes, observed),
+        _conditions(law, axes),
     )
 
 
 Axes = tuple[_Axis, _Axis]
 
 
-def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
     surge, yaw = axes
     candidates = {
         "z_e, y_u": surge.slowest(),
@@ -160,14 +162,20 @@ def _corrected(law: PolarBackstepping, axes: Axes, observed: Observed | None) ->
     return _best(candidates, terms, rates, rooms, observed.drift)
 
 
-def _printed(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
     surge, yaw = axes
     candidates = {
-        "z_e": surge.k, "psi_e": yaw.k, "u_e": surge.gain, "r_e": yaw.gain,
-        "W_u": law.sigma_u / 2.0, "W_r": law.sigma_r / 2.0,
-        "b_u": law.sigma_bu / 2.0, "b_r": law.sigma_br / 2.0,
-        "y_u": surge.A, "y_r": yaw.A,
-    }  # fmt: skip
+        "z_e": surge.k,
+        "psi_e": yaw.k,
+        "u_e": surge.gain,
+        "r_e": yaw.gain,
+        "W_u": law.sigma_u / 2.0,
+        "W_r": law.sigma_r / 2.0,
+        "b_u": law.sigma_bu / 2.0,
+        "b_r": law.sigma_br / 2.0,
+        "y_u": surge.A,
+        "y_r": yaw.A,
+    }
     if observed is None:
         return Bound(_least(candidates), math.nan, math.nan, candidates)
     rates = np.arange(1, TRIES) / TRIES * _least(candidates)
@@ -190,9 +198,12 @@ def _terms(law: PolarBackstepping, observed: Observed, left: str, over: Pair) ->
 
 
 def _best(
-    candidates: dict[str, float], terms: dict[str, float], rates: Vector,
-    rooms: tuple[Vector, Vector], drift: Pair,
-) -> Bound:  # fmt: skip
+    candidates: dict[str, float],
+    terms: dict[str, float],
+    rates: Vector,
+    rooms: tuple[Vector, Vector],
+    drift: Pair,
+) -> Bound:
     """The lowest bound over lambda, which fixes sigma_yu and sigma_yr of (47)."""
     largest = _least(candidates)
     if largest <= 0.0:
@@ -214,21 +225,29 @@ def _half_square(x: float) -> float:
     return x * x / 2.0  # x**2 would raise on overflow
 
 
-def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[Condition, ...]:
+def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[GainCondition, ...]:
     surge, yaw = axes
     why = "must outweigh -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out"
     if surge.cross:
         why += ", and the cross terms that the printed sign doubles"
     half = "1/2 of it compensates the network's error (47)"
     leak = "without leakage the estimate is not bounded (48)"
-    leakage = ("Gamma_u", "sigma_u", "Gamma_r", "sigma_r", "gamma_u", "sigma_bu", "gamma_r",
-              "sigma_br")  # fmt: skip
+    leakage = (
+        "Gamma_u",
+        "sigma_u",
+        "Gamma_r",
+        "sigma_r",
+        "gamma_u",
+        "sigma_bu",
+        "gamma_r",
+        "sigma_br",
+    )
     return (
-        Condition("k_ze", law.k_ze, surge.limit(), 0.0, why),
-        Condition("k_psie", law.k_psie, yaw.limit(), 0.0, why),
-        Condition("k_ue", law.k_ue, 0.5, 0.5, half),
-        Condition("k_re", law.k_re, 0.5, 0.5, half),
-        *(Condition(name, getattr(law, name), 0.0, 0.0, leak) for name in leakage),
+        GainCondition("k_ze", law.k_ze, surge.limit(), 0.0, why),
+        GainCondition("k_psie", law.k_psie, yaw.limit(), 0.0, why),
+        GainCondition("k_ue", law.k_ue, 0.5, 0.5, half),
+        GainCondition("k_re", law.k_re, 0.5, 0.5, half),
+        *(GainCondition(name, getattr(law, name), 0.0, 0.0, leak) for name in leakage),
     )
 
 

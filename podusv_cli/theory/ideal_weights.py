@@ -73,7 +73,9 @@ def network_output(phi: Vector, weights: Vector) -> Vector:
     return np.asarray(np.einsum("ij,j->i", phi, weights))
 
 
-def fitted(loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed) -> IdealWeights:
+def fit_weights(
+    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed
+) -> IdealWeights:
     """The fit described above; f_u and f_r are scaled by true over nominal inertia."""
     f_u, f_r = unloaded_accelerations(loop, now)
     usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # not those of a diverging run

@@ -85,12 +85,15 @@ def velocity_vector_polynomial(law: VelocityVector, at: SwayAnswer) -> Vector:
     """Coefficients of its characteristic polynomial for m23 = m32 = 0 above V_m, s^4 first."""
     (p, d), a, b, T = at, law.k_psi, law.k_r, law.T_v
     q = law.k_p * (a + b)
-    return np.array([
-        1.0, d + a + b,
-        a * b * (T * d * p + (1.0 - p) * (1.0 + T * law.k_p * p)) + d * (a + b) + q * (1.0 - p),
-        a * b * (T * d * law.k_p * p + d + law.k_p * (1.0 - p)) + d * q,
-        d * law.k_p * a * b,
-    ])  # fmt: skip
+    return np.array(
+        [
+            1.0,
+            d + a + b,
+            a * b * (T * d * p + (1.0 - p) * (1.0 + T * law.k_p * p)) + d * (a + b) + q * (1.0 - p),
+            a * b * (T * d * law.k_p * p + d + law.k_p * (1.0 - p)) + d * q,
+            d * law.k_p * a * b,
+        ]
+    )
 
 
 def momentum_vector_polynomial(at: SwayAnswer, gains: MomentumGains) -> Vector:
@@ -99,10 +102,15 @@ def momentum_vector_polynomial(at: SwayAnswer, gains: MomentumGains) -> Vector:
     `at` is the answer of the neutral point's sway z: z' = -p V r - d z.
     """
     (p, d), (eta, k_b, Q, S, h) = at, gains
-    return np.array([
-        1.0, S + d, Q * (1.0 - h - eta * p) + S * d, Q * (d * (1.0 - h) + k_b * (1.0 - p)),
-        Q * k_b * d,
-    ])  # fmt: skip
+    return np.array(
+        [
+            1.0,
+            S + d,
+            Q * (1.0 - h - eta * p) + S * d,
+            Q * (d * (1.0 - h) + k_b * (1.0 - p)),
+            Q * k_b * d,
+        ]
+    )
 
 
 def momentum_vector_gains(

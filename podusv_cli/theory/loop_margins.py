@@ -10,12 +10,10 @@ from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.theory.course import course
 from podusv_cli.theory.margins import Complex, Cut, Margins, delay_margin, margins, poles, stable
-from podusv_cli.theory.steady import Linear, linearised
+from podusv_cli.theory.steady import Linear, linearise
 
 AXES = {"surge": "u", "yaw": "r"}  # the loops, with the letters that their numbers end in
-NUMBERS = (
-    "phase_margin", "gain_margin", "gain_reduction", "delay_margin", "peak_S", "peak_T",
-)  # fmt: skip
+NUMBERS = ("phase_margin", "gain_margin", "gain_reduction", "delay_margin", "peak_S", "peak_T")
 
 
 @dataclass(frozen=True)
@@ -59,8 +57,9 @@ class LoopMargins:
         """The margins by the names that claims have for them (`metrics.margins`)."""
         by_name = {
             f"{name}_{AXES[axis]}": float(getattr(loop, name))
-            for axis, loop in self.loops.items() for name in NUMBERS
-        }  # fmt: skip
+            for axis, loop in self.loops.items()
+            for name in NUMBERS
+        }
         together = ("delay_margin", "delay_margin_loads", "decay_rate")
         return by_name | {name: float(getattr(self, name)) for name in together}
 
@@ -86,18 +85,17 @@ def loop_margins(
             "are those of a law that follows a target with a timetable; take one, as with "
             "--set path.kind=line"
         )
-    linear = linearised(
+    linear = linearise(
         loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
     )
-    cuts = {
-        axis: Cut(linear.A, linear.B[:, [i]], linear.C[[i]]) for i, axis in enumerate(AXES)
-    }  # fmt: skip
+    cuts = {axis: Cut(linear.A, linear.B[:, [i]], linear.C[[i]]) for i, axis in enumerate(AXES)}
     return LoopMargins(
-        linear, {axis: margins(cut) for axis, cut in cuts.items()},
+        linear,
+        {axis: margins(cut) for axis, cut in cuts.items()},
         delay_margin(Cut(linear.A, linear.B_command, linear.C_command)),
         delay_margin(Cut(linear.A, linear.B, linear.C)),
         tuple(_left_out(loop, grid, linear)),
-    )  # fmt: skip
+    )
 
 
 def _left_out(loop: ClosedLoop, grid: TimeGrid, linear: Linear) -> Iterator[str]:

@@ -40,9 +40,14 @@ def norms(weights: Vector) -> Vector:
 
 
 def lyapunov(
-    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed, e: Errors,
-    ideal: IdealWeights, b: Pair,
-) -> dict[str, Vector]:  # fmt: skip
+    loop: ClosedLoop,
+    law: PolarBackstepping,
+    log: Recording,
+    now: Replayed,
+    e: Errors,
+    ideal: IdealWeights,
+    b: Pair,
+) -> dict[str, Vector]:
     """V (46), its terms, and V' by the chain rule, named as in the log; each of shape (rows,).
 
     The errors of the estimates are against the ideal weights and the true bounds `b`. An estimate

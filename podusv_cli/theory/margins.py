@@ -41,13 +41,13 @@ class Cut:
     C: Vector
 
     @property
-    def opened(self) -> Vector:
+    def open_matrix(self) -> Vector:
         """A_0, shape (n, n): the loads are what they are, and the hull does not feel them."""
         return self.A - self.B @ self.C
 
     def response(self, omega: Vector) -> Complex:
         """L(jw) at these frequencies [rad/s], shape (w, m, m)."""
-        opened, unit = self.opened, np.eye(len(self.A))
+        opened, unit = self.open_matrix, np.eye(len(self.A))
         parts = [
             -self.C @ np.linalg.solve(1j * part[:, None, None] * unit - opened, self.B + 0j)
             for part in np.split(omega, range(BATCH, len(omega), BATCH))
@@ -61,7 +61,7 @@ class Cut:
 
     def frequencies(self) -> Vector:
         """Frequencies [rad/s] up to where L is below 1, with that of every resonance among them."""
-        sizes = np.abs(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.opened)]))
+        sizes = np.abs(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.open_matrix)]))
         sizes = BESIDE * sizes[sizes > SLOWEST]
         slow = max(1e-2 * sizes.min(initial=1.0), SLOWEST)
         fast = 1e2 * max(sizes.max(initial=1.0), float(np.linalg.norm(self.C @ self.B)))
@@ -110,10 +110,12 @@ def margins(cut: Cut) -> Margins:
     S, T = np.abs(1.0 / (1.0 + L)), np.abs(L / (1.0 + L))
     if not stable(cut.A):
         return Margins(omega, S, T)
-    crossed, angles = _crossed(cut, omega)
+    crossed, angles = _crossings(cut, omega)
     gains = _gains(cut, omega, L)
     return Margins(
-        omega, S, T,
+        omega,
+        S,
+        T,
         crossovers=crossed,
         phase_margin=float(np.abs(angles).min(initial=math.inf)),
         gain_margin=min((gain for gain in gains if gain > 1.0), default=math.inf),
@@ -121,12 +123,12 @@ def margins(cut: Cut) -> Margins:
         delay_margin=_delay(crossed, angles),
         peak_S=max(1.0, _peak(cut, omega, S, lambda L: 1.0 / abs(1.0 + L))),  # 1 is S at infinity
         peak_T=_peak(cut, omega, T, lambda L: abs(L / (1.0 + L))),
-    )  # fmt: skip
+    )
 
 
 def delay_margin(cut: Cut) -> float:
     """The shortest delay [s] in all loops that are cut together that makes them unstable."""
-    return _delay(*_crossed(cut, cut.frequencies())) if stable(cut.A) else math.nan
+    return _delay(*_crossings(cut, cut.frequencies())) if stable(cut.A) else math.nan
 
 
 def _delay(crossed: Vector, angles: Vector) -> float:
@@ -134,7 +136,7 @@ def _delay(crossed: Vector, angles: Vector) -> float:
     return float((np.mod(angles, 2.0 * math.pi) / crossed).min(initial=math.inf))
 
 
-def _crossed(cut: Cut, omega: Vector) -> tuple[Vector, Vector]:
+def _crossings(cut: Cut, omega: Vector) -> tuple[Vector, Vector]:
     """Where a locus has magnitude 1 [rad/s], and its angle there from -1, in (-pi, pi]."""
 
     def size(w: float, i: int) -> float:
@@ -151,7 +153,7 @@ def _gains(cut: Cut, omega: Vector, L: Complex) -> list[float]:
     """Factors of the gain with which a pole lies on the imaginary axis, at 0 as well."""
     at = _roots(lambda w: float(cut.response(np.array([w]))[0, 0, 0].imag), omega, L.imag)
     values = [complex(cut.response(np.array([w]))[0, 0, 0]).real for w in at]
-    if abs(np.linalg.eigvals(cut.opened)).min() > SLOWEST:
+    if abs(np.linalg.eigvals(cut.open_matrix)).min() > SLOWEST:
         values.append(complex(cut.response(np.zeros(1))[0, 0, 0]).real)
     return [-1.0 / value for value in values if value < 0.0]
 

@@ -41,14 +41,25 @@ FIXED = (
     _of_windows("v_bound", "m/s", "bound of the sway speed (51), with all damping", r"|v|_{\max}"),
 )
 V_DOT_BOUND = Signal(
-    "V_dot_bound", "1/s", "bound of V_dot (49), corrected; derived, not logged",
+    "V_dot_bound",
+    "1/s",
+    "bound of V_dot (49), corrected; derived, not logged",
     r"-2\lambda V+\Delta",
-)  # fmt: skip
+)
 # Quantities at every row from which the bounds are computed; not logged.
 UNLOGGED = (
-    "alpha_u_dot", "alpha_r_dot", "drift_u", "drift_r", "epsilon_u", "epsilon_r", "rest_u",
-    "rest_r", "push", "printed_push", "turn",
-)  # fmt: skip
+    "alpha_u_dot",
+    "alpha_r_dot",
+    "drift_u",
+    "drift_r",
+    "epsilon_u",
+    "epsilon_r",
+    "rest_u",
+    "rest_r",
+    "push",
+    "printed_push",
+    "turn",
+)
 
 Traces = dict[str, Vector]
 
@@ -88,7 +99,7 @@ def signals(plan: Plan) -> tuple[Signal, ...]:
     if law is None:
         return ()
     rate = () if plan.sampled else (V_DOT,)
-    return (V, *rate, *TERMS, *(ERRORS if law.filtered() else ()), *NETWORKS)
+    return (V, *rate, *TERMS, *(ERRORS if law.filter_slots() else ()), *NETWORKS)
 
 
 def about(plan: Plan) -> dict[str, Signal]:
@@ -106,10 +117,14 @@ def prepare(plan: Plan, compiled: bool) -> None:
         rates_replay(plan, compiled=compiled)
 
 
-def monitored(
-    plan: Plan, recording: Recording,
-    *, steady_fraction: float = 0.2, compiled: bool = True, allocate: Allocate = np.empty,
-) -> Monitored | None:  # fmt: skip
+def monitor_recording(
+    plan: Plan,
+    recording: Recording,
+    *,
+    steady_fraction: float = 0.2,
+    compiled: bool = True,
+    allocate: Allocate = np.empty,
+) -> Monitored | None:
     """Add V, its terms, V' and its bounds to a fresh recording; None for a law without V.
 
     V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
@@ -123,7 +138,7 @@ def monitored(
     with np.errstate(all="ignore"):  # numbers of a diverging run overflow
         replayed = rates_replay(plan, compiled=compiled)
         chosen = recording.part(ideal_weights.rows_to_fit(count, law.network.count))
-        ideal = ideal_weights.fitted(loop, law, chosen, replayed(chosen))
+        ideal = ideal_weights.fit_weights(loop, law, chosen, replayed(chosen))
         b = _disturbance_bound(loop, recording)
         traces: Traces = {}
         for rows in blocks(count, min(BLOCK, max(1, LARGEST_BLOCK // law.network.count))):
@@ -139,7 +154,7 @@ def monitored(
     extended = replace(
         recording,
         signals={**recording.signals, **{name: traces[name] for name in logged}},
-        fixed={**recording.fixed, **_fixed(windows, ideal)},
+        fixed={**recording.fixed, **_fixed_arrays(windows, ideal)},
         about=about(plan),
     )
     return Monitored(extended, windows, traces)
@@ -158,9 +173,12 @@ def _largest(values: Vector) -> float:
 
 
 def _traces(
-    loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed,
+    loop: ClosedLoop,
+    law: PolarBackstepping,
+    log: Recording,
+    now: Replayed,
     unknown: tuple[ideal_weights.IdealWeights, bounds.Pair],
-) -> Traces:  # fmt: skip
+) -> Traces:
     ideal, b = unknown
     e = error_rates(log, now, law)
     factors = ideal_weights.exponents(law.network, log)
@@ -208,15 +226,15 @@ class _Bounds:
         """The part of the run from a time [s] on."""
         rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
         value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
-        observed = self._observed(rows) if self.continuous and len(value) else None
+        observed = self._observe_rows(rows) if self.continuous and len(value) else None
         bound = bounds.ultimate_bound(self.law, self.loop.vessel, observed)
-        kept = _kept(bound.corrected, value, rate)
+        kept = _share_kept(bound.corrected, value, rate)
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
         sway = bounds.sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])
         return Window(since, observed, bound, sway, _largest(value), largest_v, kept)
 
-    def _observed(self, rows: slice) -> bounds.Observed:
+    def _observe_rows(self, rows: slice) -> bounds.Observed:
         start, ideal = self.law.network.initial_weight, self.ideal
         W = (float(np.linalg.norm(weights - start)) for weights in (ideal.W_u, ideal.W_r))
         return bounds.Observed(
@@ -232,7 +250,7 @@ class _Bounds:
         return bounds.Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
 
 
-def _kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
+def _share_kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
     """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows."""
     if not (np.isfinite(bound.Delta) and len(V)):
         return np.nan
@@ -240,7 +258,9 @@ def _kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
     return sum(int(np.count_nonzero(part)) for part in keeps) / len(V)
 
 
-def _fixed(windows: dict[str, Window], ideal: ideal_weights.IdealWeights) -> dict[str, Vector]:
+def _fixed_arrays(
+    windows: dict[str, Window], ideal: ideal_weights.IdealWeights
+) -> dict[str, Vector]:
     """The arrays of the monitor that are constant in time."""
     parts = windows.values()
     numbers = {

@@ -13,7 +13,7 @@ from podusv_cli.engine.running.replay import Replayed
 
 
 @dataclass(frozen=True)
-class LineOfSight:
+class SightLine:
     """The line of sight to the target at every row; `turn` is -1 while psi_e is folded, else 1."""
 
     turn: Vector
@@ -63,17 +63,25 @@ def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors
     beta_r_dot = rates["beta_r"] if filtered else alpha_r_dot
     nothing = np.zeros_like(psi_e)
     return Errors(
-        z_e=z_e, psi_e=psi_e, u_e=signals["u_e"], r_e=signals["r_e"],
+        z_e=z_e,
+        psi_e=psi_e,
+        u_e=signals["u_e"],
+        r_e=signals["r_e"],
         y_u=log["beta_u"] - signals["alpha_u"] if filtered else nothing,
         y_r=log["beta_r"] - signals["alpha_r"] if filtered else nothing,
-        z_e_dot=z_e_dot, psi_e_dot=psi_e_dot,
-        u_e_dot=rates["u"] - beta_u_dot, r_e_dot=rates["r"] - beta_r_dot,
-        y_u_dot=beta_u_dot - alpha_u_dot, y_r_dot=beta_r_dot - alpha_r_dot,
-        alpha_u_dot=alpha_u_dot, alpha_r_dot=alpha_r_dot, turn=sight.turn,
-    )  # fmt: skip
+        z_e_dot=z_e_dot,
+        psi_e_dot=psi_e_dot,
+        u_e_dot=rates["u"] - beta_u_dot,
+        r_e_dot=rates["r"] - beta_r_dot,
+        y_u_dot=beta_u_dot - alpha_u_dot,
+        y_r_dot=beta_r_dot - alpha_r_dot,
+        alpha_u_dot=alpha_u_dot,
+        alpha_r_dot=alpha_r_dot,
+        turn=sight.turn,
+    )
 
 
-def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> LineOfSight:
+def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> SightLine:
     s, d, u, v = now.signals, now.rates, log["u"], log["v"]
     psi_e, psi_d, distance = s["psi_e"], s["psi_d"], s["z_e"]
     turn = np.where(np.cos(psi_e - psi_d + log["psi"]) < 0.0, -1.0, 1.0)
@@ -87,12 +95,16 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Lin
     w = np.where(held, 0.0, (Q + u * sin_e - v * cos_e) / distance)
     spin = w - log["r"]
     bending = across - P * w + d["u"] * sin_e - d["v"] * cos_e + (u * cos_e + v * sin_e) * spin
-    return LineOfSight(
-        turn=turn, side=turn if law.fold == "joint" else np.ones_like(turn),
-        distance=distance, distance_rate=distance_rate,
-        w=w, w_rate=np.where(held, 0.0, (bending - w * distance_rate) / distance),
-        P=P, P_rate=along + Q * w,
-    )  # fmt: skip
+    return SightLine(
+        turn=turn,
+        side=turn if law.fold == "joint" else np.ones_like(turn),
+        distance=distance,
+        distance_rate=distance_rate,
+        w=w,
+        w_rate=np.where(held, 0.0, (bending - w * distance_rate) / distance),
+        P=P,
+        P_rate=along + Q * w,
+    )
 
 
 def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
@@ -102,7 +114,7 @@ def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
 
 
 def _alpha_u_rate(
-    log: Recording, now: Replayed, law: PolarBackstepping, sight: LineOfSight
+    log: Recording, now: Replayed, law: PolarBackstepping, sight: SightLine
 ) -> Vector:
     """Rate of (21); the paper's X_1 (40) with the true accelerations."""
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]

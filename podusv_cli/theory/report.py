@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.core.recording import largest
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.theory.bounds import Bound, Condition
+from podusv_cli.theory.bounds import Bound, GainCondition
 from podusv_cli.theory.monitor import Monitored, Window
 
 
@@ -22,12 +22,12 @@ def as_json(loop: ClosedLoop, grid: TimeGrid, monitored: Monitored) -> dict[str,
         "format": 1,
         "conditions": [_condition(condition) for condition in first.bound.conditions],
         "assumptions": list(_assumptions(loop, grid, monitored)),
-        "visited": _visited(monitored),
+        "visited": _visited_ranges(monitored),
         "windows": {name: _window(window) for name, window in monitored.windows.items()},
     }
 
 
-def _condition(condition: Condition) -> dict[str, Any]:
+def _condition(condition: GainCondition) -> dict[str, Any]:
     forms = {"holds": condition.holds, "holds_printed": condition.holds_printed}
     return asdict(condition) | forms
 
@@ -65,7 +65,7 @@ def _assumption(assumption: str, holds: bool, found: float | None = None) -> dic
     return {"assumption": assumption, "holds": holds} | number
 
 
-def _visited(monitored: Monitored) -> dict[str, list[float]]:
+def _visited_ranges(monitored: Monitored) -> dict[str, list[float]]:
     """The set of states for which the observed values hold: their ranges over the run."""
     names = ("u", "v", "r", "z_e", "psi_e", "V")
     log = monitored.recording

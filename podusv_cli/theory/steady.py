@@ -78,7 +78,7 @@ class Linear:
         return self.reach < STEPS[0] and self.distance < CLOSE
 
 
-def idealised(loop: ClosedLoop) -> ClosedLoop:
+def idealise(loop: ClosedLoop) -> ClosedLoop:
     """The loop with exact measurements and without a delay of the command."""
     actuator = loop.actuator
     if actuator.command:
@@ -87,7 +87,7 @@ def idealised(loop: ClosedLoop) -> ClosedLoop:
     return replace(loop, actuator=actuator, measurement=Exact(), estimator=NoEstimator())
 
 
-def linearised(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = True) -> Linear:
+def linearise(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = True) -> Linear:
     """The loop linearised about its steady motion along a course.
 
     The vessel gets there as in a run with this `step` [s] up to the course's time. From then on the
@@ -95,13 +95,13 @@ def linearised(loop: ClosedLoop, along: Course, step: float, *, compiled: bool =
     NotConvergedError where the vessel does not come to a steady motion, or where the right-hand
     side has no derivative there.
     """
-    loop = idealised(loop)
+    loop = idealise(loop)
     steps = max(round(along.time / step), 1)
     plan = Plan(loop, TimeGrid(step, steps, log_every=steps))
-    frame = _Frame(plan, along, _arrived(plan, compiled), compiled)
+    frame = _Frame(plan, along, _arrive(plan, compiled), compiled)
     try:
         with np.errstate(all="ignore"):
-            return _about(plan, frame, frame.steady(frame.settled(frame.start)))
+            return _about(plan, frame, frame.steady(frame.settle(frame.start)))
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise NotConvergedError(f"no steady motion was found: {error}; {WHAT_IT_TAKES}") from error
 
@@ -116,7 +116,7 @@ def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
         A=jacobian[np.ix_(moving, moving)],
         B=_inputs(plan, states)[moving],
         C=outputs[:2],
-        B_command=frame.commanded(q)[moving],
+        B_command=frame.command_slopes(q)[moving],
         C_command=outputs[2:],
         states=tuple(frame.labels[1 + i] for i in moving),
         course=frame.course,
@@ -127,7 +127,7 @@ def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
     )
 
 
-def _arrived(plan: Plan, compiled: bool) -> Vector:
+def _arrive(plan: Plan, compiled: bool) -> Vector:
     """The loop's state at the end of a run. Raises NotConvergedError where it diverges."""
     log = run(plan, compiled=compiled)
     if log.status == "interrupted":
@@ -204,14 +204,19 @@ class _Frame:
             raise ArithmeticError("a rate is not finite")
         return row
 
-    def settled(self, q: Vector) -> _Left:
+    def settle(self, q: Vector) -> _Left:
         """The vessel once it was left to settle, or as far as it came."""
         from scipy.integrate import BDF  # slow to import
 
         solver = BDF(
-            lambda _, q: self.row(q)[: len(q)], 0.0, q, SETTLING, rtol=1e-6, atol=1e-9,
+            lambda _, q: self.row(q)[: len(q)],
+            0.0,
+            q,
+            SETTLING,
+            rtol=1e-6,
+            atol=1e-9,
             jac=lambda _, q: self._central(q, STEPS[0])[: len(q)],
-        )  # fmt: skip
+        )
         way = [(0.0, math.hypot(*q[:2]))]
         while solver.status == "running" and solver.nfev < MOST_EVALUATIONS:
             solver.step()
@@ -274,7 +279,7 @@ class _Frame:
         at = np.unravel_index(np.nanargmax(doubt / largest), doubt.shape)
         raise NotConvergedError(self._no_derivative(q, int(at[1])))
 
-    def commanded(self, q: Vector) -> Vector:
+    def command_slopes(self, q: Vector) -> Vector:
         """Derivatives of the rates by the demands that reach the actuator, shape (states, 2)."""
         demand = self.row(q)[self._demands]
         steps = STEPS[0] * _size(demand)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
-from podusv_cli.verification.richardson import Estimate
+from podusv_cli.verification.richardson import StepEstimate
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Ranking:
         return self.same and not self.close
 
 
-def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
+def ranking(estimates: Mapping[str, StepEstimate]) -> Ranking | None:
     """The ranking by one metric; None where fewer than two runs have it."""
     known = {label: e for label, e in estimates.items() if not e.undefined}
     if len(known) < 2:
@@ -49,6 +49,6 @@ def ranking(estimates: Mapping[str, Estimate]) -> Ranking | None:
     return Ranking(orders, close, equal)
 
 
-def _too_close(a: Estimate, b: Estimate) -> bool:
+def _too_close(a: StepEstimate, b: StepEstimate) -> bool:
     gap, errors = abs(a.values[0] - b.values[0]), a.error + b.error
     return errors > 0.0 and not gap > errors

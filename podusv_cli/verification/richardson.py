@@ -25,7 +25,7 @@ SAFETY = 4.0  # error over the largest difference, where there is no order
 
 
 @dataclass(frozen=True)
-class Estimate:
+class StepEstimate:
     """A number at three steps, its order of convergence (NaN: none), and its error at the first.
 
     `scale` is the reference of the relative error: the number itself, or a length for a position.
@@ -62,15 +62,15 @@ class Estimate:
         return all(math.isnan(value) for value in self.values)
 
 
-def estimate(values: Sequence[float]) -> Estimate:
+def estimate(values: Sequence[float]) -> StepEstimate:
     """Order and error of a number from its values at the three steps; all may be NaN."""
     a, b, c = values
     if all(math.isnan(value) for value in values):
-        return Estimate((a, b, c), math.nan, 0.0, 0.0)
+        return StepEstimate((a, b, c), math.nan, 0.0, 0.0)
     return _estimate((a, b, c), abs(a - b), abs(b - c), abs(a))
 
 
-def estimate_position(positions: Sequence[np.ndarray], length: float) -> Estimate:
+def estimate_position(positions: Sequence[np.ndarray], length: float) -> StepEstimate:
     """Order and error of a point; `values` are distances [m] to the point of the finest run."""
     a, b, c = positions
     coarse, fine = math.dist(a, b), math.dist(b, c)
@@ -79,15 +79,15 @@ def estimate_position(positions: Sequence[np.ndarray], length: float) -> Estimat
 
 def _estimate(
     values: tuple[float, float, float], coarse: float, fine: float, scale: float
-) -> Estimate:
+) -> StepEstimate:
     if not math.isfinite(coarse + fine):
-        return Estimate(values, math.nan, math.inf, scale)
+        return StepEstimate(values, math.nan, math.inf, scale)
     negligible = ROUNDING * max(scale, coarse, fine)
     if max(coarse, fine) <= negligible:
-        return Estimate(values, math.nan, max(coarse, fine), scale)
+        return StepEstimate(values, math.nan, max(coarse, fine), scale)
     order = math.log2(max(coarse, negligible) / max(fine, negligible))
     if order < LEAST_ORDER:
-        return Estimate(values, math.nan, SAFETY * max(coarse, fine), scale)
+        return StepEstimate(values, math.nan, SAFETY * max(coarse, fine), scale)
     if order > LARGEST_ORDER:
-        return Estimate(values, math.nan, coarse + fine, scale)
-    return Estimate(values, order, coarse / (1.0 - 2.0**-order), scale)
+        return StepEstimate(values, math.nan, coarse + fine, scale)
+    return StepEstimate(values, order, coarse / (1.0 - 2.0**-order), scale)

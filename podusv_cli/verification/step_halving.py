@@ -27,7 +27,7 @@ class Level:
     position: Vector  # (x, y) [m]
 
 
-def refined(scenario: Scenario, halvings: int) -> TimeGrid:
+def refine_grid(scenario: Scenario, halvings: int) -> TimeGrid:
     """The scenario's grid with the step halved `halvings` times; only start and end are logged.
 
     The grid counts control periods in steps, so this count doubles with each halving.
@@ -35,14 +35,17 @@ def refined(scenario: Scenario, halvings: int) -> TimeGrid:
     grid, finer = scenario.time_grid(), 2**halvings
     steps = grid.steps * finer
     return replace(
-        grid, step=grid.step / finer, steps=steps, log_every=max(steps, 1),
+        grid,
+        step=grid.step / finer,
+        steps=steps,
+        log_every=max(steps, 1),
         hold_every=grid.hold_every * finer,
-    )  # fmt: skip
+    )
 
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
     """Run a scenario of one law with its step halved `halvings` times."""
-    plan = scenario.plan(refined(scenario, halvings))
+    plan = scenario.plan(refine_grid(scenario, halvings))
     out = to_end(plan, compiled=scenario.simulation.compiled, progress=progress)
     seen = out.seen if out.status == "finished" else None
     metrics = {} if seen is None else plan.probe.summary(seen)

@@ -10,7 +10,7 @@ from typing import Any
 
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.ranking import Ranking, ranking
-from podusv_cli.verification.richardson import Estimate, estimate, estimate_position
+from podusv_cli.verification.richardson import StepEstimate, estimate, estimate_position
 from podusv_cli.verification.step_halving import Level, Progress, run_level
 
 LEVELS = 3
@@ -22,9 +22,9 @@ class RunVerification:
     """The verification of one run."""
 
     levels: list[Level]
-    estimates: dict[str, Estimate]
+    estimates: dict[str, StepEstimate]
 
-    def unconverged(self, tolerance: float) -> list[str]:
+    def unconverged_numbers(self, tolerance: float) -> list[str]:
         """Names of numbers that are not converged; only `status` where a run did not finish."""
         if any(level.status != "finished" for level in self.levels):
             return ["status"]
@@ -42,10 +42,7 @@ class RunVerification:
             }
             for name, e in self.estimates.items()
         }
-        return {
-            "status": [level.status for level in self.levels],
-            "numbers": numbers,
-        }
+        return {"status": [level.status for level in self.levels], "numbers": numbers}
 
 
 @dataclass(frozen=True)
@@ -58,9 +55,11 @@ class Verification:
     units: dict[str, str]  # of the metrics
 
     @property
-    def unconverged(self) -> dict[str, list[str]]:
+    def unconverged_by_run(self) -> dict[str, list[str]]:
         """Names of numbers that are not converged, by run, and of metrics under `ranking`."""
-        by_run = {label: run.unconverged(self.tolerance) for label, run in self.runs.items()}
+        by_run = {
+            label: run.unconverged_numbers(self.tolerance) for label, run in self.runs.items()
+        }
         by_run["ranking"] = [name for name, rank in self.rankings.items() if not rank.converged]
         return {label: names for label, names in by_run.items() if names}
 
@@ -94,7 +93,7 @@ class Verification:
                 }
                 for name, rank in self.rankings.items()
             },
-            "converged": not self.unconverged,
+            "converged": not self.unconverged_by_run,
         }
 
 

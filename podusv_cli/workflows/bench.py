@@ -11,23 +11,19 @@ from typing import Any
 import pandas as pd
 
 from podusv_cli.optimum.collocation import casadi
-from podusv_cli.pages.page import Picture
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import Outcome, Report, run_all
-from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
-from podusv_cli.studies.bench import optima, page, standing
+from podusv_cli.studies.bench import optima, standing
+from podusv_cli.studies.bench.bench_folder import draw_figures, write_files
 from podusv_cli.studies.bench.cases import BenchCase, Selection, cases
 from podusv_cli.studies.bench.optima import Least
-from podusv_cli.studies.bench.runs import BenchRun, crashed, play
+from podusv_cli.studies.bench.runs import BenchRun, crashed_run, play
 from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS
 
 Progress = Callable[[str, float], None]
-RUNS, BOARD, REPORT, ORIGIN = "runs.csv", "leaderboard.md", "report.html", "provenance.json"
-OPTIMA = "optima.csv"
-DIGITS = "%.6g"
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Benched:
         return standing.leaderboards(self.runs)
 
     @property
-    def crashed(self) -> int:
+    def crashed_count(self) -> int:
         """Runs of laws that raised or hung."""
         return int((self.runs.status == "crashed").sum())
 
@@ -52,10 +48,12 @@ class Benched:
         """What `--json` prints."""
         board = self.board.astype(object).where(self.board.notna(), None)
         return {
-            "format": 1, "folder": str(self.folder), "runs": len(self.runs),
+            "format": 1,
+            "folder": str(self.folder),
+            "runs": len(self.runs),
             "leaderboard": board.reset_index().to_dict("records"),
             "missing": [str(failure) for failure in self.missing],
-        }  # fmt: skip
+        }
 
 
 def bench(
@@ -77,20 +75,20 @@ def bench(
             scenario.ready()
             if progress:
                 progress("compiling, once", position / len(scenarios))
-        runs = list(_simulated(every, request, progress))
+        runs = list(_simulate_cases(every, request, progress))
         made = standing.table(runs)
-        solved = list(_solved(every, runs, request, progress, extras)) if optimum else []
+        solved = list(_solve_optima(every, runs, request, progress, extras)) if optimum else []
         made = standing.with_optima(made, solved) if solved else made
         with interrupts_deferred():
-            figures = _drawn(runs, made, extras) if request.figures else []
+            figures = draw_figures(runs, made, extras) if request.figures else []
             plugins = dict.fromkeys(
                 p for case in every for law in case.laws.values() for p in law.plugged
             )
-            _write(writer, made, figures, writer.add_origin(plugins), solved)
+            write_files(writer, made, figures, writer.add_origin(plugins), solved)
             return Benched(writer.finish(), made, tuple(extras.missing))
 
 
-def _simulated(
+def _simulate_cases(
     every: Sequence[BenchCase], request: Request, progress: Progress | None
 ) -> Iterator[BenchRun]:
     def advance(position: int, fraction: float) -> None:
@@ -104,15 +102,18 @@ def _simulated(
         else:  # its process ended: which law was it?
             for law, single in case.laws.items():
                 (again,) = _run_all([replace(case, laws={law: single})], request)
-                yield from again.result or [crashed(case, law, again.failure)]
+                yield from again.result or [crashed_run(case, law, again.failure)]
 
 
-def _solved(
-    every: Sequence[BenchCase], runs: Sequence[BenchRun], request: Request,
-    progress: Progress | None, extras: Extras,
-) -> Iterator[Least]:  # fmt: skip
+def _solve_optima(
+    every: Sequence[BenchCase],
+    runs: Sequence[BenchRun],
+    request: Request,
+    progress: Progress | None,
+    extras: Extras,
+) -> Iterator[Least]:
     """The optima of all cases; what has none is added to `extras`."""
-    wanted, refused = optima.wanted(every, runs)
+    wanted, refused = optima.wanted_optima(every, runs)
     extras.missing += [Failure("an optimum for some cases", why) for why in refused]
 
     def advance(position: int, fraction: float) -> None:
@@ -145,27 +146,3 @@ def _play(case: BenchCase, tell: Callable[[float], None]) -> list[BenchRun]:
     runs = play(case)
     tell(1.0)
     return runs
-
-
-def _drawn(runs: Sequence[BenchRun], made: pd.DataFrame, extras: Extras) -> list[Picture]:
-    from podusv_cli.figures.sketch import rendered
-    from podusv_cli.studies.bench.figures import sketches  # matplotlib is slow to import
-
-    return rendered(sketches(runs, made), extras)[1]
-
-
-def _write(
-    writer: RunWriter, made: pd.DataFrame, figures: Sequence[Picture], origin: dict[str, Any],
-    solved: Sequence[Least],
-) -> None:  # fmt: skip
-    writer.add(RUNS, _csv(made))
-    writer.add(BOARD, page.as_markdown(made).encode())
-    writer.add(REPORT, page.page(made, figures, origin, solved).encode())
-    if solved:
-        writer.add(OPTIMA, _csv(optima.table(solved)))
-    for figure in figures:
-        writer.add(f"figures/{figure.name}.png", figure.file)
-
-
-def _csv(rows: pd.DataFrame) -> bytes:
-    return csv_files.text(rows, DIGITS).encode()

@@ -12,32 +12,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from podusv_cli.comparison import claims, outputs, table
-from podusv_cli.comparison.curves import ClaimedRun
 from podusv_cli.comparison.differences import differences
-from podusv_cli.comparison.entries import Entry, EntryWithoutLog, metrics_of
-from podusv_cli.comparison.margins import with_margins
-from podusv_cli.comparison.optimum import related
+from podusv_cli.comparison.known_metrics import metrics_of
+from podusv_cli.comparison.optimum import with_optimum_ratios
 from podusv_cli.core.about import RunAbout
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.finding import Finding, merged
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.finding import Finding, merge_findings
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording, Status
-from podusv_cli.findings.finding import Case, finding_kinds
+from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.table import CLOCKED, metrics_with
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome, available_workers, run_all
-from podusv_cli.scenario.limits import Size, estimate, needed
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.limits import Size, disk_needed, estimate
 from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import provenance
-from podusv_cli.storage.run_folder import FinishedRun, RunWriter, default_folder, open_run
-from podusv_cli.workflows.execute import Task, execute, unwritten, warm_up
+from podusv_cli.storage.run_folder import RunWriter, default_folder, open_run
+from podusv_cli.workflows.claimed_margins import with_margins
+from podusv_cli.workflows.execute import RunTask, execute, warm_up, why_unwritten
 from podusv_cli.workflows.gather import Members, gather
 from podusv_cli.workflows.members import Member
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import RESULTS, check_asked, opened, writer_of
+from podusv_cli.workflows.run import RESULTS, check_asked, open_scenario, writer_of
 from podusv_cli.workflows.verify import is_verified
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class Compared:
             "format": 1,
             "status": self.status,
             "folder": str(self.folder),
-            "runs": [self._run_as_json(entry) for entry in result.entries],
+            "runs": [self._run_as_json(run) for run in result.runs],
             "comparison": table.numbers(result.table),
             "failed": {label: text for label, text in result.endings.items() if text},
             "differences": result.differences,
@@ -76,28 +77,29 @@ class Compared:
 
     def places(self) -> list[Path]:
         """The fewest folders that have all of its runs."""
-        runs = (entry for entry in self.result.entries if not entry.run.folder.is_file())
-        places = [self._place(entry) for entry in runs]  # without what was measured
+        runs = (run for run in self.result.runs if not self.place(run).is_file())
+        places = [self.place(run) for run in runs]  # without what was measured
         return [self.folder] if {place.parent for place in places} == {self.folder} else places
 
-    def _place(self, entry: Entry) -> Path:
-        here = entry.label in self.result.timings
-        return self.folder / entry.label if here else entry.run.folder
+    def place(self, run: PastRun) -> Path:
+        """Where one of its runs lies: within, or where it was made; the file of a log."""
+        assert run.folder is not None  # all were opened
+        return self.folder / run.label if run.label in self.result.timings else run.folder
 
     def warnings(self) -> list[Finding]:
         """The findings about the runs made for this comparison, before and after them."""
-        return merged(self.result.warnings)
+        return merge_findings(self.result.warnings)
 
-    def _run_as_json(self, entry: Entry) -> dict[str, Any]:
+    def _run_as_json(self, run: PastRun) -> dict[str, Any]:
         """As `podusv run --json`, without what is missing; timing only of runs made now."""
         return {
             "format": 1,
-            "status": entry.recording.status,
-            "run": str(self._place(entry)),
-            "controller": entry.recording.controller,
-            "metrics": dict(entry.run.metrics),
-            "timing": dict(self.result.timings.get(entry.label, {})),
-            "warnings": [f.as_json() for f in self.result.warnings[entry.label]],
+            "status": run.recording.status,
+            "run": str(self.place(run)),
+            "controller": run.recording.controller,
+            "metrics": dict(run.metrics),
+            "timing": dict(self.result.timings.get(run.label, {})),
+            "warnings": [f.as_json() for f in self.result.warnings[run.label]],
         }
 
 
@@ -124,34 +126,37 @@ def _to_doubt(items: Sequence[Path], request: Request) -> Loaded:
             f"--doubt moves the values of one scenario, and {given} is given; name that alone, or "
             "run podusv doubt on each"
         )
-    loaded = opened(items[0], replace(request, warn=lambda finding: None), (doubt_faults,))
+    loaded = open_scenario(items[0], replace(request, warn=lambda finding: None), (doubt_faults,))
     comparison(loaded)
     return loaded
 
 
 def compare_gathered(
-    given: Members, items: Sequence[Path], request: Request, progress: Progress | None = None,
+    given: Members,
+    items: Sequence[Path],
+    request: Request,
+    progress: Progress | None = None,
     loaded: Loaded | None = None,
-) -> Compared:  # fmt: skip
+) -> Compared:
     """The same for what is gathered already; `items` are the files and folders that it is from.
 
     `loaded` is the scenario whose verdicts are doubted, if any.
     """
     check_asked(request, [member.plugins for member in given.members])
     _check_metrics(request, given.members)
-    for finding in merged({member.label: member.noticed for member in given.members}):
+    for finding in merge_findings({member.label: member.noticed for member in given.members}):
         request.warn(finding)
     text = "".join(f"{member.label}\n{member.resolved}" for member in given.members)
     target = request.out or default_folder(RESULTS, given.name, text)
     _keep_apart(items, target)
     with interrupts_deferred(), _writer(target, given.members, request) as writer:
         outcomes = make_runs(given.members, writer.folder, request, progress)
-        lost = unwritten(outcomes.values())
+        lost = why_unwritten(outcomes.values())
         extras = writer.extras
         extras.interrupted = any(outcome.interrupted for outcome in outcomes.values())
         result = collect(given.members, outcomes, given.claims, extras)
         result = replace(result, chosen=request.metrics, ratios=request.ratios)
-        if extras.interrupted and not result.entries:
+        if extras.interrupted and not result.runs:
             raise KeyboardInterrupt("interrupted before any run finished; nothing was written")
         doubted = None
         if loaded and not extras.interrupted:
@@ -166,7 +171,7 @@ def compare_gathered(
         origin = writer.add_origin(result.plugins)
         _add_report(writer, result, given.name, origin, extras, progress, request)
         folder = writer.finish(missing=lost)
-        made = {entry.label for entry in result.entries}
+        made = {run.label for run in result.runs}
         runs = [m for m in given.members if m.label in made and not m.track]
         unverified = tuple(m.label for m in runs if not is_verified(m.resolved))
         return Compared(folder, result, writer.status, tuple(extras.missing), doubted, unverified)
@@ -174,13 +179,13 @@ def compare_gathered(
 
 def _check_metrics(request: Request, members: Sequence[Member]) -> None:
     """UsageError for a metric that no run has."""
-    logged = (name for member in members if member.run for name in member.run.metrics)
+    logged = (name for member in members if member.folder for name in member.folder.metrics)
     plugged = (name for member in members for name in metrics_with(member.plugins))
     own = (name for member in members for name in member.about.metrics)
     known = dict.fromkeys((*plugged, *own, *logged))
     for name in request.metrics:
         if name not in known:
-            raise UsageError(unknown(f"metric {name!r}", name, known, "podusv list metrics"))
+            raise UsageError(unknown_word(f"metric {name!r}", name, known, "podusv list metrics"))
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
@@ -197,7 +202,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
-    space = needed(sizes(members), request.workers or available_workers())
+    space = disk_needed(sizes(members), request.workers or available_workers())
     return writer_of(request, target, space)
 
 
@@ -217,12 +222,16 @@ def make_runs(
         for _, case in wanted:
             warm_up(case, request.compiling)
     tasks = [
-        Task(
-            case.scenario, member.text, folder / member.label,
-            argv=request.argv, label=member.label, noticed=member.noticed,
+        RunTask(
+            case.scenario,
+            member.text,
+            folder / member.label,
+            argv=request.argv,
+            label=member.label,
+            noticed=member.noticed,
         )
         for member, case in wanted
-    ]  # fmt: skip
+    ]
 
     def advance(position: int, fraction: float) -> None:
         if progress:
@@ -236,71 +245,70 @@ def make_runs(
 
 
 def collect(
-    members: Sequence[Member], outcomes: Mapping[str, Outcome],
-    parsed: Sequence[claims.ParsedClaim], extras: Extras,
-) -> outputs.Result:  # fmt: skip
+    members: Sequence[Member],
+    outcomes: Mapping[str, Outcome],
+    parsed: Sequence[claims.ParsedClaim],
+    extras: Extras,
+) -> outputs.Result:
     """Open the runs and compare them; a law's cost or a verdict that fails is noted in `extras`.
 
     What the runs lack is missing in the comparison, too.
     """
     finished = {label: o.result for label, o in outcomes.items() if o.result is not None}
-    runs = {m.label: m.run for m in members if m.run}
-    runs |= {label: open_run(done.folder) for label, done in finished.items()}
-    members = _placed(members, runs)
-    runs |= _measured(members, runs)
+    folders = {m.label: m.folder for m in members if m.folder}
+    folders |= {label: open_run(done.folder) for label, done in finished.items()}
+    opened_runs = [
+        folders[m.label].as_run(m.label, m.about, m.plugins) for m in members if m.label in folders
+    ]
+    members = _place_measured(members, opened_runs)
+    runs = [*opened_runs, *_as_finished_runs(members, opened_runs)]
+    messages = {run.label: run.recording.message for run in runs}
     endings = {
-        m.label: outcomes.get(m.label, Outcome()).failure
-        or (runs[m.label].recording.message if m.label in runs else "")
+        m.label: outcomes.get(m.label, Outcome()).failure or messages.get(m.label, "")
         for m in members
     }
     for label, done in finished.items():
         extras.missing += (replace(lack, what=f"{label}: {lack.what}") for lack in done.missing)
-    entries = [
-        Entry(m.label, runs[m.label], m.about, plugins=m.plugins)
-        for m in members
-        if m.label in runs
-    ]
     made = {m.label: m.case for m in members if m.case and m.label in finished}
-    entries = related(_with_costs(entries, made, extras), extras)
-    entries = _with_departures(entries, members)
+    runs = with_optimum_ratios(_with_costs(runs, made, extras), extras)
+    runs = _with_departures(runs, members)
     scenarios = {label: case.scenario for label, case in made.items()}
-    entries = with_margins(entries, scenarios, parsed, extras)
-    sources: dict[str, ClaimedRun] = {
-        m.label: EntryWithoutLog(m.about, endings[m.label]) for m in members
-    }
-    sources |= {entry.label: entry for entry in entries}
-    numbers: dict[str, dict[str, float]] = {m.label: {} for m in members}
-    numbers |= {entry.label: entry.metrics() for entry in entries}
+    runs = with_margins(runs, scenarios, parsed, extras)
+    every = {m.label: PastRun.without_log(m.label, m.about, endings[m.label]) for m in members}
+    every |= {run.label: run for run in runs}
+    numbers = {label: run.compared_metrics() for label, run in every.items()}
     abouts = {m.label: m.about for m in members}
-    known = metrics_of(entries)
+    known = metrics_of(runs)
     plugins = tuple(dict.fromkeys(plugin for m in members for plugin in m.plugins))
     return outputs.Result(
         abouts=abouts,
-        entries=entries,
+        runs=runs,
         endings=endings,
         differences=differences({label: about.values for label, about in abouts.items()}),
         table=table.table(numbers, known),
-        verdicts=extras.made("the claims' verdicts", lambda: claims.judge(parsed, sources, known))
+        verdicts=extras.make_or_record(
+            "the claims' verdicts", lambda: claims.judge(parsed, every, known)
+        )
         or [],
         timings={label: done.timing for label, done in finished.items()},
         metrics=known,
         peaks=claims.peaks(parsed),
         plugins=plugins,
-        meanings=extras.made("what the warnings mean", lambda: _meanings(plugins)) or {},
+        meanings=extras.make_or_record("what the warnings mean", lambda: _meanings(plugins)) or {},
         warnings={m.label: getattr(finished.get(m.label), "warnings", m.noticed) for m in members},
     )
 
 
-def _placed(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> list[Member]:
+def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[Member]:
     """The members; what was measured where it is to stand, with what the runs show of it."""
-    logs = {label: run.recording for label, run in runs.items() if len(run.recording["time"])}
+    logs = {run.label: run.recording for run in runs if len(run.recording["time"])}
     done = [_done_after(m.about, logs[m.label]) for m in members if m.label in logs]
     placed = []
     for member in members:
         if member.track and logs:
             label, first = next(iter(logs.items()))
             remarks = member.track.beside_speeds(label, first)
-            track = member.track.placed(label, first)
+            track = member.track.place_beside(label, first)
             remarks = [*track.remarks, *remarks]
             about = track.about(member.about, max(done))
             member = replace(member, track=track, noticed=remarks, about=about)
@@ -313,56 +321,63 @@ def _done_after(about: RunAbout, log: Recording) -> float:
     return float(log.up_to(about.path_end)["time"][-1]) if about.path_end else math.inf
 
 
-def _measured(members: Sequence[Member], runs: Mapping[str, FinishedRun]) -> dict[str, FinishedRun]:
+def _as_finished_runs(members: Sequence[Member], runs: Sequence[PastRun]) -> list[PastRun]:
     """What was measured as a run, with the target of the first of the others that has a log."""
-    logs = (run.recording for run in runs.values())
+    logs = (run.recording for run in runs)
     first = next((log for log in logs if len(log["time"])), None)
-    return {m.label: m.track.beside(first) for m in members if m.track and first}
+    return [m.track.beside(first, m.label, m.about) for m in members if m.track and first]
 
 
-def _with_departures(entries: Sequence[Entry], members: Sequence[Member]) -> list[Entry]:
-    """The entries; runs with how far they are from the measured track, where there is one."""
+def _with_departures(runs: Sequence[PastRun], members: Sequence[Member]) -> list[PastRun]:
+    """The runs; the simulated ones with how far they are from the measured track, if any."""
     measured = {m.label: m.track for m in members if m.track}
     return [
-        replace(entry, cost={**entry.cost, **track.departures(entry.counted)})
-        if entry.label not in measured
-        else entry
+        replace(run, cost={**run.cost, **track.departures(run.counted_recording)})
+        if run.label not in measured
+        else run
         for track in measured.values()
-        for entry in entries
-    ] or [*entries]
+        for run in runs
+    ] or [*runs]
 
 
 def _meanings(plugins: Plugins) -> dict[str, str]:
     return {code: kind.meaning for code, kind in finding_kinds(plugins).items()}
 
 
-def _with_costs(entries: Sequence[Entry], made: Mapping[str, Case], extras: Extras) -> list[Entry]:
-    """The entries; those `made` now with the laws' cost measured here and now, side by side.
+def _with_costs(runs: Sequence[PastRun], made: Mapping[str, Case], extras: Extras) -> list[PastRun]:
+    """The runs; those `made` now with the laws' cost measured here and now, side by side.
 
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
     is never compared; and a finished run is looked at without its law.
     """
     timed = [
-        e
-        for e in entries
-        if e.label in made
-        and made[e.label].scenario.simulation.compiled
-        and len(e.recording["time"])
+        run
+        for run in runs
+        if run.label in made
+        and made[run.label].scenario.simulation.compiled
+        and len(run.recording["time"])
     ]
-    loops = [(made[entry.label].plan, entry.recording) for entry in timed]
+    loops = [(made[run.label].plan, run.recording) for run in timed]
     costs = extras.attempt("the laws' times", lambda: law_costs(loops)) or [UNMEASURED] * len(timed)
-    by_label = {entry.label: cost for entry, cost in zip(timed, costs, strict=True)}
-    return [replace(entry, cost=by_label.get(entry.label, UNMEASURED)) for entry in entries]
+    by_label = {run.label: cost for run, cost in zip(timed, costs, strict=True)}
+    return [replace(run, cost=by_label.get(run.label, UNMEASURED)) for run in runs]
 
 
 def _add_report(
-    writer: RunWriter, result: outputs.Result, title: str, origin: Mapping[str, Any],
-    extras: Extras, progress: Progress | None, request: Request,
-) -> None:  # fmt: skip
+    writer: RunWriter,
+    result: outputs.Result,
+    title: str,
+    origin: Mapping[str, Any],
+    extras: Extras,
+    progress: Progress | None,
+    request: Request,
+) -> None:
     """Draw the figures that are asked for, and write the report, which has them as PNG."""
     figures: dict[str, bytes] = {}
     if request.figures:
-        draw = partial(outputs.drawn, result, extras, progress, request.names, request.formats)
+        draw = partial(
+            outputs.draw_comparison, result, extras, progress, request.names, request.formats
+        )
         figures = extras.attempt("figures", partial(draw, request.workers)) or {}
     for name, content in figures.items():
         if name.partition(".")[2] in request.formats:

@@ -9,7 +9,7 @@ from typing import Any
 
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.storage import manifest
-from podusv_cli.storage.run_folder import FinishedRun
+from podusv_cli.storage.run_folder import RunFolder
 from podusv_cli.workflows.members import runs_of
 
 
@@ -48,7 +48,7 @@ def diff(one: Path, other: Path) -> Differences:
     sides = [_runs(path) for path in (one, other)]
     if all(len(runs) == 1 for runs in sides):
         return Differences({"": _pair(sides[0][0], sides[1][0])})
-    ours, theirs = ({run.folder.name: run for run in runs} for runs in sides)
+    ours, theirs = ({run.path.name: run for run in runs} for runs in sides)
     return Differences(
         {label: _pair(run, theirs[label]) for label, run in ours.items() if label in theirs},
         [label for label in ours if label not in theirs],
@@ -56,10 +56,10 @@ def diff(one: Path, other: Path) -> Differences:
     )
 
 
-def _runs(path: Path) -> list[FinishedRun]:
+def _runs(path: Path) -> list[RunFolder]:
     manifest.demand(path)
     return runs_of(path)
 
 
-def _pair(one: FinishedRun, other: FinishedRun) -> tuple[Path, Path, RunDifference]:
-    return one.folder, other.folder, difference(one, other)
+def _pair(one: RunFolder, other: RunFolder) -> tuple[Path, Path, RunDifference]:
+    return one.path, other.path, difference(one, other)

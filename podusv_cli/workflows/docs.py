@@ -78,7 +78,7 @@ def page(name: str) -> str:
 
 def reachable(text: str, folder: str) -> str:
     """Markdown of a file in this folder of a checkout, with links that lead on without one."""
-    return CONFIG.sub(_shipped, LINK.sub(lambda link: _reachable(link, folder), text))
+    return CONFIG.sub(_name_shipped, LINK.sub(lambda link: _reachable(link, folder), text))
 
 
 def is_page(name: str) -> bool:
@@ -121,7 +121,7 @@ def _sections(name: str, text: str) -> Iterator[Section]:
     yield Section(name, level, heading, "\n".join(lines))
 
 
-def _shipped(file: re.Match[str]) -> str:
+def _name_shipped(file: re.Match[str]) -> str:
     """A scenario's file as every installation names it; the file where it is not shipped."""
     scenario = shipped.PREFIX + file[1]
     return scenario if scenario in shipped.names() else file[0]

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from podusv_cli.comparison import claims
 from podusv_cli.comparison.claims import ParsedClaim, RunsVerdict
-from podusv_cli.comparison.entries import Entry, metrics_of
-from podusv_cli.comparison.margins import with_margins
+from podusv_cli.comparison.known_metrics import metrics_of
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, UsageError
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.doubt import outputs
 from podusv_cli.doubt.answer import DoubtReport, answers, labels_of
 from podusv_cli.doubt.check import doubt_faults
@@ -20,21 +20,24 @@ from podusv_cli.doubt.events import nearest_event
 from podusv_cli.doubt.judged import Judge, Judged, World
 from podusv_cli.doubt.search import search
 from podusv_cli.engine.running.simulate import to_end
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.address import with_values
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import find, placed
-from podusv_cli.storage.run_folder import InMemory, default_folder
+from podusv_cli.scenario.resolved import resolved_yaml
+from podusv_cli.scenario.yaml_tree import find, tree_with
+from podusv_cli.storage.run_folder import default_folder
+from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.doubt_study import doubt_study
-from podusv_cli.workflows.execute import examined, monitored, summary, warm_up
+from podusv_cli.workflows.execute import examine, monitor_case, summary, warm_up
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import RESULTS, opened, writer_of
+from podusv_cli.workflows.run import RESULTS, open_scenario, writer_of
 
 Progress = Callable[[str, float], None]
 
@@ -46,7 +49,7 @@ def doubt(config: Path, request: Request, progress: Progress | None = None) -> o
     tried so far. Raises UsageError without claims, ScenarioError, StorageError.
     """
     checks = (unknown_codes, limits(request.allow_large), doubt_faults)
-    loaded = opened(config, request, checks)
+    loaded = open_scenario(config, request, checks)
     if loaded.scenario.sweep and loaded.scenario.sweep.claims:
         return doubt_study(config, loaded, request, progress)
     return doubt_of(loaded, request, progress)
@@ -56,11 +59,8 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
     """The same for a scenario that is loaded and checked."""
     scenario, world = loaded.scenario, comparison(loaded)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with (
-        interrupts_deferred(),
-        writer_of(request, target) as writer,
-    ):
-        report, writer.extras.interrupted = doubted(world, scenario, request, progress)
+    with interrupts_deferred(), writer_of(request, target) as writer:
+        report, writer.extras.interrupted = doubt_subject(world, scenario, request, progress)
         outputs.write(writer, report, loaded.text, figures=request.figures)
         return outputs.Doubted(
             writer.finish(), report.answers, writer.status, tuple(writer.extras.missing)
@@ -86,30 +86,34 @@ def comparison(loaded: Loaded) -> Subject:
         )
     named = {label for claim in parsed for label in labels_of(claim.claim)}
 
-    def judged(scenario: Scenario) -> Singles:
+    def judge_comparison(scenario: Scenario) -> Singles:
         singles = with_loads(scenario.singles())
         return {label: single for label, single in singles.items() if label in named}
 
     hulls = find(loaded.root, ("doubt", "hulls"))
     others = {
-        node.content: judged(loaded.changed(placed("vessel.preset", node, loaded.root)))
+        node.content: judge_comparison(
+            loaded.merge_over(tree_with("vessel.preset", node, loaded.root))
+        )
         for node in (hulls.content if hulls else ())
     }
-    return Subject(parsed, judged(loaded.scenario), others)
+    return Subject(parsed, judge_comparison(loaded.scenario), others)
 
 
-def doubted(
+def doubt_subject(
     subject: Subject, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, bool]:
     """All that is tried, and what it says of every claim; whether an interrupt ended it."""
     cases = {label: Case.of(single) for label, single in subject.singles.items()}
     for case in cases.values():
-        examined(case)
+        examine(case)
         with interrupts_enabled():
             warm_up(case, request.compiling)
     with interrupts_enabled():
-        entries = {label: _entry(label, case, subject.parsed) for label, case in cases.items()}
-    judge, asked = judging(subject, entries), scenario.doubt or Doubt()
+        runs = {
+            label: _simulate_in_memory(label, case, subject.parsed) for label, case in cases.items()
+        }
+    judge, asked = judging(subject, runs), scenario.doubt or Doubt()
     moving = choices(subject.singles, asked)
     parsed = {claim.name: claim.claim for claim in subject.parsed}
     tried = search(parsed, moving, judge, asked, request.workers, progress)
@@ -123,23 +127,24 @@ def doubted(
         )
         for claim in subject.parsed
     ]
-    events = {claim.name: nearest_event(claim, entries) for claim in subject.parsed}
+    events = {claim.name: nearest_event(claim, runs) for claim in subject.parsed}
     return DoubtReport(scenario, answers(verdicts, tried, events), tried), interrupted
 
 
-def judging(subject: Subject, entries: Mapping[str, Entry]) -> Judge:
-    """What judges the claims in a world; `entries` are the runs that a world does not move."""
+def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
+    """What judges the claims in a world; `runs` are those that a world does not move."""
 
     def judge(world: World) -> Judged:
         labels = dict.fromkeys(label for label, _ in world)
         try:
-            moved = {label: _changed(subject, label, world) for label in labels}
+            moved = {label: _change_scenario(subject, label, world) for label in labels}
             made = {
-                label: _entry(label, Case.of(new), subject.parsed) for label, new in moved.items()
+                label: _simulate_in_memory(label, Case.of(new), subject.parsed)
+                for label, new in moved.items()
             }
         except PodusvError as error:
             return Judged({}, {}, str(error))
-        every, scenarios = {**entries, **made}, {**subject.singles, **moved}
+        every, scenarios = {**runs, **made}, {**subject.singles, **moved}
         measured = with_margins([*every.values()], scenarios, subject.parsed, Extras())
         metrics = metrics_of(measured)
         verdicts = claims.judge(subject.parsed, {e.label: e for e in measured}, metrics)
@@ -148,19 +153,18 @@ def judging(subject: Subject, entries: Mapping[str, Entry]) -> Judge:
     return judge
 
 
-def _changed(subject: Subject, label: str, world: World) -> Scenario:
+def _change_scenario(subject: Subject, label: str, world: World) -> Scenario:
     new = {at: value for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
     single = (subject.hulls[hull] if hull else subject.singles)[label]
     return with_values(single, new)
 
 
-def _entry(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> Entry:
+def _simulate_in_memory(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> PastRun:
     """A run in memory, with what a comparison adds to it that these claims name."""
     recording = to_end(case.plan, compiled=case.scenario.simulation.compiled)
-    whole, _ = monitored(case, recording)
-    numbers: dict[str, float | None] = {**summary(case, recording, Extras())}
+    whole, _ = monitor_case(case, recording)
+    numbers = summary(case, recording, Extras())
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)
-    run = InMemory(Path(), recording.status, numbers, {}, "", kept=whole)
-    return Entry(label, run, case.about, plugins=case.scenario.plugged)
+    return PastRun(label, case.about, whole, numbers, plugins=case.scenario.plugged)

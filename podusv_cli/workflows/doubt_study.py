@@ -39,13 +39,17 @@ class Studies:
     folder: Path
     request: Request
 
-    def judged(self, name: str, new: list[str]) -> tuple[Judged, list[StudyVerdict]]:
+    def judge(self, name: str, new: list[str]) -> tuple[Judged, list[StudyVerdict]]:
         """The verdicts of the study with new values; what is there already is not made again."""
         own = Request(
             overrides=[*self.request.overrides, NO_LOGS, *new],
-            out=self.folder / "studies" / name, workers=self.request.workers, figures=False,
-            argv=self.request.argv, plugins=self.request.plugins, trust=self.request.trust,
-        )  # fmt: skip
+            out=self.folder / "studies" / name,
+            workers=self.request.workers,
+            figures=False,
+            argv=self.request.argv,
+            plugins=self.request.plugins,
+            trust=self.request.trust,
+        )
         try:
             done = sweep.run(self.config, own, lambda tally: None)
         except PodusvError as error:
@@ -76,7 +80,7 @@ def doubt_study(
     folder = request.out or RESULTS / f"{scenario.name}-doubt"
     studies, moving = Studies(config, folder, request), study_choices(scenario)
     tell = progress or (lambda what, fraction: None)
-    base, verdicts = studies.judged("own", [])
+    base, verdicts = studies.judge("own", [])
     if base.failed:
         raise PodusvError(base.failed)
     alone = []
@@ -92,13 +96,13 @@ def doubt_study(
     tried = Tried(base, alone, Draws((), np.zeros((0, 0)), ()), ())
     report = DoubtReport(scenario, answers(verdicts, tried), tried)
     with RunWriter(folder / "answer", force=True, argv=request.argv) as writer:
-        writer.extras.missing += _failed(alone)
+        writer.extras.missing += _failures_of(alone)
         outputs.write(writer, report, loaded.text, figures=False)
         missing = tuple(writer.extras.missing)
         return outputs.Doubted(writer.finish(), report.answers, writer.status, missing)
 
 
-def _failed(alone: Sequence[TriedChoice]) -> Iterator[Failure]:
+def _failures_of(alone: Sequence[TriedChoice]) -> Iterator[Failure]:
     """The values with which there is no study, and why."""
     for tried in alone:
         for trial in tried.trials:
@@ -109,7 +113,7 @@ def _failed(alone: Sequence[TriedChoice]) -> Iterator[Failure]:
 def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[TriedValue]:
     return [
         TriedValue(
-            value, studies.judged(_name(choice, i), overrides(choice, value, loaded.scenario))[0]
+            value, studies.judge(_name(choice, i), overrides(choice, value, loaded.scenario))[0]
         )
         for i, value in enumerate(choice.values, 1)
     ]

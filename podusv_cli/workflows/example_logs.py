@@ -15,11 +15,14 @@ from podusv_cli.storage import csv_files, files
 MANOEUVRES = f"{PREFIX}identify/manoeuvres.yaml"
 # A log's columns, the signals that they show, and what a number is in the column's unit.
 COLUMNS = {
-    "time [s]": ("time", None, 1.0), "north [m]": ("x_m", None, 1.0),
-    "east [m]": ("y_m", None, 1.0), "heading [deg]": ("psi_m", None, math.degrees(1.0)),
-    "yaw_rate [deg/s]": ("r_m", None, math.degrees(1.0)), "port [rpm]": ("n", 0, 60.0),
+    "time [s]": ("time", None, 1.0),
+    "north [m]": ("x_m", None, 1.0),
+    "east [m]": ("y_m", None, 1.0),
+    "heading [deg]": ("psi_m", None, math.degrees(1.0)),
+    "yaw_rate [deg/s]": ("r_m", None, math.degrees(1.0)),
+    "port [rpm]": ("n", 0, 60.0),
     "starboard [rpm]": ("n", 1, 60.0),
-}  # fmt: skip
+}
 
 
 def write(config: Path, wanted: Identify) -> list[Path]:

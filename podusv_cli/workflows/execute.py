@@ -17,16 +17,18 @@ from podusv_cli import __version__
 from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Allocate, Recording, Status
 from podusv_cli.engine.running.check import check_law
 from podusv_cli.engine.running.simulate import ready, run
-from podusv_cli.findings.finding import Case, postflight
+from podusv_cli.findings.finding import find_before_run, postflight
 from podusv_cli.metrics.cost import law_costs
 from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.process.workers import Outcome
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import HELD, estimate
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import csv_files, files
@@ -63,7 +65,7 @@ class Stopwatch:
 
 
 @dataclass(frozen=True)
-class Task:
+class RunTask:
     """A scenario, its file's text, where its run folder goes, how it is called and drawn.
 
     `named`: the user asked for this folder. `noticed` is what was found before the run. A log of
@@ -76,7 +78,7 @@ class Task:
     force: bool = False
     named: bool = True
     figures: bool = False
-    names: Sequence[str] = ()  # of figures, as `figures.drawing.chosen` has them
+    names: Sequence[str] = ()  # of figures, as `figures.drawing.choose_sheets` has them
     argv: Sequence[str] = ()
     label: str = ""  # in figures; the law's kind by default
     noticed: Sequence[Finding] = ()
@@ -113,9 +115,11 @@ class Finished:
 
 
 def execute(
-    task: Task, progress: Progress | None = None, watch: Stopwatch | None = None,
+    task: RunTask,
+    progress: Progress | None = None,
+    watch: Stopwatch | None = None,
     case: Case | None = None,
-) -> Finished:  # fmt: skip
+) -> Finished:
     """Simulate, measure, write, draw; `target` is there only when all of it is.
 
     `case` is the task's scenario with its plan, where it was looked at before.
@@ -129,38 +133,46 @@ def execute(
     with (
         interrupts_deferred(),
         folder.RunWriter(
-            task.target, force=task.force, named=task.named, needed=size.needed, argv=task.argv
+            task.target,
+            force=task.force,
+            named=task.named,
+            needed=size.bytes_needed,
+            argv=task.argv,
         ) as writer,
     ):
         long = size.content > task.held and not task.scenario.log.compress
         allocate = partial(files.disk_array, writer.folder) if long else np.empty
-        recording = simulated(case, watch, progress, allocate, task.compiling)
+        recording = simulate_case(case, watch, progress, allocate, task.compiling)
         extras = writer.extras
         extras.interrupted = recording.status == "interrupted"
         with watch.part("metrics"):
             gather = partial(summary, case, recording, extras)
-            metrics = extras.made("the metrics", gather) or {}
+            metrics = extras.make_or_record("the metrics", gather) or {}
             metrics |= extras.attempt("the law's cost", lambda: _cost(case, recording)) or {}
         with watch.part("theory"):
-            whole, theory = extras.made(
+            whole, theory = extras.make_or_record(
                 "theory.json with the stability monitor's signals",
-                lambda: monitored(case, recording, allocate),
+                lambda: monitor_case(case, recording, allocate),
             ) or (recording, {})
         with watch.part("write"):
-            whole = _logged(writer, case, whole, again=long)
+            whole = _write_log(writer, case, whole, again=long)
         with watch.part("metrics"):
-            noticed = extras.made("warnings", lambda: postflight(task.scenario, whole))
+            noticed = extras.make_or_record("warnings", lambda: postflight(task.scenario, whole))
         warnings = *task.noticed, *(noticed or ())
         with watch.part("write"):
             _write(writer, task, whole, metrics, warnings)
-            about = extras.made(f"{folder.ABOUT}, which figures need,", lambda: case.about)
+            about = extras.make_or_record(
+                f"{folder.ABOUT}, which figures need,", lambda: case.about
+            )
             if about:
                 facts = about.model_dump(exclude_defaults=True)
                 writer.add_json(folder.ABOUT, {"format": 1, **facts})
             if theory:
                 writer.add_json("theory.json", theory)
         with watch.part("figures"):
-            figures = extras.attempt("figures", lambda: _drawn(task, whole, about, extras)) or {}
+            figures = (
+                extras.attempt("figures", lambda: _draw_figures(task, whole, about, extras)) or {}
+            )
             for name, content in figures.items():
                 writer.add(f"figures/{name}", content)
         status = "interrupted" if extras.interrupted else recording.status
@@ -169,13 +181,19 @@ def execute(
             final = writer.finish(status)
     message = recording.message or ("" if status == "finished" else UNDRAWN)
     return Finished(
-        final, recording.controller, status, message, metrics, watch.total(),
-        warnings=warnings, missing=tuple(extras.missing),
+        final,
+        recording.controller,
+        status,
+        message,
+        metrics,
+        watch.total(),
+        warnings=warnings,
+        missing=tuple(extras.missing),
         rows={m.name: m.about for m in headlines_first(task.scenario.known_metrics())},
-    )  # fmt: skip
+    )
 
 
-def unwritten(outcomes: Iterable[Outcome]) -> str:
+def why_unwritten(outcomes: Iterable[Outcome]) -> str:
     """Why a run could not be written, "" where none failed for that.
 
     A result without such a run is not worth an older one's place. Raises StorageError where there
@@ -200,20 +218,23 @@ def warm_up(case: Case, compiling: Progress | None = None) -> None:
         monitor.prepare(case.plan, compiled)
 
 
-def examined(case: Case) -> list[Finding]:
+def examine(case: Case) -> list[Finding]:
     """The findings about a scenario whose figures, law and path are asked before.
 
     Raises LawError.
     """
     check_figures(case.scenario)
     check_law(case.plan)
-    return case.findings()
+    return find_before_run(case)
 
 
-def simulated(
-    case: Case, watch: Stopwatch, progress: Progress | None = None,
-    allocate: Allocate = np.empty, compiling: Progress | None = None,
-) -> Recording:  # fmt: skip
+def simulate_case(
+    case: Case,
+    watch: Stopwatch,
+    progress: Progress | None = None,
+    allocate: Allocate = np.empty,
+    compiling: Progress | None = None,
+) -> Recording:
     """Simulate a scenario, with the probe of its metrics; `allocate` as `simulate` has it."""
     with watch.part("compile"), interrupts_enabled():
         warm_up(case, compiling)
@@ -250,22 +271,24 @@ def _cost(case: Case, recording: Recording) -> dict[str, float]:
     return timed | operations(case.plan, recording)
 
 
-def monitored(
+def monitor_case(
     case: Case, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
     """The recording with what the stability monitor adds, and its findings; none without V."""
     plan, scenario = case.plan, case.scenario
-    monitored_run = scenario.log.monitor and monitor.monitored(
-        plan, recording,
-        steady_fraction=scenario.metrics.steady_fraction, compiled=scenario.simulation.compiled,
+    monitored_run = scenario.log.monitor and monitor.monitor_recording(
+        plan,
+        recording,
+        steady_fraction=scenario.metrics.steady_fraction,
+        compiled=scenario.simulation.compiled,
         allocate=allocate,
-    )  # fmt: skip
+    )
     if not monitored_run:
         return recording, {}
     return monitored_run.recording, theory_report(plan.loop, plan.grid, monitored_run)
 
 
-def _logged(
+def _write_log(
     writer: folder.RunWriter, case: Case, recording: Recording, *, again: bool
 ) -> Recording:
     """Write log and scenario; the recording, `again` with its signals as they lie in the log.
@@ -285,9 +308,12 @@ def _logged(
 
 
 def _write(
-    writer: folder.RunWriter, task: Task, recording: Recording, metrics: dict[str, float],
+    writer: folder.RunWriter,
+    task: RunTask,
+    recording: Recording,
+    metrics: dict[str, float],
     warnings: Sequence[Finding],
-) -> None:  # fmt: skip
+) -> None:
     writer.add("scenario.yaml", task.text.encode())
     for name, text in task.scenario.plugin_files().items():
         writer.add(name, text.encode())
@@ -299,14 +325,17 @@ def _write(
     writer.add("metrics.csv", csv_files.lines([("metric", "value", "unit"), *rows]).encode())
 
 
-def _drawn(
-    task: Task, recording: Recording, about: RunAbout | None, extras: Extras
+def _draw_figures(
+    task: RunTask, recording: Recording, about: RunAbout | None, extras: Extras
 ) -> dict[str, bytes]:
     if not (task.figures and about):
         return {}
-    from podusv_cli.figures.drawing import chosen, draw_in_parallel  # matplotlib is slow to import
-    from podusv_cli.figures.shown import dressed
+    from podusv_cli.figures.drawing import (  # matplotlib is slow to import
+        choose_sheets,
+        draw_in_parallel,
+    )
+    from podusv_cli.figures.shown import dress_runs
 
-    plugins = task.scenario.plugged
-    shown = dressed([(task.label or recording.controller, recording, about, plugins)])
-    return draw_in_parallel(shown, chosen(task.names, shown, extras), ("png",), extras)
+    label = task.label or recording.controller
+    shown = dress_runs([PastRun(label, about, recording, plugins=task.scenario.plugged)])
+    return draw_in_parallel(shown, choose_sheets(task.names, shown, extras), ("png",), extras)

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.export import c, objects
@@ -39,10 +39,12 @@ class Products:
 
 def export(config: Path, request: Request, products: Products = Products()) -> Path:
     """Write the law into a folder. Raises ScenarioError, UsageError, LawError, StorageError."""
-    platforms, linked = _platforms(products), _linked(products) if products.fmu else {}
+    platforms, linked = _platforms(products), _linkable_platforms(products) if products.fmu else {}
     too_large = limits(allow_large=False)
     checks, plugged = (unknown_codes, too_large), of_files(request.trust)
-    loaded = load(config, request.overrides, checks, request.plugins, plugged).told(request.say)
+    loaded = load(config, request.overrides, checks, request.plugins, plugged).warn_of_dropped(
+        request.say
+    )
     scenario = single(loaded, request.controller)
     law = ExportedLaw.of(scenario)
     if too_large(replace(loaded, scenario=law.scenario)):
@@ -83,7 +85,7 @@ def _platforms(products: Products) -> Sequence[str]:
     """The platforms of the object files. Raises UsageError for an unknown one, or for no files."""
     for name in products.platforms:
         if name not in objects.PLATFORMS:
-            raise UsageError(unknown(f"platform {name!r}", name, objects.PLATFORMS))
+            raise UsageError(unknown_word(f"platform {name!r}", name, objects.PLATFORMS))
     if not (products.c or products.fmu):
         raise UsageError("--no-c and --no-fmu leave nothing to export; give one of them only")
     return tuple(dict.fromkeys(products.platforms)) or tuple(objects.PLATFORMS)
@@ -107,7 +109,7 @@ def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
         )
 
 
-def _linked(products: Products) -> Mapping[str, objects.Platform]:
+def _linkable_platforms(products: Products) -> Mapping[str, objects.Platform]:
     """The platforms of the FMU. Raises UsageError for one without libraries or a linker."""
     names = products.platforms or (this_machine(),)
     if "" in names:

@@ -15,16 +15,16 @@ from podusv_cli.comparison.measured import FEWEST, PLACE, START, Track
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
-from podusv_cli.workflows.execute import examined
+from podusv_cli.workflows.execute import examine
 from podusv_cli.workflows.measured import is_log, track
-from podusv_cli.workflows.members import Member, distinct, numbered
+from podusv_cli.workflows.members import Member, distinct, number_names
 from podusv_cli.workflows.members import from_folder as members_of
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import opened
+from podusv_cli.workflows.run import open_scenario
 
 DATED = (9.4e8, 4.2e9)  # s since 1970, of the years 2000 to 2100
 BEGIN = 0.0  # s, the first instant of every run
@@ -53,11 +53,11 @@ def gather(items: Sequence[Path], request: Request) -> Members:
         )
     logs = [item for item in items if is_log(item)]
     others = [item for item in items if item not in logs]
-    groups = [_opened(item, request, alone=len(others) == 1) for item in others]
-    return gathered([*groups, *measured(logs, groups, request.align)])
+    groups = [_open_members(item, request, alone=len(others) == 1) for item in others]
+    return join_members([*groups, *gather_logs(logs, groups, request.align)])
 
 
-def measured(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -> list[Members]:
+def gather_logs(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -> list[Members]:
     """A log among the arguments as the last of all runs. Raises UsageError."""
     if not logs:
         if align:
@@ -77,7 +77,7 @@ def measured(logs: Sequence[Path], groups: Sequence[Members], align: str = "") -
     members = [member for group in groups for member in group.members]
     speeds = [member.case.scenario.facts.U if member.case else math.inf for member in members]
     sections = [group.identify for group in groups if group.identify]
-    log = track(logs[0], sections, max(speeds), aligned=align).timed(BEGIN)
+    log = track(logs[0], sections, max(speeds), aligned=align).start_clock_at(BEGIN)
     beside = members[0].about
     _check_common(log, max(member.about.duration for member in members))
     name, text = logs[0].stem, repr(log.signals["x"].tolist())
@@ -129,7 +129,8 @@ def _about_clock(log: Track, duration: float) -> str:
     """What to do where a log in seconds hardly has an instant of the run."""
     if (
         not log.aligned
-        and replace(log, aligned=START).timed(BEGIN).common(BEGIN, duration).sum() >= FEWEST
+        and replace(log, aligned=START).start_clock_at(BEGIN).common(BEGIN, duration).sum()
+        >= FEWEST
     ):
         return (
             f"if its clock is another one, --align {START} takes its first position for the first "
@@ -138,20 +139,20 @@ def _about_clock(log: Track, duration: float) -> str:
     return "take a run that lasts longer, or a log with more positions"
 
 
-def gathered(groups: Sequence[Members]) -> Members:
+def join_members(groups: Sequence[Members]) -> Members:
     """All of several, each run with a label of its own, and with the claims about them."""
     members = distinct(member for group in groups for member in group.members)
     labels = iter(member.label for member in members)
     called = [dict(zip(group.names, labels, strict=False)) for group in groups]
     title = "-".join(dict.fromkeys(group.name for group in groups))[:80]
-    return Members(title, members, claims=_labelled(groups, called))
+    return Members(title, members, claims=_label_claims(groups, called))
 
 
-def _opened(path: Path, request: Request, *, alone: bool) -> Members:
+def _open_members(path: Path, request: Request, *, alone: bool) -> Members:
     if path.is_dir():
         return from_folder(path, request.plugins)
     fits = limits(request.allow_large, read_back=True)
-    loaded = opened(path, request, (unknown_codes, fits))
+    loaded = open_scenario(path, request, (unknown_codes, fits))
     return from_scenario(loaded, alone=alone)
 
 
@@ -168,21 +169,25 @@ def from_scenario(loaded: Loaded, *, alone: bool) -> Members:
     """The runs of a scenario, and its claims; `alone` says that nothing else is compared."""
     scenario, singles = loaded.scenario, loaded.scenario.singles()
     labels = list(singles) if alone or scenario.controllers else [scenario.name]
-    cases = [
-        Case(single, loaded.plans[label], scenario.identify) for label, single in singles.items()
-    ]
     members = [
         Member(
-            label, case.about, case.resolved_yaml, case.scenario.plugged,
-            case=case, text=loaded.text, noticed=examined(case),
+            label,
+            case.about,
+            case.resolved_yaml,
+            case.scenario.plugged,
+            case=case,
+            text=loaded.text,
+            noticed=examine(case),
         )
-        for label, case in zip(labels, cases, strict=True)
-    ]  # fmt: skip
+        for label, case in zip(labels, loaded.cases.values(), strict=True)
+    ]
     claims = parse_claims(loaded)
     return Members(scenario.name, members, list(singles), claims, scenario.identify)
 
 
-def _labelled(groups: Sequence[Members], called: Sequence[Mapping[str, str]]) -> list[ParsedClaim]:
+def _label_claims(
+    groups: Sequence[Members], called: Sequence[Mapping[str, str]]
+) -> list[ParsedClaim]:
     """All claims; names that several scenarios use are preceded by the scenario's name."""
     counts = Counter(claim.name for group in groups for claim in group.claims)
     claims = [
@@ -192,5 +197,5 @@ def _labelled(groups: Sequence[Members], called: Sequence[Mapping[str, str]]) ->
         for group, labels in zip(groups, called, strict=True)
         for claim in group.claims
     ]
-    names = numbered(claim.name for claim in claims)
+    names = number_names(claim.name for claim in claims)
     return [replace(claim, name=name) for claim, name in zip(claims, names, strict=True)]

@@ -9,22 +9,23 @@ from pathlib import Path
 from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.identify import outputs
-from podusv_cli.identify.answer import Answer
+from podusv_cli.identify.answer import Identification
 from podusv_cli.identify.fit import estimate
-from podusv_cli.identify.fit.problem import Problem
-from podusv_cli.identify.fit.records import Log
+from podusv_cli.identify.fit.problem import FitProblem
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.phrases import early_words, far_words, thrust_words, worse_words
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.identify import Identify, LogFile
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.shipped import relative_to
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import RESULTS, opened, writer_of
+from podusv_cli.workflows.run import RESULTS, open_scenario, writer_of
 
 Progress = Callable[[str, float], None]
 SETTLES = 30  # rounds, after which a search has usually settled
@@ -38,7 +39,7 @@ def identify(
     An interrupt keeps the best numbers so far. Raises UsageError without logs and for logs that
     cannot be used, ScenarioError, StorageError.
     """
-    loaded = opened(config, request, (unknown_codes,))
+    loaded = open_scenario(config, request, (unknown_codes,))
     return identify_of(loaded, request, progress)
 
 
@@ -54,12 +55,9 @@ def identify_of(
         )
     logs = _read(loaded, scenario.identify.logs, progress)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
-    with (
-        interrupts_deferred(),
-        writer_of(request, target) as writer,
-    ):
+    with interrupts_deferred(), writer_of(request, target) as writer:
         with interrupts_enabled():
-            answer = answered(scenario, scenario.identify, logs, progress)
+            answer = answer_logs(scenario, scenario.identify, logs, progress)
         warnings = (
             *(line for log, _ in logs for line in log.warnings),
             *thrust_words(answer),
@@ -78,9 +76,9 @@ def identify_of(
 
 def _read(
     loaded: Loaded, wanted: Sequence[LogFile], progress: Progress | None
-) -> list[tuple[Log, str]]:
+) -> list[tuple[FilterLog, str]]:
     """The logs with their roles. Raises LogFault with what is wrong with all of them."""
-    logs: list[tuple[Log, str]] = []
+    logs: list[tuple[FilterLog, str]] = []
     faults: list[str] = []
     for i, given in enumerate(wanted):
         if progress:
@@ -95,24 +93,27 @@ def _read(
     return logs
 
 
-def answered(
-    scenario: Scenario, wanted: Identify, logs: Sequence[tuple[Log, str]], progress: Progress | None
-) -> Answer:
+def answer_logs(
+    scenario: Scenario,
+    wanted: Identify,
+    logs: Sequence[tuple[FilterLog, str]],
+    progress: Progress | None,
+) -> Identification:
     """The hull, and what is known of its errors."""
-    problem = Problem(scenario, wanted, [log for log, role in logs if role == "fit"])
+    problem = FitProblem(scenario, wanted, [log for log, role in logs if role == "fit"])
     search = problem.search
 
     def tell(i: int, value: float) -> None:
         if progress:
             progress(f"fitting, round {i}", min(i / SETTLES, 0.99))
 
-    found = estimate.prior_kept(search, estimate.estimated(search, tell), tell)
+    found = estimate.prior_kept(search, estimate.estimate_hull(search, tell), tell)
     ways = estimate.directions(found.covariance, len(problem.hull))
-    judged: list[tuple[Log, str, Sequence[FreeRun]]] = [(log, role, ()) for log, role in logs]
+    judged: list[tuple[FilterLog, str, Sequence[FreeRun]]] = [(log, role, ()) for log, role in logs]
     try:
         for i, (log, role) in enumerate(logs):
             judged[i] = log, role, free_runs(problem, log, found.y)
     except KeyboardInterrupt:
         found = replace(found, interrupted=True)
     marks = [score for log, role, runs in judged for score in scores(log, role, runs)]
-    return Answer(problem, found, ways, judged, marks)
+    return Identification(problem, found, ways, judged, marks)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.core.phrases import unknown
-from podusv_cli.core.plugins import installed
+from podusv_cli.core.phrases import unknown_word
+from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario import shipped
 from podusv_cli.scenario.layers import extended_files
@@ -24,10 +24,12 @@ from podusv_cli.workflows.examples import ROOM, examples, texts
 SCHEMA = "podusv.schema.json"
 # What to begin with, and what each shows.
 FIRST = {
-    "mu_2017/corrected": "a run", "own_vessel": "a hull of your own",
-    "mu_2017/corrected_compare": "a comparison of laws", "studies/hull_and_sea": "a study",
+    "mu_2017/corrected": "a run",
+    "own_vessel": "a hull of your own",
+    "mu_2017/corrected_compare": "a comparison of laws",
+    "studies/hull_and_sea": "a study",
     "identify/otter": "a hull from logs",
-}  # fmt: skip
+}
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*$", re.MULTILINE)
 
 
@@ -63,7 +65,7 @@ def init(name: str, out: Path | None = None) -> Begun:
     """
     short, known = _short(name), starting_points() | examples()
     if short not in known:
-        raise UsageError(unknown(f"starting point {name!r}", short, known, "podusv init"))
+        raise UsageError(unknown_word(f"starting point {name!r}", short, known, "podusv init"))
     return (_example if short in examples() else _scenario)(short, out)
 
 
@@ -77,7 +79,7 @@ def _scenario(name: str, out: Path | None) -> Begun:
     text = own_copy(source)
     scenario = load_text(text, str(config)).scenario
     files.make_folder(config.parent)
-    plugins = installed()
+    plugins = installed_plugins()
     known_to_editors = schema_text(tuple(finding_kinds(plugins)), plugins)
     files.write_all({config: text.encode(), schema: known_to_editors.encode()})
     logs = example_logs.write(config, scenario.identify) if scenario.identify else []

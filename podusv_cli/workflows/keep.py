@@ -6,26 +6,26 @@ import os
 from functools import partial
 from pathlib import Path
 
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
-from podusv_cli.scenario.load import resolved_yaml
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.storage.run_folder import LOGS
-from podusv_cli.studies.making.draws import drawn, draws
+from podusv_cli.studies.making.draws import draw_scenario, draws
 from podusv_cli.studies.making.plan import StudyPlan
-from podusv_cli.studies.telling.keep import Kept, KeptRun, found, unmade
+from podusv_cli.studies.telling.keep import Kept, KeptRun, find_kept, missing_runs
 from podusv_cli.studies.telling.results import Results
-from podusv_cli.workflows.execute import Task, execute, warm_up
+from podusv_cli.workflows.execute import RunTask, execute, warm_up
 from podusv_cli.workflows.request import Request
 
 
 def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenario:
     """The scenario of one run of a study, under a name of its own."""
     (numbers,) = draws(plan.sweep, draw, 1)
-    single = drawn(plan.single(law, cell), plan.sweep.vary, numbers)
+    single = draw_scenario(plan.single(law, cell), plan.sweep.vary, numbers)
     end = f"-{KeptRun(law, cell, draw, '').name}"
     return single.model_copy(update={"name": f"{single.name[: LONGEST_NAME - len(end)]}{end}"})
 
@@ -46,7 +46,7 @@ def keep(
     A run that fails is missing among the `extras`. Raises StorageError only for what is not about
     one run.
     """
-    missing = unmade(folder, results)
+    missing = missing_runs(folder, results)
     tasks = [_task(folder, plan, run, request) for run in missing]
     with interrupts_enabled():
         for law, cell in dict.fromkeys((run.law, run.cell) for run in missing):
@@ -56,12 +56,16 @@ def keep(
         if outcome.failure:
             extras.missing.append(Failure(f"{LOGS}/{run.name}", outcome.failure))
     extras.interrupted |= any(outcome.interrupted for outcome in outcomes)
-    return found(folder, results, extras)
+    return find_kept(folder, results, extras)
 
 
-def _task(folder: Path, plan: StudyPlan, run: KeptRun, request: Request) -> Task:
+def _task(folder: Path, plan: StudyPlan, run: KeptRun, request: Request) -> RunTask:
     scenario = scenario_of_draw(plan, run.law, run.cell, run.draw)
-    return Task(
-        scenario, resolved_yaml(scenario), folder / LOGS / run.name,
-        figures=request.figures, argv=request.argv, label=run.law,
-    )  # fmt: skip
+    return RunTask(
+        scenario,
+        resolved_yaml(scenario),
+        folder / LOGS / run.name,
+        figures=request.figures,
+        argv=request.argv,
+        label=run.law,
+    )

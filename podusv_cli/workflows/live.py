@@ -18,29 +18,32 @@ from typing import Any
 from podusv_cli.comparison.claims import ParsedClaim
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, ScenarioError, StorageError, UsageError, in_a_line
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.simulate import run_together
 from podusv_cli.figures.chase import chase
-from podusv_cli.figures.shown import dressed
+from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.traces import FIRST, traces
-from podusv_cli.findings.finding import Case, postflight, unknown_codes
+from podusv_cli.findings.finding import find_before_run, postflight, unknown_codes
 from podusv_cli.metrics.table import headlines_first
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.address import ValueRefused, with_values
-from podusv_cli.scenario.controls import Control, controls
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.controls import Knob, controls
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import Loaded, load, load_text, yaml_text
+from podusv_cli.scenario.load import Loaded, load, load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import kinds_of, of_files
-from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted, plain, route
+from podusv_cli.scenario.resolved import yaml_text
+from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted_key, plain, route
 from podusv_cli.workflows.compare import compare
-from podusv_cli.workflows.execute import monitored, summary, warm_up
+from podusv_cli.workflows.execute import monitor_case, summary, warm_up
 from podusv_cli.workflows.live_verdicts import (
     claims_about,
-    entry_of,
     limits_in_words,
     margins_of,
+    past_run_of,
     verdicts_on,
 )
 from podusv_cli.workflows.request import Request
@@ -88,7 +91,7 @@ class Live:
     _puts: dict[str, tuple[Any, Case]] = field(default_factory=dict)  # the last one of each law
     _bases: dict[str, Base] = field(default_factory=dict)  # by words
 
-    def loaded(self, moved: Moved) -> Loaded:
+    def load(self, moved: Moved) -> Loaded:
         """The scenario with the values moved. Raises ScenarioError."""
         checks = (unknown_codes, limits())
         return load(self.source, self.assignments(moved), checks, self.files, of_files(self.trust))
@@ -100,11 +103,11 @@ class Live:
         """
         is_added = any(re.fullmatch(ADDED, key) for key in moved)
         first = self._law_of_its_own if is_added else []
-        return [*self.given, *first, *assigned(moved)]
+        return [*self.given, *first, *assignments_of(moved)]
 
     @cached_property
     def _law_of_its_own(self) -> list[str]:
-        loaded = self.loaded({})
+        loaded = self.load({})
         if loaded.scenario.controllers:
             return []
         (label,) = loaded.scenario.labels()
@@ -115,11 +118,11 @@ class Live:
         known = scenario.singles()
         for law in self.laws:
             if law not in known:
-                raise UsageError(unknown(f"controller {law!r}", law, known))
+                raise UsageError(unknown_word(f"controller {law!r}", law, known))
         added = [label for label in known if label not in self._labels]
         return {law: known[law] for law in [*self.laws, *added] or known} if self.laws else known
 
-    def controls(self, scenario: Scenario) -> list[Control]:
+    def controls(self, scenario: Scenario) -> list[Knob]:
         """All that may be moved."""
         several = scenario.controllers
         laws = (
@@ -132,14 +135,17 @@ class Live:
     def answer(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
         """What the page asks for; what podusv refuses as `refused`, sentences by key."""
         answers: dict[str, Callable[..., dict[str, Any]]] = {
-            "frame": self.frame, "margins": self.margins, "report": self.report, "save": self.saved,
-        }  # fmt: skip
+            "frame": self.frame,
+            "margins": self.margins,
+            "report": self.report,
+            "save": self.save,
+        }
         if name not in answers:
-            return _refused(unknown(f"question {name!r}", name, answers))
+            return _refused(unknown_word(f"question {name!r}", name, answers))
         if lacking := [key for key in QUESTIONS[name] if key not in asked]:
             return _refused(f"the question lacks {', '.join(lacking)}")
         try:
-            moved = self.allowed(asked["moved"])
+            moved = self.check_offered(asked["moved"])
             return answers[name](moved, *(asked[key] for key in QUESTIONS[name][1:]))
         except ScenarioError as error:
             faults = [fault for fault in error.faults if isinstance(fault, Fault)]
@@ -153,7 +159,7 @@ class Live:
             traceback.print_exc()
             return _refused(f"{in_a_line(error)}; the terminal has more")
 
-    def allowed(self, moved: Mapping[str, Any]) -> Moved:
+    def check_offered(self, moved: Mapping[str, Any]) -> Moved:
         """Numbers and words at keys that the page was offered. Raises UsageError for others.
 
         So no page can name a plug-in or a file. Of a shared address, kinds come before their keys.
@@ -163,7 +169,7 @@ class Live:
             self.offered |= {key: self.kinds for key in kinds if re.fullmatch(ADDED, key)}
             known = kinds if kinds.keys() <= self.offered.keys() else {}
             if all(kind in (self.offered[key] or [kind]) for key, kind in known.items()):
-                self.controls(self.loaded(known).scenario)
+                self.controls(self.load(known).scenario)
         for key, value in moved.items():
             words = self.offered.get(key, ("",))
             if not (value in words if words else isinstance(value, (int, float))):
@@ -182,7 +188,7 @@ class Live:
         if rest or wanted:
             self._bases.clear()
             self._puts.clear()
-            loaded = self.loaded(moved)
+            loaded = self.load(moved)
             base = self._base_of(loaded)
             cases = base.cases
         else:
@@ -191,24 +197,23 @@ class Live:
         steps = scenario.time_grid().steps
         if steps > MOST_STEPS:
             raise UsageError(f"{steps} steps; a page follows at most {MOST_STEPS}: simulate less")
-        runs, findings, numbers, entries = [], dict[str, list[str]](), {}, []
+        runs, findings, numbers = list[PastRun](), dict[str, list[str]](), {}
         for label, recording in self._recordings(cases, rest).items():
             case = cases[label]
             if rest:
-                recording, _ = monitored(case, recording)
-                for found in (*case.findings(), *postflight(case.scenario, recording)):
+                recording, _ = monitor_case(case, recording)
+                for found in (*find_before_run(case), *postflight(case.scenario, recording)):
                     findings.setdefault(str(found), []).append(label)
             numbers[label] = summary(case, recording, Extras())
-            entries.append(entry_of(label, case, recording, numbers[label], base.claims))
-            runs.append((label, recording, case.about, scenario.plugged))
-        shown = dressed(runs)
+            runs.append(past_run_of(label, case, recording, numbers[label], base.claims))
+        shown = dress_runs(runs)
         told: dict[str, Any] = {
             "chase": chase(shown, FRAMES),
             "curves": traces(shown, [n for n in signals or FIRST if any(r.has(n) for r in shown)]),
             "numbers": _table(scenario, numbers),
-            "endings": {label: log.message for label, log, *_ in runs if log.message},
+            "endings": {r.label: r.recording.message for r in runs if r.recording.message},
             "limits": {label: limits_in_words(numbers[label]) for label in numbers},
-            "verdicts": verdicts_on(base.claims, entries, cases, at_rest=rest),
+            "verdicts": verdicts_on(base.claims, runs, cases, at_rest=rest),
             "command": self.command(moved, [*cases]),
         }
         if rest:
@@ -218,11 +223,15 @@ class Live:
             known = list(
                 dict.fromkeys(n for r in shown for n in r.signals if r.signal(n).ndim == 1)
             )
-            told |= {"controls": [asdict(c) for c in self.controls(loaded.scenario)],
-                     "signals": known, "name": loaded.scenario.name,
-                     "kinds": self.kinds, "several": base.several,
-                     "alone": self._labels[0] if len(self._labels) == 1 else "",
-                     "added": [x for x in cases if x not in self._labels]}  # fmt: skip
+            told |= {
+                "controls": [asdict(c) for c in self.controls(loaded.scenario)],
+                "signals": known,
+                "name": loaded.scenario.name,
+                "kinds": self.kinds,
+                "several": base.several,
+                "alone": self._labels[0] if len(self._labels) == 1 else "",
+                "added": [x for x in cases if x not in self._labels],
+            }
         return told | {"cpu": time.thread_time() - began}
 
     def _recordings(self, cases: Mapping[str, Case], rest: bool) -> dict[str, Recording]:
@@ -242,16 +251,19 @@ class Live:
 
     def margins(self, moved: Moved) -> dict[str, Any]:
         """The margins of every law's loops, about the steady motion at the end of the run."""
-        loaded = self.loaded(moved)
+        loaded = self.load(moved)
         cases = self._base_of(loaded).cases
         return {"margins": {label: margins_of(case) for label, case in cases.items()}}
 
     def report(self, moved: Moved) -> dict[str, Any]:
         """The report of what is shown, in a folder of results as `podusv compare` makes it."""
         request = Request(
-            self.assignments(moved), plugins=self.files, trust=self.trust, force=True,
+            self.assignments(moved),
+            plugins=self.files,
+            trust=self.trust,
+            force=True,
             argv=shlex.split(self.command(moved, self._labels)),
-        )  # fmt: skip
+        )
         done = compare([Path(self.source)], request)
         if done.status == "interrupted":
             raise KeyboardInterrupt
@@ -259,7 +271,7 @@ class Live:
         return {"file": str(page.resolve()), "page": page.read_text("utf-8")}
 
     def _base_of(self, loaded: Loaded) -> Base:
-        cases = {n: Case(s, loaded.plan(s)) for n, s in self.singles(loaded.scenario).items()}
+        cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
         claims, unread = list[ParsedClaim](), tuple[str, ...]()
         try:
             claims = claims_about(parse_claims(loaded), [*cases])
@@ -273,7 +285,7 @@ class Live:
         words = {k: x for k, x in moved.items() if isinstance(x, str) or _is_loaded(route(k))}
         known = json.dumps(words)
         if known not in self._bases:
-            self._bases = {known: self._base_of(self.loaded(words))}
+            self._bases = {known: self._base_of(self.load(words))}
         base = self._bases[known]
         return base, {
             label: self._put(label, case, moved, words, base) for label, case in base.cases.items()
@@ -299,21 +311,18 @@ class Live:
         except ValueRefused as error:
             own = f"controllers.{label}" if base.several else "controller"
             place, _, said = str(error).partition(": ")  # where no single value is to blame
-            key = dotted(error.steps).replace("controller", own, 1) or place
+            key = dotted_key(error.steps).replace("controller", own, 1) or place
             text = str(error) if error.steps else said
             raise ScenarioError([Fault(Mark(self.source), key, text)]) from error
-        made, path, approach = (
-            Case(scenario, scenario.plan()),
-            scenario.path,
-            scenario.controller.approach(),
-        )
+        made, path, approach = (Case.of(scenario), scenario.path, scenario.controller.approach())
         seen = {
-            "length": scenario.vessel.length, "beam": scenario.vessel.beam,
+            "length": scenario.vessel.length,
+            "beam": scenario.vessel.beam,
             "waypoints": tuple(map(tuple, path.waypoints())),
             "circles": tuple(map(tuple, path.circles())),
             "standoff": approach.standoff if approach else 0.0,
             "values": {**case.about.values, "path": path.model_dump(mode="json")},
-        }  # fmt: skip
+        }
         vars(made)["about"] = case.about.model_copy(update=seen)  # all of it takes as long as a run
         self._puts[label] = (words, new), made
         return made
@@ -330,20 +339,20 @@ class Live:
     @cached_property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of laws that may be added."""
-        return tuple(kinds_of(type(self.loaded({}).scenario), "controller"))
+        return tuple(kinds_of(type(self.load({}).scenario), "controller"))
 
     @cached_property
     def _labels(self) -> tuple[str, ...]:
-        return self.loaded({}).scenario.labels()
+        return self.load({}).scenario.labels()
 
-    def saved(self, moved: Moved, name: Any) -> dict[str, Any]:
+    def save(self, moved: Moved, name: Any) -> dict[str, Any]:
         """Write what differs into NAME.yaml in this folder. Raises StorageError where it is there.
 
         It loads to the very scenario that is shown, or is written whole.
         """
         if not re.fullmatch(r"\w[\w-]*", str(name)):
             raise UsageError(f"{name!r} is no name; letters, digits, _ and -")
-        file, loaded = Path(f"{name}.yaml"), self.loaded(moved)
+        file, loaded = Path(f"{name}.yaml"), self.load(moved)
         changed: dict[str, Any] = {}
         for key in [text.partition("=")[0] for text in self.assignments(moved)]:
             steps, inner, node = route(key), changed, loaded.root
@@ -378,7 +387,7 @@ def _is_loaded(steps: Route) -> bool:
     return steps[0] in WHOLE or steps[: len(LINK)] == LINK
 
 
-def assigned(moved: Moved) -> list[str]:
+def assignments_of(moved: Moved) -> list[str]:
     """Values as `--set` takes them."""
     return [
         f"{key}={value if isinstance(value, str) else json.dumps(value)}"
@@ -391,20 +400,14 @@ def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> li
     first = [m.about for m in headlines_first(scenario.known_metrics()) if m.headline]
     return [
         {
-            "name": a.name, "row": a.row, "unit": "" if a.unit == "1" else a.unit,
+            "name": a.name,
+            "row": a.row,
+            "unit": "" if a.unit == "1" else a.unit,
             "values": [
-                own[a.name] if math.isfinite(own.get(a.name, math.nan)) else a.undefined
+                own[a.name] if math.isfinite(own.get(a.name, math.nan)) else a.undefined_word
                 for own in numbers.values()
             ],
         }
         for a in first
         if any(a.name in own for own in numbers.values())
-    ]  # fmt: skip
-
-
-def page(title: str, base: str) -> str:
-    """The page, which asks under a path."""
-    from podusv_cli.pages.page import environment
-
-    template = environment("podusv_cli.comparison").get_template("live.html.j2")
-    return template.render(title=title, base=base)
+    ]

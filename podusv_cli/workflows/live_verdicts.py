@@ -5,26 +5,29 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from podusv_cli.comparison.claims import ParsedClaim, judge
-from podusv_cli.comparison.entries import Entry, metrics_of
-from podusv_cli.comparison.margins import with_margins
+from podusv_cli.comparison.known_metrics import metrics_of
 from podusv_cli.core.errors import LawError, NotConvergedError
+from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case
 from podusv_cli.metrics.effort import saturated_fraction
 from podusv_cli.metrics.margins import OF_LOOP
 from podusv_cli.metrics.operations import law_operations, operations
 from podusv_cli.process.extras import Extras
-from podusv_cli.storage.run_folder import InMemory
+from podusv_cli.scenario.case import Case
 from podusv_cli.theory.loop_margins import loop_margins
+from podusv_cli.workflows.claimed_margins import with_margins
 
 SHOWN_MARGINS = (
-    "phase_margin_u", "phase_margin_r", "gain_margin_u", "gain_margin_r", "delay_margin",
+    "phase_margin_u",
+    "phase_margin_r",
+    "gain_margin_u",
+    "gain_margin_r",
+    "delay_margin",
     "decay_rate",
-)  # fmt: skip
+)
 
 
 def claims_about(parsed: Sequence[ParsedClaim], labels: Sequence[str]) -> list[ParsedClaim]:
@@ -43,22 +46,27 @@ def _names_in(tree: ast.expr | None) -> set[str]:
     return {node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called}
 
 
-def entry_of(
-    label: str, case: Case, recording: Recording, numbers: Mapping[str, float],
+def past_run_of(
+    label: str,
+    case: Case,
+    recording: Recording,
+    numbers: Mapping[str, float],
     parsed: Sequence[ParsedClaim],
-) -> Entry:  # fmt: skip
+) -> PastRun:
     """A run that was only simulated, as claims ask it; `numbers` are its metrics by name."""
-    known: dict[str, float | None] = {**numbers}
+    known = {**numbers}
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         known |= operations(case.plan, recording)
-    run = InMemory(Path(), recording.status, known, {}, "", kept=recording)
-    return Entry(label, run, case.about, plugins=case.scenario.plugged)
+    return PastRun(label, case.about, recording, known, plugins=case.scenario.plugged)
 
 
 def verdicts_on(
-    parsed: Sequence[ParsedClaim], entries: Sequence[Entry], cases: Mapping[str, Case], *,
+    parsed: Sequence[ParsedClaim],
+    runs: Sequence[PastRun],
+    cases: Mapping[str, Case],
+    *,
     at_rest: bool,
-) -> list[dict[str, Any]]:  # fmt: skip
+) -> list[dict[str, Any]]:
     """The verdict on each claim, for the page.
 
     While values move, margins and the monitor's signals are missing: only the claims that can be
@@ -66,16 +74,20 @@ def verdicts_on(
     """
     if at_rest:
         scenarios = {label: case.scenario for label, case in cases.items()}
-        entries = with_margins(entries, scenarios, parsed, Extras())
-    verdicts = judge(parsed, {entry.label: entry for entry in entries}, metrics_of(entries))
+        runs = with_margins(runs, scenarios, parsed, Extras())
+    verdicts = judge(parsed, {run.label: run for run in runs}, metrics_of(runs))
     return [
         {
-            "name": v.name, "says": v.claim.says, "expect": v.claim.expect, "answer": v.answer,
-            "words": v.in_words, "evidence": v.evidence(),
+            "name": v.name,
+            "says": v.claim.says,
+            "expect": v.claim.expect,
+            "answer": v.answer,
+            "words": v.in_words,
+            "evidence": v.evidence(),
         }
         for v in verdicts
         if at_rest or v.answer is not None
-    ]  # fmt: skip
+    ]
 
 
 def margins_of(case: Case) -> dict[str, Any]:

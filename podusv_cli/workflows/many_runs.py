@@ -46,7 +46,7 @@ def loaded_for(
         loaded = kept_scenario(config, *given, plugins.of_folder(request.trust))
     else:
         loaded = load(config, *given, plugins.of_files(request.trust))
-    loaded.told(lambda lost: request.warn(lost.removeprefix("warning: ")))
+    loaded.warn_of_dropped(lambda lost: request.warn(lost.removeprefix("warning: ")))
     if getattr(loaded.scenario, key) is None:
         named = config if isinstance(config, Path) else loaded.scenario.name
         raise UsageError(f"{named} has no key `{key}`, {advice}")
@@ -60,9 +60,12 @@ def folder_of(config: Config) -> Path | None:
 
 
 def kept_scenario(
-    folder: Path, overrides: Sequence[str] = (), checks: Sequence[Check] = (),
-    added: Sequence[str] = (), plugged: Plugged = LOOKED_AT,
-) -> Loaded:  # fmt: skip
+    folder: Path,
+    overrides: Sequence[str] = (),
+    checks: Sequence[Check] = (),
+    added: Sequence[str] = (),
+    plugged: Plugged = LOOKED_AT,
+) -> Loaded:
     """The scenario that a folder keeps; no link to another file, either."""
     path = folder / SCENARIO
     return load_stored(files.read_text(path), str(path), overrides, checks, added, plugged)
@@ -91,12 +94,12 @@ def executor_for(
     return executor(request.scheduler, request.workers, recipe, seal)
 
 
-def refused(executor: Executor) -> tuple[str, ...]:
+def refusals_of(executor: Executor) -> tuple[str, ...]:
     """Why workers of a cluster got no units."""
     return tuple(executor.provenance().get("refused", {}).values())
 
 
-def interrupted(kept: str, command: str, folder: Path) -> KeyboardInterrupt:
+def interruption(kept: str, command: str, folder: Path) -> KeyboardInterrupt:
     """What ends a command that was interrupted: what it leaves there, and how to go on."""
     again = plugins.continue_with(command, folder)
     return KeyboardInterrupt(f"interrupted; {kept} are kept, continue with: {again}")

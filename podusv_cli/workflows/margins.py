@@ -18,7 +18,7 @@ from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 from podusv_cli.theory.loop_margins import LoopMargins, loop_margins
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import opened, single
+from podusv_cli.workflows.run import open_scenario, single
 
 
 @dataclass(frozen=True)
@@ -32,22 +32,29 @@ class MarginsOfLaws:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints, and margins.json holds."""
         return {
-            "format": 1, "folder": None if self.folder is None else str(self.folder),
+            "format": 1,
+            "folder": None if self.folder is None else str(self.folder),
             "laws": {label: _as_json(law) for label, law in self.laws.items()},
             "failed": dict(self.failed),
-        }  # fmt: skip
+        }
 
 
 def _as_json(law: LoopMargins) -> dict[str, Any]:
     linear = law.linear
     return {
-        "at": linear.course.time, "speed": linear.course.speed, "turn": linear.course.turn,
-        "z_e": linear.distance, "motion": linear.motion, "load": linear.load,
-        "left_out": law.left_out, "open": law.open, "stable": law.stable,
+        "at": linear.course.time,
+        "speed": linear.course.speed,
+        "turn": linear.course.turn,
+        "z_e": linear.distance,
+        "motion": linear.motion,
+        "load": linear.load,
+        "left_out": law.left_out,
+        "open": law.open,
+        "stable": law.stable,
         "poles": [[pole.real, pole.imag] for pole in law.poles],
         "crossovers": {axis: loop.crossovers for axis, loop in law.loops.items()},
         "margins": law.numbers(),
-    }  # fmt: skip
+    }
 
 
 def margins(config: Path, request: Request, at: float | None = None) -> MarginsOfLaws:
@@ -61,7 +68,7 @@ def margins(config: Path, request: Request, at: float | None = None) -> MarginsO
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
-    loaded = opened(config, request, checks)
+    loaded = open_scenario(config, request, checks)
     duration, label = loaded.scenario.simulation.duration, request.controller
     if at is not None and at > duration:
         raise UsageError(f"--at {at:g}: the run ends at {duration:g} s; give an earlier time")

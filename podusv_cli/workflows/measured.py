@@ -49,10 +49,12 @@ def track(
     [m/s] is that of the fastest boat beside it; `aligned` as in `Track`. Raises UsageError where
     the log has no positions, or has mistakes that its motion shows.
     """
-    from podusv_cli.identify.logs.checks import checked
-    from podusv_cli.identify.logs.reading import Named, delivered_each, table
+    from podusv_cli.identify.logs.checks import check_log
+    from podusv_cli.identify.logs.reading import NamedQuantities, delivered_each, table
 
-    named = Named(identify[0].columns, identify[0].frame) if identify else Named()
+    named = (
+        NamedQuantities(identify[0].columns, identify[0].frame) if identify else NamedQuantities()
+    )
     log = table(path, STATE, named)
     if lacking := [name for name in PLANE if name not in log.columns]:
         raise UsageError(
@@ -65,7 +67,7 @@ def track(
     rows = new["x"] & new["y"]
     if np.count_nonzero(rows) < 2:
         raise UsageError(f"{path}: has fewer than two positions, which is no track")
-    lines = [*log.warnings, *checked(log, top_speed=top_speed)]
+    lines = [*log.warnings, *check_log(log, top_speed=top_speed)]
     if log.from_fix and not aligned:
         lines.append(NO_COMMON_PLACE)
     signals = {

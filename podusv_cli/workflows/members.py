@@ -20,8 +20,8 @@ from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.core.finding import Finding
 from podusv_cli.core.plugins import Plugins
 from podusv_cli.core.recording import Recording
-from podusv_cli.findings.finding import Case
 from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.plugins import continue_with, on_hand, used_of
 from podusv_cli.storage import manifest
@@ -35,15 +35,26 @@ from podusv_cli.storage.run_folder import (
     RESOLVED,
     STUDY,
     THEORY,
-    FinishedRun,
+    RunFolder,
     open_run,
 )
 
 # Signals that every log has, as figures and comparisons need them.
 NEEDED = (
-    "time", "x", "y", "psi", "u", "v", "r", "x_d", "y_d", "tau_u_cmd", "tau_r_cmd", "tau_u",
+    "time",
+    "x",
+    "y",
+    "psi",
+    "u",
+    "v",
+    "r",
+    "x_d",
+    "y_d",
+    "tau_u_cmd",
+    "tau_r_cmd",
+    "tau_u",
     "tau_r",
-)  # fmt: skip
+)
 _TERMS = ("z_e", "psi_e", "u_e", "r_e", "y_u", "y_r", "W_u", "W_r", "b_u", "b_r")
 _BOUNDS = ("V", "window_start", "V_lambda", "V_Delta", "V_bound", "v_bound")
 # Signals that a signal needs beside it.
@@ -63,7 +74,7 @@ class _Repetition(BaseModel):
 
 @dataclass(frozen=True)
 class Member:
-    """One run of several: finished, or the `case` of one that is still to be made.
+    """One run of several: the `folder` of one that is over, or the `case` of one to be made.
 
     A `track` is no run: it was measured. `plugins` have figures, metrics and signals for it.
     """
@@ -72,7 +83,7 @@ class Member:
     about: RunAbout
     resolved: str  # the text of resolved.yaml
     plugins: Plugins = ()
-    run: FinishedRun | None = None
+    folder: RunFolder | None = None
     case: Case | None = None
     text: str = ""  # the scenario's file
     noticed: Sequence[Finding] = ()  # before the run
@@ -87,13 +98,13 @@ def from_folder(path: Path, files: Sequence[str] = ()) -> list[Member]:
     plugins = on_hand(files)
     return [
         Member(
-            run.folder.name, run.about or _told_before(run, files), run.resolved_yaml, plugins, run
+            run.path.name, run.about or _told_before(run, files), run.resolved_yaml, plugins, run
         )
         for run in runs_of(path)
-    ]  # fmt: skip
+    ]
 
 
-def runs_of(path: Path, *, optional: str = "") -> list[FinishedRun]:
+def runs_of(path: Path, *, optional: str = "") -> list[RunFolder]:
     """The finished runs of a folder: one run, or all those of a comparison.
 
     Their logs and theory.json were checked. Raises UsageError for a folder without finished runs,
@@ -101,10 +112,14 @@ def runs_of(path: Path, *, optional: str = "") -> list[FinishedRun]:
     """
     if (path / STUDY).is_file():
         raise UsageError(_about_study(path))
-    inner = _listed(path, optional) if os.path.lexists(path / manifest.NAME) else _unlisted(path)
+    inner = (
+        _find_listed(path, optional)
+        if os.path.lexists(path / manifest.NAME)
+        else _find_unlisted(path)
+    )
     if not inner:
         manifest.demand(path)
-    return [_checked(child, optional) for child in (inner or [path])]
+    return [_check_member(child, optional) for child in (inner or [path])]
 
 
 def _about_study(path: Path) -> str:
@@ -117,13 +132,13 @@ def _about_study(path: Path) -> str:
     )
 
 
-def _unlisted(path: Path) -> list[Path]:
+def _find_unlisted(path: Path) -> list[Path]:
     """Run folders inside a folder that has no manifest; links are not followed."""
     children = sorted(path.iterdir()) if path.is_dir() else ()
     return [c for c in children if not c.is_symlink() and os.path.lexists(c / LOG)]
 
 
-def _listed(path: Path, optional: str) -> list[Path]:
+def _find_listed(path: Path, optional: str) -> list[Path]:
     """The runs of a finished comparison, or of one made again, in its order; none in a run."""
     files = manifest.check(path, optional).files
     runs = sorted(name.removesuffix(f"/{LOG}") for name in files if name.endswith(f"/{LOG}"))
@@ -144,24 +159,24 @@ def _first_row(path: Path) -> list[str]:
         raise StorageError(f"cannot read {path}: no CSV ({error})") from error
 
 
-def _checked(path: Path, optional: str) -> FinishedRun:
+def _check_member(path: Path, optional: str) -> RunFolder:
     run = open_run(path, optional=optional)
     if run.has_log and (wrong := _fault(run.recording)):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")
-    stability.check(run.theory, run.folder / THEORY)
+    stability.check(run.theory, run.path / THEORY)
     return run
 
 
-def _told_before(run: FinishedRun, files: Sequence[str]) -> RunAbout:
+def _told_before(run: RunFolder, files: Sequence[str]) -> RunAbout:
     """What a run says about itself of which an older podusv wrote no about.json."""
-    source = str(run.folder / RESOLVED)
+    source = str(run.path / RESOLVED)
     try:
         given = load_stored(run.resolved_yaml, source, plugged=partial(used_of, files))
     except ScenarioError as error:
         raise UsageError(
-            f"{run.folder}: an older podusv wrote it without {ABOUT}, and its scenario cannot be "
+            f"{run.path}: an older podusv wrote it without {ABOUT}, and its scenario cannot be "
             f"read: {str(error).splitlines()[0]}; name the files of its plug-ins with --plugin, or "
-            f"make the run anew: {continue_with('rerun', run.folder)} --out NEW"
+            f"make the run anew: {continue_with('rerun', run.path)} --out NEW"
         ) from error
     return about_of(given.scenario)
 
@@ -181,11 +196,11 @@ def _fault(log: Recording) -> str:
 def distinct(members: Iterable[Member]) -> list[Member]:
     """The members, in order, each with a label of its own."""
     members = list(members)
-    labels = numbered([member.label for member in members], taken=RESERVED)
+    labels = number_names([member.label for member in members], taken=RESERVED)
     return [replace(member, label=label) for member, label in zip(members, labels, strict=True)]
 
 
-def numbered(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+def number_names(names: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """The names; repeated ones and those `taken` get a number: pid, pid_2, ...
 
     Some file systems do not tell upper from lower case, so neither does this.

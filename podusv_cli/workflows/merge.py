@@ -10,13 +10,13 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.storage import files
 from podusv_cli.storage.writer import TABLES, sole_writer
 from podusv_cli.studies.making import record
-from podusv_cli.studies.making.dispatch import Tally
+from podusv_cli.studies.making.dispatch import StudyTally
 from podusv_cli.studies.making.joining import gaps, join, mixture
 from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.store import SCENARIO, Store
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.studies import stored
-from podusv_cli.workflows.sweep import Swept, answered
+from podusv_cli.workflows.studies import open_store
+from podusv_cli.workflows.sweep import Swept, answer_study
 
 
 def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
@@ -28,7 +28,7 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     if inside := [study for study in studies if study.resolve() == out.resolve()]:
         raise UsageError(f"--out {out} is one of the studies, {inside[0]}; name another folder")
     started = datetime.now(UTC)
-    others = [stored(study) for study in studies]
+    others = [open_store(study) for study in studies]
     most = max(others, key=lambda other: other.about.draws)
     store = Store(out, most.about)
     for other in others:
@@ -36,13 +36,16 @@ def merge(studies: Sequence[Path], out: Path, request: Request) -> Swept:
     plugins = record.plugin_files(most.folder, most.about)
     texts = {SCENARIO: files.read_text(most.folder / SCENARIO), **plugins}
     with sole_writer(out), sole_writer(out, TABLES):
-        return _joined(store, others, texts, started, request)
+        return _join_stores(store, others, texts, started, request)
 
 
-def _joined(
-    store: Store, others: Sequence[Store], texts: Mapping[str, str], started: datetime,
+def _join_stores(
+    store: Store,
+    others: Sequence[Store],
+    texts: Mapping[str, str],
+    started: datetime,
     request: Request,
-) -> Swept:  # fmt: skip
+) -> Swept:
     """Write the runs of the others into a study, and judge it where it is whole."""
     out = store.folder
     store.open(started.isoformat(timespec="seconds"), texts)
@@ -51,7 +54,7 @@ def _joined(
     session.end(0)
     if mixed := mixture(out):
         request.warn(mixed)
-    tally = Tally.of(store.covered())
+    tally = StudyTally.of(store.covered_draws())
     if tally.made < tally.wanted:
         return Swept(out, tally, missing_runs=tuple(gaps(store)))
-    return answered(store, store.write_runs(), request)
+    return answer_study(store, store.write_runs(), request)

@@ -13,7 +13,7 @@ from string import Template
 
 from podusv_cli.components.vessels.vessel import VESSELS
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import kinds_of
@@ -33,7 +33,7 @@ def _figures() -> Iterable[str]:
 
 
 @dataclass(frozen=True)
-class Part:
+class StartingFiles:
     """What there is a starting file for: the names that are taken, files, and commands to try.
 
     `files` are templates by name; `words` are for templates.
@@ -45,63 +45,75 @@ class Part:
     words: Mapping[str, str] = field(default_factory=dict)
 
 
-def _plugin(what: str, taken: Callable[[], Iterable[str]], command: str, **words: str) -> Part:
+def _plugin(
+    what: str, taken: Callable[[], Iterable[str]], command: str, **words: str
+) -> StartingFiles:
     made = {"$name.py": f"{what}.py", "test_$name.py": "test.py", "$name.yaml": "scenario.yaml"}
-    return Part(taken, made, (f"podusv {command} $name.yaml", TESTED), words)
+    return StartingFiles(taken, made, (f"podusv {command} $name.yaml", TESTED), words)
 
 
 PARTS = {
     "law": _plugin(
-        "law", partial(kinds_of, Scenario, "controller"), "compare",
-        law="$name", more="controllers: {$name: {}, pid: {kind: pid}}",
+        "law",
+        partial(kinds_of, Scenario, "controller"),
+        "compare",
+        law="$name",
+        more="controllers: {$name: {}, pid: {kind: pid}}",
     ),
     "path": _plugin("path", partial(kinds_of, Scenario, "path"), "run", path="$name"),
     "disturbance": _plugin(
         "disturbance", partial(kinds_of, Scenario, "disturbance"), "run", disturbance="$name"
     ),
     "measurement": _plugin(
-        "measurement", partial(kinds_of, Scenario, "measurement"), "run",
+        "measurement",
+        partial(kinds_of, Scenario, "measurement"),
+        "run",
         more="measurement: {kind: $name}",
     ),
     "estimator": _plugin(
-        "estimator", partial(kinds_of, Scenario, "estimator"), "run",
+        "estimator",
+        partial(kinds_of, Scenario, "estimator"),
+        "run",
         more="measurement: {kind: sensors}\nestimator: {kind: $name}",
     ),
     "metric": _plugin("metric", lambda: METRICS, "run"),
     "figure": _plugin("figure", _figures, "compare"),
-    "vessel": Part(
+    "vessel": StartingFiles(
         partial(preset_names, VESSELS),
         {"$name.yaml": "vessel.yaml", "$name_line.yaml": "vessel_task.yaml"},
         ("podusv run $name_line.yaml",),
     ),
-    "paper": Part(
+    "paper": StartingFiles(
         partial(kinds_of, Scenario, "controller"),
         {
-            "$name/$name.py": "law.py", "$name/test_$name.py": "test.py",
-            "$name/vessel.yaml": "vessel.yaml", "$name/base.yaml": "paper_base.yaml",
-            "$name/task.yaml": "paper_task.yaml", "$name/starts.yaml": "paper_starts.yaml",
+            "$name/$name.py": "law.py",
+            "$name/test_$name.py": "test.py",
+            "$name/vessel.yaml": "vessel.yaml",
+            "$name/base.yaml": "paper_base.yaml",
+            "$name/task.yaml": "paper_task.yaml",
+            "$name/starts.yaml": "paper_starts.yaml",
             "$name/README.md": "paper_page.md",
         },
         ("podusv compare $name/task.yaml", "python -m pytest $name/test_$name.py"),
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenFiles:
     """The files that were written, and commands to try them with."""
 
     files: tuple[Path, ...]
     commands: tuple[str, ...]
 
 
-def new(what: str, name: str) -> Written:
+def new(what: str, name: str) -> WrittenFiles:
     """Write the starting files of a part into the current folder.
 
     Raises UsageError for a name that cannot be one, StorageError where a file exists.
     """
     if what not in PARTS:
-        raise UsageError(unknown(f"part {what!r}", what, PARTS))
+        raise UsageError(unknown_word(f"part {what!r}", what, PARTS))
     part = PARTS[what]
     _check_name(what, name)
     words = _words(what, name)
@@ -109,8 +121,8 @@ def new(what: str, name: str) -> Written:
     for place in places:
         if place.exists():
             raise StorageError(f"{place} exists; take another name, or another folder")
-    storage.write_texts(Path(), {str(at): _filled(form, words) for at, form in places.items()})
-    return Written(
+    storage.write_texts(Path(), {str(at): _fill_form(form, words) for at, form in places.items()})
+    return WrittenFiles(
         tuple(places), tuple(command.replace("$name", name) for command in part.commands)
     )
 
@@ -124,13 +136,19 @@ def _check_name(what: str, name: str) -> None:
 
 def _words(what: str, name: str) -> dict[str, str]:
     own = {word: text.replace("$name", name) for word, text in PARTS[what].words.items()}
-    return DEFAULTS | own | {
-        "name": name, "what": what, "file": f"{name}.py",
-        "Class": "".join(word.capitalize() for word in name.split("_")),
-        "sentence": f"{'An' if what[0] in 'aeiou' else 'A'} {what} of our own.",
-    }  # fmt: skip
+    return (
+        DEFAULTS
+        | own
+        | {
+            "name": name,
+            "what": what,
+            "file": f"{name}.py",
+            "Class": "".join(word.capitalize() for word in name.split("_")),
+            "sentence": f"{'An' if what[0] in 'aeiou' else 'A'} {what} of our own.",
+        }
+    )
 
 
-def _filled(form: str, words: dict[str, str]) -> str:
+def _fill_form(form: str, words: dict[str, str]) -> str:
     text = files(TEMPLATES).joinpath(FOLDER, f"{form}.txt").read_text("utf-8")
     return Template(text).substitute(words).rstrip() + "\n"

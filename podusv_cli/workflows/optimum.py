@@ -18,15 +18,16 @@ from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
 from podusv_cli.optimum.feedback import schedule
-from podusv_cli.optimum.problem import Minimised, Motion, Problem, problem
+from podusv_cli.optimum.problem import Minimised, Motion, OptimumProblem, problem
 from podusv_cli.scenario.limits import estimate, limits
-from podusv_cli.scenario.load import Loaded, resolved_yaml
+from podusv_cli.scenario.load import Loaded
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.sections import Control
 from podusv_cli.storage.run_folder import RunWriter, free_folder, open_run
-from podusv_cli.workflows.execute import Finished, Task, check_figures, execute
+from podusv_cli.workflows.execute import Finished, RunTask, check_figures, execute
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import RESULTS, opened, single
+from podusv_cli.workflows.run import RESULTS, open_scenario, single
 
 BESIDE = VelocityVector()  # a law from which the search begins, too: it turns the bow into the load
 Progress = Callable[[str, float], None]
@@ -50,25 +51,39 @@ class Optimum:
         """Where the run lies."""
         return self.run.folder
 
+    @property
+    def tolerance(self) -> float:
+        """Up to which the solver found each optimum."""
+        return collocation.TOLERANCE
+
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints of it."""
         stages = [
             {
-                "start": s.start, "step": s.step, "integral": s.integral,
-                "iterations": s.iterations, "s": s.seconds,
+                "start": s.start,
+                "step": s.step,
+                "integral": s.integral,
+                "iterations": s.iterations,
+                "s": s.seconds,
             }
             for s in self.stages
-        ]  # fmt: skip
+        ]
         return {
-            **self.run.as_json(), "minimised": self.minimised, "grids": stages,
-            "tolerance": collocation.TOLERANCE, "departures": self.departures,
-        }  # fmt: skip
+            **self.run.as_json(),
+            "minimised": self.minimised,
+            "grids": stages,
+            "tolerance": self.tolerance,
+            "departures": self.departures,
+        }
 
 
 def optimum(
-    config: Path, request: Request, minimised: Minimised, step: float,
+    config: Path,
+    request: Request,
+    minimised: Minimised,
+    step: float,
     progress: Progress | None = None,
-) -> Optimum:  # fmt: skip
+) -> Optimum:
     """Find the optimum of a scenario from a run of its law, and write a run that repeats it.
 
     `step` [s] is that of the finest grid. Raises UsageError without CasADi and for a scenario that
@@ -76,14 +91,17 @@ def optimum(
     """
     collocation.casadi()
     checks = (unknown_codes, limits(request.allow_large))
-    loaded = opened(config, request, checks)
+    loaded = open_scenario(config, request, checks)
     return optimum_of(loaded, request, minimised, step, progress)
 
 
 def optimum_of(
-    loaded: Loaded, request: Request, minimised: Minimised, step: float,
+    loaded: Loaded,
+    request: Request,
+    minimised: Minimised,
+    step: float,
     progress: Progress | None = None,
-) -> Optimum:  # fmt: skip
+) -> Optimum:
     """The same for a scenario that is loaded already."""
     collocation.casadi()
     scenario = single(loaded, request.controller) if request.controller else loaded.scenario
@@ -91,15 +109,22 @@ def optimum_of(
     check_figures(scenario)
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
     size = estimate(scenario, loaded.plan(scenario))
-    with RunWriter(target, force=request.force, needed=size.needed):
+    with RunWriter(target, force=request.force, needed=size.bytes_needed):
         pass  # a place that cannot be written to is told before anything is computed
     guesses = _guesses(scenario)
-    stages, motion = collocation.searched(wanted, guesses, step, progress)
+    stages, motion = collocation.search_optima(wanted, guesses, step, progress)
     repeated = _repeating(scenario, wanted, motion)
-    task = Task(
-        repeated, resolved_yaml(repeated), target, request.force, request.out is not None,
-        request.figures, argv=request.argv, label="optimum", noticed=preflight(repeated),
-    )  # fmt: skip
+    task = RunTask(
+        repeated,
+        resolved_yaml(repeated),
+        target,
+        request.force,
+        request.out is not None,
+        request.figures,
+        argv=request.argv,
+        label="optimum",
+        noticed=preflight(repeated),
+    )
     done = execute(task, progress and (lambda fraction: progress("repeating", fraction)))
     return Optimum(minimised, stages, done, _departures(done.folder, motion))
 
@@ -128,7 +153,7 @@ def _run(scenario: Scenario) -> Recording:
     return to_end(scenario.plan(), compiled=scenario.simulation.compiled)
 
 
-def _repeating(scenario: Scenario, wanted: Problem, motion: Motion) -> Scenario:
+def _repeating(scenario: Scenario, wanted: OptimumProblem, motion: Motion) -> Scenario:
     """The scenario with the optimum in place of its law, which acts continuously."""
     law = Schedule(rows=schedule(wanted, motion), minimises=wanted.minimised)
     description = f"A motion of least {wanted.minimised}, found by podusv optimum."

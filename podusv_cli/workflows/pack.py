@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from podusv_cli.comparison.run_difference import Change, version_changes
 from podusv_cli.core.errors import StorageError
-from podusv_cli.core.plugins import installed
+from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.storage import archive, json_files, manifest, provenance, wheel
 from podusv_cli.storage.manifest import Manifest
 from podusv_cli.storage.run_folder import LOG, check_free_space
@@ -25,10 +25,11 @@ PACKAGES = "packages"  # the folder of wheels, which no manifest lists
 # A file that only folders of one kind have.
 KINDS = {mark: kind for mark, (kind, *_) in runs.KINDS.items()} | {"comparison.csv": "comparison"}
 AGAIN = {
-    "run": "podusv rerun {folder}", "comparison": "podusv rerun {folder}",
+    "run": "podusv rerun {folder}",
+    "comparison": "podusv rerun {folder}",
     "study": "podusv sweep run {folder}/scenario.yaml --out again",
     "search": "podusv tune {folder}/scenario.yaml --out again",
-}  # fmt: skip
+}
 # What podusv reads and shows; whatever else is in an archive counts as code.
 DATA = {".yaml", ".json", ".h5", ".csv", ".md", ".tex", ".png", ".pdf", ".gif", ".mp4"}
 PAGES = {".html", ".svg"}  # may have scripts, which a browser executes
@@ -42,7 +43,7 @@ class _Plugin(BaseModel):
     sha256: str = ""
 
 
-class _Session(BaseModel):
+class _PackSession(BaseModel):
     """What made a result, as provenance.json has it."""
 
     model_config = ConfigDict(extra="allow")
@@ -50,14 +51,14 @@ class _Session(BaseModel):
     plugins: list[_Plugin] = []
 
 
-class _Origin(_Session):
+class _PackOrigin(_PackSession):
     """provenance.json; that of a study has several sessions."""
 
-    sittings: list[_Session] | None = None
+    sittings: list[_PackSession] | None = None
 
 
 @dataclass(frozen=True)
-class Contents:
+class PackedContents:
     """What a packed folder says of itself.
 
     `sizes` are bytes by file, `lacking` the logs that were not packed. `code` are files that are
@@ -90,15 +91,15 @@ class Contents:
         return f"{command.format(folder=shlex.quote(str(folder)))}{kept}{trust}"
 
 
-class Written(NamedTuple):
+class WrittenArchive(NamedTuple):
     """What was packed, the archive's bytes, and files of the folder that are not of the result."""
 
-    contents: Contents
+    contents: PackedContents
     size: int
     left_out: tuple[str, ...]
 
 
-def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> Written:
+def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> WrittenArchive:
     """Write what the manifest of a finished folder lists into one archive.
 
     Installed packages whose components its runs took come with it as wheels, where they are still
@@ -112,7 +113,7 @@ def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> Written:
     there = {name: one.bytes for name, one in listed.files.items() if (folder / name).exists()}
     sizes = {n: size for n, size in there.items() if logs or PurePosixPath(n).name != LOG}
     sessions = _sessions(
-        json_files.read_as(folder / name, _Origin) for name in sizes if _is_origin(name)
+        json_files.read_as(folder / name, _PackOrigin) for name in sizes if _is_origin(name)
     )
     foreign = manifest.foreign(folder, listed)
     sizes |= {name: (folder / name).stat().st_size for name in foreign if _is_wheel(name)}
@@ -120,14 +121,14 @@ def pack(folder: Path, out: Path, *, logs: bool, force: bool) -> Written:
     written = archive.write(out, folder, [*sizes, manifest.NAME], made)
     sizes |= {name: len(data) for name, data in made.items()}
     contents = _contents(folder.resolve().name, listed, sizes, sessions)
-    return Written(contents, written, tuple(name for name in foreign if not _is_wheel(name)))
+    return WrittenArchive(contents, written, tuple(name for name in foreign if not _is_wheel(name)))
 
 
 @dataclass(frozen=True)
 class Packed:
     """An open archive, and what it has."""
 
-    contents: Contents
+    contents: PackedContents
     _archive: archive.Archive
 
     def unpack(self, out: Path, tell: Callable[[float], object] = lambda part: None) -> None:
@@ -149,15 +150,15 @@ class Packed:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Packed]:
+def open_packed(path: Path) -> Iterator[Packed]:
     """An archive of `pack` and what it has, before anything of it is written.
 
     Raises StorageError for what is no such archive, and for one that would be written elsewhere
     than in its folder, has links, would become far too large, or has files, beside wheels of
     packages, that its manifest does not list.
     """
-    with archive.opened(path) as packed:
-        listed = manifest.parsed(packed.text(manifest.NAME), path / packed.name)
+    with archive.open_archive(path) as packed:
+        listed = manifest.parse_manifest(packed.text(manifest.NAME), path / packed.name)
         sizes = {name: size for name, size in packed.sizes.items() if name != manifest.NAME}
         for name, size in sizes.items():
             entry = listed.files.get(name)
@@ -167,9 +168,10 @@ def opened(path: Path) -> Iterator[Packed]:
         if gone := sorted(name for name in missing if PurePosixPath(name).name != LOG):
             raise packed.fault(f"{gone[0]} is missing")
         sessions = _sessions(
-            json_files.parsed_as(packed.text(name), path / name, _Origin)
-            for name in sizes if _is_origin(name)
-        )  # fmt: skip
+            json_files.parsed_as(packed.text(name), path / name, _PackOrigin)
+            for name in sizes
+            if _is_origin(name)
+        )
         yield Packed(_contents(packed.name, listed, sizes, sessions), packed)
 
 
@@ -182,40 +184,45 @@ def _is_wheel(name: str) -> bool:
     return str(path.parent) == PACKAGES and path.suffix == ".whl"
 
 
-def _sessions(origins: Iterable[_Origin]) -> list[_Session]:
+def _sessions(origins: Iterable[_PackOrigin]) -> list[_PackSession]:
     """What made the results: a session each, of a study several."""
     several = ([origin] if origin.sittings is None else origin.sittings for origin in origins)
     return [session for sessions in several for session in sessions]
 
 
 def _contents(
-    name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[_Session]
-) -> Contents:
+    name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[_PackSession]
+) -> PackedContents:
     made_by = sessions[-1].model_dump() if sessions else {}
     kinds = (kind for mark, kind in KINDS.items() if mark in listed.files)
     ends = {name: PurePosixPath(name).suffix for name in sizes}
-    return Contents(
-        name, next(kinds, "result"), listed.status, sizes,
+    return PackedContents(
+        name,
+        next(kinds, "result"),
+        listed.status,
+        sizes,
         lacking=tuple(sorted({*listed.files} - {*sizes})),
         code=tuple(name for name, end in ends.items() if end not in DATA | PAGES),
         pages=tuple(name for name, end in ends.items() if end in PAGES),
-        packages={f"{package} {version}": _found(package, version, sha256, sizes)
-                  for package, version, sha256 in _packages(sessions)},
+        packages={
+            f"{package} {version}": _find_package(package, version, sha256, sizes)
+            for package, version, sha256 in _packages(sessions)
+        },
         made_by={key: made_by[key] for key in ("podusv", "python", "packages") if key in made_by},
         differs=version_changes(made_by, provenance.surroundings()),
-    )  # fmt: skip
+    )
 
 
-def _packages(sessions: Iterable[_Session]) -> list[tuple[str, str, str]]:
+def _packages(sessions: Iterable[_PackSession]) -> list[tuple[str, str, str]]:
     """Name, version and digest of the packages whose components runs took, each once."""
     listed = (plugin for session in sessions for plugin in session.plugins)
     named = ((p.package, p.version, p.sha256) for p in listed if p.package)
     return [*dict.fromkeys(named)]
 
 
-def _found(package: str, version: str, sha256: str, sizes: Mapping[str, int]) -> str:
+def _find_package(package: str, version: str, sha256: str, sizes: Mapping[str, int]) -> str:
     """Whether this very package is installed, and where its wheel is else."""
-    here = {plugin.name: plugin for plugin in installed()}.get(package)
+    here = {plugin.name: plugin for plugin in installed_plugins()}.get(package)
     if here and here.sha256 == sha256:
         return "installed"
     place = f"{PACKAGES}/{wheel.name_of(package, version)}"
@@ -224,9 +231,9 @@ def _found(package: str, version: str, sha256: str, sizes: Mapping[str, int]) ->
     return (f"another one is installed ({here})" if here else "not installed") + how
 
 
-def _wheels(sessions: Iterable[_Session]) -> dict[str, bytes]:
+def _wheels(sessions: Iterable[_PackSession]) -> dict[str, bytes]:
     """Wheels of these packages, where the very ones are installed and have no compiled modules."""
-    here = {(plugin.name, plugin.sha256): plugin for plugin in installed()}
+    here = {(plugin.name, plugin.sha256): plugin for plugin in installed_plugins()}
     used = {
         (name, version): here.get((name, sha256)) for name, version, sha256 in _packages(sessions)
     }

@@ -17,13 +17,14 @@ import numpy as np
 from podusv_cli.comparison.differences import differences
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.recording import Recording
 from podusv_cli.figures import panels
 from podusv_cli.figures.animation import animate, file_name
 from podusv_cli.figures.drawing import ALL, SCREEN, check_names, draw_in_parallel, figures_of
 from podusv_cli.figures.sheet import Sheet
-from podusv_cli.figures.shown import Shown, dressed
+from podusv_cli.figures.shown import Shown, dress_runs
 from podusv_cli.figures.style import STYLES, Look
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.storage import files, manifest
@@ -47,7 +48,7 @@ class Drawn:
 
 
 @dataclass(frozen=True)
-class Choice:
+class PlotChoice:
     """What `plot` draws beside figures by name, of which part of the runs [s], and how.
 
     `labels` are names of the runs, in their order.
@@ -64,7 +65,7 @@ class Choice:
 def look_of(columns: int, size: str, style: str) -> Look:
     """The look that is asked for; `size` is WIDTH or WIDTHxHEIGHT in inches. UsageError."""
     if style not in STYLES:
-        raise UsageError(unknown(f"style {style!r}", style, STYLES))
+        raise UsageError(unknown_word(f"style {style!r}", style, STYLES))
     if not size:
         return Look(columns, style=STYLES[style])
     numbers = re.fullmatch(r"(\d+(?:\.\d*)?)(?:x(\d+(?:\.\d*)?))?", size)
@@ -77,7 +78,7 @@ def look_of(columns: int, size: str, style: str) -> Look:
     return Look(1 if width < NARROW else 2, width, height or None, STYLES[style])
 
 
-def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> Drawn:
+def plot(runs: Sequence[Path], request: Request, choice: PlotChoice = PlotChoice()) -> Drawn:
     """Draw finished runs, overlaid; files of the same names in the folder are replaced.
 
     Raises UsageError for an unknown figure, signal or format, for a figure that the runs lack the
@@ -85,19 +86,19 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     belongs to a finished folder; StorageError.
     """
     out = request.out or Path()
-    members = _labelled(run for path in runs for run in from_folder(path, request.plugins))
-    members = _named(members, choice.labels)
+    members = _label_members(run for path in runs for run in from_folder(path, request.plugins))
+    members = _name_members(members, choice.labels)
     known = figures_of(member.plugins for member in members)
     check_names(request.names, request.formats, known)
-    whole = [(m.label, m.run.recording, m.about, m.plugins) for m in members if m.run]
-    empty = _empty(members, dressed(whole))
-    shown = dressed([(label, _during(log, choice), about, own) for label, log, about, own in whole])
+    whole = [m.folder.as_run(m.label, m.about, m.plugins) for m in members if m.folder]
+    empty = _empty(whole, dress_runs(whole))
+    shown = dress_runs([replace(run, log=_during(run.recording, choice)) for run in whole])
     if not shown:
-        ends = ", ".join(f"{label} ends at {log['time'][-1]:g} s" for label, log, *_ in whole)
+        ends = ", ".join(f"{run.label} ends at {run.recording['time'][-1]:g} s" for run in whole)
         raise UsageError(
             f"no run has two instants from {choice.since:g} to {choice.until:g} s ({ends})"
         )
-    sheets = _chosen(request.names, known, shown, choice.signals)
+    sheets = _choose_sheets(request.names, known, shown, choice.signals)
     planned = [f"{sheet.name}.{form}" for sheet in sheets for form in request.formats]
     film = file_name()
     planned += [film] * choice.animated
@@ -114,7 +115,7 @@ def plot(runs: Sequence[Path], request: Request, choice: Choice = Choice()) -> D
     return Drawn([out / n for n in drawn], replaced, empty, extras.missing, differing)
 
 
-def _named(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
+def _name_members(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
     """The runs under the names that are given for them, if any."""
     if not labels:
         return list(members)
@@ -126,7 +127,7 @@ def _named(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
     return [replace(member, label=label) for member, label in zip(members, labels, strict=True)]
 
 
-def _during(log: Recording, choice: Choice) -> Recording:
+def _during(log: Recording, choice: PlotChoice) -> Recording:
     """The part of a log that is asked for; one that ends before the run does is whole."""
     t = log["time"]
     first, last = np.searchsorted(t, [choice.since, np.nextafter(choice.until, math.inf)])
@@ -136,7 +137,7 @@ def _during(log: Recording, choice: Choice) -> Recording:
     return part if last == len(t) else replace(part, status="finished")
 
 
-def _labelled(members: Iterable[Member]) -> list[Member]:
+def _label_members(members: Iterable[Member]) -> list[Member]:
     """Each run folder once, with a label that tells it apart from the others.
 
     The folder's name, or the scenario's where the folder has none of its own; where several have
@@ -154,7 +155,7 @@ def _labelled(members: Iterable[Member]) -> list[Member]:
 
 
 def _folder(member: Member) -> Path:
-    return member.run.folder if member.run else Path(member.label)
+    return member.folder.path if member.folder else Path(member.label)
 
 
 def _short(member: Member) -> str:
@@ -162,13 +163,13 @@ def _short(member: Member) -> str:
     return member.about.name if STAMP.fullmatch(name) else name
 
 
-def _empty(members: Sequence[Member], shown: Sequence[Shown]) -> dict[str, str]:
+def _empty(runs: Sequence[PastRun], shown: Sequence[Shown]) -> dict[str, str]:
     """Runs of which nothing can be drawn, and how they ended; UsageError where those are all."""
     drawable = {run.label for run in shown}
     endings = {
-        member.label: member.run.recording.message or "has a single row"
-        for member in members
-        if member.run and visible(member.label) not in drawable
+        run.label: run.recording.message or "has a single row"
+        for run in runs
+        if visible(run.label) not in drawable
     }
     if not shown:
         endings_in_words = "; ".join(f"{label}: {ending}" for label, ending in endings.items())
@@ -183,7 +184,7 @@ LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
 )
 
 
-def _chosen(
+def _choose_sheets(
     asked: Sequence[str], known: Mapping[str, Sheet], shown: Sequence[Shown], signals: Sequence[str]
 ) -> list[Sheet]:
     """The figures to draw: those that are asked for, or all that the runs have signals for.
@@ -203,7 +204,7 @@ def _chosen(
     there = dict.fromkeys(name for run in shown for name in run.signals)
     for name in signals:
         if name not in there:
-            raise UsageError(unknown(f"signal {name!r}", name, there, "log.h5 of the runs"))
+            raise UsageError(unknown_word(f"signal {name!r}", name, there, "log.h5 of the runs"))
     sheets = [fitting[name] for name in dict.fromkeys(asked)]
     sheets += [panels.signals(*signals)] if signals else []
     return sheets or list(fitting.values())
@@ -213,7 +214,7 @@ def _check_not_finished(out: Path, names: Iterable[str]) -> None:
     """UsageError where a file to be written belongs to a finished folder, by its manifest."""
     place = Path(os.path.realpath(out))
     for folder in (place, *place.parents):
-        listed = _listed(folder)
+        listed = _list_folder(folder)
         for name in names:
             inside = (place / name).relative_to(folder).as_posix()
             if inside in listed or inside == manifest.NAME:
@@ -223,7 +224,7 @@ def _check_not_finished(out: Path, names: Iterable[str]) -> None:
                 )
 
 
-def _listed(folder: Path) -> frozenset[str]:
+def _list_folder(folder: Path) -> frozenset[str]:
     with suppress(StorageError):
         return frozenset(manifest.read(folder).files)
     return frozenset()

@@ -13,24 +13,24 @@ from typing import Any
 from podusv_cli.comparison.run_difference import RunDifference, difference
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
 from podusv_cli.scenario.about import about_of
-from podusv_cli.scenario.limits import limits, needed
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.limits import disk_needed, limits
 from podusv_cli.scenario.load import load_stored
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_folder
 from podusv_cli.storage import manifest, run_folder
-from podusv_cli.storage.run_folder import LOG, FinishedRun
+from podusv_cli.storage.run_folder import LOG, RunFolder
 from podusv_cli.storage.staging import Staging, remove_abandoned
 from podusv_cli.workflows.compare import make_runs, sizes
-from podusv_cli.workflows.execute import Finished, Task, execute, unwritten
+from podusv_cli.workflows.execute import Finished, RunTask, execute, why_unwritten
 from podusv_cli.workflows.members import Member, runs_of
 from podusv_cli.workflows.request import Request
 
 Progress = Callable[[str, float], None]
-Pairs = Sequence[tuple[FinishedRun, Scenario]]
+Pairs = Sequence[tuple[RunFolder, Scenario]]
 
 
 @dataclass(frozen=True)
@@ -101,47 +101,55 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
     runs = [(run, _scenario(run, request)) for run in runs_of(path, optional=LOG)]
     for run, _ in runs:
         if run.status == "interrupted":
-            raise UsageError(f"{run.folder} was interrupted; there is no whole run to repeat")
+            raise UsageError(f"{run.path} was interrupted; there is no whole run to repeat")
     return (_one if len(runs) == 1 else _several)(runs, request, progress)
 
 
-def _scenario(run: FinishedRun, request: Request) -> Scenario:
+def _scenario(run: RunFolder, request: Request) -> Scenario:
     return load_stored(
-        run.resolved_yaml, str(run.folder / run_folder.RESOLVED),
+        run.resolved_yaml,
+        str(run.path / run_folder.RESOLVED),
         checks=(limits(request.allow_large, read_back=True),),
         plugged=of_folder(request.trust),
-    ).scenario  # fmt: skip
+    ).scenario
 
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     ((original, scenario),) = runs
-    label = original.folder.name or str(original.folder)
+    label = original.path.name or str(original.path)
     advance = partial(progress, label) if progress else None
     with _passing(request) as place:
         target, text = request.out or place / "again", original.resolved_yaml
-        task = Task(scenario, text, target, request.force, argv=request.argv)
-        return Repetition({label: _repeated(original, execute(task, advance))}, {})
+        task = RunTask(scenario, text, target, request.force, argv=request.argv)
+        return Repetition({label: _hold_against(original, execute(task, advance))}, {})
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     again = [
         Member(
-            run.folder.name, about_of(scenario), run.resolved_yaml,
-            case=Case.of(scenario), text=run.resolved_yaml,
+            run.path.name,
+            about_of(scenario),
+            run.resolved_yaml,
+            case=Case.of(scenario),
+            text=run.resolved_yaml,
         )
         for run, scenario in runs
-    ]  # fmt: skip
+    ]
     with _passing(request) as place:
         target = request.out or place / "again"
-        room = needed(sizes(again), available_workers())
+        room = disk_needed(sizes(again), available_workers())
         with run_folder.RunWriter(
             target, force=request.force, needed=room, argv=request.argv
         ) as writer:
             outcomes = make_runs(again, writer.folder, request, progress)
-            missing = unwritten(outcomes.values())
+            missing = why_unwritten(outcomes.values())
             ended = zip((run for run, _ in runs), outcomes.items(), strict=True)
             done = Repetition(
-                {label: _repeated(run, end.result) for run, (label, end) in ended if end.result},
+                {
+                    label: _hold_against(run, end.result)
+                    for run, (label, end) in ended
+                    if end.result
+                },
                 {label: end.failure for label, end in outcomes.items() if not end.result},
             )
             # the order in which compare and rerun take them, as no table here has it
@@ -166,9 +174,9 @@ def _passing(request: Request) -> Iterator[Path]:
         staging.discard()
 
 
-def _repeated(original: FinishedRun, done: Finished) -> Repeated:
+def _hold_against(original: RunFolder, done: Finished) -> Repeated:
     """A run that was made once more, held against the original."""
     differing = difference(original, run_folder.open_run(done.folder))
     return Repeated(
-        original.folder, original.status, done.status, differing, done.missing, done.message
+        original.path, original.status, done.status, differing, done.missing, done.message
     )

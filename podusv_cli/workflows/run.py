@@ -8,17 +8,17 @@ from pathlib import Path
 
 from podusv_cli.core.component import BY_RULE
 from podusv_cli.core.errors import UsageError
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.plugins import Plugins
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.scenario.address import content
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Check, Loaded, load
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
-from podusv_cli.scenario.yaml_tree import dotted
+from podusv_cli.scenario.yaml_tree import dotted_key
 from podusv_cli.storage.run_folder import RunWriter, default_folder
-from podusv_cli.workflows.execute import Finished, Progress, Stopwatch, Task, examined, execute
+from podusv_cli.workflows.execute import Finished, Progress, RunTask, Stopwatch, examine, execute
 from podusv_cli.workflows.request import Request
 
 RESULTS = Path("results")
@@ -29,37 +29,38 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
     watch = Stopwatch()
     with watch.part("load"):
         checks = (unknown_codes, limits(request.allow_large))
-        loaded = opened(config, request, checks)
+        loaded = open_scenario(config, request, checks)
     return run_loaded(loaded, request, progress, watch)
 
 
-def opened(config: Path, request: Request, checks: Sequence[Check]) -> Loaded:
+def open_scenario(config: Path, request: Request, checks: Sequence[Check]) -> Loaded:
     """The scenario of a file; warns of values that it loses. Raises ScenarioError."""
     loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
-    return loaded.told(request.warn)
+    return loaded.warn_of_dropped(request.warn)
 
 
 def writer_of(request: Request, target: Path, needed: float = 0.0) -> RunWriter:
     """What writes the folder that a request asks for."""
     return RunWriter(
-        target, force=request.force, named=request.out is not None, needed=needed,
-        argv=request.argv,
-    )  # fmt: skip
+        target, force=request.force, named=request.out is not None, needed=needed, argv=request.argv
+    )
 
 
 def run_loaded(
-    loaded: Loaded, request: Request, progress: Progress | None = None,
+    loaded: Loaded,
+    request: Request,
+    progress: Progress | None = None,
     watch: Stopwatch | None = None,
-) -> Finished:  # fmt: skip
+) -> Finished:
     """Execute a scenario that is loaded and checked. Raises StorageError."""
     watch = watch or Stopwatch()
     with watch.part("load"):
         scenario = single(loaded, request.controller)
         check_asked(request, [scenario.plugged])
-        case = Case(scenario, loaded.plan(scenario), loaded.scenario.identify)
+        case = loaded.case(scenario)
         target = request.out or default_folder(RESULTS, scenario.name, case.resolved_yaml)
     with watch.part("preflight"):
-        noticed = examined(case)
+        noticed = examine(case)
     for line in _choices(scenario, others(loaded, request.controller)):
         request.say(line)
     if claims := loaded.scenario.claims:
@@ -67,11 +68,18 @@ def run_loaded(
         request.say(f"{len(claims)} {each} not judged by one run; `podusv compare` judges them")
     for finding in noticed:
         request.warn(finding)
-    task = Task(
-        scenario, loaded.text, target, force=request.force, named=request.out is not None,
-        figures=request.figures, names=request.names, argv=request.argv, noticed=noticed,
+    task = RunTask(
+        scenario,
+        loaded.text,
+        target,
+        force=request.force,
+        named=request.out is not None,
+        figures=request.figures,
+        names=request.names,
+        argv=request.argv,
+        noticed=noticed,
         compiling=request.compiling,
-    )  # fmt: skip
+    )
     return execute(task, progress, watch, case)
 
 
@@ -82,7 +90,7 @@ def _choices(scenario: Scenario, others: Sequence[str]) -> Iterator[str]:
         yield f"{only}; `podusv compare` runs {', '.join(others)}"
     for section, keys in groupby(scenario.keys_by_rule(), lambda at: at[:-1]):
         numbers = (f"{at[-1]} {content(scenario, at):.4g}" for at in keys)
-        yield f"{dotted(section)}: defaults {BY_RULE}: {', '.join(numbers)}"
+        yield f"{dotted_key(section)}: defaults {BY_RULE}: {', '.join(numbers)}"
 
 
 def check_asked(request: Request, plugins: Iterable[Plugins]) -> None:
@@ -112,7 +120,7 @@ def single(loaded: Loaded, label: str = "") -> Scenario:
     """
     known = loaded.scenario.controllers
     if label and label not in known:
-        raise UsageError(unknown(f"controller {label!r}", label, known))
+        raise UsageError(unknown_word(f"controller {label!r}", label, known))
     if loaded.scenario.open_choice and not label:
         raise UsageError(
             f"{loaded.scenario.name} has several controllers; choose one with --controller "

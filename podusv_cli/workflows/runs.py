@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.scenario.yaml_text import read
 from podusv_cli.scenario.yaml_tree import Node, find, plain, route
 from podusv_cli.storage import files, json_files
@@ -46,15 +46,17 @@ class _Session(BaseModel):
     duration_s: float = 0.0
 
 
-class _Origin(_Session):
+class _RunOrigin(_Session):
     sittings: list[_Session] = []
 
 
 # A file that only folders of this kind have, the file with their scenario, what is read of it.
 KINDS = {
-    "metrics.json": ("run", "resolved.yaml", _OfRun), STUDY: ("study", "scenario.yaml", _Told),
-    "tune.json": ("search", "scenario.yaml", _Told), "runs.csv": ("bench", "", None),
-}  # fmt: skip
+    "metrics.json": ("run", "resolved.yaml", _OfRun),
+    STUDY: ("study", "scenario.yaml", _Told),
+    "tune.json": ("search", "scenario.yaml", _Told),
+    "runs.csv": ("bench", "", None),
+}
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,15 @@ class ListedRun:
     def as_json(self) -> dict[str, Any]:
         """As plain data."""
         return {
-            "folder": str(self.folder), "kind": self.kind, "name": self.name,
-            "laws": list(self.laws), "status": self.status, "started": self.started,
-            "seconds": self.seconds, "metrics": dict(self.metrics),
-        }  # fmt: skip
+            "folder": str(self.folder),
+            "kind": self.kind,
+            "name": self.name,
+            "laws": list(self.laws),
+            "status": self.status,
+            "started": self.started,
+            "seconds": self.seconds,
+            "metrics": dict(self.metrics),
+        }
 
 
 def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRun]:
@@ -99,7 +106,7 @@ def runs(root: Path, where: Sequence[str] = (), sort: str = "") -> list[ListedRu
     if not known:
         raise UsageError(f"--sort {sort}: there is no run below {root}, and only runs have metrics")
     if sort not in known:
-        raise UsageError(unknown(f"metric {sort!r}", sort, known, "podusv list metrics"))
+        raise UsageError(unknown_word(f"metric {sort!r}", sort, known, "podusv list metrics"))
     measured = (run for run in every if run.kind == "run")
     return sorted(measured, key=lambda run: run.metrics.get(sort, math.inf))
 
@@ -120,7 +127,7 @@ def _read(folder: Path, mark: str) -> ListedRun:
         about = json_files.read_as(folder / mark, model) if model else _Told()
         ending, origin = (
             _if_there(folder / MANIFEST, _Ending),
-            _if_there(folder / PROVENANCE, _Origin),
+            _if_there(folder / PROVENANCE, _RunOrigin),
         )
         text = files.read_text(folder / scenario) if scenario else ""
     except StorageError:
@@ -129,11 +136,16 @@ def _read(folder: Path, mark: str) -> ListedRun:
     named = NAME.search(text)
     metrics = about.metrics if isinstance(about, _OfRun) else {}
     return ListedRun(
-        folder, kind, about.name or (named[1] if named else folder.name),
-        [*about.laws] or [*filter(None, [about.controller])], ending.status, sessions[0].started,
+        folder,
+        kind,
+        about.name or (named[1] if named else folder.name),
+        [*about.laws] or [*filter(None, [about.controller])],
+        ending.status,
+        sessions[0].started,
         sum(session.duration_s for session in sessions),
-        {name: math.nan if x is None else x for name, x in metrics.items()}, scenario,
-    )  # fmt: skip
+        {name: math.nan if x is None else x for name, x in metrics.items()},
+        scenario,
+    )
 
 
 def _if_there(path: Path, model: type[json_files.Model]) -> json_files.Model:
@@ -150,7 +162,7 @@ def _holding(every: Sequence[ListedRun], condition: str) -> list[ListedRun]:
     values = {folder: find(tree, route(key)) for folder, tree in trees.items()}
     if trees and not any(values.values()):
         known = dict.fromkeys(name for tree in trees.values() for name in _keys(tree))
-        wrong = unknown(f"key {key!r}", key, known, "podusv explain")
+        wrong = unknown_word(f"key {key!r}", key, known, "podusv explain")
         raise UsageError(f"--where {condition}: {wrong}")
     return [
         run for run in every if (node := values.get(run.folder)) and plain(node) == plain(wanted)

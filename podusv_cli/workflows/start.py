@@ -11,13 +11,13 @@ from pathlib import Path
 from string import Template
 
 from podusv_cli.components.actuators.pod import Pods
-from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimated
+from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimate_vessel
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core import units
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
-from podusv_cli.core.phrases import unknown
-from podusv_cli.core.plugins import installed
+from podusv_cli.core.phrases import unknown_word
+from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.findings.finding import finding_kinds, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load_text
@@ -41,10 +41,14 @@ EXAMPLE = "2x180N@1.0: two of 180 N each, 1.0 m beside the centre line"
 SIZES = {"m": (1e-3, 1e3), "kg": (1e-3, 1e9), "N": (1e-4, 1e8), "m/s": (1e-3, 100.0)}
 # What is drawn in a study: a factor on each of these keys, by the name in `SCATTER`.
 FACTORS = {
-    "I_z": ("I_z",), "X_udot": ("X_udot",), "Y_vdot": ("Y_vdot",), "N_rdot": ("N_rdot",),
-    "surge_damping": ("X_u", "X_uu"), "sway_damping": ("Y_v", "Y_vv"),
+    "I_z": ("I_z",),
+    "X_udot": ("X_udot",),
+    "Y_vdot": ("Y_vdot",),
+    "N_rdot": ("N_rdot",),
+    "surge_damping": ("X_u", "X_uu"),
+    "sway_damping": ("Y_v", "Y_vv"),
     "yaw_damping": ("N_r", "N_rr"),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -84,22 +88,22 @@ def start(boat: Boat, out: Path) -> Path:
     the file exists.
     """
     hull, thrusters = _hull(boat)
-    return _written(out, _of_dimensions(hull, thrusters, known=bool(boat.speed)))
+    return _write_new(out, _of_dimensions(hull, thrusters, known=bool(boat.speed)))
 
 
 def start_from(preset: str, out: Path) -> Path:
     """The same for a vessel of podusv whose thrusters are known, too."""
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
-        raise UsageError(unknown(f"boat {preset!r}", preset, known))
-    return _written(out, _of_preset(preset))
+        raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
+    return _write_new(out, _of_preset(preset))
 
 
-def _written(out: Path, text: str) -> Path:
+def _write_new(out: Path, text: str) -> Path:
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
     _check(text, out)
-    plugins, schema = installed(), out.with_name(SCHEMA)
+    plugins, schema = installed_plugins(), out.with_name(SCHEMA)
     storage.make_folder(out.parent)
     known = schema_text(tuple(finding_kinds(plugins)), plugins)
     storage.write_all({out: text.encode(), schema: known.encode()})
@@ -190,7 +194,7 @@ def _thrusters(boat: Boat) -> Thrusters:
             f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
         )
     if turn > TURN:
-        degrees = turn <= 90.0 and not units.parted(boat.turn)
+        degrees = turn <= 90.0 and not units.split_quantity(boat.turn)
         way = f"; write {boat.turn}deg" if degrees else ""
         raise UsageError(f"--turn {boat.turn}: more than 90 deg to either side{way}")
     if count == 1 and not turn:
@@ -199,10 +203,10 @@ def _thrusters(boat: Boat) -> Thrusters:
 
 
 def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
-    numbers = {name: float(f"{x:.3g}") for name, x in estimated(hull).items()}
+    numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
-    return _filled(title, boat, "\n".join(_study(numbers)))
+    return _fill_template(title, boat, "\n".join(_study(numbers)))
 
 
 def _of_preset(preset: str) -> str:
@@ -210,10 +214,10 @@ def _of_preset(preset: str) -> str:
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
     )
-    return _filled(f"{preset} of podusv with its thrusters.", boat, "")
+    return _fill_template(f"{preset} of podusv with its thrusters.", boat, "")
 
 
-def _filled(title: str, boat: str, study: str) -> str:
+def _fill_template(title: str, boat: str, study: str) -> str:
     scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
@@ -221,11 +225,17 @@ def _filled(title: str, boat: str, study: str) -> str:
     speed = float(f"{min(hull.cruise, holds, RADIUS * facts.r_top * hull.length):.2g}")
     long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
     words = {
-        "title": title, "schema": SCHEMA, "length": f"{hull.length:g}", "mass": f"{hull.mass:g}",
-        "boat": boat, "speed": f"{speed:g}", "long": f"{long:g}", "wide": f"{wide:g}",
+        "title": title,
+        "schema": SCHEMA,
+        "length": f"{hull.length:g}",
+        "mass": f"{hull.mass:g}",
+        "boat": boat,
+        "speed": f"{speed:g}",
+        "long": f"{long:g}",
+        "wide": f"{wide:g}",
         "duration": f"{10.0 * math.ceil(0.1 * TIME * (2.0 * long + wide) / speed):g}",
         "study": study,
-    }  # fmt: skip
+    }
     template = files("podusv_cli.workflows").joinpath("starting_files", "boat.yaml.txt")
     return Template(template.read_text("utf-8")).substitute(words).rstrip() + "\n"
 

@@ -10,13 +10,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.core.escaping import visible
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.scenario import plugins
-from podusv_cli.scenario.load import resolved_yaml
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.storage import files, json_files
+from podusv_cli.scenario.resolved import resolved_yaml
+from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.making import before, record
 from podusv_cli.studies.making.plan import KERNELS, StudyPlan, differing, disagreements, plan
@@ -56,7 +57,7 @@ def check_study(folder: Path) -> None:
         raise UsageError(f"{folder} is not the folder of a study: it has no {STUDY}")
 
 
-def stored(study: Path) -> Store:
+def open_store(study: Path) -> Store:
     """The store of a study's folder, for reading; its scenario and plug-ins are not looked at.
 
     Only where an older podusv wrote study.json, its scenario is, with installed plug-ins alone.
@@ -79,7 +80,7 @@ def _of_before(study: Path) -> Scenario:
         ) from error
 
 
-def planned(study: Path, *, trusted: bool) -> StudyPlan:
+def read_plan(study: Path, *, trusted: bool) -> StudyPlan:
     """The plan of a study's folder, whose plug-in files are executed if they are `trusted`.
 
     Runs of other kernels than those of this podusv are no fault. Raises UsageError where the folder
@@ -88,7 +89,7 @@ def planned(study: Path, *, trusted: bool) -> StudyPlan:
     """
     check_study(study)
     made = plan(kept_scenario(study, plugged=plugins.of_folder(trusted)))
-    noted, ours = record.begun(study).identity, json_files.plain(made.identity)
+    noted, ours = record.read_identity(study).identity, json_text.plain(made.identity)
     if keys := [key for key in differing(noted, ours) if not key.endswith(KERNELS)]:
         raise UsageError(
             f"{study / SCENARIO} is not the scenario of the runs in {STUDY}: "
@@ -100,10 +101,10 @@ def planned(study: Path, *, trusted: bool) -> StudyPlan:
 
 def status(study: Path) -> Made:
     """How far a study is. Raises UsageError, StorageError."""
-    store = stored(study)
+    store = open_store(study)
     rows = [
         (law, store.about.cells[cell], int(there.sum()))
-        for (law, cell), there in store.covered().items()
+        for (law, cell), there in store.covered_draws().items()
     ]
     return Made(store.about.draws, rows)
 
@@ -115,9 +116,9 @@ def draw(
 
     Raises UsageError, ScenarioError where they are not, StorageError.
     """
-    made = planned(study, trusted=trusted)
+    made = read_plan(study, trusted=trusted)
     if law not in made.laws:
-        raise UsageError(unknown(f"law {law!r}", law, made.laws))
+        raise UsageError(unknown_word(f"law {law!r}", law, made.laws))
     if cell >= len(made.cells):
         last = len(made.cells) - 1
         raise UsageError(f"--cell {cell}: there is no such cell; they are numbered 0 to {last}")
@@ -138,9 +139,9 @@ def draw(
 def export(study: Path, form: str, out: Path | None) -> Path:
     """Write all runs as one table. Raises UsageError, StorageError."""
     if form not in FORMATS:
-        raise UsageError(unknown(f"format {form!r}", form, FORMATS))
+        raise UsageError(unknown_word(f"format {form!r}", form, FORMATS))
     path = out or study / f"runs.{form}"
-    store = stored(study)
+    store = open_store(study)
     if not (study / RUNS).exists():
         raise UsageError(
             f"{study} has no {RUNS} yet: podusv sweep report {shlex.quote(str(study))}"

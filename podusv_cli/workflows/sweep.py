@@ -18,10 +18,10 @@ from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.scenario import plugins
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage.writer import PATIENCE, TABLES, sole_writer
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.making import record
-from podusv_cli.studies.making.check import sweep_faults, unjudged
-from podusv_cli.studies.making.dispatch import Executor, Gaps, Tally, Tell, dispatch
+from podusv_cli.studies.making.check import sweep_faults, unjudged_claims
+from podusv_cli.studies.making.dispatch import Executor, Gaps, StudyTally, Tell, dispatch
 from podusv_cli.studies.making.estimate import check_fits
 from podusv_cli.studies.making.invalid import check_draws
 from podusv_cli.studies.making.joining import mixture
@@ -29,8 +29,8 @@ from podusv_cli.studies.making.plan import StudyPlan, plan
 from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.store import Store
 from podusv_cli.studies.telling import outputs
-from podusv_cli.studies.telling.keep import contradiction, found, unmade
-from podusv_cli.studies.telling.results import Results, judged
+from podusv_cli.studies.telling.keep import contradiction, find_kept, missing_runs
+from podusv_cli.studies.telling.results import Results, judge_study
 from podusv_cli.workflows.keep import keep
 from podusv_cli.workflows.many_runs import (
     Config,
@@ -38,15 +38,15 @@ from podusv_cli.workflows.many_runs import (
     executor_for,
     finish,
     folder_of,
-    interrupted,
+    interruption,
     loaded_for,
     one_by_one,
-    refused,
+    refusals_of,
     scenario_texts,
 )
 from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS
-from podusv_cli.workflows.studies import check_study, stored
+from podusv_cli.workflows.studies import check_study, open_store
 
 NO_SWEEP = (
     "which says what is to be drawn; see podusv docs studies, or start from one: podusv "
@@ -59,7 +59,7 @@ class Swept:
     """A study as far as it is made; without results where it is not whole."""
 
     folder: Path
-    tally: Tally
+    tally: StudyTally
     results: Results | None = None
     missing: tuple[Failure, ...] = ()  # of figures, report and kept logs
     missing_runs: tuple[str, ...] = ()  # after a merge, in words
@@ -73,9 +73,15 @@ class Swept:
         counts = {"wanted": self.tally.wanted, "made": self.tally.made}
         missing = [str(failure) for failure in self.missing]
         return {
-            "format": 1, "status": status, "folder": str(self.folder), **counts, **answer,
-            "missing": missing, "missing_runs": self.missing_runs, "refused": self.refused,
-        }  # fmt: skip
+            "format": 1,
+            "status": status,
+            "folder": str(self.folder),
+            **counts,
+            **answer,
+            "missing": missing,
+            "missing_runs": self.missing_runs,
+            "refused": self.refused,
+        }
 
 
 def run(config: Config, request: Request, tell: Tell) -> Swept:
@@ -86,7 +92,7 @@ def run(config: Config, request: Request, tell: Tell) -> Swept:
     kept.
     """
     started = datetime.now(UTC)
-    made, folder, texts = _planned(config, request)
+    made, folder, texts = _plan_study(config, request)
     check_fits(made, folder, request.shard[1])
     for law in made.laws:  # before there is a folder that a mended law would not fit
         compiled = made.scenario.simulation.compiled
@@ -102,8 +108,8 @@ def run(config: Config, request: Request, tell: Tell) -> Swept:
 def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tell: Tell) -> Swept:
     """Simulate what is missing of a study whose folder is open, and judge it if it is whole."""
     with executor_for(request, store.folder, made.scenario, store.seal) as executor:
-        tally, whole = _marched(store, made, request, started, executor, tell)
-    swept = Swept(store.folder, tally, refused=refused(executor))
+        tally, whole = _march_study(store, made, request, started, executor, tell)
+    swept = Swept(store.folder, tally, refused=refusals_of(executor))
     if whole and request.shard != Request().shard:
         whole = _is_whole(store)
         swept = replace(swept, part_is_whole=not whole)
@@ -111,30 +117,39 @@ def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tel
         return swept
     with sole_writer(store.folder, TABLES, PATIENCE, request.warn):
         runs = store.write_runs()
-        return replace(answered(store, runs, request, made), refused=swept.refused)
+        return replace(answer_study(store, runs, request, made), refused=swept.refused)
 
 
-def _marched(
-    store: Store, made: StudyPlan, request: Request, started: datetime, executor: Executor,
+def _march_study(
+    store: Store,
+    made: StudyPlan,
+    request: Request,
+    started: datetime,
+    executor: Executor,
     tell: Tell,
-) -> tuple[Tally, bool]:  # fmt: skip
+) -> tuple[StudyTally, bool]:
     """Simulate what is missing, and note the session; how far it is, and if it is whole."""
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
-    seen = Tally(0)
+    seen = StudyTally(0)
 
-    def told(tally: Tally) -> None:
+    def tell_tally(tally: StudyTally) -> None:
         nonlocal seen
         seen = tally
         tell(tally)
 
     try:
         return dispatch(
-            store, made, told, executor, seconds=request.seconds, part=request.shard,
+            store,
+            made,
+            tell_tally,
+            executor,
+            seconds=request.seconds,
+            part=request.shard,
             begin=partial(_announce, store.folder, made, request),
-        )  # fmt: skip
+        )
     except KeyboardInterrupt as stop:
         kept = f"the {seen.made} runs that are made" if seen.made else "all runs that were made"
-        raise interrupted(kept, "sweep run", store.folder) from stop
+        raise interruption(kept, "sweep run", store.folder) from stop
     finally:
         timed = {"processor_s": seen.computed, "timed_runs": seen.ran}
         session.end(
@@ -156,16 +171,16 @@ def _announce(
 
 def _is_whole(store: Store) -> bool:
     """Whether all runs of the study are there."""
-    tally = Tally.of(store.covered())
+    tally = StudyTally.of(store.covered_draws())
     return tally.made == tally.wanted
 
 
-def _planned(config: Config, request: Request) -> tuple[StudyPlan, Path, dict[str, str]]:
+def _plan_study(config: Config, request: Request) -> tuple[StudyPlan, Path, dict[str, str]]:
     """A new study, or one that is to be continued: plan, folder, scenario and plug-ins."""
     if there := folder_of(config):
         check_study(there)
     loaded = loaded_for("sweep", NO_SWEEP, config, request, [sweep_faults])
-    if remark := unjudged(loaded.scenario):
+    if remark := unjudged_claims(loaded.scenario):
         request.warn(remark)
     own = there or default_folder(loaded.scenario)
     return plan(loaded), request.out or own, scenario_texts(loaded)
@@ -176,23 +191,25 @@ def default_folder(scenario: Scenario) -> Path:
     return RESULTS / f"{scenario.name}-sweep"
 
 
-def answered(store: Store, runs: Table, request: Request, made: StudyPlan | None = None) -> Swept:
+def answer_study(
+    store: Store, runs: RunsTable, request: Request, made: StudyPlan | None = None
+) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
     With the plan of the study, the logs that it is to keep are made, too.
     Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
     """
     with interrupts_deferred():
-        results = judged(store.about, runs)
+        results = judge_study(store.about, runs)
         outputs.write_tables(store.folder, results)
-        extras, whole = Extras(), results.made == results.wanted
+        extras, whole = Extras(), results.made_runs == results.wanted_runs
         if whole and made:
             if store.about.keep != Keep():
                 request.say("making the logs that are kept")
             kept = keep(store.folder, made, results, extras, request)
         else:
-            kept = found(store.folder, results, extras)
-        if whole and not made and unmade(store.folder, results):
+            kept = find_kept(store.folder, results, extras)
+        if whole and not made and missing_runs(store.folder, results):
             again = plugins.continue_with("sweep run", store.folder)
             request.warn(f"logs of kept runs are missing; they are made by: {again}")
         if contradicted := contradiction(kept):
@@ -203,7 +220,7 @@ def answered(store: Store, runs: Table, request: Request, made: StudyPlan | None
         status: Status = "finished" if whole else "interrupted"
         command = "sweep run" if made else "sweep report"
         finish(store.folder, extras, "runs, tables and verdicts", command, status)
-        tally = Tally(results.wanted, results.made)
+        tally = StudyTally(results.wanted_runs, results.made_runs)
         return Swept(store.folder, tally, results, tuple(extras.missing))
 
 
@@ -212,8 +229,8 @@ def report(study: Path, request: Request) -> Swept:
     started = datetime.now(UTC)
     check_study(study)
     with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked
-        store = stored(study)
-        if not Tally.of(store.covered()).made:
+        store = open_store(study)
+        if not StudyTally.of(store.covered_draws()).made:
             raise UsageError(
                 f"{study} has no runs yet: {plugins.continue_with('sweep run', study)}"
             )
@@ -224,4 +241,4 @@ def report(study: Path, request: Request) -> Swept:
                 f"no draw in {study} has runs of all laws yet, so they cannot be compared; "
                 f"continue: {plugins.continue_with('sweep run', study)}"
             )
-        return answered(store, runs, request)
+        return answer_study(store, runs, request)

@@ -15,7 +15,7 @@ from podusv_cli.scenario.load import Loaded
 from podusv_cli.storage import files
 from podusv_cli.storage.writer import sole_writer
 from podusv_cli.studies.making.check import sweep_faults
-from podusv_cli.studies.making.dispatch import Executor, Tally
+from podusv_cli.studies.making.dispatch import Executor, StudyTally
 from podusv_cli.studies.making.plan import digest
 from podusv_cli.studies.making.sessions import SessionLog
 from podusv_cli.studies.making.unit import prepare
@@ -28,7 +28,7 @@ from podusv_cli.studies.tuning.plan import TRAIN, TunePlan
 from podusv_cli.studies.tuning.remarks import remarks
 from podusv_cli.studies.tuning.results import SearchResults
 from podusv_cli.studies.tuning.sampler import optuna
-from podusv_cli.studies.tuning.search import Search
+from podusv_cli.studies.tuning.search import GainSearch
 from podusv_cli.studies.tuning.space import with_gains
 from podusv_cli.studies.tuning.validation import validate
 from podusv_cli.workflows.many_runs import (
@@ -37,16 +37,16 @@ from podusv_cli.workflows.many_runs import (
     executor_for,
     finish,
     folder_of,
-    interrupted,
+    interruption,
     loaded_for,
     one_by_one,
-    refused,
+    refusals_of,
     scenario_texts,
 )
 from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS
 
-Tell = Callable[[Tally, str], None]
+Tell = Callable[[StudyTally, str], None]
 NO_TUNE = (
     "which says how many runs a search has; see podusv docs tuning, or start from one: podusv "
     "init studies/tune_small"
@@ -66,12 +66,15 @@ class Tuned:
         """What `--json` prints."""
         results = self.results
         return {
-            "format": 1, "status": "finished", "folder": str(self.folder),
+            "format": 1,
+            "status": "finished",
+            "folder": str(self.folder),
             "laws": results.laws.to_dict("records"),
             "gains": {law: dict(results.winner(law).gains) for law in results.winners},
-            "remarks": remarks(results), "missing": [str(failure) for failure in self.missing],
+            "remarks": remarks(results),
+            "missing": [str(failure) for failure in self.missing],
             "refused": self.refused,
-        }  # fmt: skip
+        }
 
 
 def tune(config: Config, request: Request, tell: Tell) -> Tuned:
@@ -83,17 +86,17 @@ def tune(config: Config, request: Request, tell: Tell) -> Tuned:
     """
     started = datetime.now(UTC)
     optuna()
-    loaded, folder = _loaded(config, request)
+    loaded, folder = _load_config(config, request)
     with sole_writer(folder):
-        return _tuned(loaded, folder, request, started, tell)
+        return _tune_folder(loaded, folder, request, started, tell)
 
 
-def _tuned(
+def _tune_folder(
     loaded: Loaded, folder: Path, request: Request, started: datetime, tell: Tell
-) -> Tuned:  # fmt: skip
+) -> Tuned:
     """Search what is not there yet, or all anew; no other process writes into the folder."""
     plan, texts = TunePlan(loaded.scenario), scenario_texts(loaded)
-    noted = None if request.force else place.known(folder, plan)
+    noted = None if request.force else place.read_known(folder, plan)
     plan = replace(plan, idle=noted.idle if noted else _idle(plan, request))
     if not any(plan.gains.values()):
         raise UsageError(
@@ -106,11 +109,11 @@ def _tuned(
     place.write(folder, plan, noted, stamp, texts)
     request.begin(f"{plan.size}; in {folder}")
     with executor_for(request, folder, plan.scenario, digest(plan.base.identity)) as executor:
-        results = _simulated(plan, folder, request, started, executor, tell)
-    return replace(_written(results, folder, request), refused=refused(executor))
+        results = _run_search(plan, folder, request, started, executor, tell)
+    return replace(_write_results(results, folder, request), refused=refusals_of(executor))
 
 
-def _loaded(config: Config, request: Request) -> tuple[Loaded, Path]:
+def _load_config(config: Config, request: Request) -> tuple[Loaded, Path]:
     """The scenario, and the folder of the search."""
     if there := folder_of(config):
         place.check(there)
@@ -119,34 +122,38 @@ def _loaded(config: Config, request: Request) -> tuple[Loaded, Path]:
     return loaded, request.out or own
 
 
-def _simulated(
-    plan: TunePlan, folder: Path, request: Request, started: datetime, executor: Executor,
+def _run_search(
+    plan: TunePlan,
+    folder: Path,
+    request: Request,
+    started: datetime,
+    executor: Executor,
     tell: Tell,
-) -> SearchResults:  # fmt: skip
+) -> SearchResults:
     """Search and validate what is not there yet, and note the session."""
     session = SessionLog(folder, request.argv, started, plan.scenario.plugged)
     made = {"search": 0, "validation": 0}
 
-    def searched(tally: Tally, searches: Sequence[Search]) -> None:
+    def tell_searched(tally: StudyTally, searches: Sequence[GainSearch]) -> None:
         made["search"] = tally.made - tally.before
         tell(tally, _leaders(searches))
 
-    def validated(tally: Tally) -> None:
+    def tell_validated(tally: StudyTally) -> None:
         made["validation"] = tally.made - tally.before
         tell(tally, "found gains on fresh draws")
 
     try:
         searches = _searches(plan, folder)
         _prepare(plan, request)
-        dispatch(searches, executor, searched)
+        dispatch(searches, executor, tell_searched)
         trials = {law: [s.trials for s in searches if s.law == law] for law in plan.gains}
         trials = {law: of_law for law, of_law in trials.items() if of_law}
         stamp = started.isoformat(timespec="seconds")
         return SearchResults(
-            plan, trials, validate(plan, trials, folder, stamp, executor, validated)
+            plan, trials, validate(plan, trials, folder, stamp, executor, tell_validated)
         )
     except KeyboardInterrupt as stop:
-        raise interrupted("all batches that were finished", "tune", folder) from stop
+        raise interruption("all batches that were finished", "tune", folder) from stop
     finally:
         session.end(sum(made.values()), executor.provenance())
 
@@ -173,17 +180,17 @@ def _idle(plan: TunePlan, request: Request) -> dict[str, tuple[str, ...]]:
     return find_idle(plan, request.workers)
 
 
-def _searches(plan: TunePlan, folder: Path) -> list[Search]:
+def _searches(plan: TunePlan, folder: Path) -> list[GainSearch]:
     """All of each law with gains, the laws in turn."""
     return [
-        Search(plan, law, number, folder)
+        GainSearch(plan, law, number, folder)
         for number in range(plan.tune.searches)
         for law, gains in plan.gains.items()
         if gains
     ]
 
 
-def _leaders(searches: Sequence[Search]) -> str:
+def _leaders(searches: Sequence[GainSearch]) -> str:
     """The best objective so far of every law, in words."""
     best_values: dict[str, float] = {}
     for search in searches:
@@ -194,7 +201,7 @@ def _leaders(searches: Sequence[Search]) -> str:
     return f"best on the training draws: {leaders}" if best_values else "no gains are tried yet"
 
 
-def _written(results: SearchResults, folder: Path, request: Request) -> Tuned:
+def _write_results(results: SearchResults, folder: Path, request: Request) -> Tuned:
     """Write the scenario and the tables, then figures and the report."""
     with interrupts_deferred():
         files.write_bytes(folder / place.TUNED, place.tuned_yaml(results))

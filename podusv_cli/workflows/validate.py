@@ -8,19 +8,19 @@ from pathlib import Path
 
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.component import BY_RULE
-from podusv_cli.core.finding import Finding, merged
+from podusv_cli.core.finding import Finding, merge_findings
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.engine.running.lanes import why_alone
-from podusv_cli.findings.finding import Case, unknown_codes
+from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.findings.proof import argument, conditions
 from podusv_cli.scenario.limits import largest, limits
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.sweep import Sweep
 from podusv_cli.scenario.yaml_tree import Route
-from podusv_cli.studies.making.check import sweep_faults, unjudged
-from podusv_cli.workflows.execute import examined, warm_up
+from podusv_cli.studies.making.check import sweep_faults, unjudged_claims
+from podusv_cli.workflows.execute import examine, warm_up
 from podusv_cli.workflows.request import Request
-from podusv_cli.workflows.run import opened
+from podusv_cli.workflows.run import open_scenario
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Valid:
         yield from self.study
         yield from map(str, self.findings)
 
-    def explained(self) -> Iterator[str]:
+    def explain_lines(self) -> Iterator[str]:
         """How runs march, the rank argument, the proof's conditions, every value and its origin."""
         scenario = self.loaded.scenario
         for law, plan in self.loaded.plans.items() if scenario.sweep else ():
@@ -60,15 +60,12 @@ def validate(config: Path, request: Request) -> Valid:
     Raises ScenarioError, LawError, and StorageError for a study that fits nowhere.
     """
     checks = (unknown_codes, limits(request.allow_large), sweep_faults, _tune_faults)
-    loaded = opened(config, request, checks)
+    loaded = open_scenario(config, request, checks)
     parse_claims(loaded)
     scenario = loaded.scenario
     study = _study(loaded, scenario.sweep) if scenario.sweep else []
-    cases = {
-        label: Case(single, loaded.plans[label]) for label, single in scenario.singles().items()
-    }
-    findings = merged({label: examined(case) for label, case in cases.items()})
-    for case in cases.values():
+    findings = merge_findings({label: examine(case) for label, case in loaded.cases.items()})
+    for case in loaded.cases.values():
         warm_up(case)
     return Valid(loaded, findings, study)
 
@@ -96,7 +93,7 @@ def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
         f"runs of the study: {len(made.laws) * len(made.cells) * sweep.draws:,} "
         f"(laws: {len(made.laws)}, cells: {len(made.cells)}, draws: {sweep.draws:,})"
     )
-    remark = unjudged(loaded.scenario)
+    remark = unjudged_claims(loaded.scenario)
     lines = [counted, check_draws(made).in_words(), *filter(None, [remark])]
     if not loaded.scenario.tune:
         return lines

@@ -8,12 +8,15 @@ from hashlib import sha256
 from pathlib import Path
 
 import podusv_cli
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError, UsageError
-from podusv_cli.engine.machine import code_folder, object_cache
+from podusv_cli.engine.machine import object_cache
 from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.process import code_folder
 from podusv_cli.scenario.limits import limits
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.load import load
 from podusv_cli.scenario.plugins import of_files
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import files, json_files
 from podusv_cli.verification import TOLERANCE
 from podusv_cli.verification import verify as verification
@@ -23,11 +26,17 @@ RESULT = {"format", "tolerance", "steps", "runs", "converged"}  # keys of what `
 
 
 def verify(
-    config: Path, overrides: Sequence[str], tolerance: float, out: Path | None = None,
-    progress: Callable[[str, float], None] | None = None, *, force: bool = False,
-    plugins: Sequence[str] = (), trust: bool = False,
+    config: Path,
+    overrides: Sequence[str],
+    tolerance: float,
+    out: Path | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    *,
+    force: bool = False,
+    plugins: Sequence[str] = (),
+    trust: bool = False,
     warn: Callable[[object], None] = lambda finding: None,
-) -> Verification:  # fmt: skip
+) -> Verification:
     """Verify a scenario's numbers, which `keep` can write to the file `out`.
 
     Raises UsageError for a run folder, ScenarioError, LawError, and StorageError where `out` is no
@@ -36,12 +45,14 @@ def verify(
     if (config / "resolved.yaml").is_file():
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
-    scenario = load(config, overrides, checks, plugins, of_files(trust)).told(warn).scenario
+    scenario = (
+        load(config, overrides, checks, plugins, of_files(trust)).warn_of_dropped(warn).scenario
+    )
     if out:
         files.check_places([out])
         _spare(out, force)
     done = verification.verify(scenario, tolerance, progress)
-    if not done.unconverged and tolerance <= TOLERANCE:
+    if not done.unconverged_by_run and tolerance <= TOLERANCE:
         _remember(map(resolved_yaml, scenario.singles().values()))
     return done
 
@@ -70,7 +81,7 @@ def keep(done: Verification, out: Path, *, force: bool = False) -> None:
     """Write a verification as JSON to the file `out`. Raises StorageError, as `verify`."""
     _spare(out, force)
     files.make_folder(out.parent)
-    files.write_bytes(out, json_files.encode(done.as_json()))
+    files.write_bytes(out, json_text.encode(done.as_json()))
 
 
 def _spare(out: Path, force: bool) -> None:

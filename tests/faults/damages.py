@@ -58,7 +58,7 @@ OTHERS: dict[str, Callable[[Path], object]] = {
     "empty": Path.touch,
     "zeros": lambda path: path.write_bytes(bytes(100_000)),
     "noise": lambda path: path.write_bytes(random.Random(1).randbytes(100_000)),
-}  # fmt: skip
+}
 
 
 def text(folder: Path, argument: str) -> None:
@@ -73,12 +73,19 @@ def text(folder: Path, argument: str) -> None:
 
 # `{whole}` stands for what is between the outer brackets of the file as it was.
 TEXTS = {
-    "list": "[]", "open": "{{whole}", "twice": "{{whole}}{}", "no_text": "{\udcff}",
-    "zero": "{{whole}, \0}", "deep": "[" * 100_000, "nan": '{{whole}, "a": NaN}',
-    "large": '{{whole}, "a": 1e999}', "digits": '{{whole}, "a": ' + "9" * 1_000_000 + "}",
-    "same": '{{whole}, "a": 1, "a": 2}', "escape": '{{whole}, "\\u001b[2J\\n": 1}',
+    "list": "[]",
+    "open": "{{whole}",
+    "twice": "{{whole}}{}",
+    "no_text": "{\udcff}",
+    "zero": "{{whole}, \0}",
+    "deep": "[" * 100_000,
+    "nan": '{{whole}, "a": NaN}',
+    "large": '{{whole}, "a": 1e999}',
+    "digits": '{{whole}, "a": ' + "9" * 1_000_000 + "}",
+    "same": '{{whole}, "a": 1, "a": 2}',
+    "escape": '{{whole}, "\\u001b[2J\\n": 1}',
     "long": '{{whole}, "a": "' + "a" * 20_000_000 + '"}',
-}  # fmt: skip
+}
 
 
 def entry(folder: Path, argument: str) -> None:
@@ -104,11 +111,16 @@ def yaml(folder: Path, argument: str) -> None:
 
 
 YAML = {
-    "empty": "", "open": "{a: [", "no_text": "a: \udcff", "deep": "a: " + "[" * 100_000,
+    "empty": "",
+    "open": "{a: [",
+    "no_text": "a: \udcff",
+    "deep": "a: " + "[" * 100_000,
     "aliases": "a: &a [1]\nb: [*a, *a]\n{whole}",
-    "extends": "extends: {pipe}\n{whole}", "file": "path: {kind: waypoints, file: {pipe}}\n",
-    "escaped": '"\\e[2J": 1\n{whole}', "tag": "a: !!python/object/apply:os.abort []\n{whole}",
-}  # fmt: skip
+    "extends": "extends: {pipe}\n{whole}",
+    "file": "path: {kind: waypoints, file: {pipe}}\n",
+    "escaped": '"\\e[2J": 1\n{whole}',
+    "tag": "a: !!python/object/apply:os.abort []\n{whole}",
+}
 
 
 def hdf5(folder: Path, argument: str) -> None:
@@ -138,7 +150,7 @@ HDF5: dict[str, Callable[[h5py.File, Path], object]] = {
     "external": _external,
     "external_link": _linked("u", lambda pipe: h5py.ExternalLink(str(pipe), "/u")),
     "external_provenance": _linked("provenance", lambda pipe: h5py.ExternalLink(str(pipe), "/")),
-}  # fmt: skip
+}
 
 
 def foreign(folder: Path, argument: str) -> None:

@@ -15,9 +15,17 @@ plain = taking(Pid.law, SIGNATURES["law"])
 
 @kernel
 def endless(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It never returns."""
     plain(t, x, memory, target, k, table, tau, rate, signals, work)
     while t > BEGIN and tau[0] > -1e300:
@@ -26,9 +34,17 @@ def endless(
 
 @kernel
 def undefined(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """Its demand in yaw is no number."""
     plain(t, x, memory, target, k, table, tau, rate, signals, work)
     if t > BEGIN:
@@ -37,9 +53,17 @@ def undefined(
 
 @kernel
 def raising(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It raises, which only plain Python can."""
     plain(t, x, memory, target, k, table, tau, rate, signals, work)
     if t > BEGIN:
@@ -48,9 +72,17 @@ def raising(
 
 @kernel
 def unstable(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It pushes the harder the faster it goes."""
     plain(t, x, memory, target, k, table, tau, rate, signals, work)
     tau[0] = 1e6 * x[3]
@@ -58,9 +90,17 @@ def unstable(
 
 @kernel
 def too_long(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It writes a third demand."""
     plain(t, x, memory, target, k, table, tau, rate, signals, work)
     tau[2] = 0.0
@@ -68,18 +108,34 @@ def too_long(
 
 @kernel
 def too_short(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It writes one demand only."""
     tau[0] = 0.0
 
 
 @kernel
 def slow(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It takes seconds once, not for ever: in the tests' own process it must not stay."""
     plain(t, x, memory, target, k, table, tau, rate, signals, work)
     if BEGIN < t < END:
@@ -89,9 +145,17 @@ def slow(
 
 @kernel
 def slow_when_told(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """The same for one demand only."""
     tau[0] = k.surge
     tau[1] = 0.0
@@ -102,9 +166,17 @@ def slow_when_told(
 
 @kernel
 def slow_at_once(
-    t: float, x: Vector, memory: Vector, target: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """It takes seconds from the start, in plain Python."""
     for i in range(10_000_000):
         tau[0] = math.sin(tau[0] + i)

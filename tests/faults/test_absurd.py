@@ -13,8 +13,8 @@ from counting import counted
 from scenario_samples import loaded
 from storage_samples import deadline
 
-from podusv_cli.findings.finding import Case
 from podusv_cli.scenario import limits
+from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import estimate
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows import compare, execute
@@ -192,8 +192,8 @@ log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
 """
     scenario = loaded(text).scenario
     case = Case.of(scenario)
-    recording = execute.simulated(case, execute.Stopwatch())
-    recording, _ = execute.monitored(case, recording)
+    recording = execute.simulate_case(case, execute.Stopwatch())
+    recording, _ = execute.monitor_case(case, recording)
     expected = estimate(scenario, case.plan)
     assert expected.steps == 10
     assert expected.rows == len(recording["time"])
@@ -230,8 +230,8 @@ def test_a_disk_that_may_do_is_tried(podusv, crowded):
     write("a.yaml", f"{LAW}log: {{compress: true}}\n".replace("1.0}", "0.1, compiled: false}"))
     scenario = load("a.yaml").scenario
     size = estimate(scenario, scenario.plan())
-    crowded(size.needed)
-    assert size.needed < size.disk
+    crowded(size.bytes_needed)
+    assert size.bytes_needed < size.disk
     assert podusv("run", "a.yaml", "-q", "--no-figures", "--out", "x").code == 0
     with h5py.File("x/log.h5") as log:
         assert log["x"].compression == "gzip"

@@ -115,7 +115,7 @@ def test_a_comparison_keeps_its_runs(podusv, monkeypatch, what):
 
 
 def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(podusv, monkeypatch):
-    monkeypatch.setattr(ideal_weights, "fitted", broken)
+    monkeypatch.setattr(ideal_weights, "fit_weights", broken)
     said = podusv("compare", write("a.yaml", TWO), "--out", "x", "-q", "--no-figures")
     assert said.code == 0
     for label in ("one", "other"):
@@ -127,7 +127,7 @@ def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(podusv, monkeypatch
 def test_rerun_tells_what_the_repeated_run_lacks(podusv, monkeypatch):
     write("a.yaml", ADAPTIVE)
     assert podusv("run", "a.yaml", "--out", "x", "-q", "--no-figures").code == 0
-    monkeypatch.setattr(ideal_weights, "fitted", broken)
+    monkeypatch.setattr(ideal_weights, "fit_weights", broken)
     said = podusv("rerun", "x")
     assert said.code == 3
     assert said.err.startswith(f"x: theory.json with the stability monitor's signals {BUG}")
@@ -138,7 +138,7 @@ def test_what_cannot_be_stored_stays_an_error(podusv, monkeypatch):
     def full(*given: Any) -> NoReturn:
         raise StorageError("the disk is full")
 
-    monkeypatch.setattr(ideal_weights, "fitted", full)
+    monkeypatch.setattr(ideal_weights, "fit_weights", full)
     said = podusv("run", write("a.yaml", ADAPTIVE), "--out", "x", "-q", "--no-figures")
     assert (said.code, said.err) == (5, "the disk is full\n")
     assert not Path("x").exists()
@@ -147,10 +147,13 @@ def test_what_cannot_be_stored_stays_an_error(podusv, monkeypatch):
 @pytest.mark.parametrize(
     "override",
     [
-        "simulation.step=0.5", "controller.k_psie=500", "controller.Gamma_u=1e5",
-        "controller.gamma_r=1e5", "vessel.Y_vv=100",
+        "simulation.step=0.5",
+        "controller.k_psie=500",
+        "controller.Gamma_u=1e5",
+        "controller.gamma_r=1e5",
+        "vessel.Y_vv=100",
     ],
-)  # fmt: skip
+)
 def test_the_theory_of_a_run_that_leaves_all_numbers_is_made(podusv, override):
     said = podusv("run", CORRECTED, "--set", override, "--no-figures", "-q", "--out", "x")
     assert said.code == 4

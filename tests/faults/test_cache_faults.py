@@ -1,6 +1,6 @@
 """Whatever becomes of compiled code on disk, a run computes what its source says.
 
-Edited sources, torn writes, old caches: tests/test_cache.py.
+Edited sources, torn writes, old caches: tests/engine/test_cache.py.
 """
 
 import os
@@ -16,7 +16,8 @@ import pytest
 from command_samples import BASE, ROOT, write
 
 from podusv_cli.core.kinematics import wrap
-from podusv_cli.engine.machine import code_folder, compile, object_cache
+from podusv_cli.engine.machine import compile, object_cache
+from podusv_cli.process import code_folder
 from podusv_cli.process.temporary_names import temporary_name
 
 FRESH = code_folder.code_folder
@@ -38,10 +39,12 @@ def begun(out: str, **environment: str) -> subprocess.Popen[str]:
     other = {name: text for name, text in os.environ.items() if name not in names}
     words = ["run", "a.yaml", "--out", out, "--no-figures", "-q"]
     return subprocess.Popen(
-        [sys.executable, "-m", "podusv_cli", *words], text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        [sys.executable, "-m", "podusv_cli", *words],
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         env={**other, "PYTHONPATH": str(ROOT), **environment},
-    )  # fmt: skip
+    )
 
 
 def log(process: subprocess.Popen[str], said: str = "") -> bytes:
@@ -88,7 +91,9 @@ def test_without_any_place_it_compiles_leaves_nothing_and_says_so(folder, monkey
     monkeypatch.setattr(tempfile, "tempdir", str(folder / "tmp"))
     for name in ("PODUSV_CACHE", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, "/dev/null/nowhere")
-    assert compile.compiled(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))(7.0) == wrap(7.0)
+    assert compile.compile_piece(compile.Piece(wrap, CFUNCTYPE(c_double, c_double)))(7.0) == wrap(
+        7.0
+    )
     (told,) = caplog.messages
     assert told.startswith("podusv: compiled code is not kept, so each command compiles anew; set")
     assert {path.name for path in folder.rglob("*")} == {"a.yaml", "tmp"}

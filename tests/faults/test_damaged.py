@@ -58,9 +58,12 @@ class Opener:
     def _started(self, run: Path) -> subprocess.Popen[str]:
         way = ":".join(map(str, Path(DAMAGING).parents[:3]))
         return subprocess.Popen(
-            [sys.executable, DAMAGING, str(run)], text=True, env={**ENVIRONMENT, "PYTHONPATH": way},
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        )  # fmt: skip
+            [sys.executable, DAMAGING, str(run)],
+            text=True,
+            env={**ENVIRONMENT, "PYTHONPATH": way},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
 
     def __call__(self, way: str, patience: int = 60) -> Outcome:
         if self._process.poll() is not None:
@@ -163,14 +166,24 @@ def test_json_that_podusv_does_not_write(opened, which):
 
 
 WRONG = [
-    "metrics.json metrics []", "metrics.json metrics drop", "metrics.json metrics.iae true",
-    'metrics.json metrics.iae "1"', 'theory.json windows {"a": 1}', "theory.json windows drop",
-    'theory.json conditions [{"holds": false}]', "theory.json windows.whole.largest_V []",
-    "about.json values {}", "about.json values.path 5", "about.json values.vessel drop",
-    "about.json outages []", 'about.json length "1"', "about.json law [5]",
+    "metrics.json metrics []",
+    "metrics.json metrics drop",
+    "metrics.json metrics.iae true",
+    'metrics.json metrics.iae "1"',
+    'theory.json windows {"a": 1}',
+    "theory.json windows drop",
+    'theory.json conditions [{"holds": false}]',
+    "theory.json windows.whole.largest_V []",
+    "about.json values {}",
+    "about.json values.path 5",
+    "about.json values.vessel drop",
+    "about.json outages []",
+    'about.json length "1"',
+    "about.json law [5]",
     'about.json said {"disturbance.1": ""}',
-    'theory.json windows.whole.corrected.bound "a"', "theory.json assumptions [[]]",
-]  # fmt: skip
+    'theory.json windows.whole.corrected.bound "a"',
+    "theory.json assumptions [[]]",
+]
 
 
 @pytest.mark.parametrize("what", WRONG)
@@ -275,8 +288,13 @@ def test_every_command_says_so_in_a_line_and_leaves_nothing(run, tmp_path, podus
     folder = run.with_name("commanded")
     damaged(run, folder, way)
     before = files(folder) if "pipe" not in way else {}
-    for words in (["plot", folder], ["plot", run, folder], ["compare", run, folder],
-                  ["rerun", folder], ["diff", run, folder]):  # fmt: skip
+    for words in (
+        ["plot", folder],
+        ["plot", run, folder],
+        ["compare", run, folder],
+        ["rerun", folder],
+        ["diff", run, folder],
+    ):
         with deadline():
             said = podusv(*words)
         assert (said.code, said.out) == (5, ""), (words, said)

@@ -30,7 +30,7 @@ from podusv_cli.process.workers import run_all
 from podusv_cli.scenario.load import load, load_text
 from podusv_cli.storage.files import fingerprint
 from podusv_cli.storage.log_reader import read_log
-from podusv_cli.workflows.execute import Task, execute
+from podusv_cli.workflows.execute import RunTask, execute
 
 ROOT = Path(__file__).parents[2]
 CORRECTED = str(ROOT / "configs/mu_2017/corrected.yaml")
@@ -41,13 +41,14 @@ ASTERN = (9.0, -9.0, -2.0, 0.3, 0.1, 0.0)
 PARTS: dict[str, dict[str, Any]] = {
     **{
         f"{room[:-1]} {name}": {room[:-1]: example(kind)}
-        for room in ROOMS for name, kind in kinds(room).items()
+        for room in ROOMS
+        for name, kind in kinds(room).items()
     },
     "difference": {"controller": AdaptiveNeural(rate="difference", B_u=5.0)},
     "held direction": {"controller": AdaptiveNeural(hold_below=20.0)},
     "folded": {"controller": FullBackstepping(fold="printed"), "start": ASTERN},
     "literal path": {"path": LineCircle(switch=0.05, reading="literal")},
-}  # fmt: skip
+}
 
 # Runs a scenario as if on another processor and leaves its log. Arguments: the scenario, the
 # folder, the processor as LLVM calls it (- for this one), overrides.
@@ -70,9 +71,13 @@ assert asked or processor == "-", "the compiler did not ask what it compiles for
 def python(*words: str, **settings: str) -> subprocess.CompletedProcess[str]:
     """A Python process of its own."""
     return subprocess.run(
-        [sys.executable, *words], env={**os.environ, "PYTHONPATH": str(ROOT), **settings},
-        capture_output=True, text=True, check=True, timeout=300,
-    )  # fmt: skip
+        [sys.executable, *words],
+        env={**os.environ, "PYTHONPATH": str(ROOT), **settings},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
 
 
 def repeatable(folder: Path) -> dict[str, Any]:
@@ -131,7 +136,7 @@ def test_one_worker_and_many_write_the_same_bytes(tmp_path):
     ]
     for workers in (1, 4):
         folders = [tmp_path / str(workers) / str(i) for i in range(len(gains))]
-        tasks = [Task(s, SOUND, folder) for s, folder in zip(scenarios, folders, strict=True)]
+        tasks = [RunTask(s, SOUND, folder) for s, folder in zip(scenarios, folders, strict=True)]
         outcomes = run_all([partial(execute, task) for task in tasks], workers=workers)
         assert not any(outcome.failure for outcome in outcomes)
     for i in range(len(gains)):
@@ -141,16 +146,19 @@ def test_one_worker_and_many_write_the_same_bytes(tmp_path):
 # --- other processors
 
 
-@pytest.mark.parametrize("processor", [
-    "x86-64",  # vectors of two numbers, nothing fused
-    "haswell",  # of four; could fuse multiply and add
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "processor",
+    [
+        "x86-64",  # vectors of two numbers, nothing fused
+        "haswell",  # of four; could fuse multiply and add
+    ],
+)
 @pytest.mark.slow  # compiles everything anew
 @INTEL
 def test_code_for_other_instruction_sets_writes_the_same_bytes(processor, tmp_path):
     words = ["simulation.duration=20"]
     scenario = load(CORRECTED, words).scenario.alone()
-    here = execute(Task(scenario, Path(CORRECTED).read_text(), tmp_path / "here")).folder
+    here = execute(RunTask(scenario, Path(CORRECTED).read_text(), tmp_path / "here")).folder
     cache = str(tmp_path / "cache")
     there = tmp_path / "there"
     python("-c", ELSEWHERE, CORRECTED, str(there), processor, *words, PODUSV_CACHE=cache)
@@ -163,10 +171,13 @@ WITHOUT_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-AVX,-FMA,-FMA
 
 @pytest.mark.slow
 @INTEL
-@pytest.mark.parametrize(("name", "words"), [
-    ("mu_2017/corrected", ["path.reading=sine", "path.switch=1"]),
-    ("pod/single", ["controllers=null", "controller={kind: pid}"]),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("mu_2017/corrected", ["path.reading=sine", "path.switch=1"]),
+        ("pod/single", ["controllers=null", "controller={kind: pid}"]),
+    ],
+)
 def test_a_c_library_that_rounds_otherwise_changes_no_number_of_a_run(name, words, tmp_path):
     """But for the rate of V, which is computed after the march, from numpy's cosine."""
     if python("-c", ANGLES).stdout == python("-c", ANGLES, **WITHOUT_FMA).stdout:
@@ -184,10 +195,21 @@ def test_a_c_library_that_rounds_otherwise_changes_no_number_of_a_run(name, word
 
 # What is rounded correctly everywhere.
 EXACT = {
-    "math.sqrt", "math.copysign", "math.floor", "math.ceil", "math.fabs", "math.isfinite",
-    "math.isnan", "math.pi", "math.inf", "math.nan",
-    "np.ceil", "np.float64", "np.int64", "np.empty",
-}  # fmt: skip
+    "math.sqrt",
+    "math.copysign",
+    "math.floor",
+    "math.ceil",
+    "math.fabs",
+    "math.isfinite",
+    "math.isnan",
+    "math.pi",
+    "math.inf",
+    "math.nan",
+    "np.ceil",
+    "np.float64",
+    "np.int64",
+    "np.empty",
+}
 
 
 def test_kernels_take_nothing_from_the_c_library_that_it_may_round_otherwise():

@@ -111,9 +111,14 @@ def test_streams_that_take_nothing_until_python_ends(podusv, streams, unbuffered
     with FULL.open("w") as full:
         out, err = (full if name in streams else subprocess.PIPE for name in ("out", "err"))
         done = subprocess.run(
-            [sys.executable, "-m", "podusv_cli", *words], text=True, timeout=60, check=False,
-            env=os.environ | extra, stdout=out, stderr=err,
-        )  # fmt: skip
+            [sys.executable, "-m", "podusv_cli", *words],
+            text=True,
+            timeout=60,
+            check=False,
+            env=os.environ | extra,
+            stdout=out,
+            stderr=err,
+        )
     assert done.returncode == 5
     assert "Traceback" not in (done.stderr or "")
     assert "ignored" not in (done.stderr or "")
@@ -129,9 +134,11 @@ def a_device(path: str) -> None:
 
 
 ODD: dict[str, Callable[[str], None]] = {
-    "device": a_device, "pipe": os.mkfifo, "folder": os.mkdir,
+    "device": a_device,
+    "pipe": os.mkfifo,
+    "folder": os.mkdir,
     "link": lambda path: os.symlink("v.json", path),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("place", ODD)

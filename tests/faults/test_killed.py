@@ -21,8 +21,8 @@ from counts import count, few
 from old_results import COMMANDS, SUCCESS, assert_nothing_lost, assert_whole, bring_back, left_over
 from storage_samples import Saboteur, fails, files, until_nothing_breaks
 
-from podusv_cli.engine.machine import code_folder, object_cache
-from podusv_cli.process import workers
+from podusv_cli.engine.machine import object_cache
+from podusv_cli.process import code_folder, workers
 from podusv_cli.process.interrupts import Interrupts
 from podusv_cli.process.temporary_names import temporary_name
 from podusv_cli.storage import provenance, staging

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from counts import count
+from lane_samples import aligned, bits
 from random_kernels import watching
-from test_lanes import aligned, bits
 
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import LANES, Vector

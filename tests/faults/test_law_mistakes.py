@@ -273,12 +273,12 @@ IMPORTED = {
     "gain = nothing_of_this_name": "own_laws.mine cannot be imported: NameError: name "
     "'nothing_of_this_name' is not defined (mine.py, line 1)",
     f"from {PID} import Pid\nclass Mine(Pid):\n    kind: str = 'mine'": (
-        "own_laws.mine.Mine: its kind is no fixed word; write kind: Literal[\"mine\"] = \"mine\""
+        'own_laws.mine.Mine: its kind is no fixed word; write kind: Literal["mine"] = "mine"'
     ),
     f"from {PID} import Pid\nclass Mine(Pid): pass": (
         f"own_laws.mine.Mine: its kind pid is that of {PID}, too; take another name"
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("text", IMPORTED)

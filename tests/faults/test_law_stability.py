@@ -35,9 +35,7 @@ def drawn(random: Any, spread: float = 0.3) -> Vessel:
     """The vessel with every inertia and damping changed by up to this."""
     a, b, c, *scales = random.uniform(1 - spread, 1 + spread, 6)
     v = NONLINEAR
-    changes = {
-        "X_udot": v.m - a * v.m11, "Y_vdot": v.m - b * v.m22, "N_rdot": v.I_z - c * v.m33,
-    }  # fmt: skip
+    changes = {"X_udot": v.m - a * v.m11, "Y_vdot": v.m - b * v.m22, "N_rdot": v.I_z - c * v.m33}
     for names, scale in zip(DAMPING, scales, strict=True):
         changes |= {name: scale * getattr(v, name) for name in names}
     return v.model_copy(update=changes)
@@ -55,7 +53,7 @@ def steady_velocity(k: Any, turn: float = 0.0, loads: Vector = LOAD) -> tuple[fl
 
 def at_rest(
     law: Any, vessel: Vessel, told: Vessel, turn: float = 0.0, loads: Vector = LOAD
-) -> Vector:  # fmt: skip
+) -> Vector:
     """(x, memory) on the target, which goes north: in its frame nothing changes."""
     true, k = bundle(vessel.constants()), bundle(told.constants())
     u, v = steady_velocity(true, turn, loads)
@@ -73,7 +71,7 @@ def at_rest(
 
 def rates(
     law: Any, s: Vector, vessel: Vessel, told: Vessel, turn: float = 0.0, loads: Vector = LOAD
-) -> Vector:  # fmt: skip
+) -> Vector:
     """Of (x, memory) in the frame of the target: its position, its course, its turn [rad/s]."""
     x, memory, out = s[:6], s[6:], np.zeros(6)
     target = np.array([0.0, 0.0, SPEED, 0.0, 0.0, SPEED * turn])
@@ -187,7 +185,7 @@ def test_adrc_is_not_stable_on_all_of_them():
         (MomentumVector(), CYBERSHIP, NONLINEAR, 0.443, 0.446, 0.427),
         (WARY, CYBERSHIP, NONLINEAR, -0.037, -0.049, -0.024),
     ],
-)  # fmt: skip
+)
 def test_the_eigenvalues_are_those_of_the_table(law, vessel, told, line, starboard, port):
     """theory.md: on the line and on the paper's circle to either side."""
     growths = [growth(law, vessel, told, turn) for turn in (0.0, TURN, -TURN)]
@@ -217,11 +215,16 @@ def test_a_known_hull_cycles_on_the_circle_where_an_eigenvalue_grows(law, turn, 
     heading = np.pi / 2 if turn == "starboard" else -np.pi / 2
     out = run(
         corrected(
-            controller=law, vessel=CYBERSHIP, actuator=Saturated(), disturbance=STEADY,
-            path=Circle(radius=16.67, turn=turn), start=(15.67, 0.0, heading, 0.5, 0.0, 0.0),
+            controller=law,
+            vessel=CYBERSHIP,
+            actuator=Saturated(),
+            disturbance=STEADY,
+            path=Circle(radius=16.67, turn=turn),
+            start=(15.67, 0.0, heading, 0.5, 0.0, 0.0),
         ),
-        200.0, step=0.02,
-    )  # fmt: skip
+        200.0,
+        step=0.02,
+    )
     assert lowest <= out["z_e"][out["time"] > 170].max() <= highest
 
 
@@ -234,11 +237,17 @@ def test_such_a_hull_cycles_also_where_no_eigenvalue_grows(omega_v, grows, lowes
     law, vessel = VelocityVector(omega_v=omega_v), CYBERSHIP
     out = run(
         corrected(
-            controller=law, vessel=vessel, nominal=NONLINEAR, actuator=Saturated(), path=Line(),
-            disturbance=STEADY, start=(-2.0, 0.0, 0.0, 0.5, 0.0, 0.0),
+            controller=law,
+            vessel=vessel,
+            nominal=NONLINEAR,
+            actuator=Saturated(),
+            path=Line(),
+            disturbance=STEADY,
+            start=(-2.0, 0.0, 0.0, 0.5, 0.0, 0.0),
         ),
-        150.0, step=0.02,
-    )  # fmt: skip
+        150.0,
+        step=0.02,
+    )
     assert (growth(law, vessel) > 0.0) is grows
     assert lowest <= out["z_e"][out["time"] > 100].max() <= highest
 

@@ -20,16 +20,27 @@ from command_samples import ROOT
 from counts import count
 
 from podusv_cli import cli
-from podusv_cli.findings.finding import Case
 from podusv_cli.process.workers import available_workers
-from podusv_cli.scenario.load import load, resolved_yaml
+from podusv_cli.scenario.case import Case
+from podusv_cli.scenario.load import load
+from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import provenance
 from podusv_cli.workflows.execute import warm_up
 
 VALUES = (
-    "0", "-0.0", "5e-324", "1e-300", "1e-9", "-1.0", "1e9", "1e30", "1e150", "1e200", "1.7e308",
+    "0",
+    "-0.0",
+    "5e-324",
+    "1e-300",
+    "1e-9",
+    "-1.0",
+    "1e9",
+    "1e30",
+    "1e150",
+    "1e200",
+    "1.7e308",
     "-1e308",
-)  # fmt: skip
+)
 SHORT = "simulation.duration=0.5"
 EXTENDED = ("claims.yaml", "ablation_laws.yaml")  # no scenarios in themselves
 PARTS = [

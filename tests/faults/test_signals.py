@@ -29,7 +29,7 @@ from command_samples import (
     under_way,
     wait_for,
     write,
-)  # fmt: skip  # fmt: skip
+)
 from storage_samples import files
 
 from podusv_cli.process.workers import INTERRUPTED, Outcome

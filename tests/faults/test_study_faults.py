@@ -83,9 +83,12 @@ def test_killed_at_any_time_it_goes_on_where_it_was(tmp_path):
 def started(folder, name):
     command = [sys.executable, "-m", "podusv_cli", "sweep", "run", "small.yaml", "--out", name]
     return subprocess.Popen(
-        [*command, "--no-figures"], cwd=folder,
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        [*command, "--no-figures"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
 
 
 def children_are_gone(group, patience=20.0):
@@ -109,7 +112,9 @@ def test_a_full_disk_is_a_sentence_and_nothing_is_lost(whole, tmp_path):
         folder = tmp_path / str(share)
         with pytest.raises(StorageError, match="the disk is full"):
             written_within(folder, begun + share * (needed - begun))
-        kept.append(sum(int(m.sum()) for m in Store(folder, about(small())).covered().values()))
+        kept.append(
+            sum(int(m.sum()) for m in Store(folder, about(small())).covered_draws().values())
+        )
         assert content(made(folder)) == content(whole)
     assert 0 == kept[0] < kept[1] < kept[2] < 2 * small().sweep.draws
 

@@ -35,9 +35,12 @@ def environment(extra: Mapping[str, str]) -> dict[str, str]:
 
 def podusv(*words: str, extra: Mapping[str, str] | None = None, **streams: Any) -> Any:
     return subprocess.run(
-        [sys.executable, "-m", "podusv_cli", *words], env=environment(extra or {}),
-        timeout=60, check=False, **streams,
-    )  # fmt: skip
+        [sys.executable, "-m", "podusv_cli", *words],
+        env=environment(extra or {}),
+        timeout=60,
+        check=False,
+        **streams,
+    )
 
 
 @pytest.mark.slow
@@ -103,9 +106,12 @@ def on_a_terminal(extra: Mapping[str, str], *words: str) -> bytes:
     """What a terminal gets to see."""
     ours, theirs = pty.openpty()
     with subprocess.Popen(
-        [sys.executable, "-m", "podusv_cli", *words], stdin=theirs, stdout=theirs, stderr=theirs,
+        [sys.executable, "-m", "podusv_cli", *words],
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
         env=environment(extra),
-    ) as process:  # fmt: skip
+    ) as process:
         os.close(theirs)
         shown = b""
         while part := _read(ours):

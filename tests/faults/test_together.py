@@ -107,13 +107,15 @@ def test_figures_that_are_drawn_at_once_are_whole(podusv, before):
 def test_a_run_that_is_replaced_while_it_is_drawn_is_drawn_or_refused(podusv):
     """What is read across the change is seen to be damaged.
 
-    That it is there at every moment is in tests/test_storage_staging.py, step by step.
+    That it is there at every moment is in tests/storage/test_storage_staging.py, step by step.
     """
     for _ in TIMES:
         drawn, made, compared = at_once(
-            podusv, ("plot", "x", "--out", "figures"), (*RUN, "--out", "x", "--force"),
+            podusv,
+            ("plot", "x", "--out", "figures"),
+            (*RUN, "--out", "x", "--force"),
             ("compare", "x", "both", "--out", "new", "--force", "--no-figures"),
-        )  # fmt: skip
+        )
         assert made.code == 0
         for each in (drawn, compared):
             assert each.code == 0 or (

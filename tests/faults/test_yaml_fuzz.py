@@ -145,15 +145,33 @@ sweep:
 TOLD = {
     "scenarios": (
         ("vessel", "path", "disturbance", "simulation", "controller", "controllers", "claims"),
-        ("start", "actuator.pods", "vessel.m", "vessel.preset", "path.kind", "actuator.kind",
-         "actuator.pods[0].x", "controller.network", "metrics", "log"),
+        (
+            "start",
+            "actuator.pods",
+            "vessel.m",
+            "vessel.preset",
+            "path.kind",
+            "actuator.kind",
+            "actuator.pods[0].x",
+            "controller.network",
+            "metrics",
+            "log",
+        ),
     ),
     "sweeps": (
         ("sweep", "sweep.vary"),
-        ("sweep.vary.damping.times.lognormal", "sweep.laws", "sweep.grid", "sweep.keep",
-         "sweep.vary.vessel.m", "sweep.claims.S1", "sweep.success", "path"),
+        (
+            "sweep.vary.damping.times.lognormal",
+            "sweep.laws",
+            "sweep.grid",
+            "sweep.keep",
+            "sweep.vary.vessel.m",
+            "sweep.claims.S1",
+            "sweep.success",
+            "path",
+        ),
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ from podusv_cli.components.actuators.propeller import (
     speed_for,
     thrust,
 )
-from podusv_cli.components.actuators.rudder import slant, steered
+from podusv_cli.components.actuators.rudder import slant, steer_rudder
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import direction
@@ -83,7 +83,9 @@ def allocate(
             demand[0], Y_wanted, at.low, at.high, at.most_astern, at.most_ahead, k.priority, answer
         )
         T[0], delta[0] = answer[0], answer[1]
-        return made(demand, at.most_ahead, at.most_ahead * abs(table[X]), k, table, T, delta)
+        return meets_demand(
+            demand, at.most_ahead, at.most_ahead * abs(table[X]), k, table, T, delta
+        )
     return by_least_squares(state, demand, flows, k, table, T, delta)
 
 
@@ -129,7 +131,7 @@ def by_least_squares(
         delta[i] = direction(side * along, side * across)
         if T[i] == 0.0:  # any angle does, so the one in reach that is nearest to 0 is taken
             delta[i] = within(0.0, low[i], high[i])
-    return made(demand, all_u, all_r, k, table, T, delta)
+    return meets_demand(demand, all_u, all_r, k, table, T, delta)
 
 
 @kernel
@@ -142,7 +144,7 @@ def shape(at: Reach, pod: Vector, most: float, sector: Vector) -> None:
 
 
 @kernel
-def made(
+def meets_demand(
     demand: Vector, all_u: float, all_r: float, k: Any, table: Vector, T: Vector, delta: Vector
 ) -> bool:
     """Whether these thrusts and angles make the demand."""
@@ -167,7 +169,7 @@ def settings(count: int, T: Vector, flows: Vector, k: Any, table: Vector, comman
     for i in range(count):
         pod = tail(table, i * WIDTH)
         if pod[LIFT] > 0.0:
-            if not steered(T[i], command[count + i], flows[i], pod, k, answer):
+            if not steer_rudder(T[i], command[count + i], flows[i], pod, k, answer):
                 made_all = False
             command[i], command[count + i] = answer[0], answer[1]
         else:

@@ -62,9 +62,17 @@ def nearest(p_x: float, p_y: float, sector: Vector, side: float, out: Vector) ->
 
 @kernel
 def pull(
-    count: int, C: Vector, tau: Vector, sides: Vector, sectors: Vector, eps: float, y: Vector,
-    g: Vector, slope: Vector, curve: Vector,
-) -> None:  # fmt: skip
+    count: int,
+    C: Vector,
+    tau: Vector,
+    sides: Vector,
+    sectors: Vector,
+    eps: float,
+    y: Vector,
+    g: Vector,
+    slope: Vector,
+    curve: Vector,
+) -> None:
     """The dual's gradient at y into `slope`, minus its Hessian into `curve`.
 
     `g` takes two numbers a pod, then three more of scratch; `curve` the lower triangle.
@@ -107,9 +115,17 @@ def ascent(curve: Vector, slope: Vector, out: Vector) -> None:
 
 @kernel
 def climb(
-    count: int, C: Vector, tau: Vector, sides: Vector, sectors: Vector, eps: float,
-    settled: float, y: Vector, g: Vector, slope: Vector,
-) -> None:  # fmt: skip
+    count: int,
+    C: Vector,
+    tau: Vector,
+    sides: Vector,
+    sectors: Vector,
+    eps: float,
+    settled: float,
+    y: Vector,
+    g: Vector,
+    slope: Vector,
+) -> None:
     """Newton's method on the dual from y, each step as long as the dual rises along it."""
     way, curve = scratch(3), scratch(6)
     pull(count, C, tau, sides, sectors, eps, y, g, slope, curve)
@@ -122,9 +138,18 @@ def climb(
 
 @kernel
 def along(
-    count: int, C: Vector, tau: Vector, sides: Vector, sectors: Vector, eps: float, way: Vector,
-    y: Vector, g: Vector, slope: Vector, curve: Vector,
-) -> None:  # fmt: skip
+    count: int,
+    C: Vector,
+    tau: Vector,
+    sides: Vector,
+    sectors: Vector,
+    eps: float,
+    way: Vector,
+    y: Vector,
+    g: Vector,
+    slope: Vector,
+    curve: Vector,
+) -> None:
     """One step from y: the whole way where the dual rises all along, else to where it is level."""
     start = scratch(3)
     for a in range(AXES):

@@ -19,9 +19,15 @@ def within(number: float, low: float, high: float) -> float:
 
 @kernel
 def one_pod(
-    X: float, Y: float, low: float, high: float, most_astern: float, most_ahead: float,
-    priority: float, out: Vector,
-) -> None:  # fmt: skip
+    X: float,
+    Y: float,
+    low: float,
+    high: float,
+    most_astern: float,
+    most_ahead: float,
+    priority: float,
+    out: Vector,
+) -> None:
     """Thrust [N] and angle [rad] for the force (X, Y) [N] at the pod, into `out`.
 
     Angles reach from `low` to `high`, inside a right angle to either side; thrust from

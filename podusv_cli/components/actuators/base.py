@@ -12,9 +12,9 @@ from podusv_cli.components.actuators.command import (
     GIVEN,
     Command,
     Drive,
-    Failure,
-    commanded,
+    EffectivenessLoss,
     failing,
+    with_command_path,
 )
 from podusv_cli.components.actuators.recorded import (
     Recorded,
@@ -84,7 +84,7 @@ class Actuator(Component):
     command: Command | None = value(
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )
-    failure: Failure | None = value(None, "", "loss of effectiveness at a time")
+    failure: EffectivenessLoss | None = value(None, "", "loss of effectiveness at a time")
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -159,7 +159,7 @@ class Actuator(Component):
         drive: Drive = obeying(self.obey) if recorded and self.obey else self.drive
         if self.failure:
             drive = failing(drive, self.lose)
-        return commanded(drive) if self.command else drive
+        return with_command_path(drive) if self.command else drive
 
     @property
     def signals_with(self) -> tuple[Signal, ...]:
@@ -205,21 +205,29 @@ class Actuator(Component):
         """
         state = self.rest()
         for _ in range(ROUNDS):
-            tau, rate = self._driven(x, state, demand)
+            tau, rate = self._drive_once(x, state, demand)
             if np.allclose(rate, 0.0):
                 break
             shifts = SMALL * np.eye(len(state))
-            slopes = [(self._driven(x, state + d, demand)[1] - rate) / SMALL for d in shifts]
+            slopes = [(self._drive_once(x, state + d, demand)[1] - rate) / SMALL for d in shifts]
             state = state - np.linalg.lstsq(np.array(slopes).T, rate, rcond=None)[0]
         return tau
 
-    def _driven(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
+    def _drive_once(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
         """Loads and rate of the state."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
         call(
-            self.drive, t=0.0, x=x, state=state, demand=demand, k=bundle(self.constants()),
-            table=self.table(), tau=tau, rate=rate, signals=signals,
-        )  # fmt: skip
+            self.drive,
+            t=0.0,
+            x=x,
+            state=state,
+            demand=demand,
+            k=bundle(self.constants()),
+            table=self.table(),
+            tau=tau,
+            rate=rate,
+            signals=signals,
+        )
         return tau, rate
 
     def input_matrix(self) -> Vector:

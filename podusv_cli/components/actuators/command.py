@@ -35,16 +35,21 @@ class Command(Component):
     """How the law's demand reaches the actuator: delayed, rounded, and with a dead zone."""
 
     delay: float = value(
-        0.0, "s", "time from the law to the actuator, a whole number of steps; the demand is zero "
-        "until the first command arrives", ge=0,
-    )  # fmt: skip
+        0.0,
+        "s",
+        "time from the law to the actuator, a whole number of steps; the demand is zero "
+        "until the first command arrives",
+        ge=0,
+    )
     resolution_u: float = value(
         0.0, "N", "the surge force is rounded to the nearest multiple of this; 0: not rounded", ge=0
     )
     resolution_r: float = value(
-        0.0, "N m", "the yaw moment is rounded to the nearest multiple of this; 0: not rounded",
+        0.0,
+        "N m",
+        "the yaw moment is rounded to the nearest multiple of this; 0: not rounded",
         ge=0,
-    )  # fmt: skip
+    )
     dead_zone_u: float = value(
         0.0, "N", "a surge force up to this gives nothing, a larger one what is above it", ge=0
     )
@@ -53,20 +58,22 @@ class Command(Component):
     )
 
 
-class Failure(Component):
+class EffectivenessLoss(Component):
     """A loss of effectiveness at a time."""
 
     time: float = value(
-        ..., "s", "when the effectiveness is lost: with the first step that begins then or later",
+        ...,
+        "s",
+        "when the effectiveness is lost: with the first step that begins then or later",
         ge=0,
-    )  # fmt: skip
+    )
     effectiveness: float = value(
         0.0, "", "the part of the loads (of a pod: of its thrust) that is left", ge=0, le=1
     )
 
 
 @kernel
-def rounded(demand: float, resolution: float) -> float:
+def round_to(demand: float, resolution: float) -> float:
     """The nearest multiple of the resolution, of two the even one; as it is for resolution 0."""
     if resolution > 0.0:
         count = demand / resolution
@@ -84,45 +91,66 @@ def beyond(demand: float, zone: float) -> float:
 
 
 def _inner(
-    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    state: Vector,
+    demand: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+) -> None:
     """Stands for an actuator's `drive`."""
 
 
-def _lost(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
+def _lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:
     """Stands for an actuator's `lose`."""
 
 
-def _commanded(
-    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector,
-) -> None:  # fmt: skip
+def _drive_commanded(
+    t: float,
+    x: Vector,
+    state: Vector,
+    demand: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+) -> None:
     """`drive` with the demand rounded and the dead zone taken off; its signals come first."""
     given = scratch(DRIVEN)
     for i in range(DRIVEN):
         given[i] = demand[i]
-    given[0] = beyond(rounded(demand[0], k.command_resolution_u), k.command_dead_zone_u)
-    given[1] = beyond(rounded(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+    given[0] = beyond(round_to(demand[0], k.command_resolution_u), k.command_dead_zone_u)
+    given[1] = beyond(round_to(demand[1], k.command_resolution_r), k.command_dead_zone_r)
     signals[0], signals[1] = given[0], given[1]
     _inner(t, x, state, given, k, table, tau, rate, tail(signals, LOGGED))
 
 
 def _failing(
-    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    state: Vector,
+    demand: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+) -> None:
     """`drive`, and what is left of its loads in steps that begin after the failure."""
     _inner(t, x, state, demand, k, table, tau, rate, signals)
     if demand[BEGAN] >= k.failure_time:
-        _lost(state, k, table, tau, signals)
+        _lose(state, k, table, tau, signals)
 
 
 @cache
-def commanded(drive: Drive) -> Drive:
+def with_command_path(drive: Drive) -> Drive:
     """A kernel with the command path before `drive`; the same one for the same kernel."""
     inner = taking(drive, DRIVE)
-    made: Drive = specialise(_commanded, f"{drive.__qualname__}_commanded", _inner=inner)
+    made: Drive = specialise(_drive_commanded, f"{drive.__qualname__}_commanded", _inner=inner)
     return made
 
 
@@ -130,17 +158,17 @@ def commanded(drive: Drive) -> Drive:
 def failing(drive: Drive, lose: Drive) -> Drive:
     """A kernel with the failure behind `drive`; the same one for the same kernels."""
     inner, lost = taking(drive, DRIVE), taking(lose, LOSE)
-    made: Drive = specialise(
-        _failing, f"{drive.__qualname__}_failing", _inner=inner, _lost=lost
-    )  # fmt: skip
+    made: Drive = specialise(_failing, f"{drive.__qualname__}_failing", _inner=inner, _lose=lost)
     return made
 
 
 @warn_before_run(
-    "late-failure", about="actuator.failure", meaning="the failure never happens",
+    "late-failure",
+    about="actuator.failure",
+    meaning="the failure never happens",
     condition="the failure's time is not before the end of the run",
     remedy="let the failure happen earlier, or simulate longer",
-)  # fmt: skip
+)
 def late_failure(case: Any) -> Sentences:
     """The run ends before the actuator fails."""
     failure, end = case.scenario.actuator.failure, case.scenario.simulation.duration
@@ -152,10 +180,12 @@ def late_failure(case: Any) -> Sentences:
 
 
 @warn_before_run(
-    "late-command", about="actuator.command", meaning="no command reaches the actuator",
+    "late-command",
+    about="actuator.command",
+    meaning="no command reaches the actuator",
     condition="the delay is not shorter than the run",
     remedy="take a shorter delay, or simulate longer",
-)  # fmt: skip
+)
 def late_command(case: Any) -> Sentences:
     """The run ends before the first command arrives."""
     delay, end = case.scenario.actuator.delay(), case.scenario.simulation.duration

@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from podusv_cli.components.actuators.command import Failure
+from podusv_cli.components.actuators.command import EffectivenessLoss
 from podusv_cli.core.component import Component, value
 
 
@@ -40,9 +40,12 @@ class Pod(Component):
     n_rate: float = value(..., "1/s2", "fastest change of the propeller's speed", gt=0)
     n_lag: float = value(..., "s", "time constant of the propeller's speed", gt=0)
     angle_limit: float = value(
-        math.radians(35.0), "rad", "largest angle, both ways; 0 for a fixed propeller",
-        ge=0, le=0.5 * math.pi,
-    )  # fmt: skip
+        math.radians(35.0),
+        "rad",
+        "largest angle, both ways; 0 for a fixed propeller",
+        ge=0,
+        le=0.5 * math.pi,
+    )
     angle_rate: float | None = value(
         None, "rad/s", "fastest change of the angle; needed unless the propeller is fixed", gt=0
     )
@@ -79,14 +82,26 @@ class Pod(Component):
         """
         astern = self.T_nV if self.T_nV_astern is None else self.T_nV_astern
         return [
-            self.x, self.y, self.T_nn, self.T_nn_astern, self.T_nV, astern, self.n_max,
-            self.n_max_astern, self.angle_limit, self.n_rate,
-            self.angle_rate or 1.0, self.n_lag, self.angle_lag or 1.0, self.power_nnn or 0.0,
-            self.rudder.lift if self.rudder else 0.0, self.rudder.stall if self.rudder else 0.0,
-        ]  # fmt: skip
+            self.x,
+            self.y,
+            self.T_nn,
+            self.T_nn_astern,
+            self.T_nV,
+            astern,
+            self.n_max,
+            self.n_max_astern,
+            self.angle_limit,
+            self.n_rate,
+            self.angle_rate or 1.0,
+            self.n_lag,
+            self.angle_lag or 1.0,
+            self.power_nnn or 0.0,
+            self.rudder.lift if self.rudder else 0.0,
+            self.rudder.stall if self.rudder else 0.0,
+        ]
 
 
-class PodFailure(Failure):
+class PodFailure(EffectivenessLoss):
     """A pod's loss of thrust at a time."""
 
     pod: int = value(..., "", "the pod that fails, from 0", ge=0)

@@ -119,15 +119,19 @@ class Pods(Actuator):
     kind: Literal["pod"] = "pod"
     presets = Presets("podusv_cli.components.actuators", "set of pods", "pod file")
     preset: str = value(
-        "", "", "the file that brings the pods along: the name of one of podusv's, or a YAML file "
+        "",
+        "",
+        "the file that brings the pods along: the name of one of podusv's, or a YAML file "
         "beside the scenario, which is read in; none where empty",
-    )  # fmt: skip
+    )
     source: str = value("", "", "where the pods' numbers come from")
     validity: str = value("", "", "what they hold for")
     counts: Literal["turns", "parts"] = value(
-        "turns", "", "what n counts: turns a second, logged as n, or parts of full speed, "
+        "turns",
+        "",
+        "what n counts: turns a second, logged as n, or parts of full speed, "
         "logged as n_part; units of the pods' numbers with s for n then go without",
-    )  # fmt: skip
+    )
     failure: PodFailure | None = value(None, "", "a pod's loss of thrust at a time")
     pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
@@ -141,9 +145,12 @@ class Pods(Actuator):
         0.0, "", "several pods: what sway force counts in the squares beside 1 for surge", ge=0
     )
     horizon: float = value(
-        0.0, "s", "0: angles and speeds anywhere within their limits are asked for; else those "
-        "that their rates allow within this time", ge=0,
-    )  # fmt: skip
+        0.0,
+        "s",
+        "0: angles and speeds anywhere within their limits are asked for; else those "
+        "that their rates allow within this time",
+        ge=0,
+    )
 
     @model_validator(mode="after")
     def _steerable(self) -> Self:
@@ -244,9 +251,16 @@ class Pods(Actuator):
         signals = np.zeros(len(self.signals))
         for _ in range(ROUNDS):
             call(
-                self.drive, x=x, state=state, demand=demand, k=k, table=table, tau=tau, rate=rate,
+                self.drive,
+                x=x,
+                state=state,
+                demand=demand,
+                k=k,
+                table=table,
+                tau=tau,
+                rate=rate,
                 signals=signals,
-            )  # fmt: skip
+            )
             command = signals[FLAGS : FLAGS + count]
             if np.allclose(state, command, rtol=1e-9, atol=0.0):
                 break
@@ -295,8 +309,9 @@ class Pods(Actuator):
         """The numbers of these vectors as signals of their own, counted from 1."""
         return tuple(
             replace(vector, name=f"{vector.name}_{i}", axes=())
-            for vector in vectors for i in range(1, len(self.pods) + 1)
-        )  # fmt: skip
+            for vector in vectors
+            for i in range(1, len(self.pods) + 1)
+        )
 
     @property
     def zero_where_missing(self) -> tuple[str, ...]:
@@ -332,9 +347,15 @@ class Pods(Actuator):
     @staticmethod
     @kernel
     def drive(
-        x: Vector, state: Vector, demand: Vector, k: Any, table: Vector, tau: Vector, rate: Vector,
+        x: Vector,
+        state: Vector,
+        demand: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Loads from the pods' states; rates towards what the demand asks for."""
         count = int(k.count)
         command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)
@@ -352,9 +373,15 @@ class Pods(Actuator):
     @staticmethod
     @kernel
     def obey(
-        x: Vector, state: Vector, demand: Vector, k: Any, table: Vector, tau: Vector, rate: Vector,
+        x: Vector,
+        state: Vector,
+        demand: Vector,
+        k: Any,
+        table: Vector,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Loads from the pods' states; rates towards the speeds and angles, cut at their limits."""
         count, met = int(k.count), True
         command, thrusts = tail(signals, FLAGS), tail(signals, FLAGS + 2 * count)

@@ -18,11 +18,14 @@ SPEEDS = {  # by what n counts: actual and asked for
     "parts": (
         Signal("n_part", "1", "propeller speed, in parts of full speed", "n", POD),
         Signal(
-            "n_part_cmd", "1", "propeller speed that was asked for, in parts of full speed",
-            r"n_\mathrm{cmd}", POD,
+            "n_part_cmd",
+            "1",
+            "propeller speed that was asked for, in parts of full speed",
+            r"n_\mathrm{cmd}",
+            POD,
         ),
     ),
-}  # fmt: skip
+}
 DELTA = Signal("delta", "rad", "propulsion angle", r"\delta", POD)
 DELTA_CMD = Signal(
     "delta_cmd", "rad", "propulsion angle that was asked for", r"\delta_\mathrm{cmd}", POD
@@ -39,9 +42,24 @@ PHYSICAL = 0.0
 
 # A pod's numbers in the actuator's table, by position.
 (
-    X, Y, T_AHEAD, T_ASTERN, T_NV, T_NV_ASTERN, N_AHEAD, N_ASTERN, ANGLE, N_RATE, DELTA_RATE, N_LAG,
-    DELTA_LAG, POWER, LIFT, STALL, WIDTH,
-) = range(17)  # fmt: skip
+    X,
+    Y,
+    T_AHEAD,
+    T_ASTERN,
+    T_NV,
+    T_NV_ASTERN,
+    N_AHEAD,
+    N_ASTERN,
+    ANGLE,
+    N_RATE,
+    DELTA_RATE,
+    N_LAG,
+    DELTA_LAG,
+    POWER,
+    LIFT,
+    STALL,
+    WIDTH,
+) = range(17)
 
 
 @kernel

@@ -61,22 +61,38 @@ def constants_of(rows: Vector, first: int, *, held: bool) -> dict[str, float]:
     """What `obeying` reads beside the actuator's own constants; `first` is where its table ends."""
     count, width = len(rows), rows.shape[1] - 1
     return {
-        "recorded_first": float(first), "recorded_rows": float(count),
-        "recorded_width": float(width), "recorded_held": float(held),
-    }  # fmt: skip
+        "recorded_first": float(first),
+        "recorded_rows": float(count),
+        "recorded_width": float(width),
+        "recorded_held": float(held),
+    }
 
 
 def _obey(
-    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    state: Vector,
+    demand: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+) -> None:
     """Stands for an actuator's `obey`."""
 
 
 def _obeying(
-    t: float, x: Vector, state: Vector, demand: Vector, k: Any, table: Vector,
-    tau: Vector, rate: Vector, signals: Vector,
-) -> None:  # fmt: skip
+    t: float,
+    x: Vector,
+    state: Vector,
+    demand: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+) -> None:
     """`obey` with the commands of the rows at t; before the first and after the last theirs."""
     count, width = int(k.recorded_rows), int(k.recorded_width)
     times = tail(table, int(k.recorded_first))

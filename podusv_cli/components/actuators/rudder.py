@@ -56,7 +56,7 @@ def slant(delta: float, pod: Vector) -> float:
 
 
 @kernel
-def steered(T: float, angle: float, flow: float, pod: Vector, k: Any, out: Vector) -> bool:
+def steer_rudder(T: float, angle: float, flow: float, pod: Vector, k: Any, out: Vector) -> bool:
     """Propeller speed and rudder angle for a force T [N] at an angle [rad]; whether they make it.
 
     Thrust makes up for the rudder's drag. Astern there is no force across.

@@ -43,9 +43,14 @@ class Adrc(HandController, ObservingController):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """A + k_v s along and across the bow, less the observed loads."""
         h = hand_errors(x, memory[LAGGED], target, k)
         along, across = h.A_a + k.k_v * h.s_a, h.A_b + k.k_v * h.s_b

@@ -66,16 +66,24 @@ class Alos(LineOfSight, ObservingController):
     kind: Literal["alos"] = "alos"
     signals: ClassVar[tuple[Signal, ...]] = STEERED
     rules: ClassVar[dict[str, Rule]] = {
-        **LineOfSight.rules, **by.OBSERVER, "gamma": by.YAW_PER_REACH, "sigma": by.YAW_REACH,
-        "k_u": by.SURGE, "k_psi": by.YAW, "k_r": by.YAW, "N_m": by.MOMENT,
-    }  # fmt: skip
+        **LineOfSight.rules,
+        **by.OBSERVER,
+        "gamma": by.YAW_PER_REACH,
+        "sigma": by.YAW_REACH,
+        "k_u": by.SURGE,
+        "k_psi": by.YAW,
+        "k_r": by.YAW,
+        "N_m": by.MOMENT,
+    }
     lookahead: Ruled = value(0.7, "m", "distance ahead on the path that the bow aims at", gt=0)
     U: Ruled = value(1.1, "m/s", "largest wanted surge velocity", gt=0)
     learns: Literal["adaptive", "integral", "published"] = value(
-        "adaptive", "", "how the crab angle is found: adapted as an angle (after ALOS, Fossen "
+        "adaptive",
+        "",
+        "how the crab angle is found: adapted as an angle (after ALOS, Fossen "
         "2023, but slower far from the line), by an integral of the cross-track error (ILOS, "
         "Borhaug et al. 2008), or by ALOS as published, whose lookahead does not grow",
-    )  # fmt: skip
+    )
     gamma: Ruled = value(0.2, "rad/(m s)", "gain of the adapted angle", ge=0)
     crab_m: float = value(0.5, "rad", "largest adapted angle", gt=0)
     sigma: Ruled = value(0.1, "m/s", "gain of the integral", ge=0)
@@ -104,9 +112,14 @@ class Alos(LineOfSight, ObservingController):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Heading to the line of sight less the crab angle; speed along the course."""
         at = course_frame(x, target, k)
         u, v, r = x[3], x[4], x[5]

@@ -22,8 +22,8 @@ from podusv_cli.components.controllers.rover import (
     STEERING_I,
     THROTTLE_I,
     Rover,
-    approached,
-    clipped,
+    approach_speed,
+    clip,
     kept_within,
     path_course,
 )
@@ -49,7 +49,7 @@ def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
     c, s = cos_sin(x[2])
     v_x, v_y = target[2] + k.pos_P * (target[0] - x[0]), target[3] + k.pos_P * (target[1] - x[1])
     length = math.sqrt(v_x * v_x + v_y * v_y)
-    scale = min(approached(x, target, k.pos_P, k) / length, 1.0) if length > 0.0 else 0.0
+    scale = min(approach_speed(x, target, k.pos_P, k) / length, 1.0) if length > 0.0 else 0.0
     ahead, aside = scale * (v_x * c + v_y * s), scale * (v_y * c - v_x * s)
     u_d = max(ahead, 0.0)
     sideways = k.vel_P * (aside - x[4]) + k.vel_FF * aside + target[5] * c - target[4] * s
@@ -66,16 +66,16 @@ def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, flo
     if speed < STANDING or x[3] <= 0.0:
         speed, track = STANDING, x[2]
     L_1 = max(k.l1_damping * k.l1_period * speed / math.pi, k.l1_least)
-    sine = clipped(-across / L_1, CAPTURE)
+    sine = clip(-across / L_1, CAPTURE)
     sight = arctangent(sine, math.sqrt(1.0 - sine * sine))
     learns = k.l1_I * sight if abs(sight) < LEARNS else 0.0
     # The angle of the velocity is wrapped, the sum is not: facing away, it turns the way back.
-    off = clipped(sight + angle_i + wrap(course - track), 0.5 * math.pi)
+    off = clip(sight + angle_i + wrap(course - track), 0.5 * math.pi)
     _, turning = cos_sin(off)
     sideways = 4.0 * k.l1_damping * k.l1_damping * speed * speed / L_1 * turning
     over = max(x[3], SLOWEST) if x[3] >= 0.0 else min(x[3], -SLOWEST)
     learns = kept_within(angle_i, learns, LEARNT_MOST)
-    return approached(x, target, k.pos_P, k), sideways / over, learns
+    return approach_speed(x, target, k.pos_P, k), sideways / over, learns
 
 
 @kernel
@@ -90,8 +90,10 @@ class ArduPilot(Rover):
 
     kind: Literal["ardupilot"] = "ardupilot"
     rules: ClassVar[dict[str, Rule]] = Rover.rules | {
-        "speed_FF": by.THROTTLE, "speed_P": by.THROTTLE, "speed_I": by.THROTTLE,
-    }  # fmt: skip
+        "speed_FF": by.THROTTLE,
+        "speed_P": by.THROTTLE,
+        "speed_I": by.THROTTLE,
+    }
     guidance: Literal["position", "l1"] = value(
         "position", "", "the position controller of Rover 4.3 and later, or L1 of 4.2 and before"
     )
@@ -110,20 +112,25 @@ class ArduPilot(Rover):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Guidance, then throttle and steering; where both exceed the thrusters, both give way."""
         rate[CROSS_I] = 0.0
         if k.guidance == L1:
             u_d, turn, rate[CROSS_I] = by_l1(x, target, memory[CROSS_I], k)
         else:
             u_d, turn = by_position(x, target, k)
-        r_d = clipped(turn, k.r_m)
+        r_d = clip(turn, k.r_m)
         u_e, r_e = u_d - x[3], r_d - x[5]
         throttle = k.speed_FF * u_d + k.speed_P * u_e + memory[THROTTLE_I]
         steering = k.rate_FF * r_d + k.rate_P * r_e + memory[STEERING_I]
-        t, s = clipped(throttle, 1.0), clipped(steering, 1.0)
+        t, s = clip(throttle, 1.0), clip(steering, 1.0)
         over = max(abs(t) + abs(s), 1.0) if k.mixing == SHARED else 1.0
         tau[0], tau[1] = k.surge * t / over, k.yaw * s / over
         both = over > 1.0

@@ -38,7 +38,7 @@ class Most(NamedTuple):
     moment: float = math.inf  # N m
 
 
-class Trial(NamedTuple):
+class ManoeuvreTrial(NamedTuple):
     """A manoeuvring trial: which, when it begins [s], and what change of heading reverses it [rad].
 
     `switch` is 0 where nothing is reversed.
@@ -135,7 +135,7 @@ class Controller(Component):
         """The metric that its motion minimises among all motions of the task; empty for laws."""
         return ""
 
-    def trial(self) -> Trial | None:
+    def trial(self) -> ManoeuvreTrial | None:
         """The manoeuvring trial that this is, for the metrics of trials; None for a law."""
         return None
 

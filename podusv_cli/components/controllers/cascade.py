@@ -64,13 +64,17 @@ class Cascade(Controller):
         0.05, "rad/s", "yaw rate of the virtual ship that k_v and k_2 are for", gt=0
     )
     cross: Literal["turning", "constant"] = value(
-        "turning", "", "k_v and k_2 grow with the virtual ship's yaw rate and change sign with it, "
+        "turning",
+        "",
+        "k_v and k_2 grow with the virtual ship's yaw rate and change sign with it, "
         "or are the same whatever the turn",
-    )  # fmt: skip
+    )
     origin: Literal["earth", "target"] = value(
-        "earth", "", "about which point positions are turned into the two ships' axes: the origin "
+        "earth",
+        "",
+        "about which point positions are turned into the two ships' axes: the origin "
         "of the coordinates, as in the source, or the target",
-    )  # fmt: skip
+    )
 
     def slots(self) -> Slots:
         """The virtual ship's sway velocity."""
@@ -102,9 +106,15 @@ class Cascade(Controller):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
-        signals: Vector, work: Vector,
-    ) -> None:  # fmt: skip
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
+        signals: Vector,
+        work: Vector,
+    ) -> None:
         """Two loops that meet in the turn: yaw does not see the position."""
         V_d = Moving(target[2], target[3], target[4], target[5])
         speed = math.sqrt(V_d.x * V_d.x + V_d.y * V_d.y)

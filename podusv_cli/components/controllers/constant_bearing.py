@@ -47,9 +47,11 @@ def approach(e: Moving, V_d: Moving, k: Any) -> Moving:
     kappa = k.k_p * math.sqrt(q2)
     fall = kappa * q2 * slope * (e.x * e.rate_x + e.y * e.rate_y)
     return Moving(
-        V_d.x + kappa * e.x, V_d.y + kappa * e.y,
-        V_d.rate_x + kappa * e.rate_x - fall * e.x, V_d.rate_y + kappa * e.rate_y - fall * e.y,
-    )  # fmt: skip
+        V_d.x + kappa * e.x,
+        V_d.y + kappa * e.y,
+        V_d.rate_x + kappa * e.rate_x - fall * e.x,
+        V_d.rate_y + kappa * e.rate_y - fall * e.y,
+    )
 
 
 @kernel

@@ -89,9 +89,13 @@ class LineOfSight(Controller):
     """What laws with line-of-sight guidance have in common."""
 
     rules: ClassVar[dict[str, Rule]] = {
-        "lookahead": by.AHEAD, "k_s": by.SURGE, "U": by.SPEED, "U_min": by.SPEED, "V_m": by.SPEED,
+        "lookahead": by.AHEAD,
+        "k_s": by.SURGE,
+        "U": by.SPEED,
+        "U_min": by.SPEED,
+        "V_m": by.SPEED,
         "chi_m": by.TURN,
-    }  # fmt: skip
+    }
 
     lookahead: Ruled = value(2.0, "m", "distance ahead on the path that the bow aims at", gt=0)
     k_s: Ruled = value(0.3, "1/s", "gain of the distance along the course", ge=0)

@@ -42,10 +42,11 @@ def hand_target(psi_f: float, rate: float, bend: float, target: Vector, k: Any) 
     reach = k.hand if k.reference == ORIGIN else 0.0
     c, s = cos_sin(psi_f)
     return Moving(
-        target[2] - reach * rate * s, target[3] + reach * rate * c,
+        target[2] - reach * rate * s,
+        target[3] + reach * rate * c,
         target[4] - reach * (bend * s + rate * rate * c),
         target[5] + reach * (bend * c - rate * rate * s),
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -62,16 +63,19 @@ def hand_errors(x: Vector, psi_f: float, target: Vector, k: Any) -> Hand:
     e = Moving(
         target[0] - x[0] + reach * cos_f - k.hand * cos_psi,
         target[1] - x[1] + reach * sin_f - k.hand * sin_psi,
-        V_h.x - h_x, V_h.y - h_y,
-    )  # fmt: skip
+        V_h.x - h_x,
+        V_h.y - h_y,
+    )
     V = approach(e, V_h, k)
     s_x, s_y = V.x - h_x, V.y - h_y
     return Hand(
-        s_x * cos_psi + s_y * sin_psi, s_y * cos_psi - s_x * sin_psi,
+        s_x * cos_psi + s_y * sin_psi,
+        s_y * cos_psi - s_x * sin_psi,
         V.rate_x * cos_psi + V.rate_y * sin_psi + r * w,
         V.rate_y * cos_psi - V.rate_x * sin_psi - r * u,
-        math.sqrt(e.x * e.x + e.y * e.y), rate,
-    )  # fmt: skip
+        math.sqrt(e.x * e.x + e.y * e.y),
+        rate,
+    )
 
 
 @kernel
@@ -89,8 +93,12 @@ class HandController(Controller):
     """Options of the hand point, the same for every law that steers it."""
 
     rules: ClassVar[dict[str, Rule]] = {
-        "hand": by.AHEAD, "T_f": by.HAND_TIME, "k_p": by.HAND, "U": by.SPEED, "k_v": by.HAND,
-    }  # fmt: skip
+        "hand": by.AHEAD,
+        "T_f": by.HAND_TIME,
+        "k_p": by.HAND,
+        "U": by.SPEED,
+        "k_v": by.HAND,
+    }
 
     signals: ClassVar[tuple[Signal, ...]] = (
         Signal("s_a", "m/s", "velocity that the hand point lacks along the bow"),
@@ -99,9 +107,11 @@ class HandController(Controller):
     )
     hand: Ruled = value(0.3, "m", "how far the hand point is ahead of the origin", gt=0)
     reference: Literal["target", "origin"] = value(
-        "origin", "", "what comes to the target: the hand point as published (target), or the "
+        "origin",
+        "",
+        "what comes to the target: the hand point as published (target), or the "
         "origin, with a target for the hand point that lies ahead along the lagged heading",
-    )  # fmt: skip
+    )
     T_f: Ruled = value(2.0, "s", "lag of that heading", gt=0)
     k_p: Ruled = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
     U: Ruled = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)

@@ -51,12 +51,14 @@ class HandPosition(HandController):
         """nu' = -gain nu + I, I' = -k_i nu at rest, with I_b per `hand`."""
         return [
             Loop(
-                axis.name, "k_v", axis.damping,
+                axis.name,
+                "k_v",
+                axis.damping,
                 np.array([axis.damping, 0.0]) + np.array([-gain, 1.0]) * axis.told / axis.inertia,
                 np.array([[-self.k_i, 0.0]]),
             )
             for axis, gain in zip(axes, self.rate_gains(), strict=True)
-        ]  # fmt: skip
+        ]
 
     @staticmethod
     @kernel
@@ -69,9 +71,14 @@ class HandPosition(HandController):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """A + k_v s + I along and across the bow."""
         h = hand_errors(x, memory[LAGGED], target, k)
         along = h.A_a + k.k_v * h.s_a + memory[I_A]

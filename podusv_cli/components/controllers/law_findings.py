@@ -30,10 +30,13 @@ GROWN = 0.01  # by which it may grow there
 
 
 @warn_before_run(
-    "coupling-saddle", about="controller.coupling", meaning="the printed sign makes a saddle",
+    "coupling-saddle",
+    about="controller.coupling",
+    meaning="the printed sign makes a saddle",
     condition="k_ze k_ue < 1 or k_psie k_re < 1 with the printed sign",
-    remedy="take coupling: corrected, or larger gains", law=PolarBackstepping,
-)  # fmt: skip
+    remedy="take coupling: corrected, or larger gains",
+    law=PolarBackstepping,
+)
 def coupling_saddle(case: Any) -> Sentences:
     """With the printed sign, z_e' = -k_ze z_e - u_e and m11 u_e' = -k_ue u_e - z_e; yaw alike.
 
@@ -56,10 +59,13 @@ def coupling_saddle(case: Any) -> Sentences:
 
 
 @warn_before_run(
-    "network-range", about="controller.network", meaning="no node near the speeds needed",
+    "network-range",
+    about="controller.network",
+    meaning="no node near the speeds needed",
     condition=f"a steady (u, v, r) along the path is more than {FAR:g} widths from every node",
-    remedy="move low and high, or widen spread", law=PolarBackstepping,
-)  # fmt: skip
+    remedy="move low and high, or widen spread",
+    law=PolarBackstepping,
+)
 def network_range(case: Any) -> Sentences:
     """No node of the network within two widths of the velocities that keep up with the target."""
     nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
@@ -78,10 +84,13 @@ def network_range(case: Any) -> Sentences:
 
 
 @warn_after_run(
-    "off-network", about="controller.network", meaning="no node within two widths",
+    "off-network",
+    about="controller.network",
+    meaning="no node within two widths",
     condition=f"no node within {FAR:g} widths of (u, v, r)",
-    remedy="move low and high, or widen spread", law=PolarBackstepping,
-)  # fmt: skip
+    remedy="move low and high, or widen spread",
+    law=PolarBackstepping,
+)
 def off_network(scenario: Any, log: Recording) -> Sentences:
     """No node of the network within two widths of (u, v, r)."""
     name = NODE_DISTANCE.name
@@ -95,10 +104,13 @@ def off_network(scenario: Any, log: Recording) -> Sentences:
 
 
 @warn_after_run(
-    "bound-growing", about="controller", meaning="an estimated bound still grew at the end",
+    "bound-growing",
+    about="controller",
+    meaning="an estimated bound still grew at the end",
     condition=f"growth above {GROWN:.0%} over the last {LAST:.0%} of the run, to a new maximum",
-    remedy="simulate longer, or take more leakage", law=PolarBackstepping,
-)  # fmt: skip
+    remedy="simulate longer, or take more leakage",
+    law=PolarBackstepping,
+)
 def bound_growing(scenario: Any, log: Recording) -> Sentences:
     """An estimated bound still grows at the end."""
     time = log["time"]
@@ -117,10 +129,13 @@ def bound_growing(scenario: Any, log: Recording) -> Sentences:
 
 
 @warn_before_run(
-    "start-astern", about="start", meaning="the start lies outside the folding range",
+    "start-astern",
+    about="start",
+    meaning="the start lies outside the folding range",
     condition="the target is more than a right angle off the bow, and fold is not joint",
-    remedy="turn start.psi, or take fold: joint", law=TrackingController,
-)  # fmt: skip
+    remedy="turn start.psi, or take fold: joint",
+    law=TrackingController,
+)
 def start_astern(case: Any) -> Sentences:
     """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error."""
     law, start = case.scenario.controller, case.scenario.start
@@ -136,10 +151,13 @@ def start_astern(case: Any) -> Sentences:
 
 
 @warn_before_run(
-    "start-kick", about="controller.first_difference", meaning="the first difference is a kick",
+    "start-kick",
+    about="controller.first_difference",
+    meaning="the first difference is a kick",
     condition=f"|psi_d(0)|/difference_step above {KICK:g} rad/s",
-    remedy="take first_difference: from_start", law=TrackingController,
-)  # fmt: skip
+    remedy="take first_difference: from_start",
+    law=TrackingController,
+)
 def start_kick(case: Any) -> Sentences:
     """Remark 5's difference, started from psi_d = 0, is a kick of psi_d(0)/Delta t for a sample."""
     law = case.scenario.controller
@@ -155,10 +173,14 @@ def start_kick(case: Any) -> Sentences:
 
 
 @warn_after_run(
-    "near-target", about="controller.standoff", meaning="z_e came close to its singularity",
+    "near-target",
+    about="controller.standoff",
+    meaning="z_e came close to its singularity",
     condition=f"z_e below {NEAR:g} hull lengths, and hold_below is smaller than that",
-    remedy="take a standoff, or hold_below", law=TrackingController, needs=("z_e",),
-)  # fmt: skip
+    remedy="take a standoff, or hold_below",
+    law=TrackingController,
+    needs=("z_e",),
+)
 def near_target(scenario: Any, log: Recording) -> Sentences:
     """z_e comes near 0, where psi_d is not defined and w = psi_d' grows as 1/z_e.
 
@@ -180,10 +202,13 @@ def near_target(scenario: Any, log: Recording) -> Sentences:
 
 
 @warn_after_run(
-    "crosswise", about="controller", meaning="cos psi_e came close to zero",
+    "crosswise",
+    about="controller",
+    meaning="cos psi_e came close to zero",
     condition=f"|cos psi_e| below {CROSSWISE:g}",
-    remedy="start with a heading nearer to the line of sight", law=TrackingController,
-)  # fmt: skip
+    remedy="start with a heading nearer to the line of sight",
+    law=TrackingController,
+)
 def crosswise(scenario: Any, log: Recording) -> Sentences:
     """cos psi_e comes near 0, by which (21) divides."""
     if "psi_e" not in log:
@@ -197,11 +222,13 @@ def crosswise(scenario: Any, log: Recording) -> Sentences:
 
 
 @warn_before_run(
-    "relay-gains", about="controller", meaning="PID's gains swing the actuator between its limits",
+    "relay-gains",
+    about="controller",
+    meaning="PID's gains swing the actuator between its limits",
     condition=f"(K_P + K_D/T_d)/inertia times the loop's delay and its period exceeds {RELAY:g}",
     remedy="take smaller gains; PID's defaults are the paper's, for a model ship without delays",
     law=Pid,
-)  # fmt: skip
+)
 def relay_gains(case: Any) -> Sentences:
     """PID's defaults do not follow from hull and actuator, unlike those of later laws."""
     law, hull, facts = case.scenario.controller, case.scenario.nominal, case.facts
@@ -226,11 +253,13 @@ def relay_gains(case: Any) -> Sentences:
 
 
 @warn_before_run(
-    "policy-period", about="control.period", law=Policy,
+    "policy-period",
+    about="control.period",
+    law=Policy,
     meaning="a policy runs at another period than in its training",
     condition="control.period is another one than the policy's file says of its training",
     remedy="set control.period to that of the training, or train anew with this one",
-)  # fmt: skip
+)
 def policy_period(case: Any) -> Sentences:
     """What the network has learned of its own delay belongs to another period.
 

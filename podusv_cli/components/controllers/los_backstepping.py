@@ -47,7 +47,7 @@ def sight(x: Vector, target: Vector, k: Any) -> float:
 
 
 @kernel
-def turned(memory: Vector, sighted: float, w: float, rate: Vector) -> None:
+def filter_angle(memory: Vector, sighted: float, w: float, rate: Vector) -> None:
     """Rates of the filtered angle and of its two derivatives: a triple pole at -w."""
     rate[1], rate[2] = memory[2], memory[3]
     rate[3] = w * (w * (w * wrap(sighted - memory[1]) - 3.0 * memory[2]) - 3.0 * memory[3])
@@ -77,17 +77,21 @@ class LosBackstepping(Controller):
     k2: float = value(10.0, "kg/s", "gain of the sway velocity in alpha_2", ge=0)
     k3: float = value(2.5, "kg m2/s", "gain of the yaw rate", ge=0)
     circle: float = value(
-        2.51, "m", "radius of the circle about the ship, n of its lengths (here two of 1.255 m)",
+        2.51,
+        "m",
+        "radius of the circle about the ship, n of its lengths (here two of 1.255 m)",
         gt=0,
-    )  # fmt: skip
+    )
     w: float = value(0.9, "1/s", "triple pole of the filter of the line of sight", gt=0)
     sway: Literal["accounted", "left_out"] = value(
-        "accounted", "", "whether alpha_2' enters the moment, as in the source, or is left out",
-    )  # fmt: skip
+        "accounted", "", "whether alpha_2' enters the moment, as in the source, or is left out"
+    )
     filter_start: Literal["heading", "sight"] = value(
-        "heading", "", "where the filtered angle starts: at the ship's heading, so that z1 is 0, "
+        "heading",
+        "",
+        "where the filtered angle starts: at the ship's heading, so that z1 is 0, "
         "or at the line of sight",
-    )  # fmt: skip
+    )
 
     def slots(self) -> Slots:
         """alpha_2, then the filter."""
@@ -111,9 +115,14 @@ class LosBackstepping(Controller):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Backstepping: heading, then the three velocities, of which sway has alpha_2."""
         u, v, r, alpha_2, r_f = x[3], x[4], x[5], memory[0], memory[2]
         u_d = math.sqrt(target[2] * target[2] + target[3] * target[3])
@@ -127,6 +136,6 @@ class LosBackstepping(Controller):
         tau[0] = k.m11 * faster - k.X_u * u - k.k1 * z_u
         tau[1] = k.m33 * turn - k.N_v * v - k.N_r * r - k.k3 * z_r - z1
         tau[1] += 0.0 if k.sway == LEFT_OUT else k.m32 * rate[0]
-        turned(memory, sighted, k.w, rate)
+        filter_angle(memory, sighted, k.w, rate)
         signals[0], signals[1], signals[2], signals[3] = z1, z_u, v - alpha_2, z_r
         signals[4] = wrap(sighted)

@@ -76,18 +76,27 @@ class LosPid(LineOfSight):
         return [
             pi_loop(surge, "omega_u", self.omega_u),
             Loop(
-                yaw.name, "omega_psi", yaw.damping, to_r * np.array([-3.0 * w, -3.0 * w * w, 1.0]),
-                np.array([[1.0, 0.0, 0.0], [0.0, -w * w * w, 0.0]]), name="PID loop",
+                yaw.name,
+                "omega_psi",
+                yaw.damping,
+                to_r * np.array([-3.0 * w, -3.0 * w * w, 1.0]),
+                np.array([[1.0, 0.0, 0.0], [0.0, -w * w * w, 0.0]]),
+                name="PID loop",
                 told=np.array([0.0, w / to_r]),
             ),
-        ]  # fmt: skip
+        ]
 
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """The heading is damped by the yaw rate itself; its integral holds a steady turn."""
         at = course_frame(x, target, k)
         sight, _ = line_of_sight(at, max(at.along, 0.0), 0.0, 0.0, k)

@@ -17,16 +17,18 @@ from podusv_cli.core.signal import Signal
 
 NEAR = 1e-9  # s
 SIDE = Signal(
-    "side", "1", "side to which the trial steers: 1 starboard, -1 port, 0 before it; in a step in "
+    "side",
+    "1",
+    "side to which the trial steers: 1 starboard, -1 port, 0 before it; in a step in "
     "which it changes, the mean over the step",
-)  # fmt: skip
+)
 STEERING = Signal(
     "delta_s", "rad", "angle at which the thrust steers, positive to starboard", r"\delta_s"
 )
 
 
 @kernel
-def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> None:
+def steer_thrust(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> None:
     """The demand of a thrust that acts `lever` behind the origin and steers at `angle` [rad].
 
     A side of 1 is starboard, -1 port; between them it is the mean over a step in which the side
@@ -39,7 +41,7 @@ def steered(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> 
 
 
 @kernel
-def begun(t: float, k: Any) -> bool:
+def has_begun(t: float, k: Any) -> bool:
     """Whether the trial has begun at this instant; t is a whole number of steps, but rounded."""
     return bool(t > k.execute - NEAR)
 
@@ -50,9 +52,11 @@ class Manoeuvre(Controller):
     rules: ClassVar[dict[str, Rule]] = {"thrust": by.FORCE}
     thrust: Ruled = value(2.0, "N", "thrust of the approach", gt=0)
     execute: float = value(
-        60.0, "s", "time at which the trial begins, a whole number of steps; steady speed by then",
+        60.0,
+        "s",
+        "time at which the trial begins, a whole number of steps; steady speed by then",
         ge=0,
-    )  # fmt: skip
+    )
 
     def takes_samples(self) -> bool:
         """How far the trial is, is a part of the memory, which changes at instants only."""

@@ -28,7 +28,7 @@ class Seen(NamedTuple):
     k_p: float  # gain of the distance [1/s], smaller near a target that rests
 
 
-class Gain(NamedTuple):
+class LevelledGain(NamedTuple):
     """A gain that levels off with the distance, and its rate."""
 
     kappa: float  # 1/s
@@ -36,36 +36,40 @@ class Gain(NamedTuple):
 
 
 @kernel
-def seen(x: Vector, target: Vector, k: Any) -> Seen:
+def see_target(x: Vector, target: Vector, k: Any) -> Seen:
     """Distance, velocity and acceleration of the target along and across the bow."""
     c, s = cos_sin(x[2])
     e_x, e_y = target[0] - x[0], target[1] - x[1]
     e, V_d = Moving(e_x, e_y, 0.0, 0.0), Moving(target[2], target[3], target[4], target[5])
     return Seen(
-        e_x * c + e_y * s, e_y * c - e_x * s, V_d.x * c + V_d.y * s, V_d.y * c - V_d.x * s,
-        V_d.rate_x * c + V_d.rate_y * s, turn_rate(V_d, k.V_m),
+        e_x * c + e_y * s,
+        e_y * c - e_x * s,
+        V_d.x * c + V_d.y * s,
+        V_d.y * c - V_d.x * s,
+        V_d.rate_x * c + V_d.rate_y * s,
+        turn_rate(V_d, k.V_m),
         approach_speed(e, V_d, k.U),
         resting_gain(math.sqrt(e_x * e_x + e_y * e_y), math.sqrt(V_d.x * V_d.x + V_d.y * V_d.y), k),
-    )  # fmt: skip
+    )
 
 
 @kernel
-def levelled(gain: float, at: Seen, closing: float) -> Gain:
+def level_gain(gain: float, at: Seen, closing: float) -> LevelledGain:
     """kappa = gain/sqrt(1 + (gain |e|/s_max)^2); `closing` is e.e' [m2/s]."""
     slope = (gain / at.s_max) * (gain / at.s_max)
     q2 = 1.0 / (1.0 + slope * (at.e_a * at.e_a + at.e_b * at.e_b))
     kappa = gain * math.sqrt(q2)
-    return Gain(kappa, -kappa * q2 * slope * closing)
+    return LevelledGain(kappa, -kappa * q2 * slope * closing)
 
 
 @kernel
-def guidance(x: Vector, at: Seen, along: Gain, k_b: float, k: Any) -> Wanted:
+def guidance(x: Vector, at: Seen, along: LevelledGain, k_b: float, k: Any) -> Wanted:
     """V_c and its surge rate: the gain k_b across the target's course, and `along` along it.
 
     Where the target is slower than V_m the course gives way to the bow.
     """
     d_a, d_b = at.t_a - x[3], at.t_b - x[4]
-    across = levelled(k_b, at, at.e_a * d_a + at.e_b * d_b)
+    across = level_gain(k_b, at, at.e_a * d_a + at.e_b * d_b)
     bow = k.V_m * k.V_m
     per = 1.0 / (at.t_a * at.t_a + at.t_b * at.t_b + bow)
     dot, rate = at.t_a * at.e_a + at.t_b * at.e_b, at.t_a * d_a + at.t_b * d_b

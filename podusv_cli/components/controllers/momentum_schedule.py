@@ -29,14 +29,14 @@ REST_SHARE = 0.8  # of |Y_v|/m11
 ANGLE = 0.19  # rad; the moment is in proportion to the angle up to here at least
 
 
-class Answer(NamedTuple):
+class SwayResponse(NamedTuple):
     """How sway answers yaw: z' = -p V r - d z."""
 
     p: float  # P/V
     d: float  # 1/s
 
 
-class Schedule(NamedTuple):
+class GainSchedule(NamedTuple):
     """Gains of the linear loop at this speed and sway."""
 
     eta: float  # weight on the sway that yaw causes
@@ -55,7 +55,7 @@ def neutral(nominal: Vessel, thrust_lever: float | None) -> dict[str, float]:
     return {"per_lever": per, "neutral_mass": mass, "x_n": x_n}
 
 
-def paced(m33: float, N_m: float, Q0: float, S0: float) -> dict[str, float]:
+def pace_constants(m33: float, N_m: float, Q0: float, S0: float) -> dict[str, float]:
     """The pace f, Q = f^2 Q0 [1/s2], S = f S0 [1/s] and Q/S, as constants of a law."""
     f = pace(m33, N_m, Q0)
     return {"pace": f, "Q": f * f * Q0, "S": f * S0, "Q_per_S": f * Q0 / S0}
@@ -81,7 +81,7 @@ def resting_gain(distance: float, speed: float, k: Any) -> float:
 
 
 @kernel
-def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any) -> Answer:
+def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any) -> SwayResponse:
     """p and d of the nominal vessel at the speed V [m/s], sway v [m/s], load sway v_l [m/s].
 
     `more` [m/s] is added to P.
@@ -92,7 +92,7 @@ def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any
     d = max((2.0 * abs(k.Y_vv) * present - linear) / k.neutral_mass, 0.0)
     from_yaw = k.Y_r + k.Y_vr * sway + k.per_lever * (k.N_r + k.N_vr * sway - k.m23 * V)
     P = (k.m11 * V - from_yaw) / k.neutral_mass - k.x_n * d + more
-    return Answer(P / V, d)
+    return SwayResponse(P / V, d)
 
 
 @kernel
@@ -108,7 +108,7 @@ def routh_gain(p: float, d: float, eta: float, k: Any) -> float:
 
 
 @kernel
-def schedule(at: Answer, k: Any) -> Schedule:
+def schedule(at: SwayResponse, k: Any) -> GainSchedule:
     """eta and k_b; `trust` is by how much the true p may exceed the told one."""
     p = k.trust * at.p
     eta = 1.0 / (1.0 + T_D * at.d / k.pace)
@@ -117,4 +117,4 @@ def schedule(at: Answer, k: Any) -> Schedule:
         eta = min(eta, ETA_SHARE / p)
     if p > 1.0:
         k_b = min(k_b, ACROSS_SHARE * at.d / (p - 1.0), ROUTH_SHARE * routh_gain(p, at.d, eta, k))
-    return Schedule(eta, min(k_b, BANDWIDTH_SHARE * k.Q_per_S * max(1.0 - eta * p, 0.0)))
+    return GainSchedule(eta, min(k_b, BANDWIDTH_SHARE * k.Q_per_S * max(1.0 - eta * p, 0.0)))

@@ -17,27 +17,18 @@ from typing import Any, ClassVar, Literal
 
 from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
-from podusv_cli.components.controllers.momentum_adaptation import (
-    LEARNT,
-    MORE,
-    adapt,
-    answer_force,
-)
-from podusv_cli.components.controllers.momentum_guidance import guidance, levelled, seen
+from podusv_cli.components.controllers.momentum_adaptation import LEARNT, MORE, adapt, answer_force
+from podusv_cli.components.controllers.momentum_guidance import guidance, level_gain, see_target
 from podusv_cli.components.controllers.momentum_schedule import (
     neutral,
     pace,
-    paced,
+    pace_constants,
     schedule,
     sway_answer,
 )
 from podusv_cli.components.controllers.observer import B_R, B_V, V_HAT, observe
 from podusv_cli.components.controllers.velocity_loop import Axis
-from podusv_cli.components.controllers.velocity_steering import (
-    VelocitySteering,
-    aim,
-    surge_demand,
-)
+from podusv_cli.components.controllers.velocity_steering import VelocitySteering, aim, surge_demand
 from podusv_cli.components.vessels.plant import sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Rule, Ruled, value
@@ -74,8 +65,12 @@ class MomentumVector(VelocitySteering):
 
     kind: Literal["momentum_vector"] = "momentum_vector"
     rules: ClassVar[dict[str, Rule]] = VelocitySteering.rules | {
-        "Q0": by.YAW_SQUARED, "S0": by.YAW, "k_b0": by.PACE, "T_v": by.YAW_TIME, "gamma": by.YAW,
-    }  # fmt: skip
+        "Q0": by.YAW_SQUARED,
+        "S0": by.YAW,
+        "k_b0": by.PACE,
+        "T_v": by.YAW_TIME,
+        "gamma": by.YAW,
+    }
     omega_u: Ruled = value(5.0, "rad/s", "bandwidth of the observer in surge", gt=0)
     omega_v: Ruled = value(3.0, "rad/s", "bandwidth of the observer in sway", gt=0)
     omega_r: Ruled = value(0.9, "rad/s", "bandwidth of the observer in yaw", gt=0)
@@ -84,9 +79,11 @@ class MomentumVector(VelocitySteering):
     k_b0: Ruled = value(0.5, "1/s", "largest gain of the distance across the path", gt=0)
     T_v: Ruled = value(1.8, "s", "time over which the loads' sway is predicted", ge=0)
     trust: float = value(
-        1.25, "", "how many times as much as told sway may answer yaw; more is safer and slower",
+        1.25,
+        "",
+        "how many times as much as told sway may answer yaw; more is safer and slower",
         ge=1,
-    )  # fmt: skip
+    )
     gamma: Ruled = value(
         0.2, "1/s", "how fast it learns by how much more sway answers yaw; 0: never", ge=0
     )
@@ -104,7 +101,7 @@ class MomentumVector(VelocitySteering):
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
         """With the neutral point, the gains at its pace and the yaw rate that N_m allows."""
         own = neutral(nominal, self.thrust_lever)
-        own |= paced(nominal.m33, self.N_m, self.Q0, self.S0)
+        own |= pace_constants(nominal.m33, self.N_m, self.Q0, self.S0)
         own["fastest"] = min(self.r_m, math.sqrt(self.N_m / nominal.m33))
         return super().constants_with(nominal) | own
 
@@ -120,13 +117,18 @@ class MomentumVector(VelocitySteering):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Yaw first, as far as sway bears it; surge as far as the velocity points the right way."""
-        at, v, r, v_l = seen(x, target, k), x[4], x[5], memory[LOAD_SWAY]
+        at, v, r, v_l = see_target(x, target, k), x[4], x[5], memory[LOAD_SWAY]
         closing = at.e_a * (at.t_a - x[3]) + at.e_b * (at.t_b - v)
-        along = levelled(at.k_p, at, closing)
+        along = level_gain(at.k_p, at, closing)
         V_a, V_b = at.t_a + along.kappa * at.e_a, at.t_b + along.kappa * at.e_b
         V = max(math.sqrt(V_a * V_a + V_b * V_b), k.V_m)
         more = memory[MORE] * k.m22 / k.neutral_mass

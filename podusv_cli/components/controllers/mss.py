@@ -58,9 +58,11 @@ class Mss(LineOfSight):
     against_windup: ClassVar[str] = "lower wn"
     lookahead: float = value(10.0, "m", "distance ahead on the path that the bow aims at", gt=0)
     learns: Literal["adaptive", "integral", "published"] = value(
-        "published", "", "how the crab angle is found: by ALOS (published), by ILOS (integral), or "
+        "published",
+        "",
+        "how the crab angle is found: by ALOS (published), by ILOS (integral), or "
         "as alos does it (adaptive)",
-    )  # fmt: skip
+    )
     gamma: float = value(0.001, "rad/(m s)", "gain of the adapted angle", ge=0)
     crab_m: float = value(0.5, "rad", "largest angle of learns: adaptive", gt=0)
     sigma: float = value(0.001, "m/s", "gain of the integral", ge=0)
@@ -110,17 +112,26 @@ class Mss(LineOfSight):
         return [
             pi_loop(surge, "omega_u", self.omega_u),
             Loop(
-                yaw.name, "wn", yaw.damping, yaw.told / yaw.inertia * gains,
-                np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), name="PID loop",
+                yaw.name,
+                "wn",
+                yaw.damping,
+                yaw.told / yaw.inertia * gains,
+                np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+                name="PID loop",
             ),
-        ]  # fmt: skip
+        ]
 
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Pole placement: K_p = m33 wn^2, K_d = m33 (2 zeta wn - 1/T), T_i = 10/wn."""
         at = course_frame(x, target, k)
         rate[CRAB], rate[OFFSET] = learning(at.across, memory[CRAB], memory[OFFSET], k)

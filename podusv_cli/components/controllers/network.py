@@ -19,13 +19,21 @@ from podusv_cli.core.signal import Signal
 
 MOST_NODES = 10_000
 CENTER = Signal(
-    "rbf_center", "1", "network centres in (u, v, r) [m/s, m/s, rad/s]", "c",
-    axes=("node", "input"), fixed=True,
-)  # fmt: skip
+    "rbf_center",
+    "1",
+    "network centres in (u, v, r) [m/s, m/s, rad/s]",
+    "c",
+    axes=("node", "input"),
+    fixed=True,
+)
 WIDTH = Signal(
-    "rbf_width", "1", "Gaussian widths in (u, v, r) [m/s, m/s, rad/s]", r"\sigma",
-    axes=("input",), fixed=True,
-)  # fmt: skip
+    "rbf_width",
+    "1",
+    "Gaussian widths in (u, v, r) [m/s, m/s, rad/s]",
+    r"\sigma",
+    axes=("input",),
+    fixed=True,
+)
 Triple = tuple[float, float, float]
 W_NORM_U = Signal("W_norm_u", "m/s2", "norm of the surge network weights", r"|\hat W_u|")
 W_NORM_R = Signal("W_norm_r", "rad/s2", "norm of the yaw network weights", r"|\hat W_r|")
@@ -62,7 +70,7 @@ class Network(Component):
     )
 
     @model_validator(mode="after")
-    def _spanned(self) -> Self:
+    def _check_span(self) -> Self:
         if not self.centers and any(n < 1 for n in self.nodes):
             raise ValueError(f"every axis needs at least one node, got {list(self.nodes)}")
         if self.count > MOST_NODES:
@@ -184,9 +192,15 @@ def weigh(count: int, W_u: Vector, W_r: Vector, phi: Vector) -> tuple[float, flo
 
 @kernel
 def adapt(
-    count: int, weights: Vector, phi: Vector, drive: float, Gamma: float, sigma: float,
-    initial: float, rate: Vector,
-) -> None:  # fmt: skip
+    count: int,
+    weights: Vector,
+    phi: Vector,
+    drive: float,
+    Gamma: float,
+    sigma: float,
+    initial: float,
+    rate: Vector,
+) -> None:
     """Weights' rate Gamma (drive Phi - sigma (W - W0)), drive u_e m11 or r_e m33; (27), (36)."""
     for i in range(count):
         rate[i] = Gamma * (drive * phi[i] - sigma * (weights[i] - initial))

@@ -118,10 +118,10 @@ def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:
     """nu' = -d nu + g.(nu, nu_hat, b), with b the observed load per told inertia."""
     ratio, d = axis.told / axis.inertia, axis.damping
     return Loop(
-        axis.name, key, d, np.array([d - ratio * gain, 0.0, -ratio]),
-        np.array([
-            [2.0 * omega - gain, -2.0 * omega, 0.0],
-            [omega * omega, -omega * omega, 0.0],
-        ]),
+        axis.name,
+        key,
+        d,
+        np.array([d - ratio * gain, 0.0, -ratio]),
+        np.array([[2.0 * omega - gain, -2.0 * omega, 0.0], [omega * omega, -omega * omega, 0.0]]),
         told=np.array([1.0 / ratio, 0.0]),
-    )  # fmt: skip
+    )

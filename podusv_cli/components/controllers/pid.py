@@ -106,13 +106,16 @@ class Pid(TrackingController):
         )
         return [
             Loop(
-                axis.name, key, axis.damping,
+                axis.name,
+                key,
+                axis.damping,
                 np.array([-K_P - K_D * lag, K_I, -K_D * lag]) / axis.inertia,
                 np.array([[-1.0, 0.0, 0.0], [-lag, 0.0, -lag]]),
-                cause="derivative", name="PID loop",
+                cause="derivative",
+                name="PID loop",
             )
             for axis, (key, K_P, K_I, K_D) in zip(axes, gains, strict=True)
-        ]  # fmt: skip
+        ]
 
     @staticmethod
     @kernel
@@ -124,9 +127,14 @@ class Pid(TrackingController):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """tau = K_P e + K_I integral + K_D (e - lag)/T_d on both axes."""
         aim = take_aim(x, memory, target, k, scratch(6))
         e = track(x, memory, aim, k)

@@ -22,12 +22,7 @@ from podusv_cli.components.controllers.network import (
     adapt,
     weigh,
 )
-from podusv_cli.components.controllers.tracking import (
-    HELD,
-    TRACKED,
-    TrackingController,
-    track,
-)
+from podusv_cli.components.controllers.tracking import HELD, TRACKED, TrackingController, track
 from podusv_cli.components.controllers.velocity_loop import AdaptedBound, Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.derived import difference
@@ -93,9 +88,16 @@ def compensation(memory: Vector, k: Any, rate: Vector) -> tuple[float, float]:
 
 @kernel
 def polar_backstepping(
-    x: Vector, memory: Vector, target: Vector, k: Any, table: Vector, tau: Vector, rate: Vector,
-    signals: Vector, work: Vector,
-) -> None:  # fmt: skip
+    x: Vector,
+    memory: Vector,
+    target: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+    work: Vector,
+) -> None:
     """Demand (26), (35) and memory rates (27), (28), (36), (37), see `controllers.base`.
 
     The sign s of the coupling is -1 as printed, +1 where the cross terms are to cancel in V'.
@@ -117,16 +119,22 @@ def polar_backstepping(
     u_e = x[3] - beta_u
     u_c = u_e - xi_u
     tau[0] = (
-        -k.k_ue * u_e - k.m11 * f_hat_u - memory[B_HAT_U] * lemma(u_c, k)
-        + k.m11 * beta_u_dot + s * e.z_e * e.cos_e
-    )  # fmt: skip
+        -k.k_ue * u_e
+        - k.m11 * f_hat_u
+        - memory[B_HAT_U] * lemma(u_c, k)
+        + k.m11 * beta_u_dot
+        + s * e.z_e * e.cos_e
+    )
     beta_r, beta_r_dot = yaw(e, x, aim, tail(memory, filtered), tail(rate, filtered), k, tau[0])
     r_e = x[5] - beta_r
     r_c = r_e - xi_r
     tau[1] = (
-        -k.k_re * r_e - k.m33 * f_hat_r - memory[B_HAT_R] * lemma(r_c, k)
-        + k.m33 * beta_r_dot + s * e.psi_e
-    )  # fmt: skip
+        -k.k_re * r_e
+        - k.m33 * f_hat_r
+        - memory[B_HAT_R] * lemma(r_c, k)
+        + k.m33 * beta_r_dot
+        + s * e.psi_e
+    )
 
     observe_sway(x, memory, target, k, rate)
     rate[0] = rate[1] = 0.0
@@ -173,9 +181,9 @@ class PolarBackstepping(TrackingController):
         count = self.network.count
         learnt = each(BOUNDS) + each(W_HAT, count)
         shortfall = each(SHORTFALL) if self.wants_loads() else ()
-        return HELD + learnt + self.filtered() + self.swaying() + shortfall
+        return HELD + learnt + self.filter_slots() + self.swaying() + shortfall
 
-    def filtered(self) -> Slots:
+    def filter_slots(self) -> Slots:
         """The filter's output, where there is a filter."""
         return ()
 
@@ -216,13 +224,17 @@ class PolarBackstepping(TrackingController):
         )
         return [
             Loop(
-                axis.name, key, axis.damping,
+                axis.name,
+                key,
+                axis.damping,
                 np.array([-k - b.initial / (4.0 * self.partial), -axis.told]) / axis.inertia,
                 np.array([[Gamma * axis.told * power, -Gamma * sigma]]),
-                cause="adaptation", name="adaptation", bound=b,
+                cause="adaptation",
+                name="adaptation",
+                bound=b,
             )
             for axis, b, (key, k, Gamma, sigma) in zip(axes, bounds, gains, strict=True)
-        ]  # fmt: skip
+        ]
 
     def lyapunov(self) -> Self | None:
         """This law: the paper's proof is about the whole family, with the standoff as it is."""
@@ -255,7 +267,7 @@ class FilteredBackstepping(PolarBackstepping):
         "alpha", "", "filter output at the start: 0, or the virtual control"
     )
 
-    def filtered(self) -> Slots:
+    def filter_slots(self) -> Slots:
         """(beta_u, beta_r)."""
         return each(FILTERED)
 

@@ -22,16 +22,21 @@ from podusv_cli.core.kernel import Vector, kernel, tail
 
 # What a policy is given, in the vessel's own frame: x ahead, y to starboard
 OBSERVED = (
-    "target ahead [m]", "target to starboard [m]", "u [m/s]", "v [m/s]", "r [rad/s]",
-    "target's velocity ahead [m/s]", "target's velocity to starboard [m/s]",
+    "target ahead [m]",
+    "target to starboard [m]",
+    "u [m/s]",
+    "v [m/s]",
+    "r [rad/s]",
+    "target's velocity ahead [m/s]",
+    "target's velocity to starboard [m/s]",
     "heading error [rad]",
-)  # fmt: skip
+)
 INPUTS, OUTPUTS = len(OBSERVED), 2
 RELU, CLIP = 1.0, 1.0  # the places of "relu" and "clip" among the choices, as kernels know them
 
 
 @kernel
-def observed(x: Vector, target: Vector, signals: Vector) -> None:
+def observe(x: Vector, target: Vector, signals: Vector) -> None:
     """Write what a policy is given of a state and a target into `signals`, as `OBSERVED`.
 
     The heading error is that of (19): the direction of the target less the heading, in [-pi, pi].
@@ -96,7 +101,7 @@ class Policy(Controller):
         return content
 
     @model_validator(mode="after")
-    def _given(self) -> Self:
+    def _check_weights(self) -> Self:
         if self.content is None:
             raise ValueError(
                 "weights is missing; name a safetensors file, as in weights: policy.safetensors"
@@ -127,7 +132,7 @@ class Policy(Controller):
         """The network's outputs, squashed, times (surge, yaw)."""
         hidden, width, inputs = int(k.hidden), int(k.width), INPUTS
         given, out = work, tail(work, max(inputs, width))
-        observed(x, target, given)
+        observe(x, target, given)
         for i in range(inputs):
             given[i] = (given[i] - table[i]) / table[INPUTS + i]
         weights = tail(table, 2 * INPUTS)

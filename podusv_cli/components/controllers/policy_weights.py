@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import BaseModel, Field, NonNegativeInt, ValidationError
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.phrases import quoted
+from podusv_cli.core.phrases import quote
 
 PERIOD = "control.period"  # the remark for how long a demand held in training [s]
 LENGTH = 8  # bytes of the header's length
@@ -102,7 +102,7 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
     width = max((len(bias) for _, _, bias in layers[:-1]), default=0)
     sizes = [inputs, *[width] * (len(layers) - 1), outputs]
     filled = [
-        np.concatenate([_filled(bias, (after,)), _filled(weight, (after, before)).T.ravel()])
+        np.concatenate([_fill(bias, (after,)), _fill(weight, (after, before)).T.ravel()])
         for (_, weight, bias), before, after in zip(layers, sizes, sizes[1:], strict=False)
     ]
     table = np.concatenate([*given, *filled])
@@ -117,7 +117,7 @@ def _period(remarks: Mapping[str, str]) -> float | None:
         if 0.0 < (period := float(remarks[PERIOD])) < math.inf:
             return period
     raise ValueError(
-        f"its remark {PERIOD} is {quoted(remarks[PERIOD])}; write how long a demand held in "
+        f"its remark {PERIOD} is {quote(remarks[PERIOD])}; write how long a demand held in "
         "training [s], as in '0.2'"
     )
 
@@ -172,7 +172,7 @@ def _check_shapes(
         )
 
 
-def _filled(part: Vector, shape: tuple[int, ...]) -> Vector:
+def _fill(part: Vector, shape: tuple[int, ...]) -> Vector:
     whole = np.zeros(shape)
     whole[tuple(slice(size) for size in part.shape)] = part
     return whole

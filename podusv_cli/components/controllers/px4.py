@@ -21,9 +21,9 @@ from podusv_cli.components.controllers.rover import (
     STEERING_I,
     THROTTLE_I,
     Rover,
-    approached,
+    approach_speed,
     beyond,
-    clipped,
+    clip,
     kept_within,
     path_course,
 )
@@ -51,7 +51,7 @@ def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
 @kernel
 def wanted_turn(off: float, k: Any) -> float:
     """Wanted yaw rate for a heading error [rad/s]; 0 below the threshold."""
-    return beyond(clipped(k.yaw_P * off, k.r_m), k.r_least)
+    return beyond(clip(k.yaw_P * off, k.r_m), k.r_least)
 
 
 class Px4(Rover):
@@ -59,18 +59,26 @@ class Px4(Rover):
 
     kind: Literal["px4"] = "px4"
     no_gains: ClassVar[tuple[str, ...]] = (
-        *Rover.no_gains, "lookahead_min", "lookahead_max", "stops_at", "drives_at",
-    )  # fmt: skip
+        *Rover.no_gains,
+        "lookahead_min",
+        "lookahead_max",
+        "stops_at",
+        "drives_at",
+    )
     rules: ClassVar[dict[str, Rule]] = Rover.rules | {
-        "speed_FF": by.SLOWNESS, "speed_P": by.SLOWNESS, "speed_I": by.SLOWNESS,
-    }  # fmt: skip
+        "speed_FF": by.SLOWNESS,
+        "speed_P": by.SLOWNESS,
+        "speed_I": by.SLOWNESS,
+    }
     speed_FF: Ruled = value(0.996, "s/m", "throttle per wanted speed (1/RO_MAX_THR_SPEED)", gt=0)
     speed_P: Ruled = value(0.189, "s/m", "throttle per missing speed (RO_SPEED_P)", ge=0)
     speed_I: Ruled = value(0.0189, "1/m", "rate of throttle per missing speed (RO_SPEED_I)", ge=0)
     rate_FF: Ruled = value(
-        0.103, "s/rad", "steering per wanted yaw rate "
-        "(RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED))", ge=0,
-    )  # fmt: skip
+        0.103,
+        "s/rad",
+        "steering per wanted yaw rate (RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED))",
+        ge=0,
+    )
     rate_P: Ruled = value(0.0481, "s/rad", "steering per missing yaw rate (RO_YAW_RATE_P)", ge=0)
     rate_I: Ruled = value(
         0.0481, "1/rad", "rate of steering per missing yaw rate (RO_YAW_RATE_I)", ge=0
@@ -90,9 +98,12 @@ class Px4(Rover):
     )
     u_least: float = value(0.1, "m/s", "measured speed that counts as 0 (RO_SPEED_TH)", ge=0)
     catch_up: float = value(
-        0.2, "1/s", "wanted speed per distance to a target that is ahead; podusv's, for targets "
-        "with a timetable", ge=0,
-    )  # fmt: skip
+        0.2,
+        "1/s",
+        "wanted speed per distance to a target that is ahead; podusv's, for targets "
+        "with a timetable",
+        ge=0,
+    )
 
     def slots(self) -> Slots:
         """With whether it turns on the spot."""
@@ -110,7 +121,7 @@ class Px4(Rover):
     @kernel
     def sample(x: Vector, memory: Vector, target: Vector, k: Any) -> None:
         """Begin and end turning on the spot; integrals of what is not wanted begin anew."""
-        off = heading_error(x, target, approached(x, target, k.catch_up, k), k)
+        off = heading_error(x, target, approach_speed(x, target, k.catch_up, k), k)
         bound = k.drives_at if memory[TURNS] > 0.0 else k.stops_at
         memory[TURNS] = 1.0 if abs(off) > bound else 0.0
         memory[THROTTLE_I] *= 1.0 - memory[TURNS]
@@ -119,22 +130,27 @@ class Px4(Rover):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Steering first; the wanted speed is what it leaves room for."""
-        u_d = approached(x, target, k.catch_up, k)
+        u_d = approach_speed(x, target, k.catch_up, k)
         r_d = wanted_turn(heading_error(x, target, u_d, k), k)
         u_d *= 1.0 - memory[TURNS]
         r_e = r_d - beyond(x[5], k.r_least)
-        fed_back = clipped(k.rate_P * r_e + memory[STEERING_I], 1.0)
-        steering = clipped(k.rate_FF * r_d + fed_back, 1.0) if r_d != 0.0 else 0.0
+        fed_back = clip(k.rate_P * r_e + memory[STEERING_I], 1.0)
+        steering = clip(k.rate_FF * r_d + fed_back, 1.0) if r_d != 0.0 else 0.0
         room = 1.0 - abs(steering) if k.mixing == SHARED else 1.0
         u_d = min(u_d, room / k.speed_FF)
         speed = beyond(math.sqrt(x[3] * x[3] + x[4] * x[4]), k.u_least)
         u_e = u_d - (speed if x[3] >= 0.0 else -speed)
-        fed_back = clipped(k.speed_P * u_e + memory[THROTTLE_I], 1.0)
-        throttle = clipped(k.speed_FF * u_d + fed_back, room) if u_d > 0.0 else 0.0
+        fed_back = clip(k.speed_P * u_e + memory[THROTTLE_I], 1.0)
+        throttle = clip(k.speed_FF * u_d + fed_back, room) if u_d > 0.0 else 0.0
         tau[0], tau[1] = k.surge * throttle, k.yaw * steering
         learns_r = k.rate_I * r_e if r_d != 0.0 else 0.0
         learns_u = k.speed_I * u_e if u_d > 0.0 else 0.0

@@ -35,7 +35,7 @@ SHARED = 0.0  # the place of "shared" among the choices of `mixing`
 
 
 @kernel
-def clipped(number: float, most: float) -> float:
+def clip(number: float, most: float) -> float:
     """`number` within +-`most`."""
     return min(max(number, -most), most)
 
@@ -61,7 +61,7 @@ def path_course(x: Vector, target: Vector) -> float:
 
 
 @kernel
-def approached(x: Vector, target: Vector, gain: float, k: Any) -> float:
+def approach_speed(x: Vector, target: Vector, gain: float, k: Any) -> float:
     """The target's speed, and `gain` [1/s] times how far it is ahead, within U."""
     e_x, e_y = target[0] - x[0], target[1] - x[1]
     speed = math.sqrt(target[2] * target[2] + target[3] * target[3])
@@ -78,9 +78,14 @@ class Rover(Controller):
     no_gains: ClassVar[tuple[str, ...]] = ("surge", "yaw", "U", "r_m")
     against_windup: ClassVar[str] = "lower speed_I and rate_I"
     rules: ClassVar[dict[str, Rule]] = {
-        "surge": by.FORCE, "yaw": by.MOMENT, "U": by.SPEED, "r_m": by.TURN, "rate_FF": by.STEERING,
-        "rate_P": by.STEERING, "rate_I": by.STEERING,
-    }  # fmt: skip
+        "surge": by.FORCE,
+        "yaw": by.MOMENT,
+        "U": by.SPEED,
+        "r_m": by.TURN,
+        "rate_FF": by.STEERING,
+        "rate_P": by.STEERING,
+        "rate_I": by.STEERING,
+    }
 
     surge: Ruled = value(8.0, "N", "surge force at full throttle", gt=0)
     yaw: Ruled = value(2.5, "N m", "yaw moment at full steering", gt=0)
@@ -112,9 +117,12 @@ class Rover(Controller):
         scales = (("speed", self.surge), ("rate", self.yaw))
         return [
             Loop(
-                axis.name, f"{name}_P", axis.damping,
+                axis.name,
+                f"{name}_P",
+                axis.damping,
                 np.array([-getattr(self, f"{name}_P"), 1.0]) * full / axis.inertia,
-                np.array([[-getattr(self, f"{name}_I"), 0.0]]), name="PI loop",
+                np.array([[-getattr(self, f"{name}_I"), 0.0]]),
+                name="PI loop",
             )
             for axis, (name, full) in zip(axes, scales, strict=True)
-        ]  # fmt: skip
+        ]

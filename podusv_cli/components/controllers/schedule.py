@@ -33,7 +33,7 @@ FEEDBACK_R = Signal("feedback_r", "N m", "yaw moment that departures from the mo
 
 
 @lru_cache(maxsize=4)
-def _recorded(text: str, *, held: bool) -> Recorded | None:
+def _read_recorded(text: str, *, held: bool) -> Recorded | None:
     """Commands to single propellers, which the header has by number, as `n_1`; None for demands."""
     header, _ = lines_of(text)
     numbered = any(NUMBERED.fullmatch(cell) for cell in header.cells) if header else False
@@ -46,7 +46,7 @@ def _rows(text: str) -> Vector:
 
     Recorded commands are for the actuator to read: their demand is 0.
     """
-    if _recorded(text, held=False):
+    if _read_recorded(text, held=False):
         rows = named_rows(text, NOUN).rows[:, [0, 0, 0]] * [1.0, 0.0, 0.0]
     else:
         rows = timed_rows(text, NOUN, LAYOUTS)
@@ -77,10 +77,12 @@ class Schedule(Controller):
     signals: ClassVar[tuple[Signal, ...]] = (FEEDBACK_U, FEEDBACK_R)
     file: str | None = value(None, "", "CSV file beside the scenario; its text is read into `rows`")
     rows: str = value(
-        "", "", "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
+        "",
+        "",
+        "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
         "and the gains from its errors, six of tau_u and six of tau_r; or of t and the commands "
         "of every pod, such as n_1 [1/s] and delta_1 [rad] of the first",
-    )  # fmt: skip
+    )
     between: Literal["linear", "hold"] = value(
         "linear", "", "demand or commands between rows: a straight line, or the last row's"
     )
@@ -95,14 +97,14 @@ class Schedule(Controller):
         return rows
 
     @model_validator(mode="after")
-    def _given(self) -> Self:
+    def _check_content(self) -> Self:
         if not self.rows:
             raise ValueError("file is missing; name a CSV file with columns t, tau_u, tau_r")
         return self
 
     def commands(self) -> Recorded | None:
         """The rows, where their columns are commands to propellers."""
-        return _recorded(self.rows, held=self.between == "hold")
+        return _read_recorded(self.rows, held=self.between == "hold")
 
     def optimum_of(self) -> str:
         """What `minimises` says."""

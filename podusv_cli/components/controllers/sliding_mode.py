@@ -82,9 +82,11 @@ class SlidingMode(HandController):
         "lambda_2": by.times("A g_h, A as of eta", lambda facts: authority(facts) * facts.g_h),
     }
     reaching: Literal["boundary_layer", "super_twisting"] = value(
-        "boundary_layer", "", "how the surface is reached: first order with a boundary layer, or "
+        "boundary_layer",
+        "",
+        "how the surface is reached: first order with a boundary layer, or "
         "second order, which learns slow loads",
-    )  # fmt: skip
+    )
     eta: Ruled = value(0.2, "m/s2", "bound of the loads, as accelerations of the hand point", gt=0)
     phi: Ruled = value(0.02, "m/s", "boundary layer: half its width, or the rounding", gt=0)
     lambda_1: Ruled = value(0.6, "m1/2 s-3/2", "gain of the root (super-twisting)", ge=0)
@@ -107,13 +109,15 @@ class SlidingMode(HandController):
         count = learning.shape[1]
         return [
             Loop(
-                axis.name, key, axis.damping,
+                axis.name,
+                key,
+                axis.damping,
                 np.array([axis.damping, 0.0])[:count]
                 + np.array([-gain - slope, 1.0])[:count] * axis.told / axis.inertia,
                 learning,
             )
             for axis, gain in zip(axes, self.rate_gains(), strict=True)
-        ]  # fmt: skip
+        ]
 
     @staticmethod
     @kernel
@@ -126,9 +130,14 @@ class SlidingMode(HandController):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """A plus the reaching law along and across the bow; no load is known."""
         h = hand_errors(x, memory[LAGGED], target, k)
         along = h.A_a + reach(h.s_a, memory[Z_A], k)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, ClassVar, Literal
 
 from podusv_cli.components import rules as by
-from podusv_cli.components.controllers.base import Slots, Trial, each
-from podusv_cli.components.controllers.manoeuvre import Manoeuvre, begun
+from podusv_cli.components.controllers.base import ManoeuvreTrial, Slots, each
+from podusv_cli.components.controllers.manoeuvre import Manoeuvre, has_begun
 from podusv_cli.core.component import Rule, Ruled, value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -25,15 +25,15 @@ class Stopping(Manoeuvre):
         """The stage of the trial."""
         return each((STAGE,))
 
-    def trial(self) -> Trial:
+    def trial(self) -> ManoeuvreTrial:
         """Nothing is steered."""
-        return Trial("stopping", self.execute)
+        return ManoeuvreTrial("stopping", self.execute)
 
     @staticmethod
     @kernel
     def sample(t: float, x: Vector, memory: Vector, k: Any) -> None:
         """Begin, or end where the hull lies still."""
-        if begun(t, k) and memory[0] == 0.0:
+        if has_begun(t, k) and memory[0] == 0.0:
             memory[0] = 1.0
         if memory[0] == 1.0 and x[3] <= 0.0:
             memory[0] = 2.0

@@ -131,9 +131,23 @@ def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
     alpha_u = (k.k_ze * z_e + P - v * sin_e) / cos_e
     alpha_r = w + k.k_psie * psi_e
     return Tracking(
-        z_e, distance, psi_d, cos_d, sin_d, psi_e, cos_e, sin_e, half_turn, side, w, exact_w,
-        P, Q, alpha_u, alpha_r,
-    )  # fmt: skip
+        z_e,
+        distance,
+        psi_d,
+        cos_d,
+        sin_d,
+        psi_e,
+        cos_e,
+        sin_e,
+        half_turn,
+        side,
+        w,
+        exact_w,
+        P,
+        Q,
+        alpha_u,
+        alpha_r,
+    )
 
 
 @kernel
@@ -163,9 +177,11 @@ class TrackingController(Controller):
         ge=0,
     )
     standoff_reference: Literal["line_of_sight", "crab"] = value(
-        "line_of_sight", "", "where the standoff lies: behind the target on the line of sight, or "
+        "line_of_sight",
+        "",
+        "where the standoff lies: behind the target on the line of sight, or "
         "along the heading that holds the path, so that the vessel comes to the target itself",
-    )  # fmt: skip
+    )
     omega_v: float = value(
         2.0, "rad/s", "bandwidth of the sway load's observer, for standoff_reference: crab", gt=0
     )
@@ -189,9 +205,11 @@ class TrackingController(Controller):
     )
 
     anti_windup: Literal["none", "auxiliary"] = value(
-        "none", "", "what the law's memory does while the actuator falls short of the demand: "
+        "none",
+        "",
+        "what the law's memory does while the actuator falls short of the demand: "
         "nothing as printed, or the shortfall is taken out of what it learns from",
-    )  # fmt: skip
+    )
 
     @model_validator(mode="after")
     def _aims(self) -> Self:

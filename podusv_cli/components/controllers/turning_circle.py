@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from podusv_cli.components.controllers.base import Slots, Trial, each
-from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, begun, steered
+from podusv_cli.components.controllers.base import ManoeuvreTrial, Slots, each
+from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, has_begun, steer_thrust
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 
@@ -23,19 +23,19 @@ class TurningCircle(Steering):
         """Whether it steers."""
         return each((SIDE,))
 
-    def trial(self) -> Trial:
+    def trial(self) -> ManoeuvreTrial:
         """Nothing is reversed."""
-        return Trial("turning circle", self.execute)
+        return ManoeuvreTrial("turning circle", self.execute)
 
     @staticmethod
     @kernel
     def sample(t: float, memory: Vector, k: Any) -> None:
         """Begin."""
-        memory[0] = 1.0 if begun(t, k) else 0.0
+        memory[0] = 1.0 if has_begun(t, k) else 0.0
 
     @staticmethod
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """Straight, then at the angle."""
-        steered(k.angle if memory[0] > 0.0 else 0.0, 1.0, k, tau, signals)
+        steer_thrust(k.angle if memory[0] > 0.0 else 0.0, 1.0, k, tau, signals)
         rate[0] = 0.0

@@ -89,6 +89,11 @@ def pi_loop(axis: Axis, key: str, w: float) -> Loop:
     """A double pole at -w of a law that knows the inertia, tracked back with the time 1/w."""
     to = axis.told / axis.inertia
     return Loop(
-        axis.name, key, axis.damping, to * np.array([-2.0 * w, 1.0]), np.array([[-w * w, 0.0]]),
-        name="PI loop", told=np.array([w / to]),
-    )  # fmt: skip
+        axis.name,
+        key,
+        axis.damping,
+        to * np.array([-2.0 * w, 1.0]),
+        np.array([[-w * w, 0.0]]),
+        name="PI loop",
+        told=np.array([w / to]),
+    )

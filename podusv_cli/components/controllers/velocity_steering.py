@@ -76,9 +76,15 @@ class VelocitySteering(ObservingController):
     )
     no_gains: ClassVar[tuple[str, ...]] = ("thrust_lever",)  # where the pods are
     rules: ClassVar[dict[str, Rule]] = {
-        **by.OBSERVER, "k_p": by.PACE, "U": by.SPEED, "r_m": by.YAW_RATE, "k_u": by.SURGE,
-        "V_m": by.SPEED, "a_m": by.ACCELERATION, "N_m": by.MOMENT,
-    }  # fmt: skip
+        **by.OBSERVER,
+        "k_p": by.PACE,
+        "U": by.SPEED,
+        "r_m": by.YAW_RATE,
+        "k_u": by.SURGE,
+        "V_m": by.SPEED,
+        "a_m": by.ACCELERATION,
+        "N_m": by.MOMENT,
+    }
     k_p: Ruled = value(0.5, "1/s", "gain of the distance, near the target", gt=0)
     U: Ruled = value(1.25, "m/s", "largest wanted speed, about 1.2 times that at full thrust", gt=0)
     r_m: Ruled = value(1.4, "rad/s", "yaw rate that a large angle approaches", gt=0)
@@ -86,13 +92,17 @@ class VelocitySteering(ObservingController):
     V_m: Ruled = value(0.1, "m/s", "speed below which a direction counts for less", gt=0)
     a_m: Ruled = value(1.0, "m/s2", "largest wanted acceleration used ahead", gt=0)
     astern: Literal["never", "shorter"] = value(
-        "shorter", "", "what a vessel ahead of the target does: turns round, and again when it is "
+        "shorter",
+        "",
+        "what a vessel ahead of the target does: turns round, and again when it is "
         "there (never), or backs up if its bow points to the target's course (shorter)",
-    )  # fmt: skip
+    )
     thrust_lever: Positive | None = value(
-        None, "m", "distance behind the origin at which the pods turn, whose sway force makes the "
+        None,
+        "m",
+        "distance behind the origin at which the pods turn, whose sway force makes the "
         "moment; none where the moment comes without a sway force",
-    )  # fmt: skip
+    )
     N_m: Ruled = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
     def most(self) -> Most:

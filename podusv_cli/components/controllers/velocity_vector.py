@@ -38,11 +38,12 @@ def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
     e = Moving(target[0] - x[0], target[1] - x[1], rate_x, rate_y)
     V = approach(e, Moving(target[2], target[3], target[4], target[5]), k)
     return Wanted(
-        V.x * cos_psi + V.y * sin_psi, V.y * cos_psi - V.x * sin_psi,
+        V.x * cos_psi + V.y * sin_psi,
+        V.y * cos_psi - V.x * sin_psi,
         V.rate_x * cos_psi + V.rate_y * sin_psi,
         min(max(turn_rate(V, k.V_m), -k.chi_m), k.chi_m),
         V.x * target[2] + V.y * target[3] < 0.0 < target[2] * cos_psi + target[3] * sin_psi,
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -62,8 +63,11 @@ class VelocityVector(VelocitySteering):
 
     kind: Literal["velocity_vector"] = "velocity_vector"
     rules: ClassVar[dict[str, Rule]] = VelocitySteering.rules | {
-        "k_psi": by.YAW, "k_r": by.YAW, "T_v": by.YAW_TIME, "chi_m": by.TURN,
-    }  # fmt: skip
+        "k_psi": by.YAW,
+        "k_r": by.YAW,
+        "T_v": by.YAW_TIME,
+        "chi_m": by.TURN,
+    }
     k_psi: Ruled = value(1.3, "1/s", "gain of the angle", gt=0)
     k_r: Ruled = value(1.3, "1/s", "gain of the yaw rate", gt=0)
     T_v: Ruled = value(5.0, "s", "time over which the sway velocity is predicted", ge=0)
@@ -81,9 +85,14 @@ class VelocityVector(VelocitySteering):
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Yaw first: turn the velocity vector; surge as far as it points the right way."""
         wanted = guidance(x, target, k)
         u, v, r, turn = x[3], x[4], x[5], wanted.turn

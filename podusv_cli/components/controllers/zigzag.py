@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, ClassVar, Literal
 
-from podusv_cli.components.controllers.base import Slots, Trial, each
-from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, begun, steered
+from podusv_cli.components.controllers.base import ManoeuvreTrial, Slots, each
+from podusv_cli.components.controllers.manoeuvre import SIDE, Steering, has_begun, steer_thrust
 from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.signal import Signal
@@ -43,17 +43,20 @@ class Zigzag(Steering):
         math.radians(10.0), "rad", "change of heading at which steering is reversed", gt=0
     )
     check_every: float = value(
-        0.0, "s", "time between two looks at the heading, a whole number of steps; 0: steering is "
-        "reversed when the heading has changed by `switch`, also within a step", ge=0,
-    )  # fmt: skip
+        0.0,
+        "s",
+        "time between two looks at the heading, a whole number of steps; 0: steering is "
+        "reversed when the heading has changed by `switch`, also within a step",
+        ge=0,
+    )
 
     def slots(self) -> Slots:
         """The side, the heading of the approach, the side at the end of the step, the last look."""
         return each(MEMORY)
 
-    def trial(self) -> Trial:
+    def trial(self) -> ManoeuvreTrial:
         """With the change of heading at which steering is reversed."""
-        return Trial("zig-zag", self.execute, self.switch)
+        return ManoeuvreTrial("zig-zag", self.execute, self.switch)
 
     def sample_period(self) -> float:
         """As often as the heading is looked at."""
@@ -69,7 +72,7 @@ class Zigzag(Steering):
         steering is right.
         """
         side = memory[AT_NEXT]
-        if side == 0.0 and begun(t, k):
+        if side == 0.0 and has_begun(t, k):
             side, memory[AT_HEADING] = 1.0, x[2]
         memory[AT_SIDE] = memory[AT_NEXT] = side
         left = k.switch - side * (x[2] - memory[AT_HEADING])
@@ -83,6 +86,6 @@ class Zigzag(Steering):
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:
         """At the angle, to the side of the moment."""
-        steered(k.angle if memory[AT_NEXT] != 0.0 else 0.0, memory[AT_SIDE], k, tau, signals)
+        steer_thrust(k.angle if memory[AT_NEXT] != 0.0 else 0.0, memory[AT_SIDE], k, tau, signals)
         for i in range(SIZE):
             rate[i] = 0.0

@@ -27,10 +27,8 @@ WAVE_MOTION = (
 # two among its `signals`, one behind the other.
 FLOW = (
     Signal("V_c", "m/s", "speed of the current"),
-    Signal(
-        "beta_c", "rad", "direction that the current flows to", r"\beta_c", wrapped=True
-    ),
-)  # fmt: skip
+    Signal("beta_c", "rad", "direction that the current flows to", r"\beta_c", wrapped=True),
+)
 
 
 # The arguments of a disturbance's kernel.

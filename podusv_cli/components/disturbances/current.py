@@ -41,9 +41,11 @@ class Current(Disturbance):
     interval: float = value(1.0, "s", "between two random numbers", gt=0)
     seed: int = value(1, "", "of the random numbers", ge=0, lt=2**63)
     form: Literal["irrotational", "no_acceleration"] = value(
-        "irrotational", "", "no_acceleration leaves out M nu_c', as some papers do; then a hull "
+        "irrotational",
+        "",
+        "no_acceleration leaves out M nu_c', as some papers do; then a hull "
         "that turns feels the ground",
-    )  # fmt: skip
+    )
 
     @property
     def signals(self) -> tuple[Signal, ...]:

@@ -45,7 +45,7 @@ class FromFile(Disturbance):
         return rows
 
     @model_validator(mode="after")
-    def _given(self) -> Self:
+    def _check_content(self) -> Self:
         if not self.rows:
             raise ValueError("file is missing; name a CSV file with columns t, b_u, b_v, b_r")
         return self

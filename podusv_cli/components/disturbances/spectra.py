@@ -192,7 +192,7 @@ def whole_groups(count: int) -> int:
 
 
 @kernel
-def cleared(count: int, sums: Vector) -> None:
+def clear_sums(count: int, sums: Vector) -> None:
     """Set all partial sums to 0."""
     for i in range(count):
         sums[i] = 0.0

@@ -11,12 +11,20 @@ import numpy as np
 
 from podusv_cli.components.disturbances.base import ARGUMENTS, Disturbance
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.kernel import Vector, constants_type, kernel, scratch, shared, tail, taken
+from podusv_cli.core.kernel import (
+    Vector,
+    arguments_of,
+    constants_type,
+    kernel,
+    scratch,
+    shared,
+    tail,
+)
 from podusv_cli.core.plugins import TEXT
 from podusv_cli.core.signal import Signal
 
 
-class Part(NamedTuple):
+class SumPart(NamedTuple):
     """What the kernel of the sum has to know of a part."""
 
     evaluate: Callable[..., None]
@@ -64,10 +72,12 @@ class Total(Disturbance):
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """The kernel of the sum."""
-        return _sum(tuple(
-            Part(part.kernel_with(vessel), tuple(part.constants_with(vessel)), places)
-            for part, places in zip(self.parts, self._places(), strict=True)
-        ))  # fmt: skip
+        return _sum(
+            tuple(
+                SumPart(part.kernel_with(vessel), tuple(part.constants_with(vessel)), places)
+                for part, places in zip(self.parts, self._places(), strict=True)
+            )
+        )
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
         """Those of all parts, each with the part's position in front."""
@@ -109,7 +119,7 @@ class Total(Disturbance):
 
 
 @cache
-def _sum(parts: Sequence[Part]) -> Callable[..., None]:
+def _sum(parts: Sequence[SumPart]) -> Callable[..., None]:
     """The kernel that adds up the loads of these parts.
 
     Its source is written out, because compiled code cannot choose between functions.
@@ -128,12 +138,12 @@ def _sum(parts: Sequence[Part]) -> Callable[..., None]:
     return kernel(scope["evaluate"])  # type: ignore[no-any-return]
 
 
-def _lines(i: int, part: Part, written: Set[int], alone: bool) -> Iterator[str]:
+def _lines(i: int, part: SumPart, written: Set[int], alone: bool) -> Iterator[str]:
     """What the kernel of the sum does for a part. One whose signals add up does not find them."""
     given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
     own = {"k": f"Constants{i}({given})", "table": f"tail(table, begin{i})", "b": f"load{i}"}
     own |= {} if alone else {"again": "0.0"}
-    passed = (own.get(a, a) for a in taken(part.evaluate, ARGUMENTS))
+    passed = (own.get(a, a) for a in arguments_of(part.evaluate, ARGUMENTS))
     yield f"    load{i} = scratch({3 + len(part.places)})"
     yield f"    begin{i} = int(shared(table[{i}]))"
     for j, place in enumerate(part.places):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from podusv_cli.components.disturbances.spectra import GROUP, cleared
+from podusv_cli.components.disturbances.spectra import GROUP, clear_sums
 from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
 from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, widest
 
@@ -16,7 +16,7 @@ PAIRS, LONG_ROOM, FACES, SHORT_ROOM = 4 * LANES, 9 * LANES, 8 * LANES, 15 * LANE
 
 
 @kernel
-def _added(sums: Vector, which: int) -> float:
+def _add_parts(sums: Vector, which: int) -> float:
     """One sum from its eight parts."""
     at = which * LANES
     low = (sums[at] + sums[at + 1]) + (sums[at + 2] + sums[at + 3])
@@ -27,7 +27,7 @@ def _added(sums: Vector, which: int) -> float:
 @kernel
 def _square(sums: Vector, which: int) -> float:
     """Squared magnitude of an envelope."""
-    c, s = _added(sums, which), _added(sums, which + 1)
+    c, s = _add_parts(sums, which), _add_parts(sums, which + 1)
     return c * c + s * s
 
 
@@ -67,7 +67,9 @@ def long_crested(
 
 
 @kernel
-def _reflected(j: int, i: int, c: float, s: float, count: int, table: Vector, sums: Vector) -> None:
+def _add_reflected(
+    j: int, i: int, c: float, s: float, count: int, table: Vector, sums: Vector
+) -> None:
     """Add to the envelopes of what bow or stern and what the sides reflect of a component."""
     ends, sides = table[6 * count + i], table[7 * count + i]
     sums[j] += ends * c
@@ -81,28 +83,34 @@ def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float,
     """Their squared magnitudes. Sums lie in the kernel of their loop, or it gets no vector code."""
     count, sums = int(k.lanes), scratch(PAIRS)
     widest()
-    cleared(PAIRS, sums)
+    clear_sums(PAIRS, sums)
     for block in range(count // GROUP):
         for j in range(LANES):
             for half in range(2):
                 i = block * GROUP + half * LANES + j
                 c, s = _wave(t, way, i, count, table)
-                _reflected(j, i, c, s, count, table, sums)
+                _add_reflected(j, i, c, s, count, table, sums)
     return _square(sums, 0), _square(sums, 2)
 
 
 @kernel
 def _long_motion(
-    t: float, x: Vector, way: float, c_gamma: float, s_gamma: float, k: Any, table: Vector,
+    t: float,
+    x: Vector,
+    way: float,
+    c_gamma: float,
+    s_gamma: float,
+    k: Any,
+    table: Vector,
     b: Vector,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """Put first-order motion, its velocity and the elevation into b; as `_long_envelopes`."""
     count, sums = int(k.lanes), scratch(LONG_ROOM)
     slow = k.long2 * c_gamma * c_gamma + k.wide2 * s_gamma * s_gamma
     both, speed = c_gamma * s_gamma, (c_gamma * x[3] + s_gamma * x[4]) / TURN
     turning = 4.0 * (k.long2 - k.wide2) * both * x[5] / TURN
     widest()
-    cleared(LONG_ROOM, sums)
+    clear_sums(LONG_ROOM, sums)
     for block in range(count // GROUP):
         for j in range(LANES):
             for half in range(2):
@@ -113,19 +121,19 @@ def _long_motion(
                 part = 1.0 / (1.0 + slow * square)
                 c_felt, s_felt = c * part * part, s * part * part
                 met, fading = table[i] - number * speed, turning * square * part
-                _reflected(j, i, c, s, count, table, sums)
+                _add_reflected(j, i, c, s, count, table, sums)
                 sums[4 * LANES + j] += s_felt
                 sums[5 * LANES + j] += c_felt * number
                 sums[6 * LANES + j] += c_felt * met - s_felt * fading
                 sums[7 * LANES + j] -= (s_felt * met + c_felt * fading) * number
                 sums[8 * LANES + j] += c
-    moved, rate = k.motion * _added(sums, 4), k.motion * TURN * _added(sums, 6)
+    moved, rate = k.motion * _add_parts(sums, 4), k.motion * TURN * _add_parts(sums, 6)
     b[3], b[4] = moved * k.c_beta, moved * k.s_beta
-    b[5] = -k.motion * c_gamma * s_gamma * _added(sums, 5)
+    b[5] = -k.motion * c_gamma * s_gamma * _add_parts(sums, 5)
     turned = s_gamma * s_gamma - c_gamma * c_gamma
     _hull_axes(rate * k.c_beta, rate * k.s_beta, x, b)
-    b[8] = -k.motion * (both * TURN * _added(sums, 7) + turned * x[5] * _added(sums, 5))
-    b[9] = _added(sums, 8)
+    b[8] = -k.motion * (both * TURN * _add_parts(sums, 7) + turned * x[5] * _add_parts(sums, 5))
+    b[9] = _add_parts(sums, 8)
     return _square(sums, 0), _square(sums, 2)
 
 
@@ -146,9 +154,16 @@ def short_crested(
 
 @kernel
 def _facing(
-    j: int, i: int, c: float, s: float, c_gamma: float, s_gamma: float, count: int, table: Vector,
+    j: int,
+    i: int,
+    c: float,
+    s: float,
+    c_gamma: float,
+    s_gamma: float,
+    count: int,
+    table: Vector,
     sums: Vector,
-) -> None:  # fmt: skip
+) -> None:
     """Add to the envelopes of what is reflected ahead, astern, to port and to starboard."""
     ends, sides = table[6 * count + i], table[7 * count + i]
     ahead, astern = ends * max(c_gamma, 0.0), ends * max(-c_gamma, 0.0)
@@ -177,7 +192,7 @@ def _short_envelopes(
     """The drift load alone."""
     count, sums, north, east = int(k.lanes), scratch(FACES), x[0] / TURN, x[1] / TURN
     widest()
-    cleared(FACES, sums)
+    clear_sums(FACES, sums)
     for block in range(count // GROUP):
         for j in range(LANES):
             for half in range(2):
@@ -197,7 +212,7 @@ def _short_motion(
     count, sums, north, east = int(k.lanes), scratch(SHORT_ROOM), x[0] / TURN, x[1] / TURN
     turning = 4.0 * (k.long2 - k.wide2) * x[5]
     widest()
-    cleared(SHORT_ROOM, sums)
+    clear_sums(SHORT_ROOM, sums)
     for block in range(count // GROUP):
         for j in range(LANES):
             for half in range(2):
@@ -223,8 +238,8 @@ def _short_motion(
                 sums[13 * LANES + j] += rate * s_beta
                 sums[14 * LANES + j] += (turned - fall * both) * number
     _drift(sums, k, b)
-    b[3], b[4] = k.motion * _added(sums, 9), k.motion * _added(sums, 10)
-    b[5] = -k.motion * _added(sums, 11)
-    _hull_axes(k.motion * _added(sums, 12), k.motion * _added(sums, 13), x, b)
-    b[8] = -k.motion * _added(sums, 14)
-    b[9] = _added(sums, 8)
+    b[3], b[4] = k.motion * _add_parts(sums, 9), k.motion * _add_parts(sums, 10)
+    b[5] = -k.motion * _add_parts(sums, 11)
+    _hull_axes(k.motion * _add_parts(sums, 12), k.motion * _add_parts(sums, 13), x, b)
+    b[8] = -k.motion * _add_parts(sums, 14)
+    b[9] = _add_parts(sums, 8)

@@ -42,13 +42,13 @@ from pydantic import Field, model_validator
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import WAVE_MOTION, Disturbance
-from podusv_cli.components.disturbances.reflection import BOW_AND_STERN, SIDES, Curve, reflected
-from podusv_cli.components.disturbances.torsethaugen import (
-    HIGHEST,
-    LONGEST,
-    peaks,
-    torsethaugen,
+from podusv_cli.components.disturbances.reflection import (
+    BOW_AND_STERN,
+    SIDES,
+    ReflectionCurve,
+    interpolate_shares,
 )
+from podusv_cli.components.disturbances.torsethaugen import HIGHEST, LONGEST, peaks, torsethaugen
 from podusv_cli.components.disturbances.wave_kernels import TURN, long_crested, short_crested
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import Rule, value
@@ -74,9 +74,11 @@ Share = Literal["curve"] | Annotated[float, Field(ge=0, le=1)]
 ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\zeta")
 
 
-def _shares(chosen: Share, curve: Curve, size: Vector) -> Vector:
+def _shares(chosen: Share, curve: ReflectionCurve, size: Vector) -> Vector:
     """The reflected share of each component."""
-    return reflected(curve, size) if chosen == "curve" else np.full(len(size), float(chosen))
+    return (
+        interpolate_shares(curve, size) if chosen == "curve" else np.full(len(size), float(chosen))
+    )
 
 
 class Waves(Disturbance):
@@ -101,9 +103,11 @@ class Waves(Disturbance):
         0.0, "rad", "where the waves come from: 0 north, pi/2 east", ge=-1e6, le=1e6
     )
     spectrum: Literal["jonswap", "ittc", "torsethaugen"] = value(
-        "jonswap", "", "JONSWAP, the ITTC's modified Pierson-Moskowitz spectrum, or Torsethaugen's "
+        "jonswap",
+        "",
+        "JONSWAP, the ITTC's modified Pierson-Moskowitz spectrum, or Torsethaugen's "
         "of a wind sea and a swell at full scale",
-    )  # fmt: skip
+    )
     gamma: float = value(3.3, "", "peakedness of the JONSWAP spectrum", ge=1, le=7)
     spreading: int = value(
         0, "", "n of the directions' density cos^2n; 0: all waves in one direction", ge=0, le=50
@@ -112,9 +116,11 @@ class Waves(Disturbance):
         FEWEST, "", "how many cosines; one is a regular wave of exactly this period"
     )
     amplitudes: spectra.Amplitudes = value(
-        "random", "", "of the components: drawn, so that the height scatters between seeds as a "
+        "random",
+        "",
+        "of the components: drawn, so that the height scatters between seeds as a "
         "sea's does, or those of the spectrum for every seed",
-    )  # fmt: skip
+    )
     lowest: float = value(
         0.5, "", "least frequency of a component, in terms of the peak's", gt=0, le=1e3
     )
@@ -123,16 +129,16 @@ class Waves(Disturbance):
     )
     motion: float = value(1.0, "", "factor on first-order motion; 0: none", ge=0)
     reflection_u: Share = value(
-        "curve", "", "share of a wave's amplitude that bow and stern reflect; `curve`: by the "
+        "curve",
+        "",
+        "share of a wave's amplitude that bow and stern reflect; `curve`: by the "
         "length of each wave, as strip theory has it for two ships",
-    )  # fmt: skip
+    )
     reflection_v: Share = value(
         "curve", "", "share of a wave's amplitude that the sides reflect, likewise"
     )
     drift_arm: float = value(0.0, "m", "where the drift force in sway acts, ahead of the origin")
-    seed: int = value(
-        1, "", "of rates, phases, amplitudes and directions", ge=0, lt=2**63
-    )  # fmt: skip
+    seed: int = value(1, "", "of rates, phases, amplitudes and directions", ge=0, lt=2**63)
 
     @model_validator(mode="after")
     def _has_waves(self) -> Self:
@@ -143,7 +149,7 @@ class Waves(Disturbance):
             )
         if self.spectrum == "torsethaugen":
             self._suits_torsethaugen()
-        kept = self._kept()
+        kept = self._kept_share()
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
@@ -161,7 +167,7 @@ class Waves(Disturbance):
                 f"the torsethaugen spectrum holds up to {HIGHEST:g} m and below {LONGEST:g} s, "
                 f"found {self.height:g} m and {self.period:g} s"
             )
-        kept = self._kept()
+        kept = self._kept_share()
         if kept < BOTH:
             ratio = self.period / peaks(self.height, self.period)[1].period
             bound = f"lowest {0.6 * ratio:.2g}" if ratio < 1.0 else f"highest {3.0 * ratio:.2g}"
@@ -219,7 +225,7 @@ class Waves(Disturbance):
     def _density(self, rate: Vector) -> Vector:
         return DENSITY[self.spectrum](self, rate)
 
-    def _kept(self) -> float:
+    def _kept_share(self) -> float:
         """The share of the spectrum's energy that the cut-offs leave."""
         edges = spectra.even_edges(*self._band, BINS)
         return math.fsum(spectra.in_bins(self._density, edges)) / (self.height / 4.0) ** 2
@@ -248,8 +254,15 @@ class Waves(Disturbance):
         sides = _shares(self.reflection_v, SIDES, number * vessel.beam)
         rows = np.zeros((8, spectra.whole_groups(count)))
         rows[:, :count] = (
-            rate / TURN, drawn.phase / TURN, number, drawn.amplitude, c, s, ends, sides,
-        )  # fmt: skip
+            rate / TURN,
+            drawn.phase / TURN,
+            number,
+            drawn.amplitude,
+            c,
+            s,
+            ends,
+            sides,
+        )
         return rows.ravel()
 
     @property
@@ -262,12 +275,16 @@ class Waves(Disturbance):
         pressure = 0.5 * spectra.WATER * spectra.GRAVITY
         c_beta, s_beta = cos_sin(self._travel)
         return {
-            "lanes": float(spectra.whole_groups(self.components)), "motion": self.motion,
-            "c_beta": float(c_beta), "s_beta": float(s_beta),
-            "long2": vessel.length**2 / 48.0, "wide2": vessel.beam**2 / 48.0,
-            "drift_u": pressure * vessel.beam, "drift_v": pressure * vessel.length,
+            "lanes": float(spectra.whole_groups(self.components)),
+            "motion": self.motion,
+            "c_beta": float(c_beta),
+            "s_beta": float(s_beta),
+            "long2": vessel.length**2 / 48.0,
+            "wide2": vessel.beam**2 / 48.0,
+            "drift_u": pressure * vessel.beam,
+            "drift_v": pressure * vessel.length,
             "drift_arm": self.drift_arm,
-        }  # fmt: skip
+        }
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
         """One for waves in one direction, and a slower one for waves in many."""
@@ -287,9 +304,14 @@ class Waves(Disturbance):
     @staticmethod
     @kernel
     def evaluate(
-        t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0,
+        t: float,
+        x: Vector,
+        k: Any,
+        table: Vector,
+        b: Vector,
+        again: float = 0.0,
         stage: float = 0.0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Of long-crested waves; see `kernel_with`."""
         long_crested(t, x, k, table, b, again, stage)
 

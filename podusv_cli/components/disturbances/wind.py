@@ -11,7 +11,7 @@ from pydantic import model_validator
 
 from podusv_cli.components.disturbances import spectra
 from podusv_cli.components.disturbances.base import Disturbance
-from podusv_cli.components.disturbances.spectra import GROUP, cleared
+from podusv_cli.components.disturbances.spectra import GROUP, clear_sums
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
@@ -30,7 +30,7 @@ def _gust(t: float, count: int, table: Vector) -> float:
     """The sum of all components, by sixteen partial sums, in groups of four."""
     sums = scratch(GROUP)
     widest()
-    cleared(GROUP, sums)
+    clear_sums(GROUP, sums)
     for block in range(count // GROUP):
         for j in range(GROUP):
             i = block * GROUP + j
@@ -98,17 +98,23 @@ class Wind(Disturbance):
         10.0, "m", "height at which the wind is taken that acts on the vessel", gt=0, le=1e3
     )
     drag: float = value(
-        0.0026, "", "drag coefficient of the sea's surface, of the profile and the Harris spectrum "
-        "(`norsok` has a profile of its own)", gt=0, le=0.1,
-    )  # fmt: skip
+        0.0026,
+        "",
+        "drag coefficient of the sea's surface, of the profile and the Harris spectrum "
+        "(`norsok` has a profile of its own)",
+        gt=0,
+        le=0.1,
+    )
     gusts: Literal["none", "norsok", "harris"] = value(
         "none", "", "spectrum of the gusts: none, NORSOK (Froya), or Harris"
     )
     components: int = value(50, "", "how many cosines make the gusts", ge=1, le=10_000)
     amplitudes: spectra.Amplitudes = value(
-        "random", "", "of the cosines: drawn, so that gusts scatter between seeds as the wind's "
+        "random",
+        "",
+        "of the cosines: drawn, so that gusts scatter between seeds as the wind's "
         "do, or those of the spectrum for every seed",
-    )  # fmt: skip
+    )
     lowest: float = value(
         1.0 / 600.0, "Hz", "least frequency of a gust; slower changes belong to the mean", gt=0
     )
@@ -186,10 +192,14 @@ class Wind(Disturbance):
             raise ValueError(NO_WINDAGE)
         c, s = cos_sin(self.direction)
         return vessel.windage.constants() | {
-            "length": vessel.length, "mean": self.mean, "density": self.density,
-            "direction": self.direction, "c_from": float(c), "s_from": float(s),
+            "length": vessel.length,
+            "mean": self.mean,
+            "density": self.density,
+            "direction": self.direction,
+            "c_from": float(c),
+            "s_from": float(s),
             "lanes": 0.0 if self.gusts == "none" else float(spectra.whole_groups(self.components)),
-        }  # fmt: skip
+        }
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
         """A vessel without windage, or gusts that the step cannot resolve."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -23,6 +24,16 @@ LOADS = (
     Signal("b_est_psi", "N m", "estimated load, about the vertical", r"b_{est,\psi}"),
 )
 POSE_ALONE = (True, True, True, False, False, False)  # x, y, psi have to be measured
+
+
+def mean_squared_innovation(squares: Vector, counts: Vector) -> float:
+    """NIS: the mean squared innovation over its variance; NaN where nothing was measured.
+
+    `squares` are sums of squared innovations over their variances, one for each measured quantity,
+    and `counts` how many are in each sum, as `Estimator.covariance` lays them out.
+    """
+    count = float(counts.sum())
+    return float(squares.sum()) / count if count else math.nan
 
 
 class Estimator(Component):

@@ -45,24 +45,32 @@ MOVING = 6  # of them, those that something known makes change
 PACKED = N * (N + 1) // 2
 OF_V, OF_R = N + 30, N + 35  # in the filter's state, the variances of v and r
 COVARIANCE = Signal(
-    "P_est", "", "covariance of the estimate's errors and the loads', upper triangle by rows; each "
-    "entry in the product of two units", "P", ("entry",),
-)  # fmt: skip
+    "P_est",
+    "",
+    "covariance of the estimate's errors and the loads', upper triangle by rows; each "
+    "entry in the product of two units",
+    "P",
+    ("entry",),
+)
 
 INNOVATIONS = (
     Signal(
-        "nis_sum", "1", "sum of all squared innovations so far, each over its variance; of x, y, "
-        "psi, u, v, r", axes=("measured",),
-    ),
-    Signal(
-        "nis_count", "1", "how many measured values were taken in so far; of x, y, psi, u, v, r",
+        "nis_sum",
+        "1",
+        "sum of all squared innovations so far, each over its variance; of x, y, psi, u, v, r",
         axes=("measured",),
     ),
-)  # fmt: skip
+    Signal(
+        "nis_count",
+        "1",
+        "how many measured values were taken in so far; of x, y, psi, u, v, r",
+        axes=("measured",),
+    ),
+)
 
 
 @kernel
-def unpacked(packed: Vector, full: Vector) -> None:
+def unpack_triangle(packed: Vector, full: Vector) -> None:
     """A symmetric matrix from its upper triangle."""
     at = 0
     for i in range(N):
@@ -76,7 +84,7 @@ def unpacked(packed: Vector, full: Vector) -> None:
 def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
     """P' = F P + P F^T + Q; F has entries in rows 0 to 5 and columns 2 to 8 alone."""
     full, moved = scratch(81), scratch(81)
-    unpacked(packed, full)
+    unpack_triangle(packed, full)
     for i in range(MOVING):
         for j in range(N):
             total = 0.0
@@ -101,7 +109,7 @@ def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -
     """
     full, ph = scratch(81), scratch(9)
     packed = tail(state, N)
-    unpacked(packed, full)
+    unpack_triangle(packed, full)
     variance = sigma * sigma
     for j in range(N):
         ph[j] = 0.0
@@ -153,10 +161,16 @@ class ExtendedKalmanFilter(Estimator):
 
     kind: Literal["ekf"] = "ekf"
     rules: ClassVar[dict[str, Rule]] = {
-        "q_b": by.FORCE, "q_b_psi": by.MOMENT, "sigma_b": by.FORCE, "sigma_b_psi": by.MOMENT,
-        "sigma_p": by.noise(0), "sigma_psi": by.noise(2), "sigma_u": by.noise(3),
-        "sigma_v": by.noise(4), "sigma_r": by.noise(5),
-    }  # fmt: skip
+        "q_b": by.FORCE,
+        "q_b_psi": by.MOMENT,
+        "sigma_b": by.FORCE,
+        "sigma_b_psi": by.MOMENT,
+        "sigma_p": by.noise(0),
+        "sigma_psi": by.noise(2),
+        "sigma_u": by.noise(3),
+        "sigma_v": by.noise(4),
+        "sigma_r": by.noise(5),
+    }
     bias: bool = value(True, "", "whether it estimates a load, too")
     q_u: float = value(0.02, "m/s2/sqrt(Hz)", "unexplained surge acceleration", ge=0)
     q_v: float = value(0.02, "m/s2/sqrt(Hz)", "unexplained sway acceleration", ge=0)
@@ -176,9 +190,7 @@ class ExtendedKalmanFilter(Estimator):
     def states(self) -> tuple[Signal, ...]:
         """The estimate, the load, the covariance, the innovations."""
         sums, counts = INNOVATIONS
-        return (
-            *ESTIMATE, *LOADS, *[COVARIANCE] * PACKED, *[sums] * MOVING, *[counts] * MOVING,
-        )  # fmt: skip
+        return (*ESTIMATE, *LOADS, *[COVARIANCE] * PACKED, *[sums] * MOVING, *[counts] * MOVING)
 
     @property
     def covariance(self) -> tuple[int, int]:

@@ -38,13 +38,7 @@ from pydantic import model_validator
 
 from podusv_cli.components.estimators.base import ESTIMATE, LOADS, POSE_ALONE, Estimator
 from podusv_cli.components.measurements.base import FRESH, VALUE
-from podusv_cli.components.vessels.plant import (
-    lacking,
-    plant,
-    surge_force,
-    sway_force,
-    yaw_moment,
-)
+from podusv_cli.components.vessels.plant import lacking, plant, surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -82,7 +76,7 @@ def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rat
 
 
 @kernel
-def simplified(state: Vector, k: Any, b: Vector) -> None:
+def add_nonlinear_forces(state: Vector, k: Any, b: Vector) -> None:
     """Add to the load what leaves linear damping alone of the nominal vessel's forces."""
     u, v, r = state[3], state[4], state[5]
     less = lacking(u, v, r, k)
@@ -131,11 +125,14 @@ class PassiveObserver(Estimator):
         notch, stiff = 2.0 * (self.zeta_n - self.lambda_w), self.omega_c * self.omega_v
         force, moment = stiff * (nominal.m11 + nominal.m22) / 2.0, stiff * nominal.m33
         return super().constants_with(nominal) | {
-            "K_11": -notch * self.omega_c / self.omega_0, "K_12": notch * self.omega_0,
+            "K_11": -notch * self.omega_c / self.omega_0,
+            "K_12": notch * self.omega_0,
             "K_2": self.omega_c,
-            "K_3": self.omega_b * force, "K_3_psi": self.omega_b * moment,
-            "K_4": force, "K_4_psi": moment,
-        }  # fmt: skip
+            "K_3": self.omega_b * force,
+            "K_3_psi": self.omega_b * moment,
+            "K_4": force,
+            "K_4_psi": moment,
+        }
 
     @staticmethod
     @kernel
@@ -162,7 +159,7 @@ class PassiveObserver(Estimator):
         b[1] = cosine * east - sine * north
         b[2] = state[LOAD + 2] + k.K_4_psi * e_psi
         if k.model != 0.0:
-            simplified(state, k, b)
+            add_nonlinear_forces(state, k, b)
         plant(state, tau, b, k, rate)
         u, v = state[3], state[4]
         axis(0, cosine * u - sine * v, e_x, k.K_3, state, k, rate)

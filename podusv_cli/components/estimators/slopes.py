@@ -41,7 +41,9 @@ def force_slopes(
 
 
 @kernel
-def accelerated(column: int, surge: float, sway: float, yaw: float, k: Any, f: Vector) -> None:
+def accelerate_column(
+    column: int, surge: float, sway: float, yaw: float, k: Any, f: Vector
+) -> None:
     """Put M^-1 (surge, sway, yaw) into rows 3 to 5 of a column of F."""
     determinant = k.m22 * k.m33 - k.m23 * k.m32
     f[3 * WIDTH + column] = surge / k.m11
@@ -51,9 +53,15 @@ def accelerated(column: int, surge: float, sway: float, yaw: float, k: Any, f: V
 
 @kernel
 def slopes(
-    state: Vector, unsure_v: float, unsure_r: float, b: Vector, cosine: float, sine: float, k: Any,
+    state: Vector,
+    unsure_v: float,
+    unsure_r: float,
+    b: Vector,
+    cosine: float,
+    sine: float,
+    k: Any,
     f: Vector,
-) -> None:  # fmt: skip
+) -> None:
     """Rows 0 to 5 of F: derivatives of the rates of (x, y, psi, u, v, r); b is in the body frame.
 
     By the heading, R^T b has the derivative (b_v, -b_u, 0). `unsure` are variances of v and r.
@@ -67,8 +75,8 @@ def slopes(
     f[2 * WIDTH + 5] = 1.0
     force_slopes(u, v, r, unsure_v, unsure_r, k, s)
     for i in range(3):
-        accelerated(3 + i, s[i], s[3 + i], s[6 + i], k, f)
-    accelerated(2, b[1], -b[0], 0.0, k, f)
-    accelerated(6, cosine, -sine, 0.0, k, f)
-    accelerated(7, sine, cosine, 0.0, k, f)
-    accelerated(8, 0.0, 0.0, 1.0, k, f)
+        accelerate_column(3 + i, s[i], s[3 + i], s[6 + i], k, f)
+    accelerate_column(2, b[1], -b[0], 0.0, k, f)
+    accelerate_column(6, cosine, -sine, 0.0, k, f)
+    accelerate_column(7, sine, cosine, 0.0, k, f)
+    accelerate_column(8, 0.0, 0.0, 1.0, k, f)

@@ -109,9 +109,11 @@ class Sensors(Measurement):
     def instruments(self) -> dict[str, tuple[Sensor | None, int]]:
         """Each sensor by its key, and how many quantities it has, in the order of the state."""
         return {
-            "position": (self.position, 2), "heading": (self.heading, 1),
-            "velocity": (self.velocity, 2), "yaw_rate": (self.yaw_rate, 1),
-        }  # fmt: skip
+            "position": (self.position, 2),
+            "heading": (self.heading, 1),
+            "velocity": (self.velocity, 2),
+            "yaw_rate": (self.yaw_rate, 1),
+        }
 
     def measured(self) -> tuple[bool, ...]:
         """Which of x, y, psi, u, v, r have a sensor."""
@@ -198,7 +200,7 @@ class Sensors(Measurement):
                 if sampled == int(sampled):
                     moved = b[int(k.motion) + i] if k.motion > 0.0 else 0.0
                     sample = x[i] + moved + table[int(shared(head[ERRORS])) + int(sampled)]
-                    waiting[int(sampled) % room] = rounded(sample, head[RESOLUTION])
+                    waiting[int(sampled) % room] = round_to(sample, head[RESOLUTION])
                 if delivered >= 0.0 and delivered == int(delivered):
                     sample = waiting[int(delivered) % room]
                     if not math.isnan(sample):
@@ -207,7 +209,7 @@ class Sensors(Measurement):
 
 
 @kernel
-def rounded(number: float, resolution: float) -> float:
+def round_to(number: float, resolution: float) -> float:
     """The nearest multiple of the resolution; the number itself for a resolution of 0."""
     if resolution > 0.0:
         return float(((number / resolution + ROUND) - ROUND) * resolution)

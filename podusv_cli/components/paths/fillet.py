@@ -67,6 +67,8 @@ class Fillet:
     def constants(self, place: int) -> dict[str, float]:
         """What the kernel reads from `k`, where `rows` begin at `place` of the path's table."""
         return {
-            "fillet": self.time, "fillet_period": self.period,
-            "fillet_corners": float(len(self.times)), "fillet_place": float(place),
-        }  # fmt: skip
+            "fillet": self.time,
+            "fillet_period": self.period,
+            "fillet_corners": float(len(self.times)),
+            "fillet_place": float(place),
+        }

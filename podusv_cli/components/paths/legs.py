@@ -69,12 +69,14 @@ class Legs(Path):
         2.0, "m", "distance to a waypoint within which the next leg becomes active", gt=0
     )
     switch: Literal["circle", "passed"] = value(
-        "circle", "", "when the next leg becomes active: within the acceptance radius of its first "
+        "circle",
+        "",
+        "when the next leg becomes active: within the acceptance radius of its first "
         "waypoint (circle), or also where the vessel is past the end of its leg (passed)",
-    )  # fmt: skip
+    )
 
     @model_validator(mode="after")
-    def _travelled(self) -> Self:
+    def _check_way(self) -> Self:
         self._traveller()
         return self
 

@@ -64,16 +64,21 @@ class Waypoints(Path):
         "spline", "", "between the points: a smooth spline, or straight lines with corners"
     )
     fillet: float = value(
-        0.0, "s", "the law sees each corner of straight legs as a parabola of this duration, half "
-        "of it before the corner; log and metrics have the corner. 0: it sees the corner", ge=0,
-    )  # fmt: skip
+        0.0,
+        "s",
+        "the law sees each corner of straight legs as a parabola of this duration, half "
+        "of it before the corner; log and metrics have the corner. 0: it sees the corner",
+        ge=0,
+    )
     after: Literal["continue", "stop", "loop"] = value(
-        "continue", "", "after the last point: straight on, a stop, or from there to the first "
+        "continue",
+        "",
+        "after the last point: straight on, a stop, or from there to the first "
         "point and round again",
-    )  # fmt: skip
+    )
 
     @model_validator(mode="after")
-    def _travelled(self) -> Self:
+    def _check_way(self) -> Self:
         if len(self.points) < 2:
             raise ValueError(f"needs at least two points, has {len(self.points)}")
         with np.errstate(all="ignore"):

@@ -18,9 +18,12 @@ class Envelope(Component):
     source: str = value("", "", "where the numbers come from")
     speed: float = value(..., "m/s", "largest speed", gt=0)
     drift: float = value(
-        ..., "rad", f"largest drift angle |atan2(v, |u|)|, above {AT_REST:g} of the largest speed",
-        gt=0, le=math.pi,
-    )  # fmt: skip
+        ...,
+        "rad",
+        f"largest drift angle |atan2(v, |u|)|, above {AT_REST:g} of the largest speed",
+        gt=0,
+        le=math.pi,
+    )
     yaw_rate: float = value(..., "rad/s", "largest yaw rate, either way", gt=0)
 
     def shares(self, u: Vector, v: Vector, r: Vector) -> dict[str, Vector]:

@@ -25,9 +25,14 @@ HOERNER = (
 )
 # The root mean square of the logarithm of estimate over known number on those hulls.
 SCATTER = {
-    "I_z": 0.44, "X_udot": 0.86, "Y_vdot": 1.2, "N_rdot": 0.86, "surge_damping": 0.64,
-    "sway_damping": 1.3, "yaw_damping": 1.3,
-}  # fmt: skip
+    "I_z": 0.44,
+    "X_udot": 0.86,
+    "Y_vdot": 1.2,
+    "N_rdot": 0.86,
+    "surge_damping": 0.64,
+    "sway_damping": 1.3,
+    "yaw_damping": 1.3,
+}
 
 
 class Hull(NamedTuple):
@@ -73,7 +78,7 @@ class Hull(NamedTuple):
         return 0.5 * min(self.top_speed, self.slow)
 
 
-def estimated(hull: Hull) -> dict[str, float]:
+def estimate_vessel(hull: Hull) -> dict[str, float]:
     """Numbers of `Vessel` by name; the linear damping in sway and yaw is that at `hull.cruise`.
 
     - `I_z`: a radius of gyration of 0.25 L.

@@ -60,9 +60,13 @@ class Vessel(Component):
     N_vr: float = _damping("kg m", "yaw, times |v|r")
     N_rr: float = _damping("kg m2", "yaw, times |r|r")
     coriolis: float = value(
-        1.0, "", "share of the Coriolis and centripetal terms in the motion, 0 for a model without "
-        "any; laws count on all of them", ge=0, le=1,
-    )  # fmt: skip
+        1.0,
+        "",
+        "share of the Coriolis and centripetal terms in the motion, 0 for a model without "
+        "any; laws count on all of them",
+        ge=0,
+        le=1,
+    )
     windage: Windage | None = value(
         None, "", "what the wind acts on; without it the vessel is in no wind"
     )

@@ -87,10 +87,13 @@ class ClosedLoop:
     def parts(self) -> dict[str, Component]:
         """Those that kernels belong to, as `Plan.constants` calls them."""
         return {
-            "path": self.path, "disturbance": self.disturbance, "law": self.controller,
-            "actuator": self.actuator, "measurement": self.measurement,
+            "path": self.path,
+            "disturbance": self.disturbance,
+            "law": self.controller,
+            "actuator": self.actuator,
+            "measurement": self.measurement,
             "estimator": self.estimator,
-        }  # fmt: skip
+        }
 
     @property
     def measured(self) -> bool:
@@ -154,7 +157,7 @@ class ClosedLoop:
         if texts:
             raise LawError("; ".join(texts))
 
-    def estimated(self) -> tuple[Signal, ...]:
+    def estimate_signals(self) -> tuple[Signal, ...]:
         """The estimator's states; none where the law is given the state itself."""
         return self.estimator.states if self.measured else ()
 
@@ -169,6 +172,6 @@ class ClosedLoop:
         others = (
             *((partial(describe, part), signals) for part, signals in self.disturbance.told()),
             (partial(describe, self.measurement), self.measurement.signals),
-            (partial(describe, self.estimator), self.estimated()),
+            (partial(describe, self.estimator), self.estimate_signals()),
         )
         return signal.by_name((loop, path, (partial(describe, law), law.declared()), own, *others))

@@ -18,14 +18,7 @@ from podusv_cli.core.kernel import call as call_kernel
 from podusv_cli.core.recording import Allocate
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import whole_steps
-from podusv_cli.engine.loop.closed_loop import (
-    DEMAND,
-    LOADS,
-    STATE,
-    ClosedLoop,
-    Probe,
-    nothing,
-)
+from podusv_cli.engine.loop.closed_loop import DEMAND, LOADS, STATE, ClosedLoop, Probe, nothing
 from podusv_cli.engine.loop.recent import Recent
 from podusv_cli.engine.step.delay_line import delay_line
 from podusv_cli.engine.step.grid import TimeGrid
@@ -38,9 +31,12 @@ AT_START = (0.0,)  # s
 
 # The component of each function that is no component's only one
 OWNERS = {
-    "locate": "path", "sample": "law", "after_saturation": "law", "correct": "estimator",
+    "locate": "path",
+    "sample": "law",
+    "after_saturation": "law",
+    "correct": "estimator",
     "follow": "estimator",
-}  # fmt: skip
+}
 
 
 FOLLOWS = ("states", "row", "layout", "functions")  # from a plan's `outline`
@@ -119,21 +115,27 @@ class Plan:
         loop = self.loop
         slots = [part.name for part, size in loop.controller.slots() for _ in range(size)]
         return {
-            "vessel": [*STATE], "actuator": _names(loop.actuator.states),
-            "estimator": _names(loop.estimated()), "path": _names(loop.path.places), "law": slots,
-        }  # fmt: skip
+            "vessel": [*STATE],
+            "actuator": _names(loop.actuator.states),
+            "estimator": _names(loop.estimate_signals()),
+            "path": _names(loop.path.places),
+            "law": slots,
+        }
 
     @cached_property
     def row(self) -> dict[str, list[str]]:
         """Names of what is computed at every instant, by part in the order of the row."""
         loop = self.loop
         return {
-            "target": [*TARGET, "z_e"], "law": _names(loop.controller.signals), "demand": [*DEMAND],
-            "forces": [*FORCES], "sea": [*SEA, *_names(loop.disturbance.signals)],
+            "target": [*TARGET, "z_e"],
+            "law": _names(loop.controller.signals),
+            "demand": [*DEMAND],
+            "forces": [*FORCES],
+            "sea": [*SEA, *_names(loop.disturbance.signals)],
             "actuator": _names(loop.actuator.signals_with),
             "measurement": _names(loop.measurement.signals),
             "shown": [*SHOWN] if self.recall(loop.path.fillet_for_law) else [],
-        }  # fmt: skip
+        }
 
     @cached_property
     def names(self) -> list[str]:
@@ -147,18 +149,30 @@ class Plan:
         loop, grid = self.loop, self.grid
         s, row, flow = _offsets(self.states), _offsets(self.row), self._of_sea(FLOW[0])
         return Layout(
-            states=s["end"], estimate=s["estimator"] if loop.measured else 0, place=s["path"],
-            memory=s["law"], shown=row["shown"] if self.row["shown"] else 0,
-            signals=row["law"], demand=row["demand"], tau=row["forces"],
-            b=row["sea"], flow=row["sea"] + flow if flow and loop.actuator.feels_motion else 0,
-            flags=row["actuator"], sensed=row["measurement"], columns=row["end"],
-            steps=grid.steps, log_every=grid.log_every, hold_every=grid.hold_every,
+            states=s["end"],
+            estimate=s["estimator"] if loop.measured else 0,
+            place=s["path"],
+            memory=s["law"],
+            shown=row["shown"] if self.row["shown"] else 0,
+            signals=row["law"],
+            demand=row["demand"],
+            tau=row["forces"],
+            b=row["sea"],
+            flow=row["sea"] + flow if flow and loop.actuator.feels_motion else 0,
+            flags=row["actuator"],
+            sensed=row["measurement"],
+            columns=row["end"],
+            steps=grid.steps,
+            log_every=grid.log_every,
+            hold_every=grid.hold_every,
             sample_every=_sample_steps(loop.controller, grid),
-            measured=int(loop.measured), update_first=int(grid.update_first),
-            follows=int(loop.path.follows), load_of_time=int(loop.disturbance.of_time),
+            measured=int(loop.measured),
+            update_first=int(grid.update_first),
+            follows=int(loop.path.follows),
+            load_of_time=int(loop.disturbance.of_time),
             wants_loads=int(loop.controller.wants_loads()),
             by_delay_line=int(loop.actuator.by_delay_line),
-        )  # fmt: skip
+        )
 
     def _of_sea(self, signal: Signal) -> int:
         """Where a disturbance writes a signal, behind its load; 0 where it does not."""
@@ -182,7 +196,7 @@ class Plan:
             "correct": estimator.correct if loop.measured else nothing,
             "follow": estimator.follow if loop.measured else nothing,
             "probe": self.probe.watch,
-        }  # fmt: skip
+        }
         return tuple(  # what does nothing reads nothing: its code is one for all
             Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
             for part, inner in zip(Parts._fields, Parts(**kernels), strict=True)
@@ -217,7 +231,7 @@ class Plan:
             "estimator": recall(loop.estimator.constants_with, loop.nominal),
             "vessel": recall(loop.vessel.constants),
             "probe": recall(self.probe.constants_for, loop),
-        }  # fmt: skip
+        }
 
     @property
     def path_constants(self) -> dict[str, float]:
@@ -277,25 +291,31 @@ class Plan:
         sea, end = loop.disturbance, grid.steps * grid.step
         numbers = {part: _numbers(constants) for part, constants in self.constants.items()}
         begun = {
-            "vessel": start, "actuator": recall(loop.actuator.rest),
+            "vessel": start,
+            "actuator": recall(loop.actuator.rest),
             "estimator": estimator.start(start, loop.nominal) if loop.measured else np.zeros(0),
-            "path": np.zeros(len(loop.path.places)), "law": self.first_memory,
-        }  # fmt: skip
+            "path": np.zeros(len(loop.path.places)),
+            "law": self.first_memory,
+        }
         return Vectors(
-            **numbers, path_table=self.path_table,
+            **numbers,
+            path_table=self.path_table,
             disturbance_table=recall(sea.table_for, loop.vessel, end),
             law_table=self.law_table.copy(),  # a session writes to it
             actuator_table=recall(loop.actuator.table_with, law.commands()),
             measurement_table=recall(loop.measurement.table_for, grid.step, grid.steps),
             estimator_table=recall(estimator.table),
             s=np.concatenate([begun[part] for part in self.states]),
-            row=np.zeros(layout.columns + BEFORE), stages=np.zeros(5 * layout.states),
+            row=np.zeros(layout.columns + BEFORE),
+            stages=np.zeros(5 * layout.states),
             sensed=loop.measurement.first(start, grid.step),
             delay_line=delay_line(loop.actuator.delay(), grid),
-            held=np.zeros(HELD_SIGNALS + len(law.signals)), work=np.zeros(law.workspace()),
-            seen=self.probe.first(), under_way=np.zeros(2),
+            held=np.zeros(HELD_SIGNALS + len(law.signals)),
+            work=np.zeros(law.workspace()),
+            seen=self.probe.first(),
+            under_way=np.zeros(2),
             log=allocate(rows * layout.width),
-        )  # fmt: skip
+        )
 
 
 def _kinds(loop: ClosedLoop) -> str:

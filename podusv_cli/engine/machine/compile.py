@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, cast
 
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.engine.machine import finish, object_cache, shipped, signatures
-from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported
+from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported_construct
 from podusv_cli.process.interrupts import interrupts_deferred
 from podusv_cli.process.workers import available_workers, run_all
 
@@ -59,7 +59,7 @@ class Piece(NamedTuple):
         return sum(map(len, object_cache.ingredients(self.function, {})))
 
     @property
-    def shipped(self) -> bytes | None:
+    def shipped_bitcode(self) -> bytes | None:
         """Its bitcode, if it came with podusv."""
         return shipped.bitcode(self.function, self.prototype, self.compiler)
 
@@ -70,13 +70,13 @@ class Piece(NamedTuple):
         """
         # The compiler would swallow an interrupt, so interrupts wait for it, a second or two.
         with interrupts_deferred():
-            made = self.shipped or self.translator().bitcode(self.function, self.prototype)
+            made = self.shipped_bitcode or self.translator().bitcode(self.function, self.prototype)
             return cast(bytes, made)
 
     def compile(self) -> object_cache.Code:
         """Its object code. Raises TypeError as `bitcode`."""
         with interrupts_deferred():
-            if ready := self.shipped:
+            if ready := self.shipped_bitcode:
                 alone, name = self.compiler == ALONE_BY, self.function.__qualname__
                 return finish.object_code(ready, SYMBOLS[self.compiler], name, alone)
             made = self.translator().object_code(self.function, self.prototype)
@@ -100,7 +100,7 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
     """Have the code of these pieces on the disk, compiled by as many processes as there are cores.
 
     `tell` is called with the fraction that is compiled, if there is anything to compile. A piece
-    that cannot be compiled is left to `compiled`, which says why. Raises KeyboardInterrupt.
+    that cannot be compiled is left to `compile_piece`, which says why. Raises KeyboardInterrupt.
     """
     missing = [piece for piece in pieces if not object_cache.is_cached(piece.name)]
     if not (missing and object_cache.keeps()):
@@ -121,8 +121,8 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
 
     advance(0, 0.0)
     for piece in missing:
-        if not piece.shipped:  # numba is needed, and then imported once, before the forks
-            with suppress(TypeError):  # `compiled` says that it is missing
+        if not piece.shipped_bitcode:  # numba is needed, and then imported once, before the forks
+            with suppress(TypeError):  # `compile_piece` says that it is missing
                 piece.translator()
     if len(shares) == 1:
         _keep(shares[0], partial(advance, 0))
@@ -137,7 +137,7 @@ def _keep(pieces: Sequence[Piece], tell: Callable[[float], None]) -> None:
     done = 0
     for piece in pieces:
         with suppress(TypeError):
-            object_cache.cached(piece.name, piece.compile)
+            object_cache.code_from_cache(piece.name, piece.compile)
         done += piece.size
         tell(float(done))
 
@@ -158,11 +158,13 @@ def adapter(part: str, inner: Any, names: tuple[str, ...]) -> Piece:
 def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
     """The same, compiled. Raises LawError also for a kernel that cannot be compiled."""
     try:
-        return compiled(adapter(part, inner, names))
+        return compile_piece(adapter(part, inner, names))
     except TypeError as error:
         place = f"{Path(inner.__code__.co_filename).name}, line {inner.__code__.co_firstlineno}"
         is_faulty = not isinstance(error, NoTranslator)
-        reason = (is_faulty and unsupported(inner)) or f"{error}{f'; {RULES}' if is_faulty else ''}"
+        reason = (
+            is_faulty and unsupported_construct(inner)
+        ) or f"{error}{f'; {RULES}' if is_faulty else ''}"
         raise LawError(
             f"kernel {inner.__qualname__} ({place}) cannot become machine code: {reason}"
         ) from error
@@ -179,13 +181,13 @@ def lane_adapter(part: str, inner: Any, names: tuple[str, ...], alike: frozenset
 
 @cache
 def routine(piece: Piece) -> Any:
-    """The compiled kernel, loaded once. Raises TypeError as `compiled`."""
-    return compiled(piece)
+    """The compiled kernel, loaded once. Raises TypeError as `compile_piece`."""
+    return compile_piece(piece)
 
 
-def compiled(piece: Piece) -> Any:
+def compile_piece(piece: Piece) -> Any:
     """A kernel as ctypes calls it, compiled unless its code is on the disk.
 
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
-    return object_cache.stored(piece.prototype, piece.name, piece.compile)
+    return object_cache.load_or_translate(piece.prototype, piece.name, piece.compile)

@@ -62,9 +62,7 @@ def widest(typing: Any) -> Any:
     return types.none(), code
 
 
-PRIMITIVES = {
-    kernel.tail: tail_of, kernel.scratch: scratch_of, kernel.widest: widest,
-}  # fmt: skip
+PRIMITIVES = {kernel.tail: tail_of, kernel.scratch: scratch_of, kernel.widest: widest}
 
 
 def object_code(function: Any, prototype: Any) -> Code:
@@ -87,7 +85,7 @@ def bitcode(function: Any, prototype: Any) -> bytes:
         raise TypeError(in_short(str(error))) from error
     made = llvm.parse_assembly(compiled.inspect_llvm())
     made.get_function(compiled.native_name).name = finish.SYMBOL
-    return finish.simplified(made, finish.SYMBOL)
+    return finish.simplify_module(made, finish.SYMBOL)
 
 
 # Settings of numba while it compiles kernels. It would optimise each kernel by itself, and again in
@@ -111,7 +109,7 @@ def plain_code() -> Iterator[None]:
 
 
 @cache
-def inlined(function: Any) -> Any:
+def inline_kernel(function: Any) -> Any:
     """The kernel and all kernels it calls, as a numba function to be compiled into its caller."""
     if function in PRIMITIVES:
         return PRIMITIVES[function]
@@ -134,17 +132,17 @@ def in_short(message: str) -> str:
 
 def _with_inlined(function: Any) -> Any:
     """A copy of the kernel whose globals have numba functions in place of other kernels."""
-    inner = {name: inlined(called) for name, called in kernel.named_kernels(function).items()}
+    inner = {name: inline_kernel(called) for name, called in kernel.named_kernels(function).items()}
     return kernel.with_globals(function, function.__qualname__, **inner)
 
 
 def signature(prototype: Any, type_of: Any) -> Any:
     """A prototype in numba's types; `type_of` gives that of what is no function."""
 
-    def typed(kind: Any) -> Any:
+    def numba_type(kind: Any) -> Any:
         if kind and issubclass(kind, ctypes._CFuncPtr):
             # numba wants a function from a Python object to its address, but never calls it here.
             return types.ExternalFunctionPointer(signature(kind, type_of), ctypes.addressof)
         return type_of(kind)
 
-    return typed(prototype._restype_)(*map(typed, prototype._argtypes_))
+    return numba_type(prototype._restype_)(*map(numba_type, prototype._argtypes_))

@@ -26,7 +26,7 @@ def neutral_machine() -> Any:
     )
 
 
-def simplified(made: Any, symbol: str) -> bytes:
+def simplify_module(made: Any, symbol: str) -> bytes:
     """Bitcode of a module with one function, into which all kernels that it calls are inlined.
 
     Loops are brought into the form that LLVM vectorises: without this the march is slower by up to

@@ -31,11 +31,15 @@ PARTS: dict[type[ast.AST], str] = {
     ast.Assert: "assert: machine code knows no errors; write a number that tells, as a signal",
     ast.Raise: "raise: machine code knows no errors; write a number that tells, as a signal",
     ast.Try: "try: machine code knows no errors; test the numbers before",
-    ast.List: "a list: take variables, or scratch(n)", ast.Dict: "a dict: take variables",
-    ast.ListComp: "a list: write a loop", ast.GeneratorExp: "a generator: write a loop",
-    ast.Slice: "a slice: take tail(vector, n), or a loop", ast.JoinedStr: "text: take numbers",
-    ast.Lambda: "a lambda: write a kernel", ast.FunctionDef: "a function within: write a kernel",
-}  # fmt: skip
+    ast.List: "a list: take variables, or scratch(n)",
+    ast.Dict: "a dict: take variables",
+    ast.ListComp: "a list: write a loop",
+    ast.GeneratorExp: "a generator: write a loop",
+    ast.Slice: "a slice: take tail(vector, n), or a loop",
+    ast.JoinedStr: "text: take numbers",
+    ast.Lambda: "a lambda: write a kernel",
+    ast.FunctionDef: "a function within: write a kernel",
+}
 FROM_THE_END = (
     "counts from the end, and a kernel does not know where a vector ends; count from the front"
 )
@@ -44,7 +48,7 @@ RETURNS_NOTHING = {ast.dump(ast.Return()), ast.dump(ast.Return(ast.Constant(None
 
 def check_kernel(function: Any) -> None:
     """Look at a kernel from outside podusv, and at all kernels it calls. Raises LawError."""
-    for called in _reached(function):
+    for called in _reached_kernels(function):
         node = _source(called)
         for line, text in faults(node, called.__globals__) if node else ():
             place = f"{Path(called.__code__.co_filename).name}, line {line}"
@@ -63,7 +67,7 @@ def check_arguments(function: Any, names: Collection[str]) -> None:
 
 
 @cache
-def _reached(function: Any) -> tuple[Any, ...]:
+def _reached_kernels(function: Any) -> tuple[Any, ...]:
     """The kernel and all kernels from outside podusv that it calls, each once."""
     reached, waiting = dict[Any, None](), [function]
     while waiting:
@@ -90,7 +94,7 @@ def faults(node: ast.FunctionDef, known: Mapping[str, Any]) -> Iterator[tuple[in
             case ast.Subscript(value=of, slice=index) if _is_vector(of, vectors):
                 if (whole_number(index, known) or 0) < 0:
                     yield part.lineno, f"{ast.unparse(part)} {FROM_THE_END}"
-    yield from Reads(node, known).unset()
+    yield from Reads(node, known).unset_variables()
 
 
 def _vectors(node: ast.FunctionDef) -> set[str]:
@@ -113,14 +117,14 @@ def _is_vector(node: ast.expr, vectors: Collection[str]) -> bool:
     return False
 
 
-def unsupported(function: Any) -> str:
+def unsupported_construct(function: Any) -> str:
     """What of a kernel, or of one that it calls, there is no machine code for; else empty."""
     if not is_kernel(function):
         return f"{getattr(function, '__name__', function)} is no kernel; write @kernel above it"
-    return next(filter(None, map(_unsupported, _reached(function))), "")
+    return next(filter(None, map(_unsupported_in, _reached_kernels(function))), "")
 
 
-def _unsupported(function: Any) -> str:
+def _unsupported_in(function: Any) -> str:
     """The same of one kernel alone, with file and line."""
     if function in named_kernels(function).values():
         return f"{function.__name__} calls itself; write a loop"

@@ -51,7 +51,7 @@ class Reads:
         """Whether every way through the kernel ends in `return`."""
         return self._block(self._node.body, frozenset()) is EVERYTHING
 
-    def unset(self) -> Iterator[tuple[int, str]]:
+    def unset_variables(self) -> Iterator[tuple[int, str]]:
         """Line and sentence for each variable that may be read before it is set."""
         self._block(self._node.body, self._arguments)
         yield from ((line, text) for (line, _), text in self._found.items())
@@ -74,13 +74,13 @@ class Reads:
             self._loops[-1].left.append(known)
         if isinstance(node, ast.Continue):
             self._loops[-1].again.append(known)
-        return EVERYTHING if isinstance(node, ENDS) else known | _stored(node)
+        return EVERYTHING if isinstance(node, ENDS) else known | _names_stored(node)
 
     def _after_AnnAssign(self, node: ast.AnnAssign, known: Names) -> Names:
         if node.value is None:
             return known
         self._read(node.value, known)
-        return known | _stored(node)
+        return known | _names_stored(node)
 
     def _after_AugAssign(self, node: ast.AugAssign, known: Names) -> Names:
         if isinstance(node.target, ast.Name):
@@ -90,14 +90,14 @@ class Reads:
 
     def _after_If(self, node: ast.If, known: Names) -> Names | None:
         self._read(node.test, known)
-        known |= _stored(node.test)
+        known |= _names_stored(node.test)
         if isinstance(node.test, ast.Constant):
             return self._block(node.body if node.test.value else node.orelse, known)
         return _both([self._block(node.body, known), self._block(node.orelse, known)])
 
     def _after_While(self, node: ast.While, known: Names) -> Names | None:
         self._read(node.test, known)
-        known |= _stored(node.test)
+        known |= _names_stored(node.test)
         loop, _ = self._round(node.body, known)
         endless = isinstance(node.test, ast.Constant) and bool(node.test.value)
         ended = EVERYTHING if endless else self._block(node.orelse, known)
@@ -105,7 +105,7 @@ class Reads:
 
     def _after_For(self, node: ast.For, known: Names) -> Names | None:
         self._read(node.iter, known)
-        loop, last = self._round(node.body, known | _stored(node.target))
+        loop, last = self._round(node.body, known | _names_stored(node.target))
         over = _both([last, *loop.again]) if self._has_rounds(node.iter) else known
         ended = EVERYTHING if over is EVERYTHING else self._block(node.orelse, over)
         return _both([ended, *loop.left])
@@ -132,7 +132,7 @@ class Reads:
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
             self._note(node, known)
         if isinstance(node, ast.NamedExpr):  # it has a value for what stands behind it
-            known |= _stored(node)
+            known |= _names_stored(node)
         for part in ast.iter_child_nodes(node):
             if not isinstance(part, SCOPES):
                 self._read(part, known)
@@ -145,7 +145,7 @@ class Reads:
             )
 
 
-def _stored(node: ast.AST) -> Names:
+def _names_stored(node: ast.AST) -> Names:
     names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
     return frozenset(name.id for name in names if isinstance(name.ctx, ast.Store))
 

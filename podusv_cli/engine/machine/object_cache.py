@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import llvmlite.binding as llvm
 import numpy as np
 
-from podusv_cli.engine.machine import code_folder
+from podusv_cli.process import code_folder
 
 # The files of podusv that turn kernels into machine code, from the package's folder.
 TRANSLATORS = ("core/kernel.py", "engine/machine/**/*.py")
@@ -41,15 +41,15 @@ class Code(NamedTuple):
     content: bytes
 
 
-def stored(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
+def load_or_translate(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
     """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
-    code = cached(name, translate)
+    code = code_from_cache(name, translate)
     if not code.symbol:
         raise TypeError(code.content.decode())
-    return _loaded(prototype, code)
+    return _load_code(prototype, code)
 
 
-def cached(name: str, translate: Callable[[], Code]) -> Code:
+def code_from_cache(name: str, translate: Callable[[], Code]) -> Code:
     """The code of this name: found on disk, or translated and kept there."""
     path = _path(name)
     code = _read(path) if path else None
@@ -87,7 +87,7 @@ def target() -> Any:
     )
 
 
-def _loaded(prototype: Any, code: Code) -> Any:
+def _load_code(prototype: Any, code: Code) -> Any:
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code.content))
     engine.finalize_object()
@@ -162,7 +162,7 @@ def ingredients(
     names = sorted({name for code in _codes(function.__code__) for name in code.co_names})
     for name in names:
         yield name
-        yield from _described(function.__globals__.get(name), names, numbered, alone)
+        yield from _describe_thing(function.__globals__.get(name), names, numbered, alone)
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
@@ -174,7 +174,7 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 
 
 @singledispatch
-def _described(
+def _describe_thing(
     thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any
 ) -> Iterator[str]:
     """What stands behind a name of a function that uses these names.
@@ -187,10 +187,10 @@ def _described(
     fields = getattr(thing, "_fields", ())  # of a named tuple
     yield repr((getattr(thing, "__module__", ""), called or thing, fields, members))
     if source := getattr(thing, "py_func", None):  # of what numba's own decorators made
-        yield from _described(source, names, numbered, alone)
+        yield from _describe_thing(source, names, numbered, alone)
 
 
-@_described.register
+@_describe_thing.register
 def _(
     thing: FunctionType, names: Iterable[str], numbered: dict[Any, int], alone: Any
 ) -> Iterator[str]:
@@ -200,7 +200,7 @@ def _(
         yield from ingredients(thing, numbered, alone)
 
 
-@_described.register
+@_describe_thing.register
 def _(
     thing: ModuleType, names: Iterable[str], numbered: dict[Any, int], alone: Any
 ) -> Iterator[str]:
@@ -210,18 +210,18 @@ def _(
         if (thing, name) not in numbered and hasattr(thing, name):
             numbered[thing, name] = len(numbered)
             yield name
-            yield from _described(getattr(thing, name), names, numbered, alone)
+            yield from _describe_thing(getattr(thing, name), names, numbered, alone)
 
 
-@_described.register(tuple)
+@_describe_thing.register(tuple)
 def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) -> Iterator[str]:
     yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
     for item in thing:
-        yield from _described(item, names, numbered, alone)
+        yield from _describe_thing(item, names, numbered, alone)
 
 
-@_described.register(np.ndarray)
-@_described.register(np.generic)
+@_describe_thing.register(np.ndarray)
+@_describe_thing.register(np.generic)
 def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) -> Iterator[str]:
     yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
 

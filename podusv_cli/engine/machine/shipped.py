@@ -28,9 +28,11 @@ from podusv_cli.engine.machine import kernel_source, object_cache
 FILE = Path(__file__).with_name("kernels.xz")
 # The files of podusv that make bitcode, from the package's folder.
 MAKERS = (
-    "core/kernel.py", "engine/machine/compile_numba.py", "engine/machine/finish.py",
+    "core/kernel.py",
+    "engine/machine/compile_numba.py",
+    "engine/machine/finish.py",
     "engine/machine/wide/*.py",
-)  # fmt: skip
+)
 
 
 def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
@@ -42,7 +44,11 @@ def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
 def digest(function: Any, prototype: Any, compiler: str) -> str:
     """What a kernel is kept under; empty where its file is gone, or edited since it was loaded."""
     try:
-        words = [compiler, _typed(prototype), *object_cache.ingredients(function, {}, written)]
+        words = [
+            compiler,
+            _name_type(prototype),
+            *object_cache.ingredients(function, {}, source_of),
+        ]
     except (OSError, kernel_source.OtherSource):
         return ""
     return hashlib.sha256("\n".join(words).encode()).hexdigest()[:16]
@@ -70,7 +76,7 @@ def write(kernels: Mapping[str, bytes]) -> None:
     FILE.write_bytes(lzma.compress(whole, preset=9))
 
 
-def written(function: Any) -> tuple[str, ...]:
+def source_of(function: Any) -> tuple[str, ...]:
     """A function as its file has it; of one that podusv wrote out itself, the whole text."""
     code = function.__code__
     if (text := function.__globals__.get(TEXT)) is not None:
@@ -82,14 +88,14 @@ def written(function: Any) -> tuple[str, ...]:
     return code.co_name, "".join(inspect.getblock(lines))
 
 
-def _typed(kind: Any) -> str:
+def _name_type(kind: Any) -> str:
     """A type of ctypes, alike on all systems."""
     if kind is None:
         return "none"
     if issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]
-        return f"{_typed(kind._restype_)}({','.join(map(_typed, kind._argtypes_))})"
+        return f"{_name_type(kind._restype_)}({','.join(map(_name_type, kind._argtypes_))})"
     if issubclass(kind, ctypes._Pointer):
-        return f"{_typed(kind._type_)}*"
+        return f"{_name_type(kind._type_)}*"
     if issubclass(kind, ctypes.Array):
-        return f"{kind._length_}x{_typed(kind._type_)}"
+        return f"{kind._length_}x{_name_type(kind._type_)}"
     return f"{'f' if kind is ctypes.c_double else 'i'}{ctypes.sizeof(kind)}"

@@ -36,9 +36,17 @@ LANE_PROTOTYPES: dict[str, Any] = {
     for part, arguments in SIGNATURES.items()
 }
 ADVANCE_LANES = CFUNCTYPE(
-    WHOLE, *LANE_PROTOTYPES.values(), WHOLE, WHOLE, NUMBER, POINTER(LANE_VECTOR), POINTER(WHOLE),
-    WHOLE, VECTOR, VECTOR,
-)  # fmt: skip
+    WHOLE,
+    *LANE_PROTOTYPES.values(),
+    WHOLE,
+    WHOLE,
+    NUMBER,
+    POINTER(LANE_VECTOR),
+    POINTER(WHOLE),
+    WHOLE,
+    VECTOR,
+    VECTOR,
+)
 EVALUATE_ALL = CFUNCTYPE(None, PROTOTYPES["law"], WHOLE, WHOLE, WHOLE, *[VECTOR] * 5)
 
 

@@ -89,8 +89,8 @@ def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
     work = Work(function, run.vectors.under_way, bell)
 
     def endings(stopped: bool) -> list[Ending]:
-        if stopped and work.reached < last:
-            return [Ending(work.reached, "interrupted")]
+        if stopped and work.good_instants < last:
+            return [Ending(work.good_instants, "interrupted")]
         return [work.ending(last)]
 
     return MarchThread([run], work, endings)
@@ -103,7 +103,7 @@ def march_together(
     grid, last = runs[0].plan.grid, runs[0].plan.grid.steps + 1
     lanes = Lanes.of([run.vectors for run in runs], runs[0].plan.layout)
     work = Work(partial(advance(lanes, grid.step), 0, last), lanes.under_way, bell)
-    return MarchThread(runs, work, lambda stopped: lanes.endings(work.reached, last))
+    return MarchThread(runs, work, lambda stopped: lanes.endings(work.good_instants, last))
 
 
 def _apart(vectors: Vectors) -> Vectors:
@@ -193,9 +193,15 @@ class _Runs:
     """The runs of a batch while they are made."""
 
     def __init__(
-        self, loops: Loops, grid: TimeGrid, batch: Batch, probe: Probe,
-        like: Plan | None, progress: Callable[[float], None] | None, lanes: bool | None,
-    ) -> None:  # fmt: skip
+        self,
+        loops: Loops,
+        grid: TimeGrid,
+        batch: Batch,
+        probe: Probe,
+        like: Plan | None,
+        progress: Callable[[float], None] | None,
+        lanes: bool | None,
+    ) -> None:
         self._loops, self._grid, self._batch, self._probe = loops, grid, batch, probe
         self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)
@@ -227,9 +233,9 @@ class _Runs:
 
     def _begin(self, position: int) -> None:
         """Make a run, and have it march alone, or wait for others to march beside it."""
-        run = self._made(position)
+        run = self._try_to_make(position)
         if run:
-            self._together(self._lanes.sorted(run.vectors, run))
+            self._together(self._lanes.sort_in(run.vectors, run))
         else:
             self._count()
 
@@ -255,9 +261,9 @@ class _Runs:
             while len(self._busy) >= workers:
                 wait()
 
-    def _made(self, position: int) -> BatchRun | None:
+    def _try_to_make(self, position: int) -> BatchRun | None:
         """The run, or None and an entry of why there is none."""
-        run = self._contained(position, lambda: BatchRun.of(position, self._checked(position)))
+        run = self._contain(position, lambda: BatchRun.of(position, self._check_plan(position)))
         if run and not self._settled:
             self._settle(run.plan)
         return run
@@ -270,7 +276,7 @@ class _Runs:
             self._march  # noqa: B018  a kernel that cannot be compiled ends the batch
         self._settled = True
 
-    def _checked(self, position: int) -> Plan:
+    def _check_plan(self, position: int) -> Plan:
         """The plan of a run."""
         try:
             loop = self._loops[position]
@@ -278,7 +284,7 @@ class _Runs:
         except (PodusvError, ValueError) as error:
             raise InvalidLoop(str(error)) from error
 
-    def _contained(self, position: int, make: Callable[[], BatchRun]) -> BatchRun | None:
+    def _contain(self, position: int, make: Callable[[], BatchRun]) -> BatchRun | None:
         """A run that is made; an exception is its own and no other's."""
         try:
             with interrupts_enabled():
@@ -321,14 +327,16 @@ class _Runs:
             thread.work.stop()
         for thread in self._busy:
             if thread in stopped:
-                thread.work.stopped()
+                thread.work.stop_and_count()
             for run, ending in zip(thread.runs, thread.endings(thread in stopped), strict=True):
                 self._batch.note(run, ending)
 
 
 def _blank(count: int, probe: Probe) -> Batch:
     return Batch(
-        status=np.full(count, "interrupted"), cause=np.full(count, "", object),
-        reached=np.zeros(count, np.int64), state=np.full((count, len(STATE)), np.nan),
+        status=np.full(count, "interrupted"),
+        cause=np.full(count, "", object),
+        reached=np.zeros(count, np.int64),
+        state=np.full((count, len(STATE)), np.nan),
         seen=np.full((count, probe.size), np.nan),
-    )  # fmt: skip
+    )

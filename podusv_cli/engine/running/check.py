@@ -45,14 +45,14 @@ def check_law(plan: Plan) -> None:
     if loop.path.follows:
         check_kernel(loop.path.locate)
     with np.errstate(all="ignore"):
-        asked(partial(describe, loop.path), lambda: plan.path_table)
-        asked(partial(describe, loop.path), lambda: plan.first_target, OF_NUMBERS)
-        asked(partial(describe, loop.controller), partial(_check_declared, plan))
-        asked(partial(describe, loop.controller), partial(_ask, plan), OF_NUMBERS)
+        ask_part(partial(describe, loop.path), lambda: plan.path_table)
+        ask_part(partial(describe, loop.path), lambda: plan.first_target, OF_NUMBERS)
+        ask_part(partial(describe, loop.controller), partial(_check_declared, plan))
+        ask_part(partial(describe, loop.controller), partial(_ask, plan), OF_NUMBERS)
     check_arguments(law, READ)
 
 
-def asked(
+def ask_part(
     part: Callable[[], str], ask: Callable[[], object], left: tuple[type[Exception], ...] = ()
 ) -> None:
     """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
@@ -96,7 +96,7 @@ def _check_declared(plan: Plan) -> None:
             raise LawError(f"{describe(law)}: its constant {name} = {number!r} is no named number")
 
 
-def evaluated(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
+def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     """Demand, rates and signals that the law writes at the start of a run, over `before`."""
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
@@ -117,7 +117,7 @@ def evaluated(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
 
 
 def _ask(plan: Plan) -> None:
-    law, (tau, rate, signals) = plan.loop.controller, evaluated(plan, UNWRITTEN)
+    law, (tau, rate, signals) = plan.loop.controller, evaluate_law(plan, UNWRITTEN)
     slots = [f"the rate of {name}" for name in plan.states["law"]]
     names = (*DEMAND, *(part.name for part in law.signals), *slots)
     outputs = zip(names, (*tau, *signals, *rate), strict=True)
@@ -125,9 +125,15 @@ def _ask(plan: Plan) -> None:
         raise LawError(f"{describe(law)}: it leaves {left} unwritten")
     if law.wants_loads():
         call(
-            law.after_saturation, t=0.0, memory=plan.first_memory.copy(), demand=tau,
-            tau=np.zeros(3), k=bundle(plan.law_constants), table=plan.law_table.copy(), rate=rate,
-        )  # fmt: skip
+            law.after_saturation,
+            t=0.0,
+            memory=plan.first_memory.copy(),
+            demand=tau,
+            tau=np.zeros(3),
+            k=bundle(plan.law_constants),
+            table=plan.law_table.copy(),
+            rate=rate,
+        )
 
 
 def _check_signals(plan: Plan) -> None:

@@ -66,9 +66,12 @@ def marcher(
         pointers = signatures.pointers(vectors, signatures.LANE_VECTOR)
         sizes = signatures.whole_numbers(lanes.layout)
         given = (
-            pointers, sizes, len(vectors[Vectors._fields.index("seen")]) // LANES,
-            signatures.pointer(lanes.under_way), signatures.pointer(lanes.ends),
-        )  # fmt: skip
+            pointers,
+            sizes,
+            len(vectors[Vectors._fields.index("seen")]) // LANES,
+            signatures.pointer(lanes.under_way),
+            signatures.pointer(lanes.ends),
+        )
 
         def over(first: int, last: int, steps: int = lanes.layout.steps) -> int:
             sizes[STEPS] = steps
@@ -83,7 +86,7 @@ def is_compiled(plan: Plan) -> bool:
     """Whether the march of runs like this loop is on the disk, or next to it: half a second."""
     from podusv_cli.engine.machine import object_cache
 
-    return all(object_cache.is_cached(p.name) or p.shipped for p in pieces(plan))
+    return all(object_cache.is_cached(p.name) or p.shipped_bitcode for p in pieces(plan))
 
 
 def pieces(plan: Plan) -> list[Any]:
@@ -194,7 +197,7 @@ class LaneSorter:
     def _is_worth(self, plan: Plan) -> bool:
         return self._instants >= WORTH or is_compiled(plan)
 
-    def sorted(self, vectors: Vectors, run: Any) -> list[Any]:
+    def sort_in(self, vectors: Vectors, run: Any) -> list[Any]:
         """The runs to start now that this one is ready."""
         if not self.advance:
             return [run]

@@ -50,12 +50,12 @@ def replayer(
     )
     law = compile.entry("law", loop.controller.law, tuple(constants))
 
-    def timed() -> float:
+    def read_time() -> float:
         began = time.thread_time_ns()  # of the processor: what else it does is not the law's
         replay(law, rounds, count, width, *vectors)
         return float((time.thread_time_ns() - began) / (rounds * count))
 
-    return timed
+    return read_time
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,14 @@ def rates_replay(plan: Plan, *, compiled: bool = True) -> Callable[[Recording], 
     state = list(dict.fromkeys(labels[:split]))
     rates = rates_at(plan, compiled=compiled)
 
-    def replayed(recording: Recording) -> Replayed:
+    def replay_rates(recording: Recording) -> Replayed:
         out = rates(np.column_stack([recording[name] for name in state]))
         return Replayed(
             by_name(labels[1:split], out[:, : split - 1], about),
             by_name(labels[split:], out[:, split - 1 :], about),
         )
 
-    return replayed
+    return replay_rates
 
 
 def _rates_runner(plan: Plan, compiled: bool) -> Callable[..., None]:

@@ -14,8 +14,8 @@ from podusv_cli.engine.loop.closed_loop import DEMAND, STATE, ClosedLoop, Probe
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
-from podusv_cli.engine.running.check import asked, check_law
-from podusv_cli.engine.running.thread import Ending, MarchStatus, Work, march_together, marched
+from podusv_cli.engine.running.check import ask_part, check_law
+from podusv_cli.engine.running.thread import Ending, MarchStatus, Work, march, march_together
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
 from podusv_cli.engine.step.layout import BEFORE, STEPS, Layout, Parts, Vectors
@@ -26,9 +26,12 @@ March = Callable[..., int]
 Marcher = Callable[[Vectors, Layout, float], March]  # of vectors, with a step [s]
 # What a log says of a run, by how its march ended.
 RECORDED: dict[MarchStatus, Status] = {
-    "finished": "finished", "interrupted": "interrupted",
-    "diverged": "diverged", "crashed": "diverged", "hung": "diverged",
-}  # fmt: skip
+    "finished": "finished",
+    "interrupted": "interrupted",
+    "diverged": "diverged",
+    "crashed": "diverged",
+    "hung": "diverged",
+}
 
 
 def simulate(
@@ -46,9 +49,12 @@ def simulate(
 
 
 def run(
-    plan: Plan, *, compiled: bool = True, progress: Callable[[float], None] | None = None,
+    plan: Plan,
+    *,
+    compiled: bool = True,
+    progress: Callable[[float], None] | None = None,
     allocate: Allocate = np.empty,
-) -> Recording:  # fmt: skip
+) -> Recording:
     """Integrate a loop over its grid.
 
     `progress` is called with the fraction done, about 20 times a second. An interrupt ends the
@@ -58,11 +64,13 @@ def run(
     about = plan.about
     vectors, last, advance = begin_march(plan, compiled, allocate)
     with np.errstate(all="ignore"), interrupts_deferred():
-        ending = marched(
-            advance, last, vectors.under_way,
+        ending = march(
+            advance,
+            last,
+            vectors.under_way,
             progress and (lambda reached: progress(reached / last)),
-        )  # fmt: skip
-        return replace(recorded(plan, vectors, ending), about=about)
+        )
+        return replace(recording_of(plan, vectors, ending), about=about)
 
 
 def begin_march(
@@ -71,8 +79,8 @@ def begin_march(
     """The vectors of a loop at its start, the instant after the last, and the march up to it."""
     plan.loop.check_fit(plan.grid.step)
     vectors, last = plan.vectors(plan.grid.rows, allocate), plan.layout.steps + 1
-    march = marcher(plan, compiled)(vectors, plan.layout, plan.grid.step)
-    return vectors, last, partial(march, 0, last)
+    advance = marcher(plan, compiled)(vectors, plan.layout, plan.grid.step)
+    return vectors, last, partial(advance, 0, last)
 
 
 def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Recording]:
@@ -85,7 +93,7 @@ def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Record
     with np.errstate(all="ignore"), interrupts_deferred():
         endings = march_together(works, [last for _, last, _ in begun])
         return [
-            replace(recorded(plan, vectors, ending), about=plan.about)
+            replace(recording_of(plan, vectors, ending), about=plan.about)
             for plan, (vectors, *_), ending in zip(plans, begun, endings, strict=True)
         ]
 
@@ -108,7 +116,7 @@ def ready(plan: Plan, compiled: bool, compiling: Callable[[float], None] | None 
     """
     check_law(plan)
     plan.loop.check_fit(plan.grid.step)
-    asked(lambda: "the closed loop", plan.vectors)
+    ask_part(lambda: "the closed loop", plan.vectors)
     marcher(plan, compiled, compiling)
 
 
@@ -144,7 +152,7 @@ def marcher(
     return over
 
 
-def recorded(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
+def recording_of(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
     """The recording of a march that ended so, its signals views of the log."""
     layout, law = plan.layout, plan.loop.controller
     rows = -(-ending.reached // layout.log_every)

@@ -19,7 +19,7 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.batch import BatchRun
 from podusv_cli.engine.running.lanes import MARCHING, Lanes, room, shared_constants
-from podusv_cli.engine.running.simulate import March, Marcher, recorded
+from podusv_cli.engine.running.simulate import March, Marcher, recording_of
 from podusv_cli.engine.running.thread import Ending
 from podusv_cli.engine.step.lane_march import REACHED
 from podusv_cli.engine.step.layout import SIGNATURES, Vectors
@@ -29,7 +29,7 @@ NOTHING: frozenset[str] = frozenset()
 CHANGING = ("s", "row", "stages", "sensed", "delay_line", "held", "work", "seen", "under_way")
 
 
-class Mark(NamedTuple):
+class MarchMark(NamedTuple):
     """Where a march is: its next instant, the vectors that change, and the log so far."""
 
     reached: int
@@ -75,7 +75,7 @@ class SteppedRun:
         self.reached = self._advance(self.reached, instant)
         return self.reached == instant
 
-    def seen(self) -> Vector:
+    def gathered_so_far(self) -> Vector:
         """What the probe gathers of the run that ends at the next instant, as it is steered now."""
         if not 0 < self.reached <= self.grid.steps:
             return self.vectors.seen.copy()
@@ -118,14 +118,14 @@ class SteppedRun:
         path, pointers = compile.entry(*part), [signatures.pointer(v) for v in vectors]
         return lambda t: path(t, *pointers)
 
-    def mark(self) -> Mark:
+    def mark(self) -> MarchMark:
         """Where the march is, to come back to it."""
         rows = -(-self.reached // self.grid.log_every)
         log = self.vectors.log[: rows * self._layout.width].copy()
         vectors = tuple(getattr(self.vectors, name).copy() for name in CHANGING)
-        return Mark(self.reached, vectors, log)
+        return MarchMark(self.reached, vectors, log)
 
-    def back(self, mark: Mark) -> None:
+    def back(self, mark: MarchMark) -> None:
         """Go on from a mark of this march."""
         self.reached = mark.reached
         self.vectors.log[: len(mark.log)] = mark.log
@@ -136,7 +136,7 @@ class SteppedRun:
         """What is logged so far, as of a run that was stopped here."""
         whole = self.reached > self.grid.steps
         ending = Ending(self.reached, "finished" if whole else "interrupted")
-        return recorded(self.plan, self.vectors, ending)
+        return recording_of(self.plan, self.vectors, ending)
 
 
 def in_lanes(
@@ -164,9 +164,13 @@ class SteppedBatch:
     """
 
     def __init__(
-        self, plan: Plan, runs: Sequence[BatchRun], advance: Callable[[Lanes, float], March],
-        look: Any, size: int,
-    ) -> None:  # fmt: skip
+        self,
+        plan: Plan,
+        runs: Sequence[BatchRun],
+        advance: Callable[[Lanes, float], March],
+        look: Any,
+        size: int,
+    ) -> None:
         """Nothing is marched yet; the plan is that of runs like these."""
         layout, grid = plan.layout, plan.grid
         self.places = [run.position for run in runs]
@@ -178,8 +182,13 @@ class SteppedBatch:
         given = c.s[layout.estimate * LANES :]
         _, path, names = plan.functions[0]
         shared = shared_constants(plan)["path"]
-        vectors = {"x": given, "place": c.s[layout.place * LANES :], "k": c.path,
-                   "table": c.path_table, "target": target}  # fmt: skip
+        vectors = {
+            "x": given,
+            "place": c.s[layout.place * LANES :],
+            "k": c.path,
+            "table": c.path_table,
+            "target": target,
+        }
         self._aim = in_lanes("path", path, names, shared, vectors)
         self._look = in_lanes("law", look, (), NOTHING, vectors | {"signals": view})
         self.law_table, self._seen, self._view = map(self._by_run, (c.law_table, c.seen, view))
@@ -219,7 +228,7 @@ class SteppedBatch:
         self._look(self.time)
         return self._view
 
-    def seen(self) -> Vector:
+    def gathered_so_far(self) -> Vector:
         """What the probes gather of runs that end at the next instant, or have ended before."""
         with self._unchanged:
             if self.reached <= self.grid.steps:

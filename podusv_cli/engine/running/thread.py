@@ -84,22 +84,22 @@ class Work:
             self.wait()
             ended = self.over or self.hangs()
             if progress:
-                progress(self.reached)
+                progress(self.good_instants)
 
     def stop(self) -> None:
         """Tell the march to stop at the next instant."""
         self._under_way[STOP] = 1.0
 
-    def stopped(self) -> int:
+    def stop_and_count(self) -> int:
         """Stop the march, wait a moment until it has, and count the good instants."""
         self.stop()
         end = time.monotonic() + LAST_CHANCE
         while self.started and not self.over and time.monotonic() < end:
             self.wait()
-        return self.reached
+        return self.good_instants
 
     @property
-    def reached(self) -> int:
+    def good_instants(self) -> int:
         """The number of good instants: all before the one that is under way."""
         return int(self._under_way[0]) if self.result is None else self.result
 
@@ -107,12 +107,12 @@ class Work:
         """How a march up to this instant ended; one that hangs is abandoned."""
         if self.result is None:
             self.stop()  # should the law return one day
-            return Ending(self.reached, "crashed" if self.error else "hung", self.fault())
+            return Ending(self.good_instants, "crashed" if self.error else "hung", self.fault())
         return Ending(self.result, "finished" if self.result == last else "diverged")
 
-    def interrupted(self, last: int) -> Ending:
+    def end_interrupted(self, last: int) -> Ending:
         """How a march ended that an interrupt is to stop: by itself where it is over already."""
-        return self.ending(last) if self.over else Ending(self.stopped(), "interrupted")
+        return self.ending(last) if self.over else Ending(self.stop_and_count(), "interrupted")
 
     def fault(self) -> str:
         """What is wrong with a function that has no result."""
@@ -134,10 +134,12 @@ class Work:
         self._bell.put(None)
 
 
-def marched(
-    advance: Callable[[], int], last: int, under_way: Vector,
+def march(
+    advance: Callable[[], int],
+    last: int,
+    under_way: Vector,
     progress: Callable[[int], None] | None = None,
-) -> Ending:  # fmt: skip
+) -> Ending:
     """March up to the instant `last`, excluded. To be called while interrupts are held."""
     work = Work(advance, under_way)
     try:
@@ -145,7 +147,7 @@ def marched(
             work.finish(progress)
         return work.ending(last)
     except KeyboardInterrupt:
-        return work.interrupted(last)
+        return work.end_interrupted(last)
     except BaseException:  # of `progress`; nobody will use what the march goes on to compute
         work.stop()
         raise
@@ -169,6 +171,6 @@ def march_together(works: Sequence[Work], lasts: Sequence[int]) -> list[Ending]:
         for work in works:
             work.stop()
         return [
-            work.ending(last) if was_over else Ending(work.stopped(), "interrupted")
+            work.ending(last) if was_over else Ending(work.stop_and_count(), "interrupted")
             for work, last, was_over in zip(works, lasts, over, strict=True)
         ]

@@ -7,15 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from podusv_cli.core.kernel import (
-    LANES,
-    Vector,
-    kernel,
-    lane_numbers,
-    lane_true,
-    lanes_any,
-    tail,
-)
+from podusv_cli.core.kernel import LANES, Vector, kernel, lane_numbers, lane_true, lanes_any, tail
 from podusv_cli.engine.step.layout import STOP, Parts, spread
 from podusv_cli.engine.step.rk4 import arrive, finite, named_layout, named_vectors, show_probe, step
 
@@ -66,9 +58,16 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
 @spread
 @kernel
 def advance_lanes(
-    p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any, size: int,
-    under_way: Vector, ends: Vector,
-) -> int:  # fmt: skip
+    p: Parts,
+    first: int,
+    last: int,
+    h: float,
+    vectors: Any,
+    layout: Any,
+    size: int,
+    under_way: Vector,
+    ends: Vector,
+) -> int:
     """`rk4.advance` for all lanes, without a log.
 
     A lane whose numbers are not finite goes on without an effect on the others. Returns the first

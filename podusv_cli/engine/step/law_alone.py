@@ -16,9 +16,15 @@ named_vectors, named_layout = unpacker(Vectors._fields), unpacker(Layout._fields
 
 @kernel
 def demand(
-    path: Function, law: Function, sample: Function, after: Function,
-    k: int, h: float, vectors: Vector, layout: Vector,
-) -> None:  # fmt: skip
+    path: Function,
+    law: Function,
+    sample: Function,
+    after: Function,
+    k: int,
+    h: float,
+    vectors: Vector,
+    layout: Vector,
+) -> None:
     """The demand for the sample that is in state and row at instant k, a multiple of the period.
 
     The loads in the row are those that acted since the instant before.

@@ -124,7 +124,7 @@ STOP = 1  # in `under_way`
 
 
 @kernel
-def shifted(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
+def shift_state(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
     """out = s + h ds."""
     for i in range(count):
         out[i] = s[i] + h * ds[i]

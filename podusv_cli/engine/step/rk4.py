@@ -28,7 +28,7 @@ from podusv_cli.engine.step.layout import (
     Layout,
     Parts,
     Vectors,
-    shifted,
+    shift_state,
     spread,
 )
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
@@ -60,9 +60,16 @@ def drive(t: float, s: Vector, ds: Vector, demand: Vector, p: Parts, c: Vectors,
         x = scratch(6)
         through_water(s, tail(row, n.flow), x)
     p.actuator(
-        t, x, tail(s, 6), demand, c.actuator, c.actuator_table,
-        tail(row, n.tau), tail(ds, 6), tail(row, n.flags),
-    )  # fmt: skip
+        t,
+        x,
+        tail(s, 6),
+        demand,
+        c.actuator,
+        c.actuator_table,
+        tail(row, n.tau),
+        tail(ds, 6),
+        tail(row, n.flags),
+    )
 
 
 @kernel
@@ -73,9 +80,14 @@ def load(t: float, s: Vector, p: Parts, c: Vectors, n: Layout, again: bool, stag
     """
     if not (again and n.load_of_time == 1):
         p.disturbance(
-            t, s, c.disturbance, c.disturbance_table, tail(c.row, n.b),
-            1.0 if again else 0.0, 1.0 if stage else 0.0,
-        )  # fmt: skip
+            t,
+            s,
+            c.disturbance,
+            c.disturbance_table,
+            tail(c.row, n.b),
+            1.0 if again else 0.0,
+            1.0 if stage else 0.0,
+        )
 
 
 @kernel
@@ -97,9 +109,17 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
     elif n.hold_every > 0:
         held = c.held
         p.law(
-            shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), k, table,
-            tail(held, HELD_DEMAND), memory_rate, tail(held, HELD_SIGNALS), work,
-        )  # fmt: skip
+            shared(held[0]),
+            tail(held, HELD_X),
+            memory,
+            tail(held, HELD_TARGET),
+            k,
+            table,
+            tail(held, HELD_DEMAND),
+            memory_rate,
+            tail(held, HELD_SIGNALS),
+            work,
+        )
     else:
         p.law(t, given, memory, aim, k, table, demand, memory_rate, tail(row, n.signals), work)
     wanted = demand
@@ -110,9 +130,7 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
         p.after_saturation(t, memory, demand, tau, k, table, memory_rate)
     if n.measured > 0:
-        p.follow(
-            t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate)
-        )  # fmt: skip
+        p.follow(t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate))
     plant(s, tau, b, coefficients(c.vessel), ds)
 
 
@@ -130,13 +148,13 @@ def step(t: float, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     k1 = c.stages
     k2, k3, k4 = tail(k1, count), tail(k1, 2 * count), tail(k1, 3 * count)
     y = tail(k1, 4 * count)
-    shifted(count, s, 0.5 * h, k1, y)
+    shift_state(count, s, 0.5 * h, k1, y)
     load(t + 0.5 * h, y, p, c, n, False, True)
     rates(t + 0.5 * h, y, k2, p, c, n, False)
-    shifted(count, s, 0.5 * h, k2, y)
+    shift_state(count, s, 0.5 * h, k2, y)
     load(t + 0.5 * h, y, p, c, n, True, True)
     rates(t + 0.5 * h, y, k3, p, c, n, True)
-    shifted(count, s, h, k3, y)
+    shift_state(count, s, h, k3, y)
     load(t + h, y, p, c, n, False, True)
     rates(t + h, y, k4, p, c, n, False)
     for i in range(count):
@@ -236,9 +254,16 @@ def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: La
 
 @kernel
 def evaluate_all(
-    law: Function, rounds: int, count: int, width: int,
-    rows: Vector, p: Vector, table: Vector, tau: Vector, out: Vector,
-) -> None:  # fmt: skip
+    law: Function,
+    rounds: int,
+    count: int,
+    width: int,
+    rows: Vector,
+    p: Vector,
+    table: Vector,
+    tau: Vector,
+    out: Vector,
+) -> None:
     """Call the law `rounds` times on each of `count` rows of (t, target, x, memory).
 
     `out` takes rate, signals and scratch, each up to `width` numbers.
@@ -247,9 +272,17 @@ def evaluate_all(
         for i in range(count):
             row = tail(rows, i * width)
             law(
-                row[0], tail(row, 7), tail(row, 13), tail(row, 1), p, table,
-                tau, out, tail(out, width), tail(out, 2 * width),
-            )  # fmt: skip
+                row[0],
+                tail(row, 7),
+                tail(row, 13),
+                tail(row, 1),
+                p,
+                table,
+                tau,
+                out,
+                tail(out, width),
+                tail(out, 2 * width),
+            )
 
 
 @spread

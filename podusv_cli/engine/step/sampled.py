@@ -13,7 +13,7 @@ from podusv_cli.engine.step.layout import (
     Function,
     Layout,
     Vectors,
-    shifted,
+    shift_state,
 )
 
 
@@ -24,9 +24,17 @@ def held_rates(
     """Rates of the law's memory at t with the last sample held, while the loads in the row act."""
     row, held = c.row, c.held
     law(
-        shared(held[0]), tail(held, HELD_X), memory, tail(held, HELD_TARGET), c.law, c.law_table,
-        tail(held, HELD_DEMAND), rate, tail(held, HELD_SIGNALS), c.work,
-    )  # fmt: skip
+        shared(held[0]),
+        tail(held, HELD_X),
+        memory,
+        tail(held, HELD_TARGET),
+        c.law,
+        c.law_table,
+        tail(held, HELD_DEMAND),
+        rate,
+        tail(held, HELD_SIGNALS),
+        c.work,
+    )
     if n.wants_loads > 0:
         after(t, memory, tail(row, n.demand), tail(row, n.tau), c.law, c.law_table, rate)
 
@@ -41,11 +49,11 @@ def remember(
     k2, k3, k4 = tail(k1, n.states), tail(k1, 2 * n.states), tail(k1, 3 * n.states)
     y = tail(k1, 4 * n.states)
     held_rates(t, memory, k1, law, after, c, n)
-    shifted(count, memory, 0.5 * h, k1, y)
+    shift_state(count, memory, 0.5 * h, k1, y)
     held_rates(t + 0.5 * passing, y, k2, law, after, c, n)
-    shifted(count, memory, 0.5 * h, k2, y)
+    shift_state(count, memory, 0.5 * h, k2, y)
     held_rates(t + 0.5 * passing, y, k3, law, after, c, n)
-    shifted(count, memory, h, k3, y)
+    shift_state(count, memory, h, k3, y)
     held_rates(t + passing, y, k4, law, after, c, n)
     for i in range(count):
         memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
@@ -53,9 +61,16 @@ def remember(
 
 @kernel
 def sample_and_hold(
-    k: int, t: float, h: float, path: Function, law: Function, sample: Function, after: Function,
-    c: Vectors, n: Layout,
-) -> None:  # fmt: skip
+    k: int,
+    t: float,
+    h: float,
+    path: Function,
+    law: Function,
+    sample: Function,
+    after: Function,
+    c: Vectors,
+    n: Layout,
+) -> None:
     """What happens at instants only: the law's own samples, and the hold of sampled control."""
     given, row, held = tail(c.s, n.estimate), c.row, c.held
     memory, aim = tail(c.s, n.memory), tail(row, n.shown)
@@ -72,9 +87,17 @@ def sample_and_hold(
             for _ in range(n.hold_every):  # the period that ends, with its loads
                 remember(t, 0.0, h, law, after, c, n)
         law(
-            t, given, memory, aim, p, table, tail(row, n.demand), tail(c.stages, n.memory),
-            tail(row, n.signals), c.work,
-        )  # fmt: skip
+            t,
+            given,
+            memory,
+            aim,
+            p,
+            table,
+            tail(row, n.demand),
+            tail(c.stages, n.memory),
+            tail(row, n.signals),
+            c.work,
+        )
 
 
 @kernel

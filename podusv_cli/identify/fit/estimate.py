@@ -58,7 +58,7 @@ class Scored:
 
 
 @dataclass(frozen=True)
-class Search:
+class HullSearch:
     """What is searched: `innovations` at points whose prior is normal, with covariance 1.
 
     `blocks` has the part of the logs that every delivered value belongs to. The first `hull`
@@ -77,12 +77,12 @@ class Search:
             nu, s = self.innovations(points)
         return [_value(nu[:, i], s[:, i], y) for i, y in enumerate(points)]
 
-    def scored(self, y: Vector) -> Scored:
+    def score(self, y: Vector) -> Scored:
         """Value, slopes and Fisher's matrix at a point."""
         with np.errstate(all="ignore"):
-            return self._scored(y)
+            return self._score(y)
 
-    def _scored(self, y: Vector) -> Scored:
+    def _score(self, y: Vector) -> Scored:
         nus, variances = self.innovations([y, *(y + SHIFT * np.eye(self.size))])
         value = _value(nus[:, 0], variances[:, 0], y)
         slopes, by_values, by_sizes = [], [], []
@@ -110,7 +110,7 @@ def _value(nu: Vector, s: Vector, y: Vector) -> float:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class HullEstimate:
     """Where -2 log of the posterior is least, and the covariance of its errors."""
 
     y: Vector
@@ -121,15 +121,15 @@ class Estimate:
     interrupted: bool = False
 
 
-def estimated(
-    search: Search, tell: Tell = lambda i, value: None, *, starts: int = STARTS
-) -> Estimate:
+def estimate_hull(
+    search: HullSearch, tell: Tell = lambda i, value: None, *, starts: int = STARTS
+) -> HullEstimate:
     """The best of several searches: from the prior's centre, `second`, then draws of the prior.
 
     They end when two have come to the same value. An interrupt leaves the best so far. Raises
     UsageError where the filter breaks down at the prior's centre.
     """
-    found = [_estimated(search, np.zeros(search.size), tell)]
+    found = [_search_from(search, np.zeros(search.size), tell)]
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
@@ -138,22 +138,22 @@ def estimated(
         if len(found) == 1 and search.second is not None:
             start = search.second
         try:
-            found.append(_estimated(search, start, tell))
+            found.append(_search_from(search, start, tell))
         except KeyboardInterrupt:  # before its first round
             found[-1] = replace(found[-1], interrupted=True)
     best = min(found, key=lambda e: e.value)
     return replace(best, settled=_agree(found), interrupted=found[-1].interrupted)
 
 
-def _agree(found: Sequence[Estimate]) -> bool:
+def _agree(found: Sequence[HullEstimate]) -> bool:
     """Whether two searches have come to the least value so far."""
     values = sorted(e.value for e in found)
     return len(values) > 1 and values[1] - values[0] <= SETTLED
 
 
-def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
+def _search_from(search: HullSearch, y: Vector, tell: Tell) -> HullEstimate:
     """Fisher scoring, damped as Marquardt does; each round tries eight dampings side by side."""
-    i, stopped, at = 0, False, search.scored(y)
+    i, stopped, at = 0, False, search.score(y)
     try:
         for i in range(1, ROUNDS + 1):
             tell(i, at.value)
@@ -162,11 +162,11 @@ def _estimated(search: Search, y: Vector, tell: Tell) -> Estimate:
             best = int(np.argmin(values))
             if expected <= ENOUGH or not values[best] < at.value:
                 break
-            y, at = y + steps[best], search.scored(y + steps[best])
+            y, at = y + steps[best], search.score(y + steps[best])
     except KeyboardInterrupt:
         stopped = True
     with np.errstate(all="ignore"):  # of a start at which the filter breaks down
-        return Estimate(y, at.value, covariance(at, search.hull), i, interrupted=stopped)
+        return HullEstimate(y, at.value, covariance(at, search.hull), i, interrupted=stopped)
 
 
 def _steps(at: Scored, y: Vector) -> tuple[list[Vector], float]:
@@ -200,7 +200,7 @@ def covariance(at: Scored, hull: int = 0) -> Vector:
     left = np.maximum(1.0 - hidden, 2.0 / stiffness[-1])  # at least the prior's part
     freed = np.einsum("bij,bj,bkj,bk->bi", basis, left**-0.5, basis, at.slopes @ root)
     by_blocks = 0.25 * freed.T @ freed + root.T @ root
-    return _bounded(root @ _bounded(by_blocks, 1.0, np.inf) @ root.T, 0.0, 1.0)
+    return _bound_eigenvalues(root @ _bound_eigenvalues(by_blocks, 1.0, np.inf) @ root.T, 0.0, 1.0)
 
 
 def _alone(by_sizes: Vector, hull: int) -> Vector:
@@ -214,7 +214,7 @@ def _alone(by_sizes: Vector, hull: int) -> Vector:
     return sizes
 
 
-def _bounded(matrix: Vector, least: float, most: float) -> Vector:
+def _bound_eigenvalues(matrix: Vector, least: float, most: float) -> Vector:
     """A symmetric matrix with its eigenvalues between two bounds."""
     values, basis = np.linalg.eigh(matrix)
     return np.asarray(basis * np.clip(values, least, most) @ basis.T)
@@ -232,7 +232,7 @@ class Directions:
     widths: Vector
 
     @property
-    def known(self) -> int:
+    def determined_count(self) -> int:
         """How many of them the logs determine."""
         return int(np.sum(self.widths <= OPEN))
 
@@ -245,7 +245,9 @@ def directions(covariance: Vector, hull: int) -> Directions:
     return Directions(basis, np.sqrt(np.maximum(squares, 0.0)))
 
 
-def prior_kept(search: Search, found: Estimate, tell: Tell = lambda i, value: None) -> Estimate:
+def prior_kept(
+    search: HullSearch, found: HullEstimate, tell: Tell = lambda i, value: None
+) -> HullEstimate:
     """The estimate with those directions of the hull as before that the logs say nothing of.
 
     All else is looked for again beside them. An interrupt leaves the best so far.
@@ -259,8 +261,8 @@ def prior_kept(search: Search, found: Estimate, tell: Tell = lambda i, value: No
         def innovations(points: Sequence[Vector]) -> tuple[Vector, Vector]:
             return search.innovations([rest @ point for point in points])
 
-        within = Search(innovations, rest.shape[1], search.blocks, search.hull - len(silent))
-        again = _estimated(within, rest.T @ found.y, tell)
+        within = HullSearch(innovations, rest.shape[1], search.blocks, search.hull - len(silent))
+        again = _search_from(within, rest.T @ found.y, tell)
     except KeyboardInterrupt:  # before the first round
         return replace(found, interrupted=True)
     covered = rest @ again.covariance @ rest.T + before @ before.T
@@ -270,12 +272,12 @@ def prior_kept(search: Search, found: Estimate, tell: Tell = lambda i, value: No
     )
 
 
-def _silent(search: Search, y: Vector) -> tuple[Vector, Whole]:
+def _silent(search: HullSearch, y: Vector) -> tuple[Vector, Whole]:
     """An orthonormal basis, the hull's directions first, and which of these the logs are silent of.
 
     They are silent, too, where what they say differs from block to block.
     """
     hull, whole = search.hull, np.eye(search.size)
-    ways = directions(covariance(search.scored(y), hull), hull)
+    ways = directions(covariance(search.score(y), hull), hull)
     whole[:hull, :hull] = ways.basis
     return whole, np.flatnonzero(ways.widths > SILENT)

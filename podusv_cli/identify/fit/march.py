@@ -28,7 +28,7 @@ from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.machine.signatures import LANE_PROTOTYPES, LANE_VECTOR, PROTOTYPES, WHOLE
 from podusv_cli.engine.machine.signatures import VECTOR as PLAIN
 from podusv_cli.engine.running.lanes import room
-from podusv_cli.engine.step.layout import Function, shifted
+from podusv_cli.engine.step.layout import Function, shift_state
 
 SIZE = N + PACKED + 2 * MOVING  # numbers of the filter's state
 STAGES = 4 * SIZE
@@ -45,7 +45,7 @@ NAMES = (*COEFFICIENTS, *ExtendedKalmanFilter().constants(), THRUST, DELAY, *CUR
 named = unpacker(NAMES)
 
 
-class Record(NamedTuple):
+class FilterRecord(NamedTuple):
     """A log as the march takes it: rows as above, and how many values they deliver."""
 
     rows: Vector
@@ -88,7 +88,7 @@ def seen_from_water(i: int, value: float, since: float, psi: float, k: Any, h: V
 
 
 @kernel
-def corrected(line: Vector, since: float, state: Vector, k: Any, out: Vector) -> int:
+def correct_filter(line: Vector, since: float, state: Vector, k: Any, out: Vector) -> int:
     """Take in what a row delivers; write innovation and variance of each value, and count them."""
     sigma, h = scratch(MOVING), scratch(MOVING)
     sigma[0], sigma[1], sigma[2] = k.sigma_p, k.sigma_p, k.sigma_psi
@@ -108,10 +108,20 @@ def corrected(line: Vector, since: float, state: Vector, k: Any, out: Vector) ->
 
 
 @kernel
-def filtered(
-    loads: Function, follow: Function, count: int, width: int, apart: int, record: Vector,
-    actuator: Vector, table: Vector, p: Vector, state: Vector, out: Vector, track: Vector,
-) -> None:  # fmt: skip
+def filter_rows(
+    loads: Function,
+    follow: Function,
+    count: int,
+    width: int,
+    apart: int,
+    record: Vector,
+    actuator: Vector,
+    table: Vector,
+    p: Vector,
+    state: Vector,
+    out: Vector,
+    track: Vector,
+) -> None:
     """The filter along the rows of a record: classical RK4 between them, with commands held.
 
     Rows of the track are so far `apart`; with 0 the last one alone is left.
@@ -124,21 +134,21 @@ def filtered(
         line = tail(record, row * width)
         for i in range(N):
             track[apart * row + i] = state[i]
-        at += corrected(line, since, state, k, tail(out, at))
+        at += correct_filter(line, since, state, k, tail(out, at))
         for i in range(inputs):  # the parabola through the three
             shifts = tail(line, COMMANDS + 3 * i)
             commands[i] = shifts[1] + 0.5 * late * (shifts[2] - shifts[0])
             commands[i] += 0.5 * late * late * (shifts[2] - 2.0 * shifts[1] + shifts[0])
         h = line[HOLDS]
         since += h
-        shifted(SIZE, state, 0.0, state, y)
+        shift_state(SIZE, state, 0.0, state, y)
         for stage in range(4):
             rate = tail(stages, stage * SIZE)
             loads(0.0, y, y, commands, actuator, table, tau, rate, rate)
             for i in range(3):
                 tau[i] *= k.thrust
             follow(0.0, y, tau, y, p, table, rate)
-            shifted(SIZE, state, h if stage == 2 else 0.5 * h, rate, y)
+            shift_state(SIZE, state, h if stage == 2 else 0.5 * h, rate, y)
         for i in range(SIZE):
             between = stages[SIZE + i] + stages[2 * SIZE + i]
             state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
@@ -146,11 +156,15 @@ def filtered(
 
 FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 3, *[PLAIN] * 7)
 FILTERED_LANES = (
-    LANE_PROTOTYPES["actuator"], LANE_PROTOTYPES["follow"], *[WHOLE] * 3, PLAIN, *[LANE_VECTOR] * 6,
-)  # fmt: skip
+    LANE_PROTOTYPES["actuator"],
+    LANE_PROTOTYPES["follow"],
+    *[WHOLE] * 3,
+    PLAIN,
+    *[LANE_VECTOR] * 6,
+)
 
 
-Follow = Callable[[Record, Sequence[Vector], Sequence[Vector], bool], Followed]
+Follow = Callable[[FilterRecord, Sequence[Vector], Sequence[Vector], bool], Followed]
 
 
 def pieces(actuator: Actuator) -> list[Any]:
@@ -161,7 +175,7 @@ def pieces(actuator: Actuator) -> list[Any]:
     return [
         compile.lane_adapter("actuator", actuator.replay, names, frozenset(names)),
         compile.lane_adapter("follow", ExtendedKalmanFilter.follow, NAMES, frozenset()),
-        compile.Piece(filtered, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
+        compile.Piece(filter_rows, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
     ]
 
 
@@ -180,22 +194,27 @@ def side_by_side(actuator: Actuator) -> Follow:
     a = _in_lanes([np.array([*actuator.constants().values(), 0.0])])
     table = _in_lanes([actuator.table()])
 
-    def followed(
-        record: Record, constants: Sequence[Vector], starts: Sequence[Vector], tracked: bool
+    def follow_wide(
+        record: FilterRecord, constants: Sequence[Vector], starts: Sequence[Vector], tracked: bool
     ) -> Followed:
         count, width = record.rows.shape
         rows, apart = (count, N) if tracked else (1, 0)
         out, track = room(2 * record.delivered * LANES), room(N * rows * LANES)
         p, state = _in_lanes(constants), _in_lanes(starts)
         march(
-            loads, follow, count, width, apart, signatures.pointer(record.rows),
+            loads,
+            follow,
+            count,
+            width,
+            apart,
+            signatures.pointer(record.rows),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],
-        )  # fmt: skip
+        )
         runs = len(constants)
         pairs = out.reshape(record.delivered, 2, LANES)[..., :runs]
         return Followed(pairs[:, 0], pairs[:, 1], track.reshape(rows, N, LANES)[..., :runs])
 
-    return followed
+    return follow_wide
 
 
 def _in_lanes(vectors: Sequence[Vector]) -> Vector:

@@ -23,7 +23,7 @@ DAMPINGS = tuple(n for n in FORCES[2:] if n not in ADDED.values())
 
 
 @dataclass(frozen=True)
-class Number:
+class FreeNumber:
     """One number that is looked for: its logarithm is normal about that of `prior`, with `sd`.
 
     Without a `ratio` it is normal itself. It is never more than `least` standard deviations below.
@@ -36,7 +36,7 @@ class Number:
     least: float = -math.inf
 
 
-def values_at(numbers: Sequence[Number], y: Vector) -> Vector:
+def values_at(numbers: Sequence[FreeNumber], y: Vector) -> Vector:
     """The values of numbers that are so many standard deviations, `y`, from their priors."""
     prior, sd, least = np.array([(n.prior, n.sd, n.least) for n in numbers]).reshape(-1, 3).T
     step = sd * np.maximum(y, least)
@@ -44,7 +44,7 @@ def values_at(numbers: Sequence[Number], y: Vector) -> Vector:
     return values
 
 
-def hull_numbers(vessel: Vessel, wanted: Identify) -> list[Number]:
+def hull_numbers(vessel: Vessel, wanted: Identify) -> list[FreeNumber]:
     """The vessel's numbers that are looked for. A number that is 0 stays 0.
 
     Raises UsageError for names that it has not, and where logs can give ratios alone.
@@ -67,7 +67,8 @@ def hull_numbers(vessel: Vessel, wanted: Identify) -> list[Number]:
             f"identify.priors: {unknown[0]} is not looked for; looked for: {', '.join(names)}"
         )
     return [
-        Number(n, constants.get(n, 1.0), _log_sd(wanted.priors.get(n, wanted.prior))) for n in names
+        FreeNumber(n, constants.get(n, 1.0), _log_sd(wanted.priors.get(n, wanted.prior)))
+        for n in names
     ]
 
 

@@ -15,7 +15,7 @@ from podusv_cli.components.estimators.ekf import MOVING, ExtendedKalmanFilter, N
 from podusv_cli.components.facts import Facts
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import LANES, Vector
-from podusv_cli.identify.fit.estimate import Search
+from podusv_cli.identify.fit.estimate import HullSearch
 from podusv_cli.identify.fit.march import (
     CURRENT,
     DELAY,
@@ -31,12 +31,12 @@ from podusv_cli.identify.fit.march import (
 from podusv_cli.identify.fit.numbers import (
     ADDED,
     FORCES,
-    Number,
+    FreeNumber,
     hull_numbers,
     symmetric,
     values_at,
 )
-from podusv_cli.identify.fit.records import Log
+from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.logs.reading import Whole
 from podusv_cli.process.workers import available_workers
 from podusv_cli.scenario.identify import Identify
@@ -60,7 +60,7 @@ FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
 BLOCK = 30.0  # s of a log, whose innovations count together
 
 
-def sensor_noise(log: Log) -> Vector:
+def sensor_noise(log: FilterLog) -> Vector:
     """Standard deviations of the sensors' errors, by third differences; 0 where none is measured.
 
     White noise has third differences of sqrt(20) times its own deviation, a smooth motion small
@@ -77,7 +77,7 @@ def sensor_noise(log: Log) -> Vector:
 
 
 @dataclass(frozen=True)
-class Problem:
+class FitProblem:
     """The filter along several logs as a function of the numbers that are looked for.
 
     Points are in units of the priors' standard deviations, 0 where the prior is.
@@ -85,7 +85,7 @@ class Problem:
 
     scenario: Scenario
     wanted: Identify
-    logs: Sequence[Log]
+    logs: Sequence[FilterLog]
 
     @cached_property
     def facts(self) -> Facts:
@@ -98,10 +98,10 @@ class Problem:
         sized = ExtendedKalmanFilter().sized(self.facts)
         pace = self.facts.lam**0.25  # of an acceleration times the root of a time, after Froude
         quiet = {"q_u": CALM * pace, "q_v": CALM * pace, "q_r": CALM * pace / self.facts.lam}
-        return sized.changed(quiet | self._sensed)
+        return sized.changed(quiet | self._sensor_deviations)
 
     @cached_property
-    def _sensed(self) -> dict[str, float]:
+    def _sensor_deviations(self) -> dict[str, float]:
         """The deviations of sensors that a log has: given, or guessed from it."""
         guesses = np.array([sensor_noise(log) for log in self.logs])
         sigmas: dict[str, float] = {}
@@ -114,22 +114,23 @@ class Problem:
         return sigmas
 
     @cached_property
-    def hull(self) -> list[Number]:
+    def hull(self) -> list[FreeNumber]:
         """The hull's numbers that are looked for."""
         return hull_numbers(self.scenario.vessel, self.wanted)
 
     @cached_property
-    def numbers(self) -> list[Number]:
+    def numbers(self) -> list[FreeNumber]:
         """All numbers that are looked for: the hull's, the noises, the current of every log."""
-        guessed = [name for name in self._sensed if name not in self.wanted.noise]
-        noises = [Number(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
-        noises += [Number(n, getattr(self.filter, n), UNSURE) for n in WALKS]
+        guessed = [name for name in self._sensor_deviations if name not in self.wanted.noise]
+        noises = [FreeNumber(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
+        noises += [FreeNumber(n, getattr(self.filter, n), UNSURE) for n in WALKS]
         own = {**dict.fromkeys(CURRENT if self.current else (), self.current), **self._first}
         each = [
-            Number(f"{name}, {log.name}", 0.0, sd, ratio=False)
-            for log in self.logs for name, sd in own.items()
-        ]  # fmt: skip
-        return [*self.hull, *noises, Number(DELAY, 0.0, self.wanted.step, ratio=False), *each]
+            FreeNumber(f"{name}, {log.name}", 0.0, sd, ratio=False)
+            for log in self.logs
+            for name, sd in own.items()
+        ]
+        return [*self.hull, *noises, FreeNumber(DELAY, 0.0, self.wanted.step, ratio=False), *each]
 
     @cached_property
     def current(self) -> float:
@@ -189,12 +190,12 @@ class Problem:
         constants[CURRENTS] = current
         return constants
 
-    def _currents(self, log: Log, values: Vector) -> list[float]:
+    def _currents(self, log: FilterLog, values: Vector) -> list[float]:
         """The current of a log [m/s] with `values` from `at`, north and east."""
         names = [f"{axis}, {log.name}" for axis in CURRENT]
         return [float(values[self._places[n]]) if n in self._places else 0.0 for n in names]
 
-    def currents(self, log: Log, y: Vector) -> list[float]:
+    def currents(self, log: FilterLog, y: Vector) -> list[float]:
         """The current of a log at a point [m/s], north and east."""
         return self._currents(log, self.at(y))
 
@@ -215,7 +216,7 @@ class Problem:
         values = values_at(self.hull, y[: len(self.hull)]).tolist()
         return {number.name: value for number, value in zip(self.hull, values, strict=True)}
 
-    def scaled(self, y: Vector, thrust: float) -> Vessel:
+    def scale_by_thrust(self, y: Vector, thrust: float) -> Vessel:
         """The hull that moves under this thrust as the one at a point does under its own.
 
         A motion stays as it is where all forces, inertia's and thrust's too, are times one factor.
@@ -227,7 +228,9 @@ class Problem:
     def _follow(self) -> Follow:
         return side_by_side(self.scenario.actuator)
 
-    def start(self, log: Log, current: Sequence[float], values: Vector | None = None) -> Vector:
+    def start(
+        self, log: FilterLog, current: Sequence[float], values: Vector | None = None
+    ) -> Vector:
         """The filter's state at the beginning of a log, in the water's frame.
 
         With `values` from `at` velocity and loads there are known; without, unsure.
@@ -245,8 +248,8 @@ class Problem:
         unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
         return np.concatenate([state, first[2:], unsure[np.triu_indices(N)], np.zeros(2 * MOVING)])
 
-    def followed(
-        self, log: Log, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
+    def follow(
+        self, log: FilterLog, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
     ) -> Followed:
         """The filter along a log, for every point, in the current of the point or another."""
         values = [self.at(y) for y in points]
@@ -260,7 +263,12 @@ class Problem:
         return whole
 
     def _runs(
-        self, log: Log, constants: Sequence[Vector], starts: Sequence[Vector], *, tracked: bool
+        self,
+        log: FilterLog,
+        constants: Sequence[Vector],
+        starts: Sequence[Vector],
+        *,
+        tracked: bool,
     ) -> Iterator[Followed]:
         """The filter along a log for a few constants and starts after another."""
         for i in range(0, len(constants), LANES):
@@ -276,7 +284,7 @@ class Problem:
         nu, s = (np.empty((ends[-1], len(points))) for _ in range(2))
         values = [self.at(y) for y in points]
 
-        def fill(log: Log, begin: int, end: int) -> None:
+        def fill(log: FilterLog, begin: int, end: int) -> None:
             flows = [self._currents(log, each) for each in values]
             both = zip(values, flows, strict=True)
             rows = [np.append(self.constants(v, f), self.start(log, f, v)) for v, f in both]
@@ -294,13 +302,13 @@ class Problem:
         return nu, s
 
     @cached_property
-    def search(self) -> Search:
+    def search(self) -> HullSearch:
         """What is searched, the second time from a filter on that trusts its model little.
 
         A hull far from the boat's explains a log badly, and one that is trusted is stuck there.
         """
         loud = np.array([LOUD * (number.name in WALKS) for number in self.numbers])
-        return Search(self.innovations, len(loud), self.blocks, len(self.hull), loud)
+        return HullSearch(self.innovations, len(loud), self.blocks, len(self.hull), loud)
 
     @cached_property
     def blocks(self) -> Whole:
@@ -314,6 +322,6 @@ class Problem:
         return np.concatenate(blocks)
 
 
-def channels(log: Log) -> Whole:
+def channels(log: FilterLog) -> Whole:
     """Of every value that a log delivers, which of x, y, psi, u, v, r it is."""
     return np.nonzero(log.record.rows[:, DELIVERED : DELIVERED + MOVING])[1].astype(np.int64)

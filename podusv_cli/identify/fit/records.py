@@ -10,9 +10,17 @@ from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import MOVING
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
-from podusv_cli.identify.fit.march import APART, COMMANDS, DELIVERED, HOLDS, SHIFTS, VALUES, Record
+from podusv_cli.identify.fit.march import (
+    APART,
+    COMMANDS,
+    DELIVERED,
+    HOLDS,
+    SHIFTS,
+    VALUES,
+    FilterRecord,
+)
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.reading import SLACK, Marks, Table, Whole, delivered_each
+from podusv_cli.identify.logs.reading import SLACK, LogTable, Marks, Whole, delivered_each
 
 BEGIN = 3.0  # s, from which the velocities at the start are guessed
 FEWEST = 20  # values of the position, or a log says nothing
@@ -20,7 +28,7 @@ POSE = 3  # of the state's numbers, those without which nothing can be followed
 
 
 @dataclass(frozen=True)
-class Log:
+class FilterLog:
     """A log as the filter takes it.
 
     `times` [s] are those of the record's rows, `state` what is guessed of (x, y, psi, u, v, r) at
@@ -30,19 +38,19 @@ class Log:
 
     name: str
     times: Vector
-    record: Record
+    record: FilterRecord
     state: Vector
     counts: Vector
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
-    def of(self, rows: Vector) -> Log:
+    def of(self, rows: Vector) -> FilterLog:
         """The same with other rows, from the first on."""
         counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
-        record = Record(np.ascontiguousarray(rows), int(counts.sum()))
+        record = FilterRecord(np.ascontiguousarray(rows), int(counts.sum()))
         return replace(self, times=self.times[: len(rows)], record=record, counts=counts)
 
-    def until(self, row: int) -> Log:
+    def until(self, row: int) -> FilterLog:
         """The log before a row."""
         return self.of(self.record.rows[:row])
 
@@ -52,7 +60,7 @@ class Log:
         return float(self.times[-1] - self.times[0])
 
 
-def log_of(table: Table, actuator: Actuator, step: float, delay: float = 0.0) -> Log:
+def log_of(table: LogTable, actuator: Actuator, step: float, delay: float = 0.0) -> FilterLog:
     """The log of a table, with its commands acting so much later [s].
 
     A row stands where something is delivered, and otherwise every `step`; the commands of a row are
@@ -65,11 +73,11 @@ def log_of(table: Table, actuator: Actuator, step: float, delay: float = 0.0) ->
     kept = _rows(table.times, np.any(new, axis=1), step)
     rows = _record(table, actuator, new, kept, delay)
     counts = rows[:, DELIVERED : DELIVERED + MOVING].sum(axis=0)
-    record, words = Record(rows, int(counts.sum())), (table.notes, table.warnings)
-    return Log(table.name, table.times[kept], record, _state(table, new), counts, *words)
+    record, words = FilterRecord(rows, int(counts.sum())), (table.notes, table.warnings)
+    return FilterLog(table.name, table.times[kept], record, _state(table, new), counts, *words)
 
 
-def complete(table: Table, actuator: Actuator) -> None:
+def complete(table: LogTable, actuator: Actuator) -> None:
     """Raises LogFault where pose or commands are missing."""
     needed = {s.name for s in (*STATE[:POSE], *actuator.replayed)} - {*actuator.zero_where_missing}
     if lacking := sorted(needed - table.columns.keys()):
@@ -86,7 +94,7 @@ def complete(table: Table, actuator: Actuator) -> None:
         )
 
 
-def _record(table: Table, actuator: Actuator, new: Marks, kept: Whole, delay: float) -> Vector:
+def _record(table: LogTable, actuator: Actuator, new: Marks, kept: Whole, delay: float) -> Vector:
     """The rows that are kept."""
     commands, times = actuator.replayed, table.times[kept]
     rows = np.zeros((len(kept), COMMANDS + len(SHIFTS) * len(commands)))
@@ -114,7 +122,7 @@ def _rows(times: Vector, new: Marks, step: float) -> Whole:
     return np.array(kept)
 
 
-def _means(at: Vector, table: Table, name: str, *, lagging: bool) -> Vector:
+def _means(at: Vector, table: LogTable, name: str, *, lagging: bool) -> Vector:
     """The mean of a quantity from each of these times to the next.
 
     What lags its command goes straight from value to value; all else stays until the next.
@@ -134,7 +142,7 @@ def _means(at: Vector, table: Table, name: str, *, lagging: bool) -> Vector:
     return np.append(np.diff(whole) / np.diff(at), values[k[-1]])
 
 
-def _state(table: Table, new: Marks) -> Vector:
+def _state(table: LogTable, new: Marks) -> Vector:
     """Pose and velocities at the start, by straight lines through the first seconds.
 
     Sway is not guessed: a few seconds of GNSS say less of it than that hulls hardly slip.

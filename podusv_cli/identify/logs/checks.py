@@ -19,9 +19,9 @@ import numpy as np
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.motion import DEGREES, FAST, RADIANS, Motion
+from podusv_cli.identify.logs.motion import DEGREES, FAST, RADIANS, BinnedMotion
 from podusv_cli.identify.logs.ranges import IN_MINUTES
-from podusv_cli.identify.logs.reading import SENSED, UNITS, Table, delivered_each
+from podusv_cli.identify.logs.reading import SENSED, UNITS, LogTable, delivered_each
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
 NEAREST = 2e-3  # s between positions, below which no receiver is
@@ -69,15 +69,15 @@ STEADY = 0.05  # of a speed, and in rad of a heading: standard deviations withou
 BEYOND = 1.3  # of what an actuator can do
 
 
-def checked(
-    table: Table, actuator: Actuator | None = None, top_speed: float = math.inf
+def check_log(
+    table: LogTable, actuator: Actuator | None = None, top_speed: float = math.inf
 ) -> list[str]:
     """What is doubtful about a log, a sentence each. Raises LogFault where a mistake is certain.
 
     `actuator` is that of a log from which a hull is to be found, `top_speed` [m/s] that of the
     boat.
     """
-    motion, lines = Motion(table, actuator, top_speed), list[str]()
+    motion, lines = BinnedMotion(table, actuator, top_speed), list[str]()
     try:
         with np.errstate(invalid="ignore", divide="ignore"), catch_warnings():
             simplefilter("ignore", RuntimeWarning)  # of means over nothing, which are NaN
@@ -89,7 +89,7 @@ def checked(
     return [f"{table.name}: {line}." for line in lines]
 
 
-def _out_of_reach(motion: Motion) -> Iterator[str]:
+def _out_of_reach(motion: BinnedMotion) -> Iterator[str]:
     """Commands in another unit: by what the actuator can do."""
     assert motion.actuator
     reaches = motion.actuator.reach
@@ -106,7 +106,7 @@ def _out_of_reach(motion: Motion) -> Iterator[str]:
         yield what
 
 
-def _clock(motion: Motion) -> Iterator[str]:
+def _clock(motion: BinnedMotion) -> Iterator[str]:
     """Times in minutes or longer units: rows that are too near for a sensor of positions."""
     times = motion.table.times[np.isfinite(motion.table.columns["x"])]
     span = float(np.ptp(times)) if len(times) else 0.0
@@ -121,7 +121,7 @@ def _clock(motion: Motion) -> Iterator[str]:
     yield
 
 
-def _slow_rows(motion: Motion) -> Iterator[str]:
+def _slow_rows(motion: BinnedMotion) -> Iterator[str]:
     """Times in milliseconds or finer: rows that are too far apart."""
     step = float(np.median(np.diff(motion.table.times)))
     if step >= SLOWEST:
@@ -133,7 +133,7 @@ def _slow_rows(motion: Motion) -> Iterator[str]:
     yield from ()
 
 
-def _places(motion: Motion) -> Iterator[str]:
+def _places(motion: BinnedMotion) -> Iterator[str]:
     """Positions in degrees that are called x and y: they hardly move, far from (0, 0)."""
     x, y = (motion.table.columns[name] for name in ("x", "y"))
     apart = np.hypot(np.nanstd(x), np.nanstd(y))
@@ -148,7 +148,7 @@ def _places(motion: Motion) -> Iterator[str]:
     yield what
 
 
-def _speeds_apart(motion: Motion) -> Iterator[str]:
+def _speeds_apart(motion: BinnedMotion) -> Iterator[str]:
     """Tracks that are hundreds of times slower or faster than the log's own speed."""
     speed = motion.own_speed
     if not (speed and motion.fastest) or 1.0 / OTHER_UNIT < motion.fastest / speed < OTHER_UNIT:
@@ -167,7 +167,7 @@ def _speeds_apart(motion: Motion) -> Iterator[str]:
     yield
 
 
-def _degrees_and_minutes(motion: Motion) -> Iterator[str]:
+def _degrees_and_minutes(motion: BinnedMotion) -> Iterator[str]:
     """Latitude and longitude as ddmm.mmmm near the equator: a track that is 60 times as fast.
 
     Raises LogFault where no boat is so fast, or the log's own speed is another.
@@ -183,7 +183,7 @@ def _degrees_and_minutes(motion: Motion) -> Iterator[str]:
     yield what
 
 
-def _speed_made_good(motion: Motion) -> Iterator[str]:
+def _speed_made_good(motion: BinnedMotion) -> Iterator[str]:
     """Tracks that are faster than the boat can be."""
     fast, top = motion.fastest, motion.top_speed
     what = f"its track makes {fast:.3g} m/s"
@@ -194,14 +194,14 @@ def _speed_made_good(motion: Motion) -> Iterator[str]:
         yield f"{what}, and the boat {top:.3g} at full thrust; look at the units of time, x and y"
 
 
-def _empty(motion: Motion) -> Iterator[str]:
+def _empty(motion: BinnedMotion) -> Iterator[str]:
     """Columns without numbers."""
     for name, values in motion.table.columns.items():
         if not np.isfinite(values).any():
             yield f"{name} has no number at all"
 
 
-def _compass(motion: Motion) -> Iterator[str]:
+def _compass(motion: BinnedMotion) -> Iterator[str]:
     """A heading that stands while the boat turns."""
     known = motion.table.columns["psi"][np.isfinite(motion.table.columns["psi"])]
     straight = abs(np.nanmean(np.exp(1j * np.angle(motion.velocity)))) >= ALIKE
@@ -213,7 +213,7 @@ def _compass(motion: Motion) -> Iterator[str]:
     yield from ()
 
 
-def _constant(motion: Motion) -> Iterator[str]:
+def _constant(motion: BinnedMotion) -> Iterator[str]:
     """Columns that never change, and are not 0."""
     for name, values in motion.table.columns.items():
         known = values[np.isfinite(values)]
@@ -228,9 +228,10 @@ TURNS = {
     CENTI * DEGREES: ("COLUMN [1e-2 deg]", "psi is in hundredths of a degree"),
     math.radians(RADIANS): ("COLUMN [rad]", "psi is in radians and not in degrees"),
     math.radians(CENTI * DEGREES): (
-        "COLUMN [1e-2 deg]", "psi is in hundredths of a degree and not in degrees"
+        "COLUMN [1e-2 deg]",
+        "psi is in hundredths of a degree and not in degrees",
     ),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -266,7 +267,7 @@ class Reading:
         )
 
 
-def _degrees(motion: Motion, own: Reading, degrees: Reading) -> Iterator[str]:
+def _degrees(motion: BinnedMotion, own: Reading, degrees: Reading) -> Iterator[str]:
     """Headings in degrees of a boat that hardly turns: they are beyond a turn, or go through many.
 
     Raises LogFault where they begin beyond a turn, which headings in radians do not.
@@ -287,7 +288,7 @@ def _degrees(motion: Motion, own: Reading, degrees: Reading) -> Iterator[str]:
         yield what
 
 
-def _courses(motion: Motion) -> Iterator[str]:
+def _courses(motion: BinnedMotion) -> Iterator[str]:
     """Heading in degrees, counted to port, or axes exchanged: by the course of the track."""
     moving = motion.moving
     if np.sum(moving) < FEWEST_BINS:
@@ -328,7 +329,7 @@ def _courses(motion: Motion) -> Iterator[str]:
             "north, y east, and psi counted from north towards east"
         )
     straight = abs(complex(np.nanmean(np.exp(1j * course)))) >= ALIKE
-    if not straight and lack > 1.0 - ALIKE and _unexplained(motion):
+    if not straight and lack > 1.0 - ALIKE and _is_unexplained(motion):
         yield (
             f"course and heading agree to {abs(own.mean):.2f} of 1; look at the unit and the "
             "column of psi, unless the boat moves in all directions without turning"
@@ -351,7 +352,7 @@ class Left(NamedTuple):
         return self.left > LOUD * self.noise
 
 
-def _is_half(motion: Motion) -> bool:
+def _is_half(motion: BinnedMotion) -> bool:
     """Whether twice the heading explains motion that the heading does not, in any current.
 
     In a current of half its speed a sound log's course turns twice as far as its heading, too.
@@ -360,13 +361,13 @@ def _is_half(motion: Motion) -> bool:
     return own.is_motion and doubled.left < BETTER * own.left
 
 
-def _unexplained(motion: Motion) -> bool:
+def _is_unexplained(motion: BinnedMotion) -> bool:
     """Whether headings leave most of how a boat moves open, at any leeway and in any current."""
     over = _left(motion, BEYOND * motion.fastest)
     return over.is_motion and over.left > HALF * over.moved
 
 
-def _left(motion: Motion, fastest: float = math.inf, turn: float = RADIANS) -> Left:
+def _left(motion: BinnedMotion, fastest: float = math.inf, turn: float = RADIANS) -> Left:
     """What is left of the motion with a speed through the water of at most so much [m/s].
 
     So many of the log's own numbers are a full turn of the heading.
@@ -389,7 +390,7 @@ def _left(motion: Motion, fastest: float = math.inf, turn: float = RADIANS) -> L
     return Left(whole, open_, noise)
 
 
-def _jumps(motion: Motion) -> Iterator[str]:
+def _jumps(motion: BinnedMotion) -> Iterator[str]:
     """Values that jump: of a receiver that finds itself elsewhere, or in a damaged cell."""
     new = delivered_each(motion.table.columns)
     for name in [name for name in motion.table.columns if name in SENSED]:
@@ -412,27 +413,27 @@ def _jumps(motion: Motion) -> Iterator[str]:
             )
 
 
-def _yaw_rate(motion: Motion) -> Iterator[str]:
+def _yaw_rate(motion: BinnedMotion) -> Iterator[str]:
     """Yaw rate in deg/s or of the other sign, or heading in degrees: by how both turn."""
     if "r" not in motion.table.columns:
         return
-    given = motion.rate(motion.turned())  # as smooth as the rate of the heading
+    given = motion.rate(motion.turned_angles())  # as smooth as the rate of the heading
     own, degrees = (_match(motion.rate(motion.heading(turn)), given) for turn in (RADIANS, DEGREES))
     if degrees.same and not own.same:
         raise LogFault(
             f"psi turns as r says if it is in degrees (correlation {degrees.alike:.2f}; as given "
             f'{own.alike:.2f}); write psi: "COLUMN [deg]" under identify.columns'
         )
-    for line in _compared("r", own, UNITS["rad/s"]):
+    for line in _compare_quantity("r", own, UNITS["rad/s"]):
         yield f"{line} as fast as psi turns"
 
 
-def _speeds(motion: Motion) -> Iterator[str]:
+def _speeds(motion: BinnedMotion) -> Iterator[str]:
     """Speeds in knots or of the other sign: by how positions move."""
     body = motion.velocity * np.exp(-1j * motion.heading())
     for name, moved in (("u", body.real), ("v", body.imag)):
         if name in motion.table.columns:
-            for line in _compared(name, _match(moved, motion.mean(name)), UNITS["m/s"]):
+            for line in _compare_quantity(name, _match(moved, motion.mean(name)), UNITS["m/s"]):
                 yield f"{line} as fast as positions move"
 
 
@@ -463,7 +464,7 @@ def _match(seen: Vector, given: Vector) -> Match:
     return Match(float(a @ b / math.sqrt((a @ a) * (b @ b))), math.sqrt((a @ a) / (b @ b)))
 
 
-def _compared(name: str, match: Match, units: dict[str, float]) -> Iterator[str]:
+def _compare_quantity(name: str, match: Match, units: dict[str, float]) -> Iterator[str]:
     """A quantity beside what positions and headings say of it. Raises LogFault."""
     alike, ratio = match
     if abs(alike) < ALIKE:
@@ -480,7 +481,7 @@ def _compared(name: str, match: Match, units: dict[str, float]) -> Iterator[str]
         yield f"{name} is {1.0 / ratio:.2g} times"
 
 
-def _manoeuvres(motion: Motion) -> Iterator[str]:
+def _manoeuvres(motion: BinnedMotion) -> Iterator[str]:
     """Logs without excitation."""
     fast = np.abs(motion.velocity)[motion.moving]
     turned = np.nanstd(motion.heading())
@@ -492,7 +493,7 @@ def _manoeuvres(motion: Motion) -> Iterator[str]:
         )
 
 
-def _idle(motion: Motion) -> Iterator[str]:
+def _idle(motion: BinnedMotion) -> Iterator[str]:
     """Logs in which nothing was commanded."""
     columns = motion.table.columns
     assert motion.actuator
@@ -504,10 +505,16 @@ def _idle(motion: Motion) -> Iterator[str]:
         )
 
 
-Check = Callable[[Motion], Iterator[str]]
+Check = Callable[[BinnedMotion], Iterator[str]]
 # Of every log, of those with headings, and of those that a hull is to be found from.
 OF_ALL: tuple[Check, ...] = (
-    _jumps, _clock, _places, _degrees_and_minutes, _speeds_apart, _speed_made_good, _empty,
-)  # fmt: skip
+    _jumps,
+    _clock,
+    _places,
+    _degrees_and_minutes,
+    _speeds_apart,
+    _speed_made_good,
+    _empty,
+)
 OF_HEADINGS: tuple[Check, ...] = (_compass, _courses, _yaw_rate, _speeds)
 OF_FITS: tuple[Check, ...] = (_slow_rows, _out_of_reach, _constant, _idle, _manoeuvres)

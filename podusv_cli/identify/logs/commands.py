@@ -8,12 +8,12 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector, bundle, call
-from podusv_cli.identify.logs.reading import Table
+from podusv_cli.identify.logs.reading import LogTable
 
 FINE = 0.2  # of the shortest lag, one step at most
 
 
-def acted(table: Table, actuator: Actuator) -> Table:
+def with_actuator_state(table: LogTable, actuator: Actuator) -> LogTable:
     """The log with what the actuator did at its rows, where it has only the commands of it.
 
     Lags hang on no motion of the hull. What the log itself has of this stays.
@@ -25,15 +25,18 @@ def acted(table: Table, actuator: Actuator) -> Table:
         return table
     still = np.zeros(len(table.times))
     inputs = [
-        held(table.columns.get(n, table.columns.get(commands.get(n, ""), still))) for n in names
+        hold_values(table.columns.get(n, table.columns.get(commands.get(n, ""), still)))
+        for n in names
     ]
-    did = dict(zip(names, _lagged(table.times, np.column_stack(inputs), actuator).T, strict=True))
+    did = dict(
+        zip(names, _lag_commands(table.times, np.column_stack(inputs), actuator).T, strict=True)
+    )
     note = f"{table.name}: {', '.join(lacking)} follow from commands by the actuator's lags."
     columns = {**table.columns, **{name: did[name] for name in lacking}}
     return replace(table, columns=columns, notes=(*table.notes, note))
 
 
-def held(values: Vector) -> Vector:
+def hold_values(values: Vector) -> Vector:
     """Values that stay until the next; before the first it holds, too."""
     known = np.isfinite(values)
     if not known.any():
@@ -42,7 +45,7 @@ def held(values: Vector) -> Vector:
     return np.asarray(values[last])
 
 
-def _lagged(times: Vector, commands: Vector, actuator: Actuator) -> Vector:
+def _lag_commands(times: Vector, commands: Vector, actuator: Actuator) -> Vector:
     """The actuator's state at each time by Heun's method; it begins as it is commanded."""
     k, table = bundle(actuator.constants()), actuator.table()
     longest, states = FINE * actuator.shortest_lag(), np.empty_like(commands)

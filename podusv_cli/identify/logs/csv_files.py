@@ -41,7 +41,7 @@ DATE = re.compile(r"\d{4}-\d\d-\d\d")
 CLOCK_TIME = re.compile(r"\d{1,2}:\d\d(:\d\d([.,]\d+)?)?")
 
 
-class Line(NamedTuple):
+class FileLine(NamedTuple):
     """A line of a file: its number from 1, and its cells; none where they cannot be told apart."""
 
     number: int
@@ -55,10 +55,10 @@ def read_csv(path: Path) -> Contents:
     2026-05-04T10:00:00Z, become seconds since 1970. Raises LogFault.
     """
     try:
-        text = decoded(path.read_bytes())
+        text = decode_text(path.read_bytes())
     except OSError as error:
         raise LogFault(f"{path}: cannot be read: {error.strerror}") from error
-    head, *body = list(_lines(text)) or [Line(1, ())]
+    head, *body = list(_lines(text)) or [FileLine(1, ())]
     names = _names(path, head)
     rows, warnings = _whole_rows(path, names, body, head.number)
     _check_title(path, head, rows)
@@ -77,7 +77,7 @@ def read_csv(path: Path) -> Contents:
     )
 
 
-def decoded(content: bytes) -> str:
+def decode_text(content: bytes) -> str:
     """The text of a file: UTF-16 where it says so, else UTF-8, else one byte a character."""
     encoding = next((name for bom, name in BOMS.items() if content.startswith(bom)), "utf-8")
     try:
@@ -86,7 +86,7 @@ def decoded(content: bytes) -> str:
         return content.decode("latin-1" if encoding == "utf-8" else encoding, errors="replace")
 
 
-def _lines(text: str) -> Iterator[Line]:
+def _lines(text: str) -> Iterator[FileLine]:
     """The lines but empty ones and comments; the first tells what separates cells.
 
     It is not among them where it is no more than `sep=;`, as Excel writes it.
@@ -101,7 +101,7 @@ def _lines(text: str) -> Iterator[Line]:
         if separator is None:
             separator = max(SEPARATORS, key=line.count)
             separator = separator if separator in line else " "
-        yield Line(number, _cells(line.rstrip("\n"), separator))
+        yield FileLine(number, _cells(line.rstrip("\n"), separator))
 
 
 def _cells(line: str, separator: str) -> Sequence[str]:
@@ -119,7 +119,7 @@ def _cells(line: str, separator: str) -> Sequence[str]:
     return [cell.strip() for cell in cells]
 
 
-def _names(path: Path, head: Line) -> list[str]:
+def _names(path: Path, head: FileLine) -> list[str]:
     """The names in the first line, without empty ones at its end. Raises LogFault."""
     names = [" ".join(name.split()) for name in head.cells]
     where = f"{path}: line {head.number}, its first,"
@@ -140,7 +140,7 @@ def _names(path: Path, head: Line) -> list[str]:
     return [name or f"{UNNAMED}{i}" for i, name in enumerate(names, 1)]
 
 
-def _check_title(path: Path, head: Line, rows: Sequence[Line]) -> None:
+def _check_title(path: Path, head: FileLine, rows: Sequence[FileLine]) -> None:
     """Raises LogFault where numbers stand in the line of names, and names in the next one."""
     if rows and any(map(_is_number, head.cells)) and not any(map(_may_be_value, rows[0].cells)):
         raise LogFault(
@@ -159,8 +159,8 @@ def _is_number(cell: str) -> bool:
 
 
 def _whole_rows(
-    path: Path, names: Sequence[str], body: Sequence[Line], head: int
-) -> tuple[list[Line], list[str]]:
+    path: Path, names: Sequence[str], body: Sequence[FileLine], head: int
+) -> tuple[list[FileLine], list[str]]:
     """The lines with a cell a name, and a sentence on the others. Raises LogFault.
 
     `head` is the number of the line with the names.

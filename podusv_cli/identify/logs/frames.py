@@ -53,7 +53,7 @@ def local_plane(quantities: Quantities) -> tuple[Quantities, list[str]]:
     return rest, [f"x and y are north and east of the first fix, {place}{lost}"]
 
 
-def turned(quantities: Quantities, frame: str) -> Quantities:
+def from_frame(quantities: Quantities, frame: str) -> Quantities:
     """Quantities of podusv's frame from those of `frame`: as they are, or from east, north, up."""
     return quantities if frame == "ned" else {**quantities, **_from_enu(quantities)}
 

@@ -19,38 +19,61 @@ from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.messages import TIME
 from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
-from podusv_cli.identify.logs.reading import UNITS, clock_of, delivered, listed, parted
+from podusv_cli.identify.logs.reading import (
+    UNITS,
+    clock_of,
+    list_names,
+    mark_new_values,
+    split_unit,
+)
 
 SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
 # stands for 1, 2, ... in the order of the log.
 NAMES = {
     TIME: r"time|t|timestamp|time_?stamp|stamp|timeus|epoch|secs?|seconds|date_?time|zeit",
-    "lat": r"lat|latitude|latitud|breite|breitengrad", "lon": r"lon|lng|long|longitude|longitud|"
+    "lat": r"lat|latitude|latitud|breite|breitengrad",
+    "lon": r"lon|lng|long|longitude|longitud|"
     "länge|längengrad|laenge|laengengrad",
-    "x": r"x|north|northing|pos_?n|pn|position\.x", "y": r"y|east|easting|pos_?e|pe|position\.y",
+    "x": r"x|north|northing|pos_?n|pn|position\.x",
+    "y": r"y|east|easting|pos_?e|pe|position\.y",
     "psi": r"psi|heading|hdg|compass|yaw|kompass|steuerkurs",
-    "u": r"u|surge|linear\.x|speed_?x|vx", "v": r"v|sway|linear\.y|speed_?y|vy",
+    "u": r"u|surge|linear\.x|speed_?x|vx",
+    "v": r"v|sway|linear\.y|speed_?y|vy",
     "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
     "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
     ".*propeller.*|.*motor.*|.*esc.*speed.*",
     "delta_#": r"delta_?\d|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
-    "tau_u": r"tau_u|surge_?force|force\.x", "tau_v": r"tau_v|sway_?force|force\.y",
+    "tau_u": r"tau_u|surge_?force|force\.x",
+    "tau_v": r"tau_v|sway_?force|force\.y",
     "tau_r": r"tau_r|yaw_?moment|torque\.z",
-}  # fmt: skip
+}
 # Of each of these a log needs one, the first where nothing is known.
 NEEDED = ((TIME,), ("x", "lat"), ("y", "lon"), ("psi",), ("n_1", "delta_1", "tau_u"))
 FORMS = ("^({})$", "([./ ]|_(?=...))({})$")  # the whole name, or its last part
 # Of quantities the unit that the end of a name means, and that which a range means that begins so.
 ENDINGS = {
-    "deg_s": "deg/s", "degs": "deg/s", "dps": "deg/s", "deg": "deg", "rad": "", "kn": "kn",
-    "kts": "kn", "knots": "kn", "kmh": "km/h", "rpm": "rpm", "ms": "ms", "us": "us", "ns": "ns",
+    "deg_s": "deg/s",
+    "degs": "deg/s",
+    "dps": "deg/s",
+    "deg": "deg",
+    "rad": "",
+    "kn": "kn",
+    "kts": "kn",
+    "knots": "kn",
+    "kmh": "km/h",
+    "rpm": "rpm",
+    "ms": "ms",
+    "us": "us",
+    "ns": "ns",
     "timeus": "us",
-}  # fmt: skip
+}
 BEYOND = {
-    "psi": ((7.0, "deg"),), "r": ((4.0, "deg/s"),), "n_#": ((100.0, "rpm"),),
+    "psi": ((7.0, "deg"),),
+    "r": ((4.0, "deg/s"),),
+    "n_#": ((100.0, "rpm"),),
     "delta_#": ((3.2, "deg"),),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -82,9 +105,11 @@ class Listing:
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
         return {
-            "format": 1, "columns": [asdict(own) for own in self.columns],
-            "mapping": self.mapping(), "warnings": list(self.warnings),
-        }  # fmt: skip
+            "format": 1,
+            "columns": [asdict(own) for own in self.columns],
+            "mapping": self.mapping(),
+            "warnings": list(self.warnings),
+        }
 
     def mapping(self) -> list[str]:
         """Lines to write under `identify`; comments say what could not be guessed."""
@@ -92,13 +117,13 @@ class Listing:
         for own in self.columns:
             if own.quantity:
                 unit = f" [{own.unit}]" if own.unit else ""
-                lines.append(f"  {own.quantity}: {_in_quotes(parted(own.name)[0] + unit)}")
+                lines.append(f"  {own.quantity}: {_in_quotes(split_unit(own.name)[0] + unit)}")
         known = {own.quantity for own in self.columns}
         lacking = [names[0] for names in NEEDED if not known & {*names}]
         lines += [f"  # {name}: ?   (not guessed; see podusv docs identify)" for name in lacking]
         left = [visible(own.name) for own in self.columns if not own.quantity]
         if left:
-            lines.append(f"  # columns not guessed: {listed(left)}")
+            lines.append(f"  # columns not guessed: {list_names(left)}")
         if self.turned:
             lines.append("frame: enu  # ROS counts x to the east, y to the north, turns to port")
         return lines
@@ -121,7 +146,7 @@ def listing(path: Path) -> Listing:
     for column, reason in _no_clocks(contents):
         doubts.append(f"{column!r} is not taken for {TIME}: it {reason}")
     return Listing(
-        [_listed(name, columns, guesses) for name in columns],
+        [_list_column(name, columns, guesses) for name in columns],
         any(name.endswith("orientation.yaw") for name in guesses),
         tuple(f"{path.name}: {line}." for line in (*contents.warnings, *doubts)),
     )
@@ -153,18 +178,18 @@ def _no_clocks(contents: Contents) -> Iterator[tuple[str, str]]:
             yield column, contents.doubts.get(column, "has no number")
 
 
-def _listed(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
+def _list_column(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
     values, quantity = columns[name], guesses.get(name, "")
     known = values[np.isfinite(values)]
     ends = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
     seconds = _duration(name, columns, guesses)
-    rate = float(np.sum(delivered(values))) / seconds if seconds > 0.0 else np.nan
+    rate = float(np.sum(mark_new_values(values))) / seconds if seconds > 0.0 else np.nan
     unit = _unit(name, columns, guesses) if quantity else ""
     missing = 1.0 - len(known) / max(len(values), 1)
-    return Listed(name, rate, *ends, missing, _numbered(quantity, name, guesses), unit)
+    return Listed(name, rate, *ends, missing, _number_name(quantity, name, guesses), unit)
 
 
-def _numbered(quantity: str, name: str, guesses: dict[str, str]) -> str:
+def _number_name(quantity: str, name: str, guesses: dict[str, str]) -> str:
     """`n_2` for the second of several."""
     alike = [column for column, guess in guesses.items() if guess == quantity]
     return quantity.replace("#", str(alike.index(name) + 1)) if quantity else ""
@@ -197,7 +222,7 @@ def _may_be_clock(column: str, columns: Columns) -> bool:
 
 def _plain(column: str) -> str:
     """A name in small letters, without its unit, but that of a propeller's speed."""
-    own, unit = parted(column)
+    own, unit = split_unit(column)
     if unit == "rpm":
         own = f"{own} rpm"
     name = own.lower().replace("-", "_").removesuffix("_")
@@ -207,7 +232,7 @@ def _plain(column: str) -> str:
 
 def _unit(name: str, columns: Columns, guesses: dict[str, str]) -> str:
     """Of a column: in brackets, at the end of its name, or by its range."""
-    quantity, (own, unit) = guesses[name], parted(name)
+    quantity, (own, unit) = guesses[name], split_unit(name)
     values, _ = without_none(columns[name])
     if unit:
         return unit

@@ -34,14 +34,14 @@ OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simul
 Reader = Callable[[Path], Contents]
 
 
-def _fenced(read: Reader) -> Reader:
+def _fence_reader(read: Reader) -> Reader:
     """The reader; what a library raises on a damaged file is a LogFault, what it prints a warning.
 
     A LogFault, too, where no message has numbers.
     """
 
     @wraps(read)
-    def fenced(path: Path) -> Contents:
+    def read_fenced(path: Path) -> Contents:
         with TemporaryFile("w+", errors="replace") as printed:
             try:
                 with _printed_into(printed):
@@ -61,7 +61,7 @@ def _fenced(read: Reader) -> Reader:
             return replace(contents, warnings=(*contents.warnings, damage))
         return contents
 
-    return fenced
+    return read_fenced
 
 
 @contextmanager
@@ -82,7 +82,7 @@ def _printed_into(file: IO[str]) -> Iterator[None]:
             os.close(own)
 
 
-@_fenced
+@_fence_reader
 def read_ros(path: Path) -> Contents:
     """Every topic of a ROS 2 bag: "topic.field.field"; of a quaternion also its `yaw` [rad].
 
@@ -124,7 +124,7 @@ def _yaw(w: Any, x: Any, y: Any, z: Any) -> Any:
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-@_fenced
+@_fence_reader
 def read_ulog(path: Path) -> Contents:
     """Every message of a PX4 log: "message.field"; of attitudes q also their `yaw` [rad]."""
     pyulog = _library("pyulog", path)
@@ -143,7 +143,7 @@ def read_ulog(path: Path) -> Contents:
     return Contents(columns, warnings=(damage,) if log.file_corruption else ())
 
 
-@_fenced
+@_fence_reader
 def read_dataflash(path: Path) -> Contents:
     """Every message of an ArduPilot log: "MESSAGE.Field", a second sensor's "MESSAGE_1.Field"."""
     library = _library("pymavlink.DFReader", path)

@@ -10,7 +10,7 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.logs.reading import Marks, Table, Whole
+from podusv_cli.identify.logs.reading import LogTable, Marks, Whole
 
 BIN = 1.0  # s, over which values are averaged; at least that of VALUES_A_BIN
 VALUES_A_BIN = 3
@@ -22,13 +22,13 @@ RADIANS, DEGREES = 2.0 * math.pi, 360.0  # a full turn
 
 
 @dataclass(frozen=True)
-class Motion:
+class BinnedMotion:
     """A log averaged over bins of some seconds; what moved the boat, and its top speed [m/s].
 
     The top speed is infinite where nobody knows it.
     """
 
-    table: Table
+    table: LogTable
     actuator: Actuator | None = None
     top_speed: float = math.inf
 
@@ -65,7 +65,7 @@ class Motion:
             return np.full(len(means), np.nan)
         return np.asarray(np.gradient(means, self.width))
 
-    def turned(self) -> Vector:
+    def turned_angles(self) -> Vector:
         """The mean angle in each bin by which the yaw rate says that the boat has turned [rad]."""
         known = np.isfinite(self.table.columns["r"])
         rates, times = self.table.columns["r"][known], self.table.times[known]

@@ -29,8 +29,10 @@ NONE = (
     *(32767.0 * scale for scale in (1.0, 0.1, 0.01, 1e-4)),
     *(-32768.0 * scale for scale in (1.0, 0.1, 0.01)),
     *(sign * (2.0**31 - 1.0) * scale for scale in (1.0, 1e-7) for sign in (1.0, -1.0)),
-    4294967295.0, 511.0, *(sign * nines for nines in (999.0, 9999.0, 99999.0) for sign in (1, -1)),
-)  # fmt: skip
+    4294967295.0,
+    511.0,
+    *(sign * nines for nines in (999.0, 9999.0, 99999.0) for sign in (1, -1)),
+)
 
 
 def without_none(values: Vector) -> tuple[Vector, str]:

@@ -17,10 +17,10 @@ import numpy.typing as npt
 from podusv_cli.core import units
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.core.units import allowed, spelled
+from podusv_cli.core.units import spell_unit, units_allowed_for
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
-from podusv_cli.identify.logs.frames import LAT, LON, local_plane, turned
+from podusv_cli.identify.logs.frames import LAT, LON, from_frame, local_plane
 from podusv_cli.identify.logs.messages import TIME
 from podusv_cli.identify.logs.ranges import PLACES, may_be_minutes, on_earth, without_none
 
@@ -35,18 +35,20 @@ SENSED = {signal.name for signal in (*STATE, LAT, LON)}
 OPTIONAL = {signal.name for signal in STATE[3:]}  # that may be in a log without any number
 # What logs have beside the units that people write: propellers in rad/s, angles as integers.
 OF_LOGS = {
-    "1/s": {"rad/s": 0.5 / math.pi}, "rad": {"1e-2 deg": math.pi / 18000.0},
+    "1/s": {"rad/s": 0.5 / math.pi},
+    "rad": {"1e-2 deg": math.pi / 18000.0},
     "deg": {"deg": 1.0, "rad": 180.0 / math.pi, "1e-7 deg": 1e-7, "1e-6 deg": 1e-6},
-}  # fmt: skip
+}
 # Of each of podusv's units, what one of those that logs have is in it.
 UNITS: dict[str, dict[str, float]] = {
-    unit: {name: float(factor) for name, factor in allowed(unit).items()} | OF_LOGS.get(unit, {})
+    unit: {name: float(factor) for name, factor in units_allowed_for(unit).items()}
+    | OF_LOGS.get(unit, {})
     for unit in (*units.UNITS, *OF_LOGS)
 }
 
 
 @dataclass(frozen=True)
-class Table:
+class LogTable:
     """A log: times [s], and of every quantity a value at each time, NaN where there is none.
 
     `notes` says how the log was understood, `warnings` what is doubtful about it. `from_fix`: x and
@@ -62,7 +64,7 @@ class Table:
     from_fix: bool = False
     maybe_minutes: bool = False
 
-    def part(self, begin: float, end: float) -> Table:
+    def part(self, begin: float, end: float) -> LogTable:
         """What lies from one time on before another. Raises LogFault where that is nothing."""
         inside = (self.times >= begin) & (self.times < end)
         if not inside.any():
@@ -72,7 +74,7 @@ class Table:
             )
         return self.where(inside)
 
-    def finer(self, longest: float) -> Table:
+    def finer(self, longest: float) -> LogTable:
         """With rows between its own, without any value, that are at most so far apart [s]."""
         spans = np.diff(self.times)
         parts = np.maximum(np.ceil(spans / longest - SLACK), 1.0).astype(int)
@@ -86,13 +88,13 @@ class Table:
             column[first] = self.columns[name]
         return replace(self, times=times, columns=columns)
 
-    def where(self, rows: Marks) -> Table:
+    def where(self, rows: Marks) -> LogTable:
         """These rows alone."""
         columns = {name: column[rows] for name, column in self.columns.items()}
         return replace(self, times=self.times[rows], columns=columns)
 
 
-class Named(NamedTuple):
+class NamedQuantities(NamedTuple):
     """What a log calls quantities, and the frame that it has them in."""
 
     columns: Mapping[str, str] = {}
@@ -111,7 +113,9 @@ class _Series(NamedTuple):
         return _Series(self.clock, self.times[rows], self.values[rows])
 
 
-def table(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = "") -> Table:
+def table(
+    path: Path, wanted: Sequence[Signal], named: NamedQuantities, *, name: str = ""
+) -> LogTable:
     """As `tables`, of a log whose clock begins once. Raises LogFault."""
     first, *others = tables(path, wanted, named, name=name)
     if others:
@@ -124,7 +128,9 @@ def table(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = "")
     return first
 
 
-def tables(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = "") -> list[Table]:
+def tables(
+    path: Path, wanted: Sequence[Signal], named: NamedQuantities, *, name: str = ""
+) -> list[LogTable]:
     """The quantities `wanted` of a log that has them, at the times of any, in podusv's units.
 
     A table each time that its clock begins anew. Latitude and longitude stand for x and y where the
@@ -147,34 +153,37 @@ def tables(path: Path, wanted: Sequence[Signal], named: Named, *, name: str = ""
     return [_in_frame(part, named.frame) for part in found]
 
 
-def _in_frame(whole: Table, frame: str) -> Table:
+def _in_frame(whole: LogTable, frame: str) -> LogTable:
     """The table north, east, to starboard; of latitude and longitude, which are so in any frame."""
-    flat, notes = local_plane(turned(whole.columns, frame))
+    flat, notes = local_plane(from_frame(whole.columns, frame))
     from_fix = "x" in flat and "x" not in whole.columns
     minutes = from_fix and all(may_be_minutes(whole.columns[place]) for place in PLACES)
     return replace(
-        whole, columns=flat, notes=tuple(f"{whole.name}: {note}." for note in notes),
-        from_fix=from_fix, maybe_minutes=minutes,
-    )  # fmt: skip
+        whole,
+        columns=flat,
+        notes=tuple(f"{whole.name}: {note}." for note in notes),
+        from_fix=from_fix,
+        maybe_minutes=minutes,
+    )
 
 
 def _series(
-    contents: Contents, wanted: Sequence[Signal], named: Named, name: str
+    contents: Contents, wanted: Sequence[Signal], named: NamedQuantities, name: str
 ) -> tuple[dict[str, _Series], list[str]]:
     """The wanted quantities with their times, and what is doubtful about their cells."""
     columns, words = contents.columns, list[str]()
-    clock = _found(columns, CLOCK, named, name)
+    clock = _find_column(columns, CLOCK, named, name)
     series: dict[str, _Series] = {}
     used: dict[str, str] = {}
     for signal in (*wanted, LAT, LON):
-        found = _found(columns, signal, named, name)
+        found = _find_column(columns, signal, named, name)
         if not found or (signal.name in PLACES and {"x", "y"} & series.keys()):
             continue
         own = clock_of(found.column, columns) or (clock.column if clock else "")
         if not own:
             raise LogFault(
                 f"{name}: no column is called time; name the one that has it, as in columns: "
-                f"{{time: {next(iter(columns), 't')}}} (columns: {listed(columns)})"
+                f"{{time: {next(iter(columns), 't')}}} (columns: {list_names(columns)})"
             )
         used |= {signal.name: found.column}
         if clock and own == clock.column:
@@ -187,7 +196,7 @@ def _series(
         raise LogFault(
             f"{name}: it has none of x, y (or lat, lon) and psi, which are needed; write "
             "identify.columns in a scenario beside it, as {x: north, y: east, "
-            f"psi: 'heading [deg]'}} (columns: {listed(columns)})"
+            f"psi: 'heading [deg]'}} (columns: {list_names(columns)})"
         )
     return series, [*_doubts(contents, used, name), *words]
 
@@ -246,7 +255,9 @@ class _Found(NamedTuple):
     factor: float
 
 
-def _found(columns: Columns, signal: Signal, named: Named, name: str) -> _Found | None:
+def _find_column(
+    columns: Columns, signal: Signal, named: NamedQuantities, name: str
+) -> _Found | None:
     """The column that has a quantity, and what its numbers are multiplied by.
 
     None where there is none and none was named. Raises LogFault.
@@ -255,24 +266,24 @@ def _found(columns: Columns, signal: Signal, named: Named, name: str) -> _Found 
     wanted, sign = place or signal.name, 1.0
     if wanted.startswith("-") and wanted not in columns:
         wanted, sign = wanted[1:].strip(), -1.0
-    asked, unit = parted(wanted)
+    asked, unit = split_unit(wanted)
     alike = [column for column in columns if column == wanted]
-    alike = alike or [column for column in columns if parted(column)[0] == asked]
+    alike = alike or [column for column in columns if split_unit(column)[0] == asked]
     if len(alike) > 1:
         raise LogFault(
-            f"{name}: {signal.name} may be any of {listed(alike)}; say which under "
+            f"{name}: {signal.name} may be any of {list_names(alike)}; say which under "
             f"identify.columns, as {signal.name}: {alike[0]!r}"
         )
     if alike:
-        return _Found(alike[0], sign * _factor(signal, unit or parted(alike[0])[1], name))
+        return _Found(alike[0], sign * _factor(signal, unit or split_unit(alike[0])[1], name))
     if place is None:
         return None
     near = difflib.get_close_matches(asked, columns, 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
-    raise LogFault(f"{name}: no column is called {asked!r}{hint} (columns: {listed(columns)})")
+    raise LogFault(f"{name}: no column is called {asked!r}{hint} (columns: {list_names(columns)})")
 
 
-def parted(name: str) -> tuple[str, str]:
+def split_unit(name: str) -> tuple[str, str]:
     """Name and unit of "heading [deg]" or "heading (deg)"; "q[0]" has no unit."""
     match = re.fullmatch(r"(.*?)(?: +[\[(](.*)[\])]|[\[(]([^\d].*)[\])])", name)
     return (match[1], match[2] or match[3]) if match else (name, "")
@@ -280,9 +291,9 @@ def parted(name: str) -> tuple[str, str]:
 
 def _factor(signal: Signal, unit: str, name: str) -> float:
     known = UNITS.get(signal.unit, {signal.unit: 1.0})
-    if unit and spelled(unit) not in known:
+    if unit and spell_unit(unit) not in known:
         raise LogFault(f"{name}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}")
-    return known[spelled(unit)] if unit else 1.0
+    return known[spell_unit(unit)] if unit else 1.0
 
 
 def clock_of(column: str, columns: Columns) -> str | None:
@@ -292,13 +303,13 @@ def clock_of(column: str, columns: Columns) -> str | None:
     return next((clock for clock in clocks if clock in columns), None)
 
 
-def _together(name: str, series: Mapping[str, _Series]) -> Table:
+def _together(name: str, series: Mapping[str, _Series]) -> LogTable:
     """One table of quantities that have clocks of their own."""
-    sound: list[Table] = []
+    sound: list[LogTable] = []
     for clock in dict.fromkeys(s.clock for s in series.values()):
         own = {q: s for q, s in series.items() if s.clock == clock}
         times = next(iter(own.values())).times
-        sound.append(_sound(Table(name, times, {q: s.values for q, s in own.items()}), clock))
+        sound.append(_sound(LogTable(name, times, {q: s.values for q, s in own.items()}), clock))
     times = np.unique(np.concatenate([part.times for part in sound]))
     together = {}
     for part in sound:
@@ -306,10 +317,12 @@ def _together(name: str, series: Mapping[str, _Series]) -> Table:
         for quantity, values in part.columns.items():
             together[quantity] = np.full(len(times), np.nan)
             together[quantity][at] = values
-    return Table(name, times, together, warnings=tuple(w for part in sound for w in part.warnings))
+    return LogTable(
+        name, times, together, warnings=tuple(w for part in sound for w in part.warnings)
+    )
 
 
-def _sound(log: Table, clock: str) -> Table:
+def _sound(log: LogTable, clock: str) -> LogTable:
     """The log without rows that have no time, and with one row a time. Raises LogFault."""
     timed = np.isfinite(log.times)
     warnings = []
@@ -346,14 +359,14 @@ def _of_clock(times: Vector, row: int) -> str:
     )
 
 
-def listed(columns: Iterable[str]) -> str:
+def list_names(columns: Iterable[str]) -> str:
     """The first of the names, and how many more there are."""
     names = list(columns)
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     return ", ".join(names[:LISTED]) + more
 
 
-def delivered(*columns: Vector) -> Marks:
+def mark_new_values(*columns: Vector) -> Marks:
     """Which rows of a column have a new value, or of several that come together, as x and y do.
 
     A logger that is faster than a sensor repeats its last value: where values change at regular
@@ -377,13 +390,13 @@ def delivered(*columns: Vector) -> Marks:
 
 
 def delivered_each(columns: Mapping[str, Vector]) -> dict[str, Marks]:
-    """Of every quantity, which rows have a new value. x and y come together: see `delivered`.
+    """Of every quantity, which rows have a new value. x and y come together: see `mark_new_values`.
 
     Where one of the two is missing, the other is looked at alone.
     """
-    new = {name: delivered(values) for name, values in columns.items()}
+    new = {name: mark_new_values(values) for name, values in columns.items()}
     if "x" in new and "y" in new:
         x, y = np.isfinite(columns["x"]), np.isfinite(columns["y"])
-        together = delivered(columns["x"], columns["y"])
+        together = mark_new_values(columns["x"], columns["y"])
         new |= {"x": together | (new["x"] & ~y), "y": together | (new["y"] & ~x)}
     return new

@@ -13,9 +13,9 @@ from itertools import product
 from pathlib import Path
 
 from podusv_cli.core.errors import ScenarioError, UsageError
-from podusv_cli.core.phrases import unknown
+from podusv_cli.core.phrases import unknown_word
 from podusv_cli.scenario import shipped
-from podusv_cli.scenario.layers import composed
+from podusv_cli.scenario.layers import compose_layers
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.plugins import of_files
@@ -65,7 +65,7 @@ def cases(wanted: Selection) -> Iterator[BenchCase]:
     """All cases, one by one. Raises UsageError for a folder or a name, ScenarioError for a file."""
     for path in wanted.laws:
         _check_laws(path)
-    vessels, tasks, conditions = (_chosen(wanted, axis) for axis in AXES)
+    vessels, tasks, conditions = (_choose_files(wanted, axis) for axis in AXES)
     for vessel, task, condition in product(vessels, tasks, conditions):
         layers = [
             wanted.folder / LAWS,
@@ -93,7 +93,7 @@ def _check_laws(path: Path) -> None:
         )
     faults: list[Fault] = []
     text = read_text(str(path), Mark(str(path)), "", faults)
-    root = text and composed(text, str(path), (), faults)
+    root = text and compose_layers(text, str(path), (), faults)
     if not root or faults:
         raise ScenarioError(faults)
     if taken := [key for key in OF_CASES if root.get(key)]:
@@ -104,7 +104,7 @@ def _check_laws(path: Path) -> None:
         )
 
 
-def _chosen(wanted: Selection, axis: str) -> dict[str, Path]:
+def _choose_files(wanted: Selection, axis: str) -> dict[str, Path]:
     """Files, or folders of conditions, by name."""
     if not (wanted.folder / axis).is_dir():
         raise UsageError(
@@ -116,7 +116,7 @@ def _chosen(wanted: Selection, axis: str) -> dict[str, Path]:
     names = (wanted.chosen or {}).get(axis) or known
     for name in names:
         if name not in known:
-            raise UsageError(unknown(f"{axis.rstrip('s')} {name!r}", name, known))
+            raise UsageError(unknown_word(f"{axis.rstrip('s')} {name!r}", name, known))
     return {name: known[name] for name in names}
 
 

@@ -92,11 +92,11 @@ def tracks(runs: Sequence[BenchRun], laws: Sequence[str]) -> Figure:
             _small(axes, [run for run in runs if (run.task, run.law) == (task, law)])
         row[0].set_ylabel(escaping.figure(task), **SMALL_TEXT, rotation=0, ha="right", va="center")
     for law, axes in zip(laws, every[0], strict=True):
-        axes.set_title(_folded(law), **SMALL_TEXT, pad=2.0)
+        axes.set_title(_fold_name(law), **SMALL_TEXT, pad=2.0)
     return figure
 
 
-def _folded(law: str) -> str:
+def _fold_name(law: str) -> str:
     """A law's name as text of a figure; a long one in two lines."""
     first, _, rest = law.partition("_")
     if not rest or len(law) <= LONGEST:

@@ -17,7 +17,7 @@ from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.optimum import collocation
 from podusv_cli.optimum.collocation import Stage
-from podusv_cli.optimum.problem import Motion, Problem, problem
+from podusv_cli.optimum.problem import Motion, OptimumProblem, problem
 from podusv_cli.studies.bench.cases import BenchCase
 from podusv_cli.studies.bench.runs import BenchRun
 
@@ -43,14 +43,16 @@ class Least:
 
 
 @dataclass(frozen=True)
-class Task:
+class OptimumTask:
     """Cases with one optimum, and the laws whose runs the search begins from."""
 
     cases: Sequence[BenchCase]
     laws: Sequence[str]
 
 
-def wanted(every: Iterable[BenchCase], runs: Sequence[BenchRun]) -> tuple[list[Task], list[str]]:
+def wanted_optima(
+    every: Iterable[BenchCase], runs: Sequence[BenchRun]
+) -> tuple[list[OptimumTask], list[str]]:
     """What is to be solved, and a sentence for each actuator or load that cannot be."""
     tasks: dict[str, list[BenchCase]] = {}
     refused: dict[str, None] = {}
@@ -62,7 +64,7 @@ def wanted(every: Iterable[BenchCase], runs: Sequence[BenchRun]) -> tuple[list[T
             refused[str(error).partition(": ")[2]] = None
             continue
         tasks.setdefault(first.model_dump_json(include=TASK), []).append(case)
-    return [Task(cases, _best(cases, runs)) for cases in tasks.values()], list(refused)
+    return [OptimumTask(cases, _best(cases, runs)) for cases in tasks.values()], list(refused)
 
 
 def _best(cases: Sequence[BenchCase], runs: Sequence[BenchRun]) -> list[str]:
@@ -71,7 +73,7 @@ def _best(cases: Sequence[BenchCase], runs: Sequence[BenchRun]) -> list[str]:
     return [run.law for run in sorted(done, key=lambda run: run.metrics["iae"])[:BEGINNINGS]]
 
 
-def least(of: Task, tell: Callable[[float], None]) -> Least:
+def least(of: OptimumTask, tell: Callable[[float], None]) -> Least:
     """The optimum of these cases. Raises NotConvergedError, UsageError without any beginning."""
     case = of.cases[0]
     places = [case.place for case in of.cases]
@@ -82,21 +84,21 @@ def least(of: Task, tell: Callable[[float], None]) -> Least:
         law: Motion.of(to_end(scenario.plan(), compiled=scenario.simulation.compiled))
         for law, scenario in scenarios.items()
     }
-    stages = _searched(problem(scenarios[of.laws[0]], "iae"), guesses, tell)
+    stages = _search_optimum(problem(scenarios[of.laws[0]], "iae"), guesses, tell)
     before, last = next(reversed(list(pairwise(stages))))
     lowered = before.integral - last.integral
     return Least(places, last.integral, last.step, float(np.nan_to_num(lowered)), last.start)
 
 
-def _searched(
-    asked: Problem, guesses: Mapping[str, Motion], tell: Callable[[float], None]
+def _search_optimum(
+    asked: OptimumProblem, guesses: Mapping[str, Motion], tell: Callable[[float], None]
 ) -> list[Stage]:
     """Optima on ever finer grids. Raises NotConvergedError."""
     *first, last = STEPS
     for step in first:
         with suppress(NotConvergedError):
-            return collocation.searched(asked, guesses, step, lambda _, part: tell(part))[0]
-    return collocation.searched(asked, guesses, last, lambda _, part: tell(part))[0]
+            return collocation.search_optima(asked, guesses, step, lambda _, part: tell(part))[0]
+    return collocation.search_optima(asked, guesses, last, lambda _, part: tell(part))[0]
 
 
 def table(optima: Iterable[Least]) -> pd.DataFrame:

@@ -12,14 +12,21 @@ from podusv_cli.core.escaping import markdown
 from podusv_cli.core.phrases import value_text
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.studies.bench.optima import Least
-from podusv_cli.studies.bench.standing import CROSS, PLACE, by_vessel, columns, digits, written
+from podusv_cli.studies.bench.standing import (
+    CROSS,
+    PLACE,
+    by_vessel,
+    columns,
+    digits,
+    leaderboard_rows,
+)
 
 FIRST = 60  # failures that the page lists
 DARKEST = 10.0  # times the best law's IAE
 PALE, DARK = (236, 244, 250), (8, 64, 112)  # red, green, blue
 
 
-class Cell(NamedTuple):
+class PageCell(NamedTuple):
     """A law in a case: what is written, on which colour, and why it failed."""
 
     text: str
@@ -29,26 +36,32 @@ class Cell(NamedTuple):
 
 
 def page(
-    made: pd.DataFrame, figures: Sequence[Picture], provenance: Mapping[str, Any],
+    made: pd.DataFrame,
+    figures: Sequence[Picture],
+    provenance: Mapping[str, Any],
     optima: Sequence[Least] = (),
-) -> str:  # fmt: skip
+) -> str:
     """The page; `made` is `standing.table` of all runs, `with_optima` where there are any."""
     laws = list(made.law.unique())
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
-    return environment("podusv_cli.studies.bench").get_template("bench.html.j2").render(
-        title=f"Bench of {len(laws)} laws",
-        boards={vessel: written(rows) for vessel, rows in by_vessel(made).items()},
-        laws=laws,
-        columns=columns(made),
-        counts=counts | {"cases": len(made) // len(laws), "runs": len(made)},
-        heat=list(_heat(made, laws)),
-        failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
-        more=max(0, len(failed) - FIRST),
-        figures=figures,
-        provenance=[(key, value_text(value)) for key, value in flat(provenance)],
-        optima=_grids(optima) if optima else None,
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.studies.bench")
+        .get_template("bench.html.j2")
+        .render(
+            title=f"Bench of {len(laws)} laws",
+            boards={vessel: leaderboard_rows(rows) for vessel, rows in by_vessel(made).items()},
+            laws=laws,
+            columns=columns(made),
+            counts=counts | {"cases": len(made) // len(laws), "runs": len(made)},
+            heat=list(_heat(made, laws)),
+            failures=failed[[*PLACE, "law", "status", "cause"]].to_numpy().tolist()[:FIRST],
+            more=max(0, len(failed) - FIRST),
+            figures=figures,
+            provenance=[(key, value_text(value)) for key, value in flat(provenance)],
+            optima=_grids(optima) if optima else None,
+        )
+    )
 
 
 def as_markdown(made: pd.DataFrame) -> str:
@@ -58,7 +71,7 @@ def as_markdown(made: pd.DataFrame) -> str:
 
 
 def _table(made: pd.DataFrame) -> str:
-    head, *rows = written(made)
+    head, *rows = leaderboard_rows(made)
     lines = [head, *([markdown(law), *texts] for law, *texts in rows)]
     joined = [f"| {' | '.join(line)} |\n" for line in lines]
     return f"{joined[0]}|{'---|' * len(head)}\n{''.join(joined[1:])}"
@@ -83,17 +96,17 @@ def _heat(made: pd.DataFrame, laws: Sequence[str]) -> Iterator[tuple[str, list[A
         yield vessel, rows
 
 
-def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[Cell]:
+def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[PageCell]:
     by_law = case.set_index("law")
     return [_cell(by_law.ratio[law], f"{by_law.status[law]}: {by_law.cause[law]}") for law in laws]
 
 
-def _cell(ratio: float, why: str) -> Cell:
+def _cell(ratio: float, why: str) -> PageCell:
     if not math.isfinite(ratio):
-        return Cell(CROSS, "#f6d5c3", "#7a2b00", why)
+        return PageCell(CROSS, "#f6d5c3", "#7a2b00", why)
     depth = min(math.log(ratio) / math.log(DARKEST), 1.0)
     mixed = (round(p + depth * (d - p)) for p, d in zip(PALE, DARK, strict=True))
-    return Cell(digits(ratio), f"rgb{tuple(mixed)}", "#fff" if depth > 0.45 else "#1b1f24", "")
+    return PageCell(digits(ratio), f"rgb{tuple(mixed)}", "#fff" if depth > 0.45 else "#1b1f24", "")
 
 
 def _least(case: pd.DataFrame) -> list[str]:

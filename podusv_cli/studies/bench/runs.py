@@ -47,24 +47,24 @@ class BenchRun:
 
 def play(case: BenchCase) -> list[BenchRun]:
     """Simulate every law of a case; a law that fails costs no other."""
-    return list(_played(case))
+    return list(_play_case(case))
 
 
-def _played(case: BenchCase) -> Iterator[BenchRun]:
+def _play_case(case: BenchCase) -> Iterator[BenchRun]:
     for law, scenario in case.laws.items():
         try:
             yield _run(case, law, scenario)
         except PodusvError as error:
-            yield crashed(case, law, in_a_line(error))
+            yield crashed_run(case, law, in_a_line(error))
 
 
-def crashed(case: BenchCase, law: str, cause: str) -> BenchRun:
+def crashed_run(case: BenchCase, law: str, cause: str) -> BenchRun:
     """A run of which there is nothing."""
     return BenchRun(case.place, law, "crashed", cause, {}, np.empty((0, 4)))
 
 
 def _run(case: BenchCase, law: str, scenario: Scenario) -> BenchRun:
-    plan = scenario.plan(_thinned(scenario.time_grid()))
+    plan = scenario.plan(_thin_grid(scenario.time_grid()))
     recording = to_end(plan, compiled=scenario.simulation.compiled)
     numbers = plan.probe.summary(recording.seen) if recording.seen is not None else {}
     track = np.stack([recording[name] for name in ("x", "y", "x_d", "y_d")], axis=1)
@@ -85,6 +85,6 @@ def _first(message: str) -> str:
     return message.partition(";")[0]
 
 
-def _thinned(grid: TimeGrid) -> TimeGrid:
+def _thin_grid(grid: TimeGrid) -> TimeGrid:
     """The grid with so few logged rows as a track needs."""
     return replace(grid, log_every=max(1, grid.steps // POINTS))

@@ -18,14 +18,24 @@ from podusv_cli.studies.bench.runs import BenchRun
 
 PLACE = ["vessel", "task", "condition"]
 COLUMNS = (
-    "iae", "iae_e", "z_e_steady", "e_steady", "settling_time", "peak_tau_u", "peak_tau_r",
-    "tv_tau_u", "tv_tau_r",
-)  # fmt: skip
+    "iae",
+    "iae_e",
+    "z_e_steady",
+    "e_steady",
+    "settling_time",
+    "peak_tau_u",
+    "peak_tau_r",
+    "tv_tau_u",
+    "tv_tau_r",
+)
 # What counts in their place where a path is followed
 FOLLOWED = {
-    "iae": "e_ct_integral", "iae_e": "e_ct_integral", "z_e_steady": "e_ct_steady",
-    "e_steady": "e_ct_steady", "settling_time": "path_time",
-}  # fmt: skip
+    "iae": "e_ct_integral",
+    "iae_e": "e_ct_integral",
+    "z_e_steady": "e_ct_steady",
+    "e_steady": "e_ct_steady",
+    "settling_time": "path_time",
+}
 RATIOS = {"ratio": "iae", "ratio_e": "iae_e", "variation": "tv_tau_u"}
 CROSS = "✗"
 FEWEST_TASKS = 3  # that an interval over tasks is computed from
@@ -40,10 +50,15 @@ def table(runs: Iterable[BenchRun]) -> pd.DataFrame:
     Ranks, by IAE, count from 1; laws that failed share the mean of the last ranks.
     """
     rows = [
-        {**dict(zip(PLACE, run.place, strict=True)), "law": run.law, "status": run.status,
-         "cause": run.cause, **{name: _number(run.metrics, name) for name in COLUMNS}}
+        {
+            **dict(zip(PLACE, run.place, strict=True)),
+            "law": run.law,
+            "status": run.status,
+            "cause": run.cause,
+            **{name: _number(run.metrics, name) for name in COLUMNS},
+        }
         for run in runs
-    ]  # fmt: skip
+    ]
     made = pd.DataFrame(rows)
     place = [made[name] for name in PLACE]
     for name, column in RATIOS.items():
@@ -113,52 +128,68 @@ BOARD = (
     Column("rank_low", lambda rows: over_tasks(rows)[0]),
     Column("rank_high", lambda rows: over_tasks(rows)[1]),
     Column(
-        "mean_rank", lambda rows: rows["rank"].mean(),
-        "mean rank", lambda law: _interval(law.mean_rank, law.rank_low, law.rank_high),
+        "mean_rank",
+        lambda rows: rows["rank"].mean(),
+        "mean rank",
+        lambda law: _interval(law.mean_rank, law.rank_low, law.rank_high),
         "By IAE, the integral of the distance from the vessel's origin to the target; 95 % "
         "intervals over tasks, the hull and the conditions being given. Failed runs share the mean "
         "of the last ranks of their case. A rank depends on which laws take part.",
     ),
     Column(
-        "failed", lambda rows: int((rows.status != "finished").sum()),
-        "failed", lambda law: f"{law.failed:.0f} of {law.cases:.0f}",
+        "failed",
+        lambda rows: int((rows.status != "finished").sum()),
+        "failed",
+        lambda law: f"{law.failed:.0f} of {law.cases:.0f}",
         "A run has failed where it does not reach its end, or is further off its standoff than "
         "metrics.settling_radius on average over the last part of the run, half of the hull's "
         "length and a fifth in podusv's own bench.",
     ),
     Column(
-        "median_ratio", lambda rows: middle(rows.ratio),
-        "median of IAE / best", lambda law: digits(law.median_ratio),
+        "median_ratio",
+        lambda rows: middle(rows.ratio),
+        "median of IAE / best",
+        lambda law: digits(law.median_ratio),
         "A law that keeps a standoff on purpose pays for it here. A cross: it failed in half of "
         "the cases or more.",
     ),
     Column(
-        "median_ratio_e", lambda rows: middle(rows.ratio_e),
-        "beyond the standoff", lambda law: digits(law.median_ratio_e),
+        "median_ratio_e",
+        lambda rows: middle(rows.ratio_e),
+        "beyond the standoff",
+        lambda law: digits(law.median_ratio_e),
         "The median of the same ratio of the error |z_e - standoff|.",
     ),
     Column(
-        "variation", lambda rows: middle(rows.variation),
-        "variation", lambda law: digits(law.variation),
+        "variation",
+        lambda rows: middle(rows.variation),
+        "variation",
+        lambda law: digits(law.variation),
         "The median of the total variation of the surge demand over the least of the laws at their "
         "target.",
     ),
     Column(
-        "close", lambda rows: float((rows.ratio <= CLOSE).mean()),
-        "within 10 % of the best", lambda law: f"{100 * law.close:.0f} %",
+        "close",
+        lambda rows: float((rows.ratio <= CLOSE).mean()),
+        "within 10 % of the best",
+        lambda law: f"{100 * law.close:.0f} %",
         "The share of cases in which the IAE is.",
     ),
     Column(
-        "settled", lambda rows: middle(rows.z_e_steady.fillna(np.inf)),
-        "settled [m]", lambda law: digits(law.settled),
+        "settled",
+        lambda rows: middle(rows.z_e_steady.fillna(np.inf)),
+        "settled [m]",
+        lambda law: digits(law.settled),
         "The median of the mean distance over the last part of the run.",
     ),
-)  # fmt: skip
+)
 OF_OPTIMUM = Column(
-    "of_optimum", lambda rows: middle(rows.of_optimum.dropna()),
-    "median of IAE / optimum", lambda law: digits(law.of_optimum),
+    "of_optimum",
+    lambda rows: middle(rows.of_optimum.dropna()),
+    "median of IAE / optimum",
+    lambda law: digits(law.of_optimum),
     "Over the cases that have an optimum.",
-)  # fmt: skip
+)
 
 
 def columns(made: pd.DataFrame) -> list[Column]:
@@ -188,7 +219,7 @@ def leaderboard(made: pd.DataFrame) -> pd.DataFrame:
     return board.sort_values("mean_rank", kind="stable")
 
 
-def written(made: pd.DataFrame) -> list[list[str]]:
+def leaderboard_rows(made: pd.DataFrame) -> list[list[str]]:
     """The leaderboard of one hull in words: its headings, then a row a law."""
     board, shown = leaderboard(made), [column for column in columns(made) if column.heading]
     rows = [[str(law), *(column.text(row) for column in shown)] for law, row in board.iterrows()]

@@ -22,7 +22,7 @@ import numpy as np
 from podusv_cli.core.about import MetricAbout, StudyClaim
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS
-from podusv_cli.expressions.reading import function, known, number, refuse, syntax_tree
+from podusv_cli.expressions.reading import function, known_name, number, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Logic, all_of
 from podusv_cli.studies.counting.expressions import OverLaws
 from podusv_cli.studies.counting.runs import Mask, StudyRuns
@@ -33,8 +33,11 @@ from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
 EXAMPLE = "share(a.iae < b.iae) >= 0.95"
 # of a number on the left of a comparison
 MIRRORED: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE,
-}  # fmt: skip
+    ast.Lt: ast.Gt,
+    ast.LtE: ast.GtE,
+    ast.Gt: ast.Lt,
+    ast.GtE: ast.LtE,
+}
 SHARES = {SHARE, FAILURES}
 COMPARED = (
     "compare a statistic with a number, or two shares with each other: failures(a) < failures(b); "
@@ -67,7 +70,7 @@ class Parsed:
 
 
 @dataclass(frozen=True)
-class ParsedClaim:
+class ParsedStudyClaim:
     """A claim of a study with its name."""
 
     name: str
@@ -76,7 +79,7 @@ class ParsedClaim:
 
 
 @dataclass(frozen=True)
-class _Example:
+class _ExampleStudy:
     """A study with a single draw in which every law has every metric; to check a claim."""
 
     laws: Sequence[str]
@@ -99,15 +102,17 @@ class _Example:
 def parse(text: str, laws: Sequence[str], metrics: Mapping[str, MetricAbout]) -> Parsed:
     """A claim about these laws. Raises ExpressionError."""
     tree = syntax_tree(text, EXAMPLE)
-    tried = _Evaluation(_Example(laws, list(metrics)), Parsed(tree), metrics)
+    tried = _Evaluation(_ExampleStudy(laws, list(metrics)), Parsed(tree), metrics)
     tried.condition(tree)
     return Parsed(tree, tuple(tried.links), tuple(dict.fromkeys(tried.laws)))
 
 
 def judge(
-    claims: Sequence[ParsedClaim], runs: StudyRuns, level: float,
+    claims: Sequence[ParsedStudyClaim],
+    runs: StudyRuns,
+    level: float,
     metrics: Mapping[str, MetricAbout],
-) -> list[StudyVerdict]:  # fmt: skip
+) -> list[StudyVerdict]:
     """A verdict on every claim; the probability that any is wrong is at most 1 - level."""
     tried = [_Evaluation(runs, c.parsed, metrics, c.claim.tolerance) for c in claims]
     levels = holm(lambda i, level: tried[i].at(level).answer is not None, len(tried), level)
@@ -159,41 +164,41 @@ class _Evaluation(Logic):
 
     def comparison(self, node: ast.Compare) -> Condition:
         """Statistics compared with numbers, in each cell."""
-        links = list(_compared(node))
+        links = list(_compared_statistics(node))
         self.links += links
-        return all_of([Condition.of(self._held(link)) for link in links])
+        return all_of([Condition.of(self._hold_link(link)) for link in links])
 
-    def _held(self, link: Link) -> Iterator[bool | None]:
+    def _hold_link(self, link: Link) -> Iterator[bool | None]:
         if link.text not in self.samples:
-            self.samples[link.text] = self._sampled(link.call)
+            self.samples[link.text] = self._sample_statistic(link.call)
         for sample in self.samples[link.text]:
             yield sample.holds(link.sign, link.bound, self.tolerance, self.inside)
 
-    def _sampled(self, call: ast.Call) -> Samples:
+    def _sample_statistic(self, call: ast.Call) -> Samples:
         """The statistic's samples, from the draws that all of its laws have been through."""
         walk = OverLaws(self.metrics, self.tolerance, runs=self.runs)
         sample = SAMPLERS[function(call)](call, walk)
         if not walk.names:
             refuse(call, "names no law; write law.metric, as in a.iae")
         self.laws += walk.names
-        used = np.logical_and.reduce([self._used(law) for law in set(walk.names)])
+        used = np.logical_and.reduce([self._used_draws(law) for law in set(walk.names)])
         return [sample(label, i, used[i]) for i, label in enumerate(self.runs.cells)]
 
-    def _used(self, law: str) -> Mask:
+    def _used_draws(self, law: str) -> Mask:
         done = self.runs.done(law)
         return done if self.whole else done & ~self.runs.broken(law)
 
-    def needed(self) -> list[int | None]:
+    def draws_needed(self) -> list[int | None]:
         """For every comparison that is not decided in a cell, the draws that would decide it."""
         return [
-            sample.needed(link.sign, link.bound, self.tolerance, self.inside)
+            sample.draws_needed(link.sign, link.bound, self.tolerance, self.inside)
             for link in self.parsed.links
             for sample in self.samples[link.text]
             if sample.holds(link.sign, link.bound, self.tolerance, self.inside) is None
         ]
 
 
-def _compared(node: ast.Compare) -> Iterator[Link]:
+def _compared_statistics(node: ast.Compare) -> Iterator[Link]:
     """Every statistic of a comparison, on the left of a sign and a number."""
     sides = [node.left, *node.comparators]
     for left, sign, right in zip(sides, node.ops, sides[1:], strict=False):
@@ -210,7 +215,7 @@ def _compared(node: ast.Compare) -> Iterator[Link]:
             refuse(node, COMPARED)
         if type(sign) not in SIGNS:
             refuse(node, "compare with <, <=, >, >=")
-        _checked(call, bound)
+        _check_bound(call, bound)
         yield Link(text, ast.copy_location(call, node), toward, bound)
 
 
@@ -226,27 +231,33 @@ def _is_number(node: ast.expr) -> bool:
 def _statistic(node: ast.expr) -> ast.Call:
     if not isinstance(node, ast.Call):
         refuse(node, f"no statistic of all draws; write one of {', '.join(STATISTICS)}")
-    known(function(node), STATISTICS, "statistic")
+    known_name(function(node), STATISTICS, "statistic")
     return node
 
 
-def _checked(call: ast.Call, bound: float) -> None:
+def _check_bound(call: ast.Call, bound: float) -> None:
     """Refuse a bound that no share can have, or that only a percentage could."""
     if function(call) in SHARES and not 0.0 <= bound <= 1.0:
         refuse(call, f"is a share between 0 and 1, and cannot be compared with {bound:g}")
 
 
-def _verdict(parsed: ParsedClaim, tried: _Evaluation) -> StudyVerdict:
+def _verdict(parsed: ParsedStudyClaim, tried: _Evaluation) -> StudyVerdict:
     runs, answers = tried.runs, tried.answers
     broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
     others = replace(tried, whole=False, samples={}) if broken else tried
     return StudyVerdict(
-        name=parsed.name, claim=parsed.claim, answer=tried.answer, level=tried.level,
+        name=parsed.name,
+        claim=parsed.claim,
+        answer=tried.answer,
+        level=tried.level,
         wanted=runs.wanted,
         parts=[
             Statistic.of(text, sample, tried.inside)
-            for text, samples in tried.samples.items() for sample in samples
+            for text, samples in tried.samples.items()
+            for sample in samples
         ],
-        by_cell=dict(zip(runs.cells, answers, strict=True)), needed=tried.needed(),
-        broken=broken, without_broken=others.answer,
-    )  # fmt: skip
+        by_cell=dict(zip(runs.cells, answers, strict=True)),
+        needed=tried.draws_needed(),
+        broken=broken,
+        without_broken=others.answer,
+    )

@@ -20,7 +20,7 @@ import numpy as np
 from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS, below
-from podusv_cli.expressions.reading import function, known, refuse, syntax_tree
+from podusv_cli.expressions.reading import function, known_name, refuse, syntax_tree
 from podusv_cli.expressions.walk import Condition, Walk
 from podusv_cli.studies.counting.runs import Mask, StudyRuns, worst
 
@@ -73,7 +73,7 @@ class OverLaws(OfRuns):
         """`law.metric`."""
         match node:
             case ast.Attribute(value=ast.Name(id=label), attr=name):
-                law, name = self.law(label), known(name, self.metrics, "metric")
+                law, name = self.law(label), known_name(name, self.metrics, "metric")
                 return self.countable(name, self.runs.metric(law, name), ~self.runs.success(law))
             case ast.Call():
                 refuse(node, "no function of numbers here; write law.metric, as in a.iae < b.iae")
@@ -87,8 +87,8 @@ class OverLaws(OfRuns):
         }
         if not isinstance(node, ast.Call):
             refuse(node, "not a condition; compare numbers, or write finished(law) or success(law)")
-        held = properties[known(function(node), properties, "property")]
-        return Condition.known(held(self.only(node)))
+        held = properties[known_name(function(node), properties, "property")]
+        return Condition.known_everywhere(held(self.only(node)))
 
     def only(self, node: ast.Call) -> str:
         """The law that is the only argument of a function. Raises ExpressionError."""
@@ -98,7 +98,7 @@ class OverLaws(OfRuns):
 
     def law(self, label: str) -> str:
         """The law, noted. Raises ExpressionError with the nearest name where there is none."""
-        self.names.append(known(label, self.runs.laws, "law"))
+        self.names.append(known_name(label, self.runs.laws, "law"))
         return label
 
 
@@ -113,7 +113,7 @@ class OfOneRun(OfRuns):
         """A metric's name."""
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in finished and z_e_steady <= 1.5")
-        name = known(node.id, self.metrics, "metric")
+        name = known_name(node.id, self.metrics, "metric")
         values = self.values.get(name, np.full(np.shape(self.ended), np.nan))
         return np.where(self.ended, self.countable(name, values, ~self.ended), np.nan)
 
@@ -121,21 +121,20 @@ class OfOneRun(OfRuns):
         """`finished`."""
         if not isinstance(node, ast.Name):
             refuse(node, "not a condition; compare metrics with numbers, or write finished alone")
-        known(node.id, (FINISHED,), "property")
-        return Condition.known(self.ended)
+        known_name(node.id, (FINISHED,), "property")
+        return Condition.known_everywhere(self.ended)
 
 
 def parse_success(text: str, metrics: Mapping[str, MetricAbout]) -> ast.expr:
     """The syntax tree of a condition for success. Raises ExpressionError."""
     tree = syntax_tree(text, "finished and z_e_steady <= 1.5")
-    succeeded(tree, {}, np.ones(1, bool), metrics)
+    judge_success(tree, {}, np.ones(1, bool), metrics)
     return tree
 
 
-def succeeded(
-    tree: ast.expr, values: Mapping[str, Vector], finished: Mask,
-    metrics: Mapping[str, MetricAbout],
-) -> Mask:  # fmt: skip
+def judge_success(
+    tree: ast.expr, values: Mapping[str, Vector], finished: Mask, metrics: Mapping[str, MetricAbout]
+) -> Mask:
     """Which runs of a law are a success; one is not where the condition is unknown."""
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
     return np.broadcast_to(held, np.shape(finished))

@@ -17,7 +17,12 @@ from podusv_cli.core.about import MetricAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.storage import hdf5
-from podusv_cli.studies.counting.expressions import OfOneRun, parse_success, shortfalls, succeeded
+from podusv_cli.studies.counting.expressions import (
+    OfOneRun,
+    judge_success,
+    parse_success,
+    shortfalls,
+)
 from podusv_cli.studies.counting.runs import (
     AXES,
     BROKEN,
@@ -61,7 +66,7 @@ def digest_of_the_rest(file: h5py.File) -> str:
     )
 
 
-class Table:
+class RunsTable:
     """runs.h5, open for reading, as `StudyRuns`; arrays are read when they are asked for."""
 
     def __init__(self, path: Path, success: str, known: Known) -> None:
@@ -69,7 +74,7 @@ class Table:
         self.path, self._known, self._successes = path, known, dict[str, Mask]()
         self._success = parse_success(success, known)
         self._open = ExitStack()
-        self._file = self._open.enter_context(hdf5.opened(path, "runs"))
+        self._file = self._open.enter_context(hdf5.open_hdf5(path, "runs"))
         with hdf5.readable(path, "runs"):
             self.identity = self._file.attrs["identity"].decode()
             self.laws = tuple(word.decode() for word in self._file["law"][()])
@@ -130,7 +135,9 @@ class Table:
     def success(self, law: str) -> Mask:
         """Whether a run was a success. Kept, as all tables and claims ask again and again."""
         if law not in self._successes:
-            successes = succeeded(self._success, self._read(law), self.finished(law), self._known)
+            successes = judge_success(
+                self._success, self._read(law), self.finished(law), self._known
+            )
             self._successes[law] = np.ascontiguousarray(successes)
         return self._successes[law]
 
@@ -138,22 +145,22 @@ class Table:
         """Whether a run has a result and is no success."""
         return self.done(law) & ~self.success(law) & ~self.broken(law)
 
-    def missed(self, law: str) -> list[Vector]:
+    def shortfalls_of(self, law: str) -> list[Vector]:
         """By how much every run misses each comparison of success; see `shortfalls`."""
         runs = OfOneRun(self._known, values=self._read(law), ended=self.finished(law))
         return [*shortfalls(self._success, runs)]
 
     def _read(self, law: str) -> dict[str, Vector]:
-        return {name: self.metric(law, name) for name in self.asked}
+        return {name: self.metric(law, name) for name in self.success_metrics}
 
     @cached_property
-    def asked(self) -> list[str]:
+    def success_metrics(self) -> list[str]:
         """The metrics that success depends on."""
         used = {part.id for part in ast.walk(self._success) if isinstance(part, ast.Name)}
         return [name for name in self._known if name in used]
 
     @property
-    def drawn(self) -> dict[str, Any]:
+    def drawn_quantities(self) -> dict[str, Any]:
         """The drawn quantities, one entry a draw."""
         columns: dict[str, Any] = {}
 
@@ -187,9 +194,10 @@ class Table:
         return UnitResult(
             Unit(law, cell, rows.start, len(rows)),
             {name: self._file[name][place, cell, part] for name in self.metrics},
-            status[part], self._file["until"][place, cell, part],
+            status[part],
+            self._file["until"][place, cell, part],
             tuple(self.causes.get((place, cell, draw), "") for draw in rows),
-        )  # fmt: skip
+        )
 
 
 def stretches(there: Any) -> list[range]:

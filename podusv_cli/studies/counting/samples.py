@@ -43,7 +43,9 @@ class Sample(ABC):
         """The statistic with its interval."""
 
     @abstractmethod
-    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+    def draws_needed(
+        self, sign: ast.cmpop, bound: float, margin: float, level: float
+    ) -> int | None:
         """Draws that would decide a comparison if they continue like these; None: none would."""
 
     def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
@@ -66,9 +68,11 @@ class Share(Sample):
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.yes, self.n, level, self.unknown)
 
-    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+    def draws_needed(
+        self, sign: ast.cmpop, bound: float, margin: float, level: float
+    ) -> int | None:
         """As if the share stayed as it is."""
-        return statistics.needed(self.yes / self.n, bound, level) if self.n else None
+        return statistics.draws_for_share(self.yes / self.n, bound, level) if self.n else None
 
 
 @dataclass(frozen=True)
@@ -89,11 +93,13 @@ class Discordant(Sample):
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.first, self.differ + self.unknown, level, self.unknown)
 
-    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+    def draws_needed(
+        self, sign: ast.cmpop, bound: float, margin: float, level: float
+    ) -> int | None:
         """As if the shares of draws with one alone stayed as they are."""
         if not self.differ:
             return None
-        more = statistics.needed(self.first / self.differ, bound, level)
+        more = statistics.draws_for_share(self.first / self.differ, bound, level)
         return more and math.ceil(more * self.n / self.differ)
 
 
@@ -111,13 +117,15 @@ class Quantile(Sample):
             return Interval(math.nan, -math.inf, math.inf)
         return statistics.quantile(self.values, self.q, level)
 
-    def needed(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> int | None:
+    def draws_needed(
+        self, sign: ast.cmpop, bound: float, margin: float, level: float
+    ) -> int | None:
         """As if the share of values beyond the bound stayed as it is, which decides just so."""
         if not self.n:
             return None
         held = float(np.mean(SIGNS[type(sign)](self.values, bound, margin)))
         upper = isinstance(sign, (ast.Lt, ast.LtE))
-        return statistics.needed(held, self.q if upper else 1.0 - self.q, level)
+        return statistics.draws_for_share(held, self.q if upper else 1.0 - self.q, level)
 
 
 SHARE, FAILURES, QUANTILE, MEDIAN = "share", "failures", "quantile", "median"
@@ -129,7 +137,7 @@ Sampler = Callable[[str, int, Mask], Sample]
 def _condition(call: ast.Call, walk: OverLaws) -> Condition:
     """What a share is of."""
     if function(call) == FAILURES:
-        return Condition.known(~walk.runs.success(walk.only(call)))
+        return Condition.known_everywhere(~walk.runs.success(walk.only(call)))
     return walk.condition(_arguments(call, 1, "one condition, as in share(a.iae < b.iae)")[0])
 
 
@@ -206,6 +214,9 @@ def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
 
 
 STATISTICS: dict[str, Callable[[ast.Call, OverLaws], Sampler]] = {
-    SHARE: _share, FAILURES: _share, QUANTILE: _quantile, MEDIAN: _quantile,
-}  # fmt: skip
+    SHARE: _share,
+    FAILURES: _share,
+    QUANTILE: _quantile,
+    MEDIAN: _quantile,
+}
 SAMPLERS = STATISTICS | {ALONE: _discordant}

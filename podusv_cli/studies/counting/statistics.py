@@ -20,7 +20,7 @@ import numpy as np
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import below
 
-MOST = 1_000_000_000  # draws; beyond this `needed` gives up
+MOST = 1_000_000_000  # draws; beyond this `draws_for_share` gives up
 MEDIAN = 0.5
 
 
@@ -113,11 +113,12 @@ def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Int
     low = np.sort(np.where(np.isnan(values), -inf, values), axis=-1) if unknown else high
     return [
         Interval(
-            _at(high, _middle(n, q)), _at(low, _rank(n, q, level)),
+            _at(high, _middle(n, q)),
+            _at(low, _rank(n, q, level)),
             _at(high, n + 1 - _rank(n, 1.0 - q, level)),
         )
         for q in shares
-    ]  # fmt: skip
+    ]
 
 
 def _middle(n: int, q: float) -> int:
@@ -183,7 +184,7 @@ def ratios(a: Vector, b: Vector) -> Vector:
         return np.where(np.equal(a, b), 1.0, np.where(np.isposinf(a), inf, a / b))
 
 
-def needed(estimate: float, bound: float, level: float) -> int | None:
+def draws_for_share(estimate: float, bound: float, level: float) -> int | None:
     """Draws after which a share's interval would leave the bound out, were the share as estimated.
 
     None where no number of draws would do, because the estimate lies on the bound.

@@ -37,9 +37,18 @@ class Statistic:
         """The part that a sample gives."""
         estimate, low, high = map(float, sample.interval(level))
         return cls(
-            statistic, sample.cell, sample.n, estimate, low, high, level,
-            sample.unknown, sample.both_failed, sample.close, sample.differ,
-        )  # fmt: skip
+            statistic,
+            sample.cell,
+            sample.n,
+            estimate,
+            low,
+            high,
+            level,
+            sample.unknown,
+            sample.both_failed,
+            sample.close,
+            sample.differ,
+        )
 
     def in_words(self) -> str:
         """Such as `failures(pid) = 0.01 [0.002, 0.03] in 400 draws`."""
@@ -136,15 +145,23 @@ class StudyVerdict(Verdict):
         """The verdict as plain data."""
         claim = self.claim
         return {
-            "claim": self.name, "says": claim.says, "source": claim.source,
-            "expect": claim.expect, "tolerance": claim.tolerance, "remark": claim.remark,
-            "verdict": self.verdict, "preliminary": self.preliminary, "draws": self.draws,
-            "wanted": self.wanted, "level": self.level,
+            "claim": self.name,
+            "says": claim.says,
+            "source": claim.source,
+            "expect": claim.expect,
+            "tolerance": claim.tolerance,
+            "remark": claim.remark,
+            "verdict": self.verdict,
+            "preliminary": self.preliminary,
+            "draws": self.draws,
+            "wanted": self.wanted,
+            "level": self.level,
             "statistics": [part.as_json() for part in self.parts],
             "needed": self.more if self.answer is None else None,
-            "broken": self.broken, "without_broken": ANSWERS[self.without_broken],
+            "broken": self.broken,
+            "without_broken": ANSWERS[self.without_broken],
             "reasons": list(self.reasons()),
-        }  # fmt: skip
+        }
 
 
 def _plain(value: object) -> object:

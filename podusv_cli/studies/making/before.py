@@ -13,7 +13,7 @@ from podusv_cli.scenario.model import Scenario
 from podusv_cli.storage import json_files
 from podusv_cli.storage.run_folder import STUDY
 from podusv_cli.studies.counting.expressions import FINISHED
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.making import record
 from podusv_cli.studies.making.plan import digest
 from podusv_cli.studies.making.store import RUNS, UNITS, read
@@ -38,17 +38,21 @@ def about(folder: Path, scenario: Callable[[], Scenario]) -> StudyAbout:
     known = {name: metric.about for name, metric in own.known_metrics().items()}
     foreign = before.metrics_of_plugins.items()
     known |= {name: MetricAbout(name=name, **facts) for name, facts in foreign if name not in known}
-    there = {*_measured(folder, digest(before.identity))}
+    there = {*_metrics_measured(folder, digest(before.identity))}
     return record.of_scenario(
-        own, before.laws, before.cells, before.identity, known,
+        own,
+        before.laws,
+        before.cells,
+        before.identity,
+        known,
         tuple(name for name in known if name in there),
-    ).model_copy(update={"draws": before.draws, "history": before.history})  # fmt: skip
+    ).model_copy(update={"draws": before.draws, "history": before.history})
 
 
-def _measured(folder: Path, seal: str) -> Iterator[str]:
+def _metrics_measured(folder: Path, seal: str) -> Iterator[str]:
     """The metrics of the runs that are there."""
     if (folder / RUNS).exists():
-        yield from Table(folder / RUNS, FINISHED, {}).metrics
+        yield from RunsTable(folder / RUNS, FINISHED, {}).metrics
     for path in (folder / UNITS).glob("*.unit"):
         if result := read(path, seal):
             yield from result.metrics

@@ -14,7 +14,7 @@ from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.phrases import as_yaml
 from podusv_cli.scenario.load import CLASHES, Check, Loaded
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, placed, plain, route
+from podusv_cli.scenario.yaml_tree import Fault, Node, find, merge, plain, route, tree_with
 
 MOST = 1000  # cells
 FIXED = ("extends", "plugins", *BESIDE_RUNS, "name", "claims")  # the same in all cells
@@ -42,24 +42,26 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
     """
     _check_grid(loaded)
     faults: dict[Hashable, None] = {}
-    made = list(_made(loaded, check, faults))
+    made = list(_make_cells(loaded, check, faults))
     if faults:
         raise ScenarioError(list(faults))
     return tuple(made)
 
 
-def _made(loaded: Loaded, check: Check | None, faults: dict[Hashable, None]) -> Iterator[Cell]:
+def _make_cells(
+    loaded: Loaded, check: Check | None, faults: dict[Hashable, None]
+) -> Iterator[Cell]:
     grid = _grid(loaded)
     for index, nodes in enumerate(product(*grid.values())):
-        each = [placed(key, node, loaded.root) for key, node in zip(grid, nodes, strict=True)]
+        each = [tree_with(key, node, loaded.root) for key, node in zip(grid, nodes, strict=True)]
         top = reduce(merge, each, Node({}, loaded.root.mark))
         values = tuple(zip(grid, map(plain, nodes), strict=True))
         checks = [_within(check, _label(values))] if check else []
         try:
             scenario = (
-                loaded.changed(top, checks)
+                loaded.merge_over(top, checks)
                 if grid
-                else loaded.checked([], (CLASHES, *checks)).scenario
+                else loaded.check([], (CLASHES, *checks)).scenario
             )
             yield Cell(index, values, scenario)
         except ScenarioError as error:

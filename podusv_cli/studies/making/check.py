@@ -10,28 +10,21 @@ from typing import Any
 import numpy as np
 
 from podusv_cli.core.component import Component
-from podusv_cli.core.phrases import did_you_mean, found, unknown
+from podusv_cli.core.phrases import describe_found, did_you_mean, unknown_word
 from podusv_cli.core.signal import NAME, NAME_IN_WORDS
 from podusv_cli.engine.loop.plan import Plan, no_probe
 from podusv_cli.expressions.reading import ExpressionError
 from podusv_cli.metrics.metric import Metric
-from podusv_cli.scenario.address import (
-    ValueRefused,
-    content,
-    described,
-    has,
-    is_whole,
-    no_entry,
-)
+from podusv_cli.scenario.address import ValueRefused, content, describe_key, has, is_whole, no_entry
 from podusv_cli.scenario.load import Loaded, values
 from podusv_cli.scenario.model import PER_RUN, Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS
 from podusv_cli.scenario.sweep import Quantity, Sweep
-from podusv_cli.scenario.yaml_tree import Route, dotted, route
+from podusv_cli.scenario.yaml_tree import Route, dotted_key, route
 from podusv_cli.studies.counting.claims import parse
 from podusv_cli.studies.counting.expressions import parse_success
 from podusv_cli.studies.counting.runs import AXES, ENDING, OWN
-from podusv_cli.studies.making.draws import drawn
+from podusv_cli.studies.making.draws import draw_scenario
 
 # Shares at which a distribution is tried; its ends and its middle may be rounder than its draws.
 TRIED = np.array([0.000871, 0.381966, 0.998713])
@@ -52,12 +45,15 @@ def sweep_faults(loaded: Loaded) -> list[tuple[Route, str]]:
     whole = not (loaded.contradictions or loaded.clashes)
     draws = _vary(singles(scenario), loaded.plans, sweep) if whole else ()
     return laws or [
-        *_metric_names(scenario), *draws, *_twice(sweep), *_keep(scenario, sweep),
+        *_metric_names(scenario),
+        *draws,
+        *_twice(sweep),
+        *_keep(scenario, sweep),
         *_claims(scenario, sweep),
-    ]  # fmt: skip
+    ]
 
 
-def unjudged(scenario: Scenario) -> str:
+def unjudged_claims(scenario: Scenario) -> str:
     """A sentence about the claims that a study does not judge; empty where there are none.
 
     Also where the study says itself what it judges: then both are meant, each for its command.
@@ -84,7 +80,7 @@ def _laws(scenario: Scenario, sweep: Sweep) -> Faults:
     labels = scenario.labels()
     for place, label in enumerate(sweep.laws):
         if label not in labels:
-            yield ("sweep", "laws", place), unknown(f"law {label!r}", label, labels)
+            yield ("sweep", "laws", place), unknown_word(f"law {label!r}", label, labels)
         if label in sweep.laws[:place]:
             yield ("sweep", "laws", place), f"{label} is named twice"
 
@@ -159,10 +155,10 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
 def no_section(scenario: Scenario, steps: Route) -> str:
     """Which section on the way is null, where it could have the key; else empty."""
     for end in range(1, len(steps)):
-        at, inner = dotted(steps[:end]), dotted(steps[end:])
+        at, inner = dotted_key(steps[:end]), dotted_key(steps[end:])
         if not has(scenario, at):
             return ""
-        if content(scenario, steps[:end]) is None and described(scenario, steps[:end]).follow(
+        if content(scenario, steps[:end]) is None and describe_key(scenario, steps[:end]).follow(
             steps[end:]
         ):
             return (
@@ -185,13 +181,13 @@ def _is_number(own: Any) -> bool:
 def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     """What is wrong with the kind of value that the key has."""
     steps = route(key)
-    own, way = content(scenario, steps), quantity.given[0]
-    words = described(scenario, steps).choices or (isinstance(own, bool) and ("true", "false"))
+    own, way = content(scenario, steps), quantity.given_keys[0]
+    words = describe_key(scenario, steps).choices or (isinstance(own, bool) and ("true", "false"))
     if steps[-1] in ("kind", "preset"):
         yield f"a draw cannot change {key}; list its values under grid"
-    elif quantity.seed and int not in described(scenario, steps).types:
+    elif quantity.seed and int not in describe_key(scenario, steps).types:
         yield f"{key} cannot be drawn as a seed, since it is not a whole number"
-    elif is_whole(described(scenario, steps)) and (way := _real(quantity)):
+    elif is_whole(describe_key(scenario, steps)) and (way := _real(quantity)):
         seed = "seed: true or " if steps[-1] == "seed" else ""
         yield f"{key} is a whole number, and {way} draws others; write {seed}integers: [low, high]"
     elif _is_number(own) or (own is None and not quantity.relative):
@@ -199,13 +195,15 @@ def _type(key: str, quantity: Quantity, scenario: Scenario) -> Iterator[str]:
     elif words and way != "choice":
         yield f"{way} needs a number, and {key} is one of {', '.join(words)}; use choice"
     elif not words:
-        what = "a section" if isinstance(own, Component) else found(own, str(own or "null"))
+        what = (
+            "a section" if isinstance(own, Component) else describe_found(own, str(own or "null"))
+        )
         yield f"{key} is no number but {what}"
 
 
 def _real(quantity: Quantity) -> str:
     """The way to draw, where it draws other than whole numbers; else empty."""
-    return next((way for way in quantity.distribution.given if way in REAL), "")
+    return next((way for way in quantity.distribution.given_keys if way in REAL), "")
 
 
 def _are_taken_together(
@@ -221,7 +219,7 @@ def _are_taken_together(
     draws = [{name: v[i % len(v)] for name, v in values_of.items()} for i in range(rounds)]
     try:
         return all(
-            _structure(drawn(single, quantities, draw)) == own[law]
+            _structure(draw_scenario(single, quantities, draw)) == own[law]
             for law, single in laws.items()
             for draw in draws
         )
@@ -267,7 +265,7 @@ def _scenario_or_refusal(
     name: str, quantity: Quantity, scenario: Scenario, value: Any
 ) -> Scenario | str:
     try:
-        return drawn(scenario, {name: quantity}, {name: value})
+        return draw_scenario(scenario, {name: quantity}, {name: value})
     except ValueRefused as error:
         return str(error)
 
@@ -311,7 +309,7 @@ def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
         if name not in metrics:
             yield (
                 ("sweep", "keep", "worst", name),
-                unknown(f"metric {name!r}", name, metrics, "podusv list"),
+                unknown_word(f"metric {name!r}", name, metrics, "podusv list"),
             )
     for place, draw in enumerate(sweep.keep.draws):
         if not 0 <= draw < sweep.draws:

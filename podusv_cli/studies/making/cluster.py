@@ -35,7 +35,7 @@ KILLED = "KilledWorker"  # Dask's exception for a task whose worker died, time a
 
 
 @dataclass(frozen=True)
-class Task:
+class UnitTask:
     """A unit of a study or of a variant of it, and the terms of its making.
 
     `allowed` are the workers that may make it (None: all); `alone` that nothing else is under way.
@@ -54,11 +54,11 @@ def executor(
     """Where units are made: processes of this machine, or the workers of a scheduler, if any."""
     if not scheduler:
         return nullcontext(Processes(workers))
-    return connected(scheduler, study, identity)
+    return connect_cluster(scheduler, study, identity)
 
 
 @contextmanager
-def connected(address: str, study: StudyText, identity: str) -> Iterator[Cluster]:
+def connect_cluster(address: str, study: StudyText, identity: str) -> Iterator[Cluster]:
     """The cluster of a scheduler, its workers checked; `identity` is the digest of the study's.
 
     Raises UsageError without Dask and for a worker that does not fit, StorageError without a
@@ -118,10 +118,10 @@ class Cluster:
         """Take a client of Dask, the study, and what every worker has to report."""
         self._client, self._study, self._ours = client, study, ours
         self._threads, self._looked = dict[str, int](), -LOOK
-        self._running, self._finished = dict[Any, Task](), SimpleQueue[Any]()
-        self._again, self._suspects = deque[Task](), deque[Task]()
-        self._guilty, self._refused = list[Task](), dict[str, str]()
-        self._machines, self._made = dict[str, str](), dict[str, list[Task]]()
+        self._running, self._finished = dict[Any, UnitTask](), SimpleQueue[Any]()
+        self._again, self._suspects = deque[UnitTask](), deque[UnitTask]()
+        self._guilty, self._refused = list[UnitTask](), dict[str, str]()
+        self._machines, self._made = dict[str, str](), dict[str, list[UnitTask]]()
 
     def check(self) -> None:
         """Raise UsageError where a worker computes with something else, or where there is none."""
@@ -182,7 +182,7 @@ class Cluster:
         alone = any(task.alone for task in self._running.values())
         return not alone and len(self._running) < max(1, WINDOW * sum(self._threads.values()))
 
-    def _next(self, units: Units) -> Task | None:
+    def _next(self, units: Units) -> UnitTask | None:
         if self._again:
             return self._again.popleft()
         if not self._suspects:
@@ -190,14 +190,14 @@ class Cluster:
             if not taken:
                 return None
             number, plan, unit = taken
-            task = Task(number, plan.variant, unit)
+            task = UnitTask(number, plan.variant, unit)
             if not self._is_guilty(task):
                 return task
             self._suspects.append(replace(task, alone=True))
         # A unit whose worker died may only have been beside the one that killed it.
         return None if self._running else self._suspects.popleft()
 
-    def _is_guilty(self, task: Task) -> bool:
+    def _is_guilty(self, task: UnitTask) -> bool:
         """Whether it is part of a unit that killed its worker when nothing else was under way."""
         unit, at = task.unit, (task.variant, task.unit.law, task.unit.cell)
         return any(
@@ -206,13 +206,17 @@ class Cluster:
             for guilty in self._guilty
         )
 
-    def _submit(self, task: Task) -> None:
+    def _submit(self, task: UnitTask) -> None:
         future = self._client.submit(
-            remote.made, self._study.text, self._study.plugins, astuple(task.unit),
-            digest(self._ours), astuple(task.variant) if task.variant else None,
+            remote.make_unit,
+            self._study.text,
+            self._study.plugins,
+            astuple(task.unit),
+            digest(self._ours),
+            astuple(task.variant) if task.variant else None,
             pure=False,
             workers=sorted(task.allowed) if task.allowed else None,
-        )  # fmt: skip
+        )
         self._running[future] = task
         future.add_done_callback(self._finished.put)
 
@@ -237,7 +241,7 @@ class Cluster:
         future.release()
         return reply
 
-    def _receive(self, task: Task, reply: Reply, done: Done) -> None:
+    def _receive(self, task: UnitTask, reply: Reply, done: Done) -> None:
         if reply.outcome is None:
             self._refused[reply.worker] = (
                 f"worker {reply.worker} got no units, because it computes with something else: "
@@ -278,12 +282,13 @@ class Cluster:
         """Which worker made how many runs, of the study which ones, and who was refused."""
         workers = [
             {
-                "worker": worker, "machine": self._machines[worker],
+                "worker": worker,
+                "machine": self._machines[worker],
                 "runs": sum(task.unit.count for task in tasks),
-                "units": list(_joined(task.unit for task in tasks if task.variant is None)),
+                "units": list(_join_units(task.unit for task in tasks if task.variant is None)),
             }
             for worker, tasks in self._made.items()
-        ]  # fmt: skip
+        ]
         return {"workers": workers, "refused": self._refused}
 
 
@@ -295,7 +300,7 @@ def lost_scheduler(error: BaseException) -> StorageError:
     )
 
 
-def _joined(units: Iterable[Unit]) -> Iterator[str]:
+def _join_units(units: Iterable[Unit]) -> Iterator[str]:
     """Units in words, those that follow each other as one: `pid[0] draws 0 to 63`."""
     joined: list[Unit] = []
     for unit in sorted(units):

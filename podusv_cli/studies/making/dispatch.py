@@ -20,7 +20,7 @@ from podusv_cli.studies.counting.runs import STATUSES, Mask, Unit, UnitResult
 from podusv_cli.studies.counting.runs_file import stretches
 from podusv_cli.studies.making.plan import LawInCell, StudyPlan
 from podusv_cli.studies.making.store import Store
-from podusv_cli.studies.making.unit import Part, alike, crashed, make_together, prepare
+from podusv_cli.studies.making.unit import Part, alike, crashed_unit, make_together, prepare
 
 FIRST = 8  # draws of a unit before it is known how long a run takes
 AIM = 4.0  # s of computing that a unit is to take
@@ -35,7 +35,7 @@ Shard = tuple[int, int]  # its number from 1, and how many there are
 
 
 @dataclass
-class Tally:
+class StudyTally:
     """How far a study is, for its progress."""
 
     wanted: int
@@ -70,7 +70,7 @@ class Tally:
         return math.inf if early or not self.rate else (self.wanted - self.made) / self.rate
 
 
-Tell = Callable[[Tally], None]
+Tell = Callable[[StudyTally], None]
 Gaps = dict[LawInCell, int]  # how many runs, by law and cell
 # Numbered, with the study that each is of; after the last, there may be more.
 Units = Iterator[tuple[int, StudyPlan, Unit]]
@@ -104,7 +104,7 @@ class Processes:
     def __call__(self, units: Units, done: Done) -> bool:
         """As `Executor` says."""
         shares = _Shares(units, done, self.workers)
-        return run_each(shares, shares.done, workers=self.workers)
+        return run_each(shares, shares.take_outcome, workers=self.workers)
 
     @property
     def workers(self) -> int:
@@ -132,17 +132,17 @@ class _Shares:
         return self
 
     def __next__(self) -> tuple[int, Job]:
-        parts = [self._again.popleft()] if self._again else self._taken()
+        parts = [self._again.popleft()] if self._again else self._take_share()
         number = parts[0][0]
         self._parts[number] = parts
         return number, partial(_timed_together, [(plan, unit) for _, plan, unit in parts])
 
-    def _taken(self) -> list[tuple[int, StudyPlan, Unit]]:
+    def _take_share(self) -> list[tuple[int, StudyPlan, Unit]]:
         """The next units: a process's share of those that are known to wait."""
         first, waiting = next(self._units), length_hint(self._units)
         return [first, *islice(self._units, min(TOGETHER - 1, waiting // self._workers))]
 
-    def done(self, number: int, outcome: Outcome) -> None:
+    def take_outcome(self, number: int, outcome: Outcome) -> None:
         """Tell the outcome of each unit."""
         parts = self._parts.pop(number)
         if outcome.killed and len(parts) > 1:
@@ -168,7 +168,7 @@ def _timed_together(
     return [made[i] for i in range(len(parts))]
 
 
-class Driver:
+class StudyDriver:
     """Hands out units, keeps what comes back, and finds the run that ends its process."""
 
     def __init__(
@@ -176,10 +176,10 @@ class Driver:
     ) -> None:
         """Units of this part are handed out until the monotonic time `until` [s]."""
         self.store, self.plan, self._tell, self._until = store, plan, tell, until
-        there, inside = store.covered(), np.zeros(self.plan.sweep.draws, bool)
+        there, inside = store.covered_draws(), np.zeros(self.plan.sweep.draws, bool)
         inside[shard(len(inside), *part)] = True
         self._gaps = {key: stretches(inside & np.logical_not(mask)) for key, mask in there.items()}
-        self.tally = Tally.of({key: mask[inside] for key, mask in there.items()})
+        self.tally = StudyTally.of({key: mask[inside] for key, mask in there.items()})
         self._units, self._numbers = dict[int, Unit](), count()
         self._halves: deque[Unit] = deque()
         self._seconds = 0.0  # of computing a run, so far the longest average of a unit
@@ -222,7 +222,7 @@ class Driver:
     def _size(self) -> int:
         return min(MOST, max(FIRST, round(AIM / self._seconds))) if self._seconds else FIRST
 
-    def done(self, number: int, outcome: Outcome) -> None:
+    def take_outcome(self, number: int, outcome: Outcome) -> None:
         """Keep the result of a unit; halve one that ended its process."""
         unit = self._units.pop(number)
         if outcome.result:
@@ -234,7 +234,7 @@ class Driver:
             self._halves.extend(unit.halves())
         elif outcome.killed:
             self.tally.ended[f"{unit.law}[{unit.cell}] draw {unit.first}"] = outcome.failure
-            self._keep(crashed(unit, self.plan.metrics, ENDED))
+            self._keep(crashed_unit(unit, self.plan.metrics, ENDED))
         elif not outcome.interrupted:
             self.failure = outcome
 
@@ -245,7 +245,7 @@ class Driver:
         self._tell(self.tally)
 
 
-def timed(
+def time_unit(
     plan: StudyPlan, unit: Unit, progress: Callable[[float], None]
 ) -> tuple[UnitResult, float]:
     """A unit, and the processor time that it took [s]."""
@@ -258,10 +258,15 @@ def shard(draws: int, number: int, count: int) -> slice:
 
 
 def dispatch(
-    store: Store, plan: StudyPlan, tell: Tell, executor: Executor, *, seconds: float = math.inf,
+    store: Store,
+    plan: StudyPlan,
+    tell: Tell,
+    executor: Executor,
+    *,
+    seconds: float = math.inf,
     part: Shard = (1, 1),
     begin: Callable[[Gaps, Mapping[str, str]], None] = lambda missing, alone: None,
-) -> tuple[Tally, bool]:  # fmt: skip
+) -> tuple[StudyTally, bool]:
     """Simulate what is missing, for so many seconds at most; how far it is, and if it is whole.
 
     `begin` is told before the first run what is missing, and which laws march one by one and why.
@@ -269,13 +274,13 @@ def dispatch(
     Every unit is on the disk before the next is handed out. Raises PodusvError where a unit cannot
     be made at all or not be written, KeyboardInterrupt after an interrupt; what is made is kept.
     """
-    driver = Driver(store, plan, tell, time.monotonic() + seconds, part)
+    driver = StudyDriver(store, plan, tell, time.monotonic() + seconds, part)
     missing = driver.missing()
     # Before the fork, so that no process compiles it again.
     reasons = {law: prepare(plan, law, cell) for law, cell in missing}
     begin(missing, {law: why for law, why in reasons.items() if why})
     driver.tally.began = time.monotonic()  # compiling and timing are over
-    finished = executor(driver, driver.done)
+    finished = executor(driver, driver.take_outcome)
     if driver.failure:
         raise PodusvError(driver.failure.failure)
     if not finished:

@@ -84,7 +84,7 @@ def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vecto
     }
 
 
-def drawn(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) -> Scenario:
+def draw_scenario(scenario: Scenario, vary: Mapping[str, Quantity], draw: Draw) -> Scenario:
     """The scenario of one law with the numbers of a draw; see `drawing`."""
     return drawing(scenario, {name: vary[name] for name in draw})(draw)
 

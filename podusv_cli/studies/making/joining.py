@@ -24,7 +24,7 @@ def join(into: Store, others: Sequence[Store]) -> None:
 
     Raises StorageError where two have the same run with other numbers; nothing is written then.
     """
-    seen = Comparison(into)
+    seen = SeenRuns(into)
     for other in (into, *others):
         seen.add(other)
     for other in others:
@@ -32,12 +32,12 @@ def join(into: Store, others: Sequence[Store]) -> None:
             into.write(result)
 
 
-class Comparison:
+class SeenRuns:
     """A digest of every run that was seen, and in which folder: 12 bytes a run."""
 
     def __init__(self, first: Store) -> None:
         """Nothing is seen yet of the study that this store belongs to."""
-        draws, places = first.about.draws, first.covered()
+        draws, places = first.about.draws, first.covered_draws()
         self._digests = {place: np.zeros(draws, np.uint64) for place in places}
         self._origins = {place: np.full(draws, NOWHERE, np.int32) for place in places}
         self._stores: list[Store] = []
@@ -82,10 +82,11 @@ def digests(result: UnitResult) -> Any:
 def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
     """The names of what is different of one run."""
     old = next(
-        result for result in earlier.results()
+        result
+        for result in earlier.results()
         if (result.unit.law, result.unit.cell) == (new.unit.law, new.unit.cell)
         and draw in result.unit.draws
-    )  # fmt: skip
+    )
     one, two = _run(old, draw), _run(new, draw)
     for name, value in one.items():
         if not np.array_equal(value, two[name], equal_nan=name != "cause"):
@@ -134,7 +135,7 @@ def _machine(session: Mapping[str, Any]) -> str:
 def gaps(store: Store) -> list[str]:
     """Which draws are not there, a sentence for all laws and cells that lack the same ones."""
     lacking: dict[str, list[str]] = {}
-    covered = store.covered()
+    covered = store.covered_draws()
     for (law, cell), there in covered.items():
         if not there.all():
             label = store.about.cells[cell]

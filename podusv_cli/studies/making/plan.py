@@ -103,28 +103,32 @@ class StudyPlan:
             for law in self.laws:
                 single = self.single(law, cell.index)
                 kept = {
-                    key: value for key, value in values(single).items()
+                    key: value
+                    for key, value in values(single).items()
                     if key.partition(".")[0] not in COSMETIC
-                }  # fmt: skip
+                }
                 facts |= {f"{law}[{cell.index}].{key}": value for key, value in kept.items()}
                 facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(self.run_plan(law, cell.index))
         return facts
 
-    def varied(self, variant: Variant) -> StudyPlan:
+    def vary(self, variant: Variant) -> StudyPlan:
         """The variant of this study, which has no grid. Raises ValidationError."""
         own = self.scenario.singles()
-        laws = {name: changed(own[law].controller, dict(new)) for name, law, new in variant.laws}
+        laws = {name: change_law(own[law].controller, dict(new)) for name, law, new in variant.laws}
         plain = {"laws": (), "draws": variant.draws, "claims": {}, "keep": Keep()}
         scenario = self.scenario.model_copy(
             update={
-                "controllers": laws, "controller": next(iter(laws.values())), "claims": {},
-                "tune": None, "sweep": self.sweep.model_copy(update=plain),
+                "controllers": laws,
+                "controller": next(iter(laws.values())),
+                "claims": {},
+                "tune": None,
+                "sweep": self.sweep.model_copy(update=plain),
             }
-        )  # fmt: skip
+        )
         return StudyPlan(scenario, (Cell(0, (), scenario),), variant)
 
 
-def changed(law: Controller, new: Mapping[str, Any]) -> Controller:
+def change_law(law: Controller, new: Mapping[str, Any]) -> Controller:
     """The law with other numbers. Raises ValidationError where it refuses them."""
     return law.changed(new)
 

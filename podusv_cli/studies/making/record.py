@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.core import json_text
 from podusv_cli.core.about import MetricAbout, QuantityAbout, StudyAbout, StudyIdentity
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.phrases import as_yaml
@@ -31,30 +32,46 @@ def about(plan: StudyPlan) -> StudyAbout:
 
 
 def of_scenario(
-    scenario: Scenario, laws: tuple[str, ...], cells: tuple[str, ...],
-    identity: Mapping[str, Any], metrics: dict[str, MetricAbout], measured: tuple[str, ...],
-) -> StudyAbout:  # fmt: skip
+    scenario: Scenario,
+    laws: tuple[str, ...],
+    cells: tuple[str, ...],
+    identity: Mapping[str, Any],
+    metrics: dict[str, MetricAbout],
+    measured: tuple[str, ...],
+) -> StudyAbout:
     """What the study of a scenario says about itself, with what follows from its cells and laws."""
     sweep, seas = scenario.sweep or Sweep(), scenario.disturbances().values()
     return StudyAbout(
-        name=scenario.name, description=scenario.description,
-        duration=scenario.simulation.duration, steady_fraction=scenario.metrics.steady_fraction,
+        name=scenario.name,
+        description=scenario.description,
+        duration=scenario.simulation.duration,
+        steady_fraction=scenario.metrics.steady_fraction,
         settling_radius=scenario.metrics.settling_radius,
         parts={
-            "path": scenario.path.label, "disturbance": ", ".join(sea.label for sea in seas),
+            "path": scenario.path.label,
+            "disturbance": ", ".join(sea.label for sea in seas),
             "actuator": scenario.actuator.label,
         },
         plugins={n: plugin.sha256 for n, plugin in scenario.plugins.items() if n.endswith(".py")},
-        laws=laws, cells=cells,
+        laws=laws,
+        cells=cells,
         grid={key: tuple(map(as_yaml, given)) for key, given in sweep.grid.items()},
-        draws=sweep.draws, seed=sweep.seed, design=sweep.design, success=sweep.success,
-        level=sweep.level, keep=sweep.keep, claims=sweep.claims,
+        draws=sweep.draws,
+        seed=sweep.seed,
+        design=sweep.design,
+        success=sweep.success,
+        level=sweep.level,
+        keep=sweep.keep,
+        claims=sweep.claims,
         quantities={
             name: QuantityAbout(keys=q.targets(name), drawn=in_words(q), is_seed=q.is_label)
             for name, q in sweep.vary.items()
         },
-        metrics=metrics, measured=measured, identity=json_files.plain(identity), history=(),
-    )  # fmt: skip
+        metrics=metrics,
+        measured=measured,
+        identity=json_text.plain(identity),
+        history=(),
+    )
 
 
 def drawing(study: StudyIdentity) -> tuple[Sweep, str]:
@@ -72,7 +89,7 @@ def read(folder: Path) -> StudyAbout:
     return json_files.read_as(folder / STUDY, StudyAbout)
 
 
-def begun(folder: Path) -> StudyIdentity:
+def read_identity(folder: Path) -> StudyIdentity:
     """What the runs in a folder depend on, whichever podusv made them. Raises StorageError."""
     return json_files.read_as(folder / STUDY, StudyIdentity)
 
@@ -80,7 +97,7 @@ def begun(folder: Path) -> StudyIdentity:
 def write(folder: Path, study: StudyAbout) -> None:
     """Write study.json. Raises StorageError."""
     content = {"format": FORMAT, **study.model_dump(exclude_defaults=True)}
-    files.write_bytes(folder / STUDY, json_files.encode(content))
+    files.write_bytes(folder / STUDY, json_text.encode(content))
 
 
 def plugin_files(folder: Path, study: StudyAbout) -> dict[str, str]:

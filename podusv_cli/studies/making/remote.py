@@ -20,7 +20,7 @@ from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.plugins import of_files
 from podusv_cli.storage.provenance import processor
 from podusv_cli.studies.counting.runs import Unit
-from podusv_cli.studies.making.dispatch import timed
+from podusv_cli.studies.making.dispatch import time_unit
 from podusv_cli.studies.making.plan import StudyPlan, Variant, digest, plan
 
 PLANS = 2  # plans that a worker keeps
@@ -38,7 +38,7 @@ class StudyText:
 
 
 @lru_cache(PLANS)
-def _placed(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
+def _place_plan(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
     """The plan, and the folder that its plug-ins were read from; gone when it is forgotten."""
     folder = TemporaryDirectory(prefix="podusv-")
     for name, text in recipe.plugins:
@@ -50,12 +50,12 @@ def _placed(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
 
 
 def _plan(recipe: StudyText) -> StudyPlan:
-    return _placed(recipe)[0]
+    return _place_plan(recipe)[0]
 
 
 @lru_cache(PLANS)
 def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> StudyPlan:
-    return _plan(recipe).varied(Variant(*variant))
+    return _plan(recipe).vary(Variant(*variant))
 
 
 @lru_cache(PLANS)
@@ -99,17 +99,20 @@ class Reply:
     outcome: Outcome | None
 
 
-def made(
-    text: str, plugins: Plugins, unit: tuple[str, int, int, int], expected: str,
+def make_unit(
+    text: str,
+    plugins: Plugins,
+    unit: tuple[str, int, int, int],
+    expected: str,
     variant: tuple[Any, ...] | None = None,
-) -> Reply:  # fmt: skip
+) -> Reply:
     """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
     from distributed import get_worker
 
     facts, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)
     if digest(facts) == expected:
         plan = _variant(recipe, variant) if variant else _plan(recipe)
-        job = partial(timed, plan, Unit(*unit))
+        job = partial(time_unit, plan, Unit(*unit))
         outcome = outcome_of(job, lambda fraction: None, Interrupts())
     machine = f"{processor()} ({' '.join(platform.libc_ver())})"
     return Reply(get_worker().address, machine, facts, outcome)

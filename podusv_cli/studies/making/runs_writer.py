@@ -91,7 +91,7 @@ def _lay_out(part: Path, study: StudyAbout, identity: str, causes: Causes) -> di
                 words = table(sweep, 0, wanted, stream)[name]
                 file.create_dataset(f"{DRAWN}/{name}", data=_column(words))
         file.create_dataset("failed_run", data=np.array(list(causes), np.int64).reshape(-1, 3))
-        file.create_dataset("failed_cause", data=_labelled(list(causes.values()) or [""]))
+        file.create_dataset("failed_cause", data=_label_array(list(causes.values()) or [""]))
         kinds: dict[str, Any] = {"status": np.uint8, "until": np.float64}
         kinds |= dict.fromkeys(study.measured, np.float64)
         for name, kind in kinds.items():
@@ -132,20 +132,20 @@ def _extent(
 
 
 def _labels(file: h5py.File, axis: str, labels: Any) -> h5py.Dataset:
-    content = _labelled(labels) if isinstance(labels[0], str) else labels
+    content = _label_array(labels) if isinstance(labels[0], str) else labels
     scale = file.create_dataset(axis, data=content)
     scale.make_scale(axis)
     return scale
 
 
-def _labelled(words: Sequence[str]) -> Any:
+def _label_array(words: Sequence[str]) -> Any:
     return np.array([str(word).encode() for word in words])
 
 
 def _column(drawn: Any) -> Any:
     """A drawn quantity as HDF5 takes it: numbers, or words where any of the values is one."""
     values = np.array(drawn.tolist()) if drawn.dtype.kind == "O" else drawn
-    return _labelled(values.tolist()) if values.dtype.kind == "U" else values
+    return _label_array(values.tolist()) if values.dtype.kind == "U" else values
 
 
 def _fill(

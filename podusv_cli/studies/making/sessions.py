@@ -19,6 +19,7 @@ from pydantic import (
     PositiveInt,
 )
 
+from podusv_cli.core import json_text
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.storage import files, json_files, manifest, provenance
 from podusv_cli.storage.writer import PATIENCE, PROVENANCE, sole_writer
@@ -44,13 +45,13 @@ class _Noted(BaseModel):
     processor_s: dict[str, float] = {}
 
 
-def _noted(session: dict[str, Any]) -> dict[str, Any]:
+def _note_session(session: dict[str, Any]) -> dict[str, Any]:
     _Noted.model_validate(session)
     return session
 
 
 class _Provenance(BaseModel):
-    sittings: list[Annotated[dict[str, Any], AfterValidator(_noted)]]
+    sittings: list[Annotated[dict[str, Any], AfterValidator(_note_session)]]
 
 
 def sessions(folder: Path) -> list[dict[str, Any]]:
@@ -85,9 +86,13 @@ class SessionLog:
     """
 
     def __init__(
-        self, folder: Path, argv: Sequence[str], started: datetime, plugins: Iterable[Plugin],
+        self,
+        folder: Path,
+        argv: Sequence[str],
+        started: datetime,
+        plugins: Iterable[Plugin],
         others: Iterable[Path] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Note the session, after those of `others`, whose runs it takes over.
 
         The manifest of an earlier session is removed, because the folder is no longer finished.
@@ -115,4 +120,4 @@ class SessionLog:
     def _write(self, noted: list[dict[str, Any]]) -> None:
         noted[self._place : self._place + 1] = [self._origin]
         content = {"format": 1, "sittings": noted}
-        files.write_bytes(self._folder / NAME, json_files.encode(content))
+        files.write_bytes(self._folder / NAME, json_text.encode(content))

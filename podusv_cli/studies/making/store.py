@@ -61,7 +61,7 @@ class Store:
         history: tuple[SweepCall, ...] = ()
         known = (self.folder / STUDY).exists()
         if known:
-            there = record.begun(self.folder)
+            there = record.read_identity(self.folder)
             self._agree(self.folder, there.identity)
             history = there.history
             if self.about.draws < there.draws:
@@ -95,9 +95,11 @@ class Store:
         self._agree(other.folder, other.about.identity, "leave it out")
 
     def _agree(
-        self, folder: Path, identity: Mapping[str, Any],
+        self,
+        folder: Path,
+        identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
-    ) -> None:  # fmt: skip
+    ) -> None:
         if different := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 
@@ -105,7 +107,7 @@ class Store:
         """Keep the result of a unit. Raises StorageError."""
         unit = result.unit
         name = f"{unit.law}-{unit.cell}-{unit.first}-{unit.count}.unit"
-        files.write_bytes(self.folder / UNITS / name, encoded(result, self.seal))
+        files.write_bytes(self.folder / UNITS / name, encode_unit(result, self.seal))
 
     def results(self) -> Iterator[UnitResult]:
         """Every undamaged unit of this study in the folder, and what runs.h5 has already."""
@@ -118,7 +120,7 @@ class Store:
     def _units(self) -> list[Path]:
         return sorted((self.folder / UNITS).glob("*.unit"))
 
-    def write_runs(self) -> runs_file.Table:
+    def write_runs(self) -> runs_file.RunsTable:
         """Put every run into runs.h5, and remove its units once no run is missing; the runs.
 
         A driver may make more units meanwhile, which are left alone. Raises StorageError.
@@ -148,7 +150,7 @@ class Store:
         return {(law, unit.cell, draw): cause for draw, cause in causes if cause}
 
     def _these(
-        self, earlier: Sequence[runs_file.Table], units: Sequence[Path]
+        self, earlier: Sequence[runs_file.RunsTable], units: Sequence[Path]
     ) -> Iterator[UnitResult]:
         """What runs.h5 has already, and these units. Raises StorageError for other metrics."""
         there = (result for table in earlier for result in table.results())
@@ -158,11 +160,11 @@ class Store:
             metrics = {name: result.metrics.get(name, undefined) for name in self.about.measured}
             yield replace(result, metrics=metrics)
 
-    def runs(self) -> runs_file.Table:
+    def runs(self) -> runs_file.RunsTable:
         """The runs of a study that has runs.h5. Raises StorageError, also for altered numbers."""
         path = self.folder / RUNS
         try:
-            table = runs_file.Table(path, self.about.success, self.about.metrics)
+            table = runs_file.RunsTable(path, self.about.success, self.about.metrics)
             table.check()
             own = self.about.laws, self.about.cells
             if table.identity != self.seal or (table.laws, table.cells) != own:
@@ -182,12 +184,12 @@ class Store:
                 "restore the file"
             )
 
-    def _earlier(self) -> Iterator[runs_file.Table]:
+    def _earlier(self) -> Iterator[runs_file.RunsTable]:
         """runs.h5, if it is there. Raises StorageError where it is damaged or of another study."""
         if os.path.lexists(self.folder / RUNS):
             yield self.runs()
 
-    def covered(self) -> dict[tuple[str, int], Mask]:
+    def covered_draws(self) -> dict[tuple[str, int], Mask]:
         """By law and cell, which of the wanted draws are there."""
         there = {
             (law, cell): np.zeros(self.about.draws, bool)
@@ -204,12 +206,14 @@ class Store:
         return there
 
 
-def encoded(result: UnitResult, seal: str) -> bytes:
+def encode_unit(result: UnitResult, seal: str) -> bytes:
     """A unit as the content of a file."""
     facts = {
-        "identity": seal, "unit": astuple(result.unit), "metrics": [*result.metrics],
+        "identity": seal,
+        "unit": astuple(result.unit),
+        "metrics": [*result.metrics],
         "causes": result.causes,
-    }  # fmt: skip
+    }
     table = np.array([*result.metrics.values(), result.until], "<f8")
     numbers = table.tobytes() + np.array(result.status, np.uint8).tobytes()
     return _head(facts, numbers) + numbers
@@ -221,7 +225,7 @@ def _head(facts: Mapping[str, Any], numbers: bytes) -> bytes:
     return json.dumps({**facts, SEAL: sha}).encode() + b"\n"
 
 
-def decoded(content: bytes, seal: str) -> UnitResult | None:
+def decode_unit(content: bytes, seal: str) -> UnitResult | None:
     """The unit of a file; None where it is damaged or of another identity."""
     end = content.find(b"\n") + 1
     try:
@@ -245,5 +249,5 @@ def read(path: Path, seal: str) -> UnitResult | None:
     None, too, where another podusv removed it meanwhile. Raises StorageError.
     """
     with files.storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
-        return decoded(path.read_bytes(), seal) if path.is_file() else None
+        return decode_unit(path.read_bytes(), seal) if path.is_file() else None
     return None

@@ -21,9 +21,12 @@ Part = tuple[StudyPlan, Unit]
 
 
 def prepare(
-    plan: StudyPlan, law: str, cell: int, runs: int = 0,
+    plan: StudyPlan,
+    law: str,
+    cell: int,
+    runs: int = 0,
     compiling: Callable[[float], None] | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Check a law, and have its march compiled and loaded; why its runs march one by one.
 
     The reason is empty where runs march side by side. Raises LawError.
@@ -38,9 +41,11 @@ def prepare(
 
 
 def make(
-    plan: StudyPlan, unit: Unit, progress: Callable[[float], None] | None = None,
+    plan: StudyPlan,
+    unit: Unit,
+    progress: Callable[[float], None] | None = None,
     grid: TimeGrid | None = None,
-) -> UnitResult:  # fmt: skip
+) -> UnitResult:
     """Simulate a unit, run after run, over the scenario's instants or those of another grid.
 
     Raises KeyboardInterrupt, and then nothing is kept.
@@ -49,9 +54,10 @@ def make(
 
 
 def make_together(
-    parts: Sequence[Part], progress: Callable[[float], None] | None = None,
+    parts: Sequence[Part],
+    progress: Callable[[float], None] | None = None,
     grid: TimeGrid | None = None,
-) -> list[UnitResult]:  # fmt: skip
+) -> list[UnitResult]:
     """Simulate units that are `alike`, as one batch; otherwise as `make`.
 
     A unit with runs that the batch refuses is made once more by itself, as a number such as
@@ -75,12 +81,14 @@ def make_together(
     rows = [slice(first, stop) for first, stop in pairwise(ends)]
     made = [
         UnitResult(
-            unit, probe.summaries(done.seen[own]),
+            unit,
+            probe.summaries(done.seen[own]),
             np.array([STATUSES.index(word) for word in done.status[own]], np.uint8),
-            np.maximum(done.reached[own] - 1, 0) * grid.step, tuple(map(str, done.cause[own])),
+            np.maximum(done.reached[own] - 1, 0) * grid.step,
+            tuple(map(str, done.cause[own])),
         )
         for (_, unit), own in zip(parts, rows, strict=True)
-    ]  # fmt: skip
+    ]
     if len(parts) == 1:
         return made
     refused = [STATUSES.index("invalid") in result.status for result in made]
@@ -108,10 +116,13 @@ def alike(part: Part) -> str:
     return repr((unit.law, unit.cell, {k: v for k, v in law.items() if not isinstance(v, float)}))
 
 
-def crashed(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:
+def crashed_unit(unit: Unit, names: tuple[str, ...], cause: str) -> UnitResult:
     """The result of a unit of one run that ends its process."""
     nothing = np.full(unit.count, np.nan)
     return UnitResult(
-        unit, dict.fromkeys(names, nothing),
-        np.full(unit.count, STATUSES.index("crashed"), np.uint8), nothing, (cause,) * unit.count,
-    )  # fmt: skip
+        unit,
+        dict.fromkeys(names, nothing),
+        np.full(unit.count, STATUSES.index("crashed"), np.uint8),
+        nothing,
+        (cause,) * unit.count,
+    )

@@ -7,14 +7,17 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from podusv_cli.studies.counting.claims import Link, ParsedClaim
+from podusv_cli.studies.counting.claims import Link, ParsedStudyClaim
 from podusv_cli.studies.counting.samples import FAILURES, SHARE
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.counting.verdict import Statistic, StudyVerdict
 
 SIGNS: dict[type[ast.cmpop], str] = {
-    ast.Lt: "below", ast.LtE: "at most", ast.Gt: "above", ast.GtE: "at least",
-}  # fmt: skip
+    ast.Lt: "below",
+    ast.LtE: "at most",
+    ast.Gt: "above",
+    ast.GtE: "at least",
+}
 UPWARD = (ast.Gt, ast.GtE)
 FORMS = {False: ".4g", True: ".3g%"}  # of shares
 MARGIN = 0.12  # of an axis beyond what is on it
@@ -35,7 +38,7 @@ class Bar(NamedTuple):
     ends: tuple[str, str]
 
 
-def bars(claim: ParsedClaim, verdict: StudyVerdict) -> Iterator[Bar]:
+def bars(claim: ParsedStudyClaim, verdict: StudyVerdict) -> Iterator[Bar]:
     """A bar for each comparison of a claim in each cell."""
     for link in claim.parsed.links:
         for part in verdict.parts:

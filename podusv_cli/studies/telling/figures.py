@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from podusv_cli.core import escaping
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.quantities import raised
+from podusv_cli.core.quantities import raise_powers
 from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import legend, new_figure
 from podusv_cli.studies.counting import statistics
-from podusv_cli.studies.counting.expressions import FINISHED, parse_success, succeeded
+from podusv_cli.studies.counting.expressions import FINISHED, judge_success, parse_success
 from podusv_cli.studies.telling.keep import Track
 from podusv_cli.studies.telling.results import Results
 from podusv_cli.studies.telling.summary import column_of
@@ -47,21 +47,21 @@ UNKNOWN = "#BBBBBB"
 def sketches(results: Results, tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
     """The figures that the study has numbers for."""
     cells = range(min(len(results.runs.cells), MOST_CELLS))
-    for name in results.shown:
+    for name in results.shown_metrics:
         for cell in cells:
             yield from _distribution(results, name, cell)
-    for name in results.shown:
+    for name in results.shown_metrics:
         yield from _ratios(results, name)
     for cell in cells:
         yield from _failures(results, cell)
     yield from _heatmaps(results)
-    for name in results.shown:
+    for name in results.shown_metrics:
         for cell in cells:
             yield from _correlations(results, name, cell)
     yield from _funnel(tracks)
 
 
-def _named(kind: str, results: Results, cell: int) -> str:
+def _name_figure(kind: str, results: Results, cell: int) -> str:
     return f"{kind}-cell{cell}" if len(results.runs.cells) > 1 else kind
 
 
@@ -70,16 +70,17 @@ def _at(results: Results, cell: int) -> str:
 
 
 def _label(results: Results, name: str) -> str:
-    return f"{name} [{raised(results.known[name].unit)}]"
+    return f"{name} [{raise_powers(results.known_metrics[name].unit)}]"
 
 
-def _met(results: Results, name: str, cell: int) -> dict[str, Vector]:
+def _metric_by_law(results: Results, name: str, cell: int) -> dict[str, Vector]:
     """A metric of the draws that every law that has it was tried on, failures as infinity."""
-    runs, about = results.runs, results.known[name]
+    runs, about = results.runs, results.known_metrics[name]
     return {
         law: values[runs.done(law)[cell]]
-        for law in runs.laws if (values := column_of(runs, law, cell, about)) is not None
-    }  # fmt: skip
+        for law in runs.laws
+        if (values := column_of(runs, law, cell, about)) is not None
+    }
 
 
 def _bands(level: float) -> str:
@@ -87,13 +88,13 @@ def _bands(level: float) -> str:
 
 
 def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
-    values, level = _met(results, name, cell), results.level
+    values, level = _metric_by_law(results, name, cell), results.level
     if values:
         yield Sketch(
-            _named(f"distribution-{name}", results, cell),
+            _name_figure(f"distribution-{name}", results, cell),
             f"distribution of {name} over all draws{_at(results, cell)}: "
-            f"{results.known[name].meaning}; a curve that is higher has smaller values, and one "
-            f"that ends below 100 % has failed runs{_bands(level)}",
+            f"{results.known_metrics[name].meaning}; a curve that is higher has smaller values, "
+            f"and one that ends below 100 % has failed runs{_bands(level)}",
             partial(distributions, values, _label(results, name), level),
         )
 
@@ -115,7 +116,7 @@ def _failures(results: Results, cell: int) -> Iterator[Sketch]:
     level = results.level
     for name, threshold, values in _thresholds(results, cell):
         yield Sketch(
-            _named(f"failures-{name}", results, cell),
+            _name_figure(f"failures-{name}", results, cell),
             f"failed draws{_at(results, cell)} if success asked for another threshold of {name}: "
             f"the vertical line is the study's own, {threshold:g}; each curve ends at the share of "
             f"runs that fail whatever the threshold{_bands(level)}",
@@ -128,26 +129,27 @@ def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[
 
     A run that fails for another reason has infinity.
     """
-    tree = parse_success(results.about.success, results.known)
+    tree = parse_success(results.about.success, results.known_metrics)
     parts = tree.values if isinstance(tree, ast.BoolOp) else [tree]
     for part in parts:
         match part:
             case ast.Compare(
-                left=ast.Name(id=name), ops=[ast.Lt() | ast.LtE()],
+                left=ast.Name(id=name),
+                ops=[ast.Lt() | ast.LtE()],
                 comparators=[ast.Constant(value=limit)],
-            ):  # fmt: skip
+            ):
                 others = [other for other in parts if other is not part]
-                yield name, float(str(limit)), _limited(results, name, others, cell)
+                yield name, float(str(limit)), _limit_axis(results, name, others, cell)
 
 
-def _limited(
+def _limit_axis(
     results: Results, name: str, others: Sequence[ast.expr], cell: int
 ) -> dict[str, Vector]:
     runs, limited = results.runs, dict[str, Vector]()
     rest = ast.BoolOp(ast.And(), [ast.Name(FINISHED), *others])
     for law in runs.laws:
-        read = {metric: runs.metric(law, metric) for metric in runs.asked}
-        held = succeeded(rest, read, runs.finished(law), results.known)[cell]
+        read = {metric: runs.metric(law, metric) for metric in runs.success_metrics}
+        held = judge_success(rest, read, runs.finished(law), results.known_metrics)[cell]
         values = np.where(held, runs.metric(law, name)[cell], np.inf)
         limited[law] = values[runs.done(law)[cell]]
     return {law: values for law, values in limited.items() if len(values)}
@@ -160,7 +162,7 @@ def _heatmaps(results: Results) -> Iterator[Sketch]:
     first, *rest = grid
     across = grid[first]
     down = [", ".join(values) for values in product(*(grid[key] for key in rest))]
-    for name in ("failed", *results.shown):
+    for name in ("failed", *results.shown_metrics):
         panels = {law: _panel(results, law, name, len(across)) for law in results.runs.laws}
         label = "failed [1]" if name == "failed" else _label(results, name)
         what = "share of failed draws" if name == "failed" else f"median of {name}"
@@ -191,7 +193,7 @@ def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
     by_chance = "" if np.isnan(results.level) else by_chance
     if rows.correlation.notna().any():
         yield Sketch(
-            _named(f"sensitivity-{name}", results, cell),
+            _name_figure(f"sensitivity-{name}", results, cell),
             f"what {name} depends on{_at(results, cell)}: rank correlation with the drawn "
             f"quantities that matter most to any law{by_chance}; correlations see rising and "
             "falling influence only",
@@ -216,7 +218,9 @@ def distributions(values: Mapping[str, Vector], label: str, level: float) -> Fig
     ends = _span(axes, values)
     for place, (law, numbers) in enumerate(values.items()):
         x = _steps(numbers, ends)
-        _share_curve(axes, place, _told(law, numbers), x, _at_most(numbers, x), len(numbers), level)
+        _share_curve(
+            axes, place, _legend_of(law, numbers), x, _at_most(numbers, x), len(numbers), level
+        )
     axes.set_ylim(0.0, 100.0)
     axes.set(xlabel=label, ylabel="draws with at most this value [%]")
     legend(figure)
@@ -232,7 +236,7 @@ def failure_rates(
     ends = _span(axes, values, threshold)
     for place, (law, numbers) in enumerate(values.items()):
         x, n = _steps(numbers, ends), len(numbers)
-        _share_curve(axes, place, _told(law, numbers), x, n - _at_most(numbers, x), n, level)
+        _share_curve(axes, place, _legend_of(law, numbers), x, n - _at_most(numbers, x), n, level)
     axes.axvline(threshold, **TARGET_LOOK)
     axes.set_yscale("log")
     axes.set_ylim(50.0 / max(map(len, values.values())), 110.0)
@@ -272,9 +276,11 @@ def ratios(pairs: pd.DataFrame) -> Figure:
 
 
 def heatmaps(
-    panels: Mapping[str, Vector], label: str, x: tuple[str, Sequence[str]],
+    panels: Mapping[str, Vector],
+    label: str,
+    x: tuple[str, Sequence[str]],
     y: tuple[str, Sequence[str]],
-) -> Figure:  # fmt: skip
+) -> Figure:
     """A number of every cell for each law: columns are the values of x, rows those of y.
 
     `x` and `y` are grid keys with their values; NaN is a cell without one, inf a failure.
@@ -315,9 +321,15 @@ def correlations(sensitivity: pd.DataFrame) -> Figure:
     for place, law in enumerate(table.columns):
         at = np.arange(len(table)) + (place - (count - 1) / 2) * 0.8 / count
         axes.barh(
-            at, table[law], 0.7 / count, color=nth_style(place)[0], label=escaping.figure(law),
-            edgecolor="white", linewidth=0.0, hatch=HATCHES[place % len(HATCHES)],
-        )  # fmt: skip
+            at,
+            table[law],
+            0.7 / count,
+            color=nth_style(place)[0],
+            label=escaping.figure(law),
+            edgecolor="white",
+            linewidth=0.0,
+            hatch=HATCHES[place % len(HATCHES)],
+        )
     if np.isfinite(chance):
         look_of_chance: dict[str, Any] = {"color": "#E4E4E4", "linewidth": 0.0, "zorder": 0.0}
         axes.axvspan(-chance, chance, label="by chance", **look_of_chance)
@@ -372,8 +384,8 @@ def _at_most(values: Vector, x: Vector) -> NDArray[np.int_]:
 
 
 def _share_curve(
-    axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float,
-) -> None:  # fmt: skip
+    axes: Axes, place: int, label: str, x: Vector, counts: NDArray[np.int_], n: int, level: float
+) -> None:
     """A share of draws [%] over x as steps, within its intervals."""
     color, linestyle, _ = nth_style(place)
     percent = [100.0 * np.asarray(part) for part in statistics.share(counts, n, level)]
@@ -381,7 +393,7 @@ def _share_curve(
     axes.fill_between(x, percent[1], percent[2], color=color, step="post", **BAND)
 
 
-def _told(law: str, values: Vector) -> str:
+def _legend_of(law: str, values: Vector) -> str:
     """The law as a legend tells it: how many of its runs failed, or have no number."""
     failed, unknown = int(np.isinf(values).sum()), int(np.isnan(values).sum())
     counts = [f"{failed} of {len(values)} failed"] if failed else []
@@ -395,10 +407,7 @@ def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[floa
     Returns its ends.
     """
     finite = [numbers[np.isfinite(numbers)] for numbers in values.values()]
-    ends = [
-        *shown,
-        *(end for numbers in finite if len(numbers) for end in _without_tails(numbers)),
-    ]
+    ends = [*shown, *(end for numbers in finite if len(numbers) for end in _without_tails(numbers))]
     low, high = min(ends, default=0.0), max(ends, default=1.0)
     if 0.0 < low * WIDE < high:
         axes.set_xscale("log")

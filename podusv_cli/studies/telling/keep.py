@@ -17,8 +17,8 @@ import numpy as np
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.process.extras import Extras, Failure
-from podusv_cli.storage.run_folder import LOGS, FinishedRun, open_run
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.storage.run_folder import LOGS, RunFolder, open_run
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.telling.results import Results
 
 POINTS = 2000  # of a kept run's curve in a figure
@@ -47,11 +47,11 @@ class Kept:
     """
 
     wanted: KeptRun
-    run: FinishedRun | None
+    run: RunFolder | None
     difference: str = ""
 
 
-def wanted(results: Results) -> list[KeptRun]:
+def wanted_runs(results: Results) -> list[KeptRun]:
     """The runs that `sweep.keep` asks for, each once, by law.
 
     Failed runs are the first that diverged or were no success; a run that crashed, hung or was
@@ -61,20 +61,20 @@ def wanted(results: Results) -> list[KeptRun]:
     chosen: dict[tuple[str, int, int], KeptRun] = {}
     for law in results.runs.laws:
         for run in (
-            *_failed(results.runs, law, keep.failed),
+            *_failed_runs(results.runs, law, keep.failed),
             *(w for name, count in keep.worst.items() for w in _worst(results, law, name, count)),
-            *_named(results.runs, law, keep.draws),
+            *_name_runs(results.runs, law, keep.draws),
         ):
             chosen.setdefault(run[:3], run)
     return list(chosen.values())
 
 
-def unmade(folder: Path, results: Results) -> list[KeptRun]:
+def missing_runs(folder: Path, results: Results) -> list[KeptRun]:
     """The runs that are to be kept and are not there yet."""
-    return [run for run in wanted(results) if not (folder / LOGS / run.name).exists()]
+    return [run for run in wanted_runs(results) if not (folder / LOGS / run.name).exists()]
 
 
-def _failed(runs: Table, law: str, count: int) -> Iterator[KeptRun]:
+def _failed_runs(runs: RunsTable, law: str, count: int) -> Iterator[KeptRun]:
     for draw, cell in np.argwhere(runs.failed(law).T)[:count].tolist():
         yield KeptRun(law, cell, draw, "failed")
 
@@ -88,7 +88,7 @@ def _worst(results: Results, law: str, name: str, count: int) -> Iterator[KeptRu
         yield KeptRun(law, cell, draw, f"{name}: number {rank} of the largest")
 
 
-def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[KeptRun]:
+def _name_runs(runs: RunsTable, law: str, draws: Iterable[int]) -> Iterator[KeptRun]:
     done = runs.done(law)
     for draw in draws:
         for cell in range(len(runs.cells)):
@@ -96,17 +96,20 @@ def _named(runs: Table, law: str, draws: Iterable[int]) -> Iterator[KeptRun]:
                 yield KeptRun(law, cell, draw, "named in sweep.keep.draws")
 
 
-def found(folder: Path, results: Results, extras: Extras) -> list[Kept]:
+def find_kept(folder: Path, results: Results, extras: Extras) -> list[Kept]:
     """The kept runs, compared with the table; one that is not there or differs is missing."""
-    kept = [_opened(folder / LOGS / run.name, run, results, extras) for run in wanted(results)]
+    kept = [
+        _open_kept(folder / LOGS / run.name, run, results, extras) for run in wanted_runs(results)
+    ]
     extras.missing += [
         Failure(f"{LOGS}/{run.wanted.name}", run.difference, problem="differs from runs.h5")
-        for run in kept if run.difference
-    ]  # fmt: skip
+        for run in kept
+        if run.difference
+    ]
     return kept
 
 
-def _opened(path: Path, kept_run: KeptRun, results: Results, extras: Extras) -> Kept:
+def _open_kept(path: Path, kept_run: KeptRun, results: Results, extras: Extras) -> Kept:
     if not path.exists():
         return Kept(kept_run, None)
     try:
@@ -119,7 +122,7 @@ def _opened(path: Path, kept_run: KeptRun, results: Results, extras: Extras) -> 
     return Kept(kept_run, run, difference(run, kept_run, results.runs))
 
 
-def difference(run: FinishedRun, one: KeptRun, runs: Table) -> str:
+def difference(run: RunFolder, one: KeptRun, runs: RunsTable) -> str:
     """The first metric in which a run differs from the table, with both values; "" if none does."""
     for name in runs.metrics:
         ours, theirs = run.metrics.get(name), float(runs.metric(one.law, name)[one.cell, one.draw])
@@ -144,7 +147,7 @@ def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
     """The distance to the target over time in every kept log that has it, by law."""
     by_law: dict[str, list[Track]] = {}
     for run in kept:
-        track = extras.made(f"the track of {run.wanted.name}", partial(_track, run))
+        track = extras.make_or_record(f"the track of {run.wanted.name}", partial(_track, run))
         if track:
             by_law.setdefault(run.wanted.law, []).append(track)
     return by_law

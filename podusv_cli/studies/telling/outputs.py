@@ -10,14 +10,14 @@ import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import markdown
+from podusv_cli.core.json_text import encode
 from podusv_cli.expressions.verdict import as_markdown
 from podusv_cli.pages.page import Picture, sentence
 from podusv_cli.process.extras import Extras
 from podusv_cli.storage import csv_files, files
-from podusv_cli.storage.json_files import encode
 from podusv_cli.storage.run_folder import MISSING
 from podusv_cli.studies.counting.runs import AXES, ENDING, STATUSES
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.making.sessions import timing
 from podusv_cli.studies.telling.keep import Kept, tracks
 from podusv_cli.studies.telling.results import Results
@@ -60,11 +60,13 @@ def write_report(
 
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
-        from podusv_cli.figures.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.figures.sketch import render_sketches  # matplotlib is slow to import
         from podusv_cli.studies.telling.figures import sketches
 
-        drawn, shown = rendered(sketches(results, tracks(kept, extras)), extras)
-    page = extras.made(REPORT, lambda: report.page(folder, results, kept, shown, extras.missing))
+        drawn, shown = render_sketches(sketches(results, tracks(kept, extras)), extras)
+    page = extras.make_or_record(
+        REPORT, lambda: report.page(folder, results, kept, shown, extras.missing)
+    )
     publish(folder, drawn, page, extras)
 
 
@@ -88,7 +90,7 @@ def _replace(folder: Path, contents: dict[str, bytes], only: Sequence[str] = ())
                 path.unlink(missing_ok=True)
 
 
-def export(runs: Table, path: Path) -> None:
+def export(runs: RunsTable, path: Path) -> None:
     """Write all runs as one table, a row a run: CSV, or Parquet where the name ends so."""
     whole = as_frame(runs)
     if path.suffix == ".parquet":
@@ -103,21 +105,19 @@ def export(runs: Table, path: Path) -> None:
     files.write_bytes(path, content)
 
 
-def as_frame(runs: Table) -> pd.DataFrame:
+def as_frame(runs: RunsTable) -> pd.DataFrame:
     """Every run that is made as a row: law, cell, draw, what was drawn, how it ended, metrics."""
-    frames = [
-        _frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))
-    ]  # fmt: skip
+    frames = [_frame(runs, law, cell) for law in runs.laws for cell in range(len(runs.cells))]
     import pandas as pd  # slow to import
 
     return pd.concat(frames, ignore_index=True)
 
 
-def _frame(runs: Table, law: str, cell: int) -> pd.DataFrame:
+def _frame(runs: RunsTable, law: str, cell: int) -> pd.DataFrame:
     done = runs.tried(law)[cell]
     import pandas as pd  # slow to import
 
-    drawn = {name: values[done] for name, values in runs.drawn.items()}
+    drawn = {name: values[done] for name, values in runs.drawn_quantities.items()}
     words = np.array(STATUSES)[runs.status(law)[cell][done]]
     numbers = {name: runs.metric(law, name)[cell][done] for name in runs.metrics}
     place = zip(AXES, (law, runs.cells[cell], np.flatnonzero(done)), strict=True)

@@ -13,7 +13,7 @@ from podusv_cli.expressions.verdict import by_answer
 from podusv_cli.pages.page import Picture, environment, flat
 from podusv_cli.process.extras import Failure
 from podusv_cli.studies.counting.runs import STATUSES, Mask
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.making.sessions import sessions
 from podusv_cli.studies.telling.bars import bars
@@ -26,7 +26,7 @@ DECISIVE = 2  # drawn values of a run
 SESSION = ("started", "duration_s", "runs", "podusv", "python", "platform.processor", "argv")
 
 
-class Row(NamedTuple):
+class RunRow(NamedTuple):
     """A run of a table: how it ended and why, who else failed there, and what the draw was."""
 
     law: str
@@ -42,42 +42,53 @@ class Row(NamedTuple):
 class Rows(NamedTuple):
     """The worst runs of a kind, and how many there are."""
 
-    first: Sequence[Row]
+    first: Sequence[RunRow]
     total: int
 
 
 def page(
-    folder: Path, results: Results, kept: Sequence[Kept], figures: Sequence[Picture],
+    folder: Path,
+    results: Results,
+    kept: Sequence[Kept],
+    figures: Sequence[Picture],
     missing: Sequence[Failure],
-) -> str:  # fmt: skip
+) -> str:
     """The whole report."""
     about, beside = results.about, _beside(figures, len(results.runs.laws))
     ordered = [*beside, *(picture for picture in figures if picture not in beside)]
     numbered = [*enumerate(ordered, 1)]
-    return environment("podusv_cli.studies.telling").get_template("study.html.j2").render(
-        title=f"{about.name}: a study",
-        folder=folder,
-        results=results,
-        about=about,
-        several=len(results.runs.cells) > 1,
-        answers=by_answer(results.verdicts),
-        claims=[(v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)],
-        laws=list(_laws(results)),
-        broken=runs_that(results, results.runs.broken),
-        failed=runs_that(results, results.runs.failed),
-        pairs=_pairs(results),
-        numbers=_numbers(results),
-        metrics={name: results.known[name] for name in results.shown},
-        varied=_varied(results),
-        grid=[(key, ", ".join(given)) for key, given in about.grid.items()],
-        kept=kept,
-        beside=numbered[: len(beside)],
-        figures=numbered,
-        missing=[str(failure) for failure in missing],
-        sittings=_sessions(folder),
-        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
-        first=FIRST,
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.studies.telling")
+        .get_template("study.html.j2")
+        .render(
+            title=f"{about.name}: a study",
+            folder=folder,
+            results=results,
+            about=about,
+            several=len(results.runs.cells) > 1,
+            answers=by_answer(results.verdicts),
+            claims=[
+                (v, [*bars(p, v)]) for p, v in zip(results.parsed, results.verdicts, strict=True)
+            ],
+            laws=list(_laws(results)),
+            broken=runs_that(results, results.runs.broken),
+            failed=runs_that(results, results.runs.failed),
+            pairs=_pairs(results),
+            numbers=_numbers(results),
+            metrics={name: results.known_metrics[name] for name in results.shown_metrics},
+            varied=_varied_quantities(results),
+            grid=[(key, ", ".join(given)) for key, given in about.grid.items()],
+            kept=kept,
+            beside=numbered[: len(beside)],
+            figures=numbered,
+            missing=[str(failure) for failure in missing],
+            sittings=_sessions(folder),
+            latest=[
+                (key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])
+            ],
+            first=FIRST,
+        )
+    )
 
 
 def _laws(results: Results) -> Iterator[tuple[str, str, str, str, list[str]]]:
@@ -101,7 +112,7 @@ def runs_that(results: Results, are: Any) -> Rows:
         for place, law in enumerate(runs.laws)
         for rank, (cell, draw) in enumerate(_worst(runs, law, masks[law])[:FIRST].tolist())
     )[:FIRST]
-    drawn = runs.drawn if places else {}
+    drawn = runs.drawn_quantities if places else {}
     rows = [
         _row(results, drawn, (runs.laws[place], cell, draw))
         for _, place, cell, draw in sorted(places, key=lambda found: found[1])
@@ -109,17 +120,17 @@ def runs_that(results: Results, are: Any) -> Rows:
     return Rows(rows, sum(int(mask.sum()) for mask in masks.values()))
 
 
-def _worst(runs: Table, law: str, mask: Mask) -> Any:
+def _worst(runs: RunsTable, law: str, mask: Mask) -> Any:
     """Cell and draw of runs: those that ended first, then those that missed success by most."""
     cells, draws = np.nonzero(mask)
     finished = runs.finished(law)[mask]
     until = np.where(finished, 0.0, runs.until(law)[mask])
-    missed = [-by[mask] for by in runs.missed(law)]
+    missed = [-by[mask] for by in runs.shortfalls_of(law)]
     order = np.lexsort((cells, draws, *reversed(missed), until, finished))
     return np.column_stack([cells, draws])[order]
 
 
-def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]) -> Row:
+def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]) -> RunRow:
     runs, (law, cell, draw) = results.runs, place
     until = float(runs.until(law)[cell, draw])
     status = STATUSES[int(runs.status(law)[cell, draw])]
@@ -129,17 +140,25 @@ def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]
     ending = status if status == "finished" or np.isnan(until) else f"{status} at {until:.4g} s"
     others = [other for other in runs.laws if other != law]
     failing = sum(not runs.success(other)[cell, draw] for other in others)
-    return Row(
-        law, cell, runs.cells[cell], draw, ending, cause,
+    return RunRow(
+        law,
+        cell,
+        runs.cells[cell],
+        draw,
+        ending,
+        cause,
         f"{failing} of {len(others)}",
         ", ".join(f"{name} {drawn[name][draw]:.3g}" for name in _decisive(results, law, cell))
         or "-",
-    )  # fmt: skip
+    )
 
 
 def _decisive(results: Results, law: str, cell: int) -> list[str]:
     """The drawn quantities that go together most with what success, or the answer, asks about."""
-    metric, label = (*results.runs.asked, *results.shown)[0], results.runs.cells[cell]
+    metric, label = (
+        (*results.runs.success_metrics, *results.shown_metrics)[0],
+        results.runs.cells[cell],
+    )
     sizes = {
         row["quantity"]: size
         for row in results.tables.sensitivity
@@ -153,7 +172,8 @@ def _decisive(results: Results, law: str, cell: int) -> list[str]:
 def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
     """Why a run that finished is no success: the metrics that decide."""
     reasons = [
-        f"{name} = {results.runs.metric(law, name)[cell, draw]:.5g}" for name in results.runs.asked
+        f"{name} = {results.runs.metric(law, name)[cell, draw]:.5g}"
+        for name in results.runs.success_metrics
     ]
     return ", ".join(reasons)
 
@@ -161,22 +181,28 @@ def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
 def _pairs(results: Results) -> list[Any]:
     """The rows of the shown metrics, in their order."""
     rows = [{**row, "ratio": Interval.of(row, "ratio").text(".4g")} for row in results.tables.pairs]
-    return [row for name in results.shown for row in rows if row["metric"] == name]
+    return [row for name in results.shown_metrics for row in rows if row["metric"] == name]
 
 
 def _numbers(results: Results) -> list[list[str]]:
     """Quantiles of the shown metrics, the median with its interval."""
     return [
-        [row["law"], row["cell"], row["metric"], row["unit"],
-         *(digits(row[q], infinite=word) for q in ("q05", "q25")),
-         Interval.of(row, "q50").text(infinite=word),
-         *(digits(row[q], infinite=word) for q in ("q75", "q95"))]
-        for row in results.tables.summary if row["metric"] in results.shown
-        for word in [results.known[row["metric"]].infinite]
-    ]  # fmt: skip
+        [
+            row["law"],
+            row["cell"],
+            row["metric"],
+            row["unit"],
+            *(digits(row[q], infinite=word) for q in ("q05", "q25")),
+            Interval.of(row, "q50").text(infinite=word),
+            *(digits(row[q], infinite=word) for q in ("q75", "q95")),
+        ]
+        for row in results.tables.summary
+        if row["metric"] in results.shown_metrics
+        for word in [results.known_metrics[row["metric"]].infinite]
+    ]
 
 
-def _varied(results: Results) -> list[tuple[str, str, str]]:
+def _varied_quantities(results: Results) -> list[tuple[str, str, str]]:
     """Every drawn quantity: its keys, how it is drawn, and the scenario's own values."""
     own, run = results.about.identity, f"{results.runs.laws[0]}[0]"
     return [

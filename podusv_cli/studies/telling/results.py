@@ -11,7 +11,7 @@ import numpy as np
 
 from podusv_cli.core.about import MetricAbout, StudyAbout
 from podusv_cli.studies.counting import claims, verdict
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.counting.statistics import Interval, digits
 from podusv_cli.studies.telling import summary
 
@@ -35,14 +35,14 @@ class Results:
     """The tables and verdicts of a study's runs, as far as these are made."""
 
     about: StudyAbout
-    runs: Table
+    runs: RunsTable
     tables: Tables
-    parsed: Sequence[claims.ParsedClaim]
+    parsed: Sequence[claims.ParsedStudyClaim]
     verdicts: Sequence[verdict.StudyVerdict]
     contradicted: str = ""  # why no claim is judged: a kept log has other numbers than the table
 
     @property
-    def known(self) -> Mapping[str, MetricAbout]:
+    def known_metrics(self) -> Mapping[str, MetricAbout]:
         """All metrics, with those of plug-ins."""
         return self.about.metrics
 
@@ -70,19 +70,19 @@ class Results:
         return places
 
     @cached_property
-    def broken(self) -> int:
+    def broken_runs(self) -> int:
         """How many runs crashed, hung or were invalid."""
         return sum(int(np.sum(self.runs.broken(law))) for law in self.runs.laws)
 
     @cached_property
-    def made(self) -> int:
+    def made_runs(self) -> int:
         """How many runs there are."""
         return sum(int(np.sum(self.runs.tried(law))) for law in self.runs.laws)
 
     @property
     def preliminary(self) -> str:
         """How many draws the answer is about, in words; "" where none is missing."""
-        if self.made == self.wanted:
+        if self.made_runs == self.wanted_runs:
             return ""
         draws, laws = int(np.sum(self.runs.common, axis=1).min()), len(self.runs.laws)
         cells = " of each cell" if len(self.runs.cells) > 1 else ""
@@ -90,7 +90,7 @@ class Results:
         return f"preliminary: {draws:,} of {self.runs.wanted:,} draws{cells} {of}"
 
     @property
-    def wanted(self) -> int:
+    def wanted_runs(self) -> int:
         """How many runs were asked for."""
         return len(self.runs.laws) * len(self.runs.cells) * self.runs.wanted
 
@@ -100,7 +100,7 @@ class Results:
         return self.about.level if self.about.independent else np.nan
 
     @property
-    def shown(self) -> list[str]:
+    def shown_metrics(self) -> list[str]:
         """The metrics that the answer is about: those of the claims, and the most common.
 
         Runs without any of the most common, as manoeuvring trials are, have those that a reader
@@ -108,10 +108,10 @@ class Results:
         """
         expected = " ".join(claim.expect for claim in self.about.claims.values())
         gathered = self.runs.metrics
-        headlines = [m for m in gathered if self.known[m].headline]
+        headlines = [m for m in gathered if self.known_metrics[m].headline]
         usual = [m for m in gathered if m in ALWAYS] or headlines
         shown = [m for m in gathered if m in usual or f".{m}" in expected]
-        return sorted(shown, key=lambda name: not self.known[name].headline)
+        return sorted(shown, key=lambda name: not self.known_metrics[name].headline)
 
     def without_verdicts(self, contradicted: str) -> Results:
         """The tables alone, where the runs are not what their logs say."""
@@ -119,7 +119,10 @@ class Results:
 
     def cells(self) -> tuple[list[str], list[list[str]]]:
         """Head and rows of the table of the answer: failures and medians of every law."""
-        several, about = len(self.runs.cells) > 1, [self.known[name] for name in self.shown]
+        several, about = (
+            len(self.runs.cells) > 1,
+            [self.known_metrics[name] for name in self.shown_metrics],
+        )
         medians = (f"median of {metric.row} [{metric.unit}]" for metric in about)
         head = ["law", *(["cell"] if several else []), "failed", *medians]
         rows = []
@@ -131,15 +134,15 @@ class Results:
 
     def _row(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
         if not mine:  # no run yet
-            return ["-"] * (1 + len(self.shown))
+            return ["-"] * (1 + len(self.shown_metrics))
         failed = f"{Interval.of(next(iter(mine.values())), 'failed'):.3g%}"
         return [failed, *self.medians(mine)]
 
     def medians(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
         """Medians of the shown metrics in these rows, by metric; a dash where there is none."""
         return [
-            digits(number, infinite=self.known[name].infinite)
-            for name in self.shown
+            digits(number, infinite=self.known_metrics[name].infinite)
+            for name in self.shown_metrics
             for number in [mine[name]["q50"] if name in mine else np.nan]
         ]
 
@@ -147,25 +150,28 @@ class Results:
         """What `--json` prints."""
         return {
             "preliminary": self.preliminary,
-            "broken": self.broken,
+            "broken": self.broken_runs,
             "contradicted": self.contradicted,
             "summary": self.tables.summary,
             "claims": [verdict.as_json() for verdict in self.verdicts],
         }
 
 
-def judged(about: StudyAbout, runs: Table) -> Results:
+def judge_study(about: StudyAbout, runs: RunsTable) -> Results:
     """All tables and verdicts of a study's runs."""
     level, known = about.level, about.metrics
     parsed = [
-        claims.ParsedClaim(name, claim, claims.parse(claim.expect, about.laws, known))
+        claims.ParsedStudyClaim(name, claim, claims.parse(claim.expect, about.laws, known))
         for name, claim in about.claims.items()
     ]
-    numbers = {q: values for q, values in runs.drawn.items() if not about.quantities[q].is_seed}
+    numbers = {
+        q: values for q, values in runs.drawn_quantities.items() if not about.quantities[q].is_seed
+    }
     tables = Tables(
-        summary.summary(runs, level, known), summary.pairs(runs, MARGIN, level, known),
+        summary.summary(runs, level, known),
+        summary.pairs(runs, MARGIN, level, known),
         summary.sensitivity(runs, numbers, level, known),
-    )  # fmt: skip
+    )
     if not about.independent:
         tables = Tables(*map(summary.without_intervals, tables))
     verdicts = claims.judge(parsed, runs, level, known)

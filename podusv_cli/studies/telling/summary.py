@@ -22,17 +22,25 @@ Rows = list[dict[str, Any]]  # of a table, each by the names of the columns
 def summary(runs: StudyRuns, level: float, metrics: Known) -> Rows:
     """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
     return [
-        {**_failures(runs, law, cell, level), "metric": name, "unit": metrics[name].unit,
-         **_quantiles(values, level)}
-        for law in runs.laws for cell in range(len(runs.cells))
+        {
+            **_failures(runs, law, cell, level),
+            "metric": name,
+            "unit": metrics[name].unit,
+            **_quantiles(values, level),
+        }
+        for law in runs.laws
+        for cell in range(len(runs.cells))
         for name, values in _columns(runs, law, cell, metrics)
-    ]  # fmt: skip
+    ]
 
 
 def pairs(
-    runs: StudyRuns, margin: float, level: float, metrics: Known,
+    runs: StudyRuns,
+    margin: float,
+    level: float,
+    metrics: Known,
     names: Mapping[str, str] | None = None,
-) -> Rows:  # fmt: skip
+) -> Rows:
     """For every metric, cell and two laws a and b: who wins how often, and the median of a / b.
 
     Of the draws that both laws met. A win is a smaller metric by more than the margin, which is
@@ -41,15 +49,23 @@ def pairs(
     """
     laws = names or {law: law for law in runs.laws}
     return [
-        {"metric": name, "cell": runs.cells[cell], "a": a, "b": b, "margin": margin,
-         **_pair(sign * of_a[used], sign * of_b[used], margin, level)}
-        for name in _names(runs, metrics) for sign in [-1.0 if metrics[name].margin else 1.0]
+        {
+            "metric": name,
+            "cell": runs.cells[cell],
+            "a": a,
+            "b": b,
+            "margin": margin,
+            **_pair(sign * of_a[used], sign * of_b[used], margin, level),
+        }
+        for name in _names(runs, metrics)
+        for sign in [-1.0 if metrics[name].margin else 1.0]
         for cell in range(len(runs.cells))
         for read in [{a: column_of(runs, law, cell, metrics[name]) for a, law in laws.items()}]
         for a, b in combinations(laws, 2)
-        for of_a, of_b in [(read[a], read[b])] if of_a is not None and of_b is not None
+        for of_a, of_b in [(read[a], read[b])]
+        if of_a is not None and of_b is not None
         for used in [runs.done(laws[a])[cell] & runs.done(laws[b])[cell]]
-    ]  # fmt: skip
+    ]
 
 
 def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics: Known) -> Rows:
@@ -61,25 +77,34 @@ def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics
     drawn = {name: np.asarray(values) for name, values in draws.items()}
     numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
     return [
-        {"law": law, "cell": runs.cells[cell], "quantity": quantity, "metric": name,
-         "n": known, "correlation": correlation,
-         "by_chance": statistics.by_chance(known, level)}
-        for law in runs.laws for cell in range(len(runs.cells))
+        {
+            "law": law,
+            "cell": runs.cells[cell],
+            "quantity": quantity,
+            "metric": name,
+            "n": known,
+            "correlation": correlation,
+            "by_chance": statistics.by_chance(known, level),
+        }
+        for law in runs.laws
+        for cell in range(len(runs.cells))
         for done in [runs.done(law)[cell]]
         for ranked in [{q: statistics.standard(values[done]) for q, values in numbers.items()}]
         for name, values in _columns(runs, law, cell, metrics)
         for known in [int(np.sum(~np.isnan(values)))]
         for quantity, correlation in statistics.rank_correlations(ranked, values).items()
-    ]  # fmt: skip
+    ]
 
 
 def without_intervals(rows: Rows) -> Rows:
     """The table with nothing in all columns that need independent draws."""
     return [
-        {name: np.nan if name.endswith(ENDS) or name == "by_chance" else cell
-         for name, cell in row.items()}
+        {
+            name: np.nan if name.endswith(ENDS) or name == "by_chance" else cell
+            for name, cell in row.items()
+        }
         for row in rows
-    ]  # fmt: skip
+    ]
 
 
 def _names(runs: StudyRuns, metrics: Known) -> list[str]:
@@ -98,9 +123,7 @@ def column_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vecto
     return values if done.any() and not (len(known) and np.isnan(known).all()) else None
 
 
-def _columns(
-    runs: StudyRuns, law: str, cell: int, metrics: Known
-) -> Iterator[tuple[str, Vector]]:  # fmt: skip
+def _columns(runs: StudyRuns, law: str, cell: int, metrics: Known) -> Iterator[tuple[str, Vector]]:
     """Every metric that the law has, over the draws of a cell that it met."""
     for name in _names(runs, metrics):
         if (values := column_of(runs, law, cell, metrics[name])) is not None:
@@ -111,10 +134,12 @@ def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, A
     done: Mask = runs.done(law)[cell]
     failed, n = int(np.sum(done & ~runs.success(law)[cell])), int(np.sum(done))
     return {
-        "law": law, "cell": runs.cells[cell], "n": n,
+        "law": law,
+        "cell": runs.cells[cell],
+        "n": n,
         "broken": int(np.sum(done & runs.broken(law)[cell])),
         **statistics.share(failed, n, level).columns("failed"),
-    }  # fmt: skip
+    }
 
 
 def _quantiles(values: Vector, level: float) -> dict[str, Any]:
@@ -129,7 +154,11 @@ def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
     compared = statistics.pairs(a, b, margin)
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {
-        "n": compared.n, "ties": compared.ties, "both_failed": compared.both_failed,
-        "unknown": compared.unknown, **compared.win_rate(level).columns("a_wins"),
-        **compared.loss_rate(level).columns("b_wins"), **ratio.columns("ratio"),
-    }  # fmt: skip
+        "n": compared.n,
+        "ties": compared.ties,
+        "both_failed": compared.both_failed,
+        "unknown": compared.unknown,
+        **compared.win_rate(level).columns("a_wins"),
+        **compared.loss_rate(level).columns("b_wins"),
+        **ratio.columns("ratio"),
+    }

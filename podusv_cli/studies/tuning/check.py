@@ -31,10 +31,7 @@ def tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 def _study(scenario: Scenario) -> Faults:
     if scenario.sweep is None:
-        yield (
-            ("tune",),
-            "needs the key sweep: its `vary` says what is drawn (podusv docs tuning)",
-        )
+        yield (("tune",), "needs the key sweep: its `vary` says what is drawn (podusv docs tuning)")
     elif scenario.sweep.grid:
         fault = "needs a study without a grid: put what laws have to cope with under sweep.vary"
         yield ("tune",), f"{fault}, and write `grid: {{{next(iter(scenario.sweep.grid))}: null}}`"

@@ -50,11 +50,11 @@ def sketches(results: SearchResults) -> Iterator[Sketch]:
     if len(results.effort):
         yield Sketch(
             "effort",
-            f"error against effort: the median {results.shown[0]} over the median total variation "
-            "of the surge demand on the fresh draws; hollow before, filled after the search, the "
-            "median of a law's searches with lines over their middle half; failed runs count as "
-            "the worst; down and to the left is better",
-            partial(effort, results.effort, results.shown[0]),
+            f"error against effort: the median {results.shown_metrics[0]} over the median total "
+            "variation of the surge demand on the fresh draws; hollow before, filled after the "
+            "search, the median of a law's searches with lines over their middle half; failed runs "
+            "count as the worst; down and to the left is better",
+            partial(effort, results.effort, results.shown_metrics[0]),
         )
     if results.winners:
         yield from _of_searches(results, objective)
@@ -69,12 +69,12 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
         partial(history, results.history, results.label),
     )
     rows = results.pairs[(results.pairs["when"] == "tuning")]
-    rows = rows[rows.metric == (results.shown[0])]
+    rows = rows[rows.metric == (results.shown_metrics[0])]
     if len(rows):
         yield Sketch(
             "ratios",
-            f"what the search changed in {results.shown[0]}: the median ratio of each law after "
-            "and before in the same fresh draw, with its interval; below 1 is better",
+            f"what the search changed in {results.shown_metrics[0]}: the median ratio of each law "
+            "after and before in the same fresh draw, with its interval; below 1 is better",
             partial(ratios, rows),
         )
     if len(results.importance):
@@ -92,21 +92,30 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
 def _slices(results: SearchResults, law: str, objective: str) -> Sketch:
     tried = pd.DataFrame(
         [
-            {**trial.gains, "objective": trial.value, "repeat": repeat,
-             "whole": trial.status == FINISHED}
-            for repeat, trials in enumerate(results.trials[law]) for trial in trials
+            {
+                **trial.gains,
+                "objective": trial.value,
+                "repeat": repeat,
+                "whole": trial.status == FINISHED,
+            }
+            for repeat, trials in enumerate(results.trials[law])
+            for trial in trials
         ]
-    )  # fmt: skip
+    )
     return Sketch(
         f"slices-{law}",
         f"every trial of {law} by each of its gains: {objective} over the draws that the trial "
         "met, a colour for each search, hollow where the trial was pruned or cut; the full line is "
         "the gain that was found, the broken one the scenario's",
         partial(
-            slices, tried, results.plan.gains[law], results.winner(law).gains,
-            results.label, units_of(results.plan.laws[law]),
+            slices,
+            tried,
+            results.plan.gains[law],
+            results.winner(law).gains,
+            results.label,
+            units_of(results.plan.laws[law]),
         ),
-    )  # fmt: skip
+    )
 
 
 def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
@@ -116,14 +125,20 @@ def before_and_after(laws: pd.DataFrame, label: str) -> Figure:
     axes = figure.add_subplot()
     for row, law in ordered.iterrows():
         place = float(str(row))
-        _ranged(axes, place - 0.16, law, "before", "none")
-        _ranged(axes, place + 0.16, law, "after", nth_style(1)[0])
+        _draw_range(axes, place - 0.16, law, "before", "none")
+        _draw_range(axes, place + 0.16, law, "after", nth_style(1)[0])
     for when, fill in (("before", "none"), ("after", nth_style(1)[0])):
         colour = nth_style(1 if when == "after" else 0)[0]
         axes.plot(
-            [], [], "o-", color=colour, markerfacecolor=fill, markersize=3.6, linewidth=1.2,
+            [],
+            [],
+            "o-",
+            color=colour,
+            markerfacecolor=fill,
+            markersize=3.6,
+            linewidth=1.2,
             label=f"{when} the search",
-        )  # fmt: skip
+        )
     axes.set_yticks(range(len(ordered)), [escaping.figure(law) for law in ordered.law])
     axes.set_ylim(len(ordered) - 0.4, -0.6)
     axes.set_xlabel(escaping.figure(label))
@@ -145,9 +160,13 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
             axes.plot([left, right], [y, y], color=colour, linewidth=0.8)
             axes.plot([x, x], [low, high], color=colour, linewidth=0.8)
             axes.plot(
-                x, y, markersize=4.5, markerfacecolor="none" if before else colour,
-                label=None if before else escaping.figure(str(law)), **look,
-            )  # fmt: skip
+                x,
+                y,
+                markersize=4.5,
+                markerfacecolor="none" if before else colour,
+                label=None if before else escaping.figure(str(law)),
+                **look,
+            )
     known = table.replace(np.inf, np.nan)
     wide = {name: known[name].max() > DECADE * known[name].min() for name in ("variation", "error")}
     axes.set_xscale("log" if wide["variation"] else "linear")
@@ -158,7 +177,7 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
     return figure
 
 
-def _ranged(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
+def _draw_range(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
     estimate, low, high = (law[f"objective_{when}{end}"] for end in ("", "_low", "_high"))
     colour = nth_style(0)[0] if when == "before" else nth_style(1)[0]
     if np.isfinite([low, high]).all():
@@ -175,9 +194,14 @@ def history(trials: pd.DataFrame, label: str) -> Figure:
         colour, style, _ = nth_style(place)
         for i, (_, repeat) in enumerate(rows.groupby("repeat")):
             axes.step(
-                repeat.spent, repeat.best.replace(np.inf, np.nan), where="post", color=colour,
-                linestyle=style, linewidth=0.9, label=escaping.figure(str(law)) if not i else None,
-            )  # fmt: skip
+                repeat.spent,
+                repeat.best.replace(np.inf, np.nan),
+                where="post",
+                color=colour,
+                linestyle=style,
+                linewidth=0.9,
+                label=escaping.figure(str(law)) if not i else None,
+            )
     axes.set(xlabel="simulated runs of a search", ylabel=f"best {escaping.figure(label)} so far")
     legend(figure)
     return figure
@@ -206,9 +230,12 @@ def importance(table: pd.DataFrame) -> Figure:
 
 
 def slices(
-    tried: pd.DataFrame, gains: Sequence[Gain], winner: Mapping[str, Any], label: str,
+    tried: pd.DataFrame,
+    gains: Sequence[Gain],
+    winner: Mapping[str, Any],
+    label: str,
     units: Mapping[str, str],
-) -> Figure:  # fmt: skip
+) -> Figure:
     """A panel for each gain of a law, a point for each trial."""
     across = min(len(gains), ACROSS)
     down = math.ceil(len(gains) / across)
@@ -245,9 +272,8 @@ def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, winner: Any) -> None:
         colour = nth_style(int(str(repeat)))[0]
         fill = colour if whole else "none"
         axes.scatter(
-            some.x, some.objective, facecolors=fill, edgecolors=colour,
-            **WHOLE if whole else PRUNED,
-        )  # fmt: skip
+            some.x, some.objective, facecolors=fill, edgecolors=colour, **WHOLE if whole else PRUNED
+        )
     axes.axvline(mark, **TARGET_LOOK)
     if own is not None:
         axes.axvline(own, **{**TARGET_LOOK, "linestyle": "--"})

@@ -8,9 +8,10 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveInt
 
+from podusv_cli.core import json_text
 from podusv_cli.core.errors import UsageError
-from podusv_cli.scenario.load import yaml_text
 from podusv_cli.scenario.plugins import FOLDER
+from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.sections import LONGEST_NAME
 from podusv_cli.scenario.tune import Tune
 from podusv_cli.storage import files, json_files, manifest
@@ -46,7 +47,7 @@ class TuneCall(BaseModel):
     started: str
 
 
-class Record(BaseModel):
+class TuneRecord(BaseModel):
     """What is read of tune.json; there is more."""
 
     model_config = ConfigDict(strict=True, frozen=True)
@@ -55,7 +56,7 @@ class Record(BaseModel):
     history: list[TuneCall]
 
 
-def known(folder: Path, plan: TunePlan) -> Record | None:
+def read_known(folder: Path, plan: TunePlan) -> TuneRecord | None:
     """What tune.json says of this very search; None where the folder is missing or empty.
 
     Raises UsageError where the folder holds something else, naming what is different.
@@ -64,13 +65,13 @@ def known(folder: Path, plan: TunePlan) -> Record | None:
         if not files.is_empty(folder):
             raise UsageError(f"{folder} is no search and not empty; name another with --out")
         return None
-    noted = json_files.read_as(folder / TUNE, Record)
+    noted = json_files.read_as(folder / TUNE, TuneRecord)
     if different := disagreements(noted.identity, _identity(plan)):
         raise UsageError(
             f"{folder} holds another search: {different}; name another folder with --out, or begin "
             "anew with --force"
         )
-    _as_much(folder, _asked(noted), plan.tune)
+    _as_much(folder, _read_asked(noted), plan.tune)
     return noted
 
 
@@ -79,18 +80,18 @@ def clear(folder: Path) -> None:
     manifest.remove(folder, "search", TUNE, UNFINISHED)
 
 
-def _asked(noted: Record | None) -> list[dict[str, Any]]:
+def _read_asked(noted: TuneRecord | None) -> list[dict[str, Any]]:
     return [call.model_dump(by_alias=True) for call in noted.history] if noted else []
 
 
 def write(
-    folder: Path, plan: TunePlan, noted: Record | None, started: str, texts: Mapping[str, str]
+    folder: Path, plan: TunePlan, noted: TuneRecord | None, started: str, texts: Mapping[str, str]
 ) -> None:
     """Note what is asked for, after what is `known` of the search.
 
     `texts` has the scenario and its plug-ins by the names of their files. Raises StorageError.
     """
-    content = json_files.encode(_content(plan, _asked(noted), started))
+    content = json_text.encode(_content(plan, _read_asked(noted), started))
     # With a larger budget in tune.json than in the scenario, the search could not be continued. And
     # without tune.json, a folder that is not empty is no search.
     if noted:
@@ -104,21 +105,26 @@ def write(
 
 def _identity(plan: TunePlan) -> dict[str, Any]:
     identity = {"format of tune.json": FORMAT, "optuna": sampler.version(), **plan.identity}
-    return json_files.plain(identity)
+    return json_text.plain(identity)
 
 
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
     tune = plan.tune
     asked = {
-        "budget": tune.budget, "repeats": tune.repeats, "validate": tune.validate,
+        "budget": tune.budget,
+        "repeats": tune.repeats,
+        "validate": tune.validate,
         "started": started,
-    }  # fmt: skip
+    }
     return {
-        "format": FORMAT, "name": plan.scenario.name, "laws": list(plan.laws),
+        "format": FORMAT,
+        "name": plan.scenario.name,
+        "laws": list(plan.laws),
         "gains": {law: [gain.key for gain in gains] for law, gains in plan.gains.items()},
         "idle": {law: list(keys) for law, keys in plan.idle.items()},
-        "identity": _identity(plan), "history": [*history, asked],
-    }  # fmt: skip
+        "identity": _identity(plan),
+        "history": [*history, asked],
+    }
 
 
 def _as_much(folder: Path, history: Sequence[Mapping[str, Any]], tune: Tune) -> None:
@@ -145,14 +151,14 @@ def tuned_yaml(results: SearchResults) -> bytes:
     tuned = {
         "extends": SCENARIO,
         "name": f"{scenario.name[: LONGEST_NAME - len(end)]}{end}",
-        "description": _told(results),
+        "description": _tell_results(results),
         "controllers": {law: content for law, content in laws.items() if content},
         "tune": None,
     }
     return f"# The gains that podusv tune found.\n{yaml_text(tuned)}".encode()
 
 
-def _told(results: SearchResults) -> str:
+def _tell_results(results: SearchResults) -> str:
     tune = results.plan.tune
     searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
     what = tune.objective

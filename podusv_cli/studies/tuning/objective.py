@@ -19,7 +19,14 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.expressions.margins import SIGNS
-from podusv_cli.expressions.reading import function, known, literal, number, refuse, syntax_tree
+from podusv_cli.expressions.reading import (
+    function,
+    known_name,
+    literal,
+    number,
+    refuse,
+    syntax_tree,
+)
 from podusv_cli.expressions.walk import ARITHMETIC, Condition
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.studies.counting import statistics
@@ -63,7 +70,7 @@ class OfGains(OfRuns):
         """A metric's name."""
         if not isinstance(node, ast.Name):
             refuse(node, "write metrics by their names alone, as in median(iae)")
-        name = known(node.id, self.metrics, "metric")
+        name = known_name(node.id, self.metrics, "metric")
         self.names.append(name)
         values = self.runs.metrics.get(name, np.full(self.runs.failed.shape, np.nan))
         return self.countable(name, values, self.runs.failed)
@@ -93,7 +100,7 @@ def parse_inequality(text: str, metrics: Mapping[str, Metric]) -> Inequality:
     refuse(tree, f"compare one statistic with one number by <, <=, > or >=, as in {INEQUALITY}")
 
 
-def named(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
+def metrics_in(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
     """The metrics that an expression is about, each once."""
     return [name for name in dict.fromkeys(_names(tree, metrics)) if name != FAILURES]
 
@@ -108,7 +115,7 @@ def _names(tree: ast.expr, metrics: Mapping[str, Metric]) -> list[str]:
         metrics, runs=Outcomes(dict(zip(metrics, numbers, strict=True)), np.zeros(INVENTED, bool))
     )
     with np.errstate(all="ignore"):
-        reached = _evaluated(tree, walk, math.inf)
+        reached = _evaluate(tree, walk, math.inf)
     if not math.isfinite(reached) and FAILURES not in walk.names:  # here, no run failed
         refuse(tree, f"is no finite number, whatever the runs are; example: {EXAMPLE}")
     return walk.names
@@ -122,7 +129,7 @@ def evaluate(
     `worst` is minus infinity where less is worse.
     """
     with np.errstate(all="ignore"):
-        reached = float(_evaluated(tree, OfGains(metrics, runs=runs), worst))
+        reached = float(_evaluate(tree, OfGains(metrics, runs=runs), worst))
     return reached if math.isfinite(reached) else math.inf
 
 
@@ -137,17 +144,17 @@ def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]
     return over / (abs(inequality.bound) or 1.0)
 
 
-def _evaluated(node: ast.expr, walk: OfGains, worst: float) -> Any:
+def _evaluate(node: ast.expr, walk: OfGains, worst: float) -> Any:
     match node:
         case ast.Constant():
             return np.float64(literal(node))
         case ast.UnaryOp(op=ast.USub(), operand=part):
-            return -_evaluated(part, walk, -worst)
+            return -_evaluate(part, walk, -worst)
         case ast.BinOp(left=left, right=right, op=sign) if type(sign) in ARITHMETIC:
             first = -worst if isinstance(sign, SCALING) and _is_negative(right) else worst
             second = -worst if isinstance(sign, SCALING) and _is_negative(left) else worst
             second = -second if isinstance(sign, FALLING) else second
-            parts = _evaluated(left, walk, first), _evaluated(right, walk, second)
+            parts = _evaluate(left, walk, first), _evaluate(right, walk, second)
             return ARITHMETIC[type(sign)](*parts)
         case ast.BinOp():
             refuse(node, "calculate with + - * / only")
@@ -177,5 +184,5 @@ def numbers_of(call: ast.Call, walk: OfGains, worst: float = math.inf) -> Vector
 
 def share_of(call: ast.Call) -> float:
     """Which quantile a statistic is, from 0 to 1. Raises ExpressionError."""
-    known(function(call), STATISTICS, "statistic")
+    known_name(function(call), STATISTICS, "statistic")
     return part_of(call, RUNS)[1]

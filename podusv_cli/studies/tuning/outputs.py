@@ -14,10 +14,14 @@ from podusv_cli.studies.tuning.results import SearchResults
 def write_tables(folder: Path, results: SearchResults) -> None:
     """Write all tables. Raises StorageError."""
     tables = {
-        "laws": results.laws, "searches": results.searches, "limits": results.limits,
+        "laws": results.laws,
+        "searches": results.searches,
+        "limits": results.limits,
         "validation": results.pairs,
-        "gains": results.gains, "importance": results.importance, "history": results.history,
-    }  # fmt: skip
+        "gains": results.gains,
+        "importance": results.importance,
+        "history": results.history,
+    }
     files.write_all(
         {folder / f"{n}.csv": csv_files.text(t, DIGITS).encode() for n, t in tables.items()}
     )
@@ -29,9 +33,11 @@ def write_report(folder: Path, results: SearchResults, extras: Extras, *, figure
 
     drawn, shown = dict[str, bytes](), list[Picture]()
     if figures:
-        from podusv_cli.figures.sketch import rendered  # matplotlib is slow to import
+        from podusv_cli.figures.sketch import render_sketches  # matplotlib is slow to import
         from podusv_cli.studies.tuning.figures import sketches
 
-        drawn, shown = rendered(sketches(results), extras)
-    page = extras.made("report.html", lambda: report.page(folder, results, shown, extras.missing))
+        drawn, shown = render_sketches(sketches(results), extras)
+    page = extras.make_or_record(
+        "report.html", lambda: report.page(folder, results, shown, extras.missing)
+    )
     publish(folder, drawn, page, extras)

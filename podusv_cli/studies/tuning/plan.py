@@ -12,7 +12,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.metrics.metric import Metric
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import Tune
-from podusv_cli.studies.counting.expressions import parse_success, succeeded
+from podusv_cli.studies.counting.expressions import judge_success, parse_success
 from podusv_cli.studies.counting.runs import STATUSES, UnitResult
 from podusv_cli.studies.making.cells import Cell
 from podusv_cli.studies.making.check import singles
@@ -61,11 +61,12 @@ class TunePlan:
         """The gains of every law; none for a law that is kept as it is."""
         return {
             label: tuple(
-                gain for gain in gains(single.controller, label, single, self.tune)
+                gain
+                for gain in gains(single.controller, label, single, self.tune)
                 if gain.key not in self.idle.get(label, ())
             )
             for label, single in singles(self.scenario).items()
-        }  # fmt: skip
+        }
 
     @cached_property
     def metrics(self) -> dict[str, Metric]:
@@ -92,9 +93,10 @@ class TunePlan:
         tune = self.tune
         return {
             law: (tune.searches * tune.budget, (1 + tune.searches) * tune.validate)
-            if of_law else (0, tune.validate)
+            if of_law
+            else (0, tune.validate)
             for law, of_law in self.gains.items()
-        }  # fmt: skip
+        }
 
     def in_words(self) -> Iterator[str]:
         """The gains of every law, and how many runs there are."""
@@ -137,7 +139,7 @@ class TunePlan:
     def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> StudyPlan:
         """The study of laws by their new names, on draws of a stream."""
         renamed = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
-        return self.base.varied(Variant(stream, draws, renamed))
+        return self.base.vary(Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
         """The runs of some units, in their order; failed is what the study calls no success."""
@@ -152,7 +154,7 @@ class TunePlan:
             for name in names
         }
         ended = np.concatenate([result.status == STATUSES.index("finished") for result in results])
-        return Outcomes(metrics, ~succeeded(self._success, metrics, ended, self.metrics))
+        return Outcomes(metrics, ~judge_success(self._success, metrics, ended, self.metrics))
 
     @cached_property
     def identity(self) -> dict[str, Any]:

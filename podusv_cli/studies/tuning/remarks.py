@@ -19,10 +19,18 @@ BETTER = 0.8  # of the others' error: a law that ought to be noticed
 def remarks(results: SearchResults) -> list[str]:
     """The answer first, then what it hangs on, and what a user may want to change."""
     return [
-        *_answer(results), *_power(results), *_unsettled(results), *_once(results),
-        *_bounds(results), *_kept(results), *_idle(results), *_unsound(results), *_few(results),
-        *_overfitted(results), *_beyond(results),
-    ]  # fmt: skip
+        *_answer(results),
+        *_power(results),
+        *_remark_unsettled(results),
+        *_once(results),
+        *_bounds(results),
+        *_remark_kept(results),
+        *_idle(results),
+        *_unsound(results),
+        *_few(results),
+        *_remark_overfitted(results),
+        *_beyond(results),
+    ]
 
 
 def _answer(results: SearchResults) -> Iterator[str]:
@@ -37,16 +45,16 @@ def _answer(results: SearchResults) -> Iterator[str]:
         if {row["a"], row["b"]} == {best, second}:
             yield (
                 f"{best} has the least {results.plan.tune.objective} in the median of its "
-                f"searches; the ratio of the median {results.plan.metrics[results.shown[0]].row} "
-                f"({results.shown[0]}) of {row['a']} and "
-                f"{row['b']} over searches and draws is {Interval.of(row, 'ratio'):.3f}: "
-                f"{_verdict(row)}"
+                "searches; the ratio of the median "
+                f"{results.plan.metrics[results.shown_metrics[0]].row} "
+                f"({results.shown_metrics[0]}) of {row['a']} and {row['b']} over searches and "
+                f"draws is {Interval.of(row, 'ratio'):.3f}: {_verdict(row)}"
             )
 
 
 def _power(results: SearchResults) -> Iterator[str]:
     """Whether the laws differ at all, and what difference would have been noticed."""
-    found = results.compared
+    found = results.pairs_of_laws
     if math.isfinite(found.omnibus):
         yield (
             f"if all laws were equal, a largest difference like this had a probability of "
@@ -55,7 +63,7 @@ def _power(results: SearchResults) -> Iterator[str]:
         )
 
 
-def _unsettled(results: SearchResults) -> Iterator[str]:
+def _remark_unsettled(results: SearchResults) -> Iterator[str]:
     laws = results.laws[results.laws.rank_after.isna()].law
     if len(laws):
         yield (
@@ -89,7 +97,7 @@ def _verdict(row: dict[str, Any]) -> str:
     return "neither is better"
 
 
-def _kept(results: SearchResults) -> Iterator[str]:
+def _remark_kept(results: SearchResults) -> Iterator[str]:
     for law in results.plan.laws:
         if law not in results.winners:
             yield f"{law} has no gains, kept as it is"
@@ -108,7 +116,7 @@ def _unsound(results: SearchResults) -> Iterator[str]:
             inequality.text
             for inequality, over in zip(results.plan.inequalities, trial.excesses, strict=True)
             if over > 0.0
-        ]  # fmt: skip
+        ]
         if broken:
             yield f"{law}: no trial held {' and '.join(broken)} on the training draws"
         elif not math.isfinite(trial.value):
@@ -129,7 +137,7 @@ def _few(results: SearchResults) -> Iterator[str]:
         )
 
 
-def _overfitted(results: SearchResults) -> Iterator[str]:
+def _remark_overfitted(results: SearchResults) -> Iterator[str]:
     for law in results.winners:
         reached = results.spread(law)
         taken = reached[results.winners[law].index(results.winner(law))]

@@ -29,30 +29,36 @@ def page(
     plan = results.plan
     assert plan.scenario.sweep
     numbered = [*enumerate(figures, 1)]
-    return environment("podusv_cli.studies.tuning").get_template("tune.html.j2").render(
-        title=f"{plan.scenario.name}: gains",
-        folder=folder,
-        scenario=plan.scenario,
-        sweep=plan.scenario.sweep,
-        tune=plan.tune,
-        objective=plan.tune.objective,
-        laws=list(_laws(results)),
-        remarks=remarks(results),
-        words={name: about.row for name, about in plan.metrics.items()},
-        pairs=list(_pairs(results)),
-        few=FEW,
-        metric=results.shown[0] if results.shown else "",
-        gains=list(_gains(results)),
-        varied=[
-            (", ".join(quantity.targets(name)), in_words(quantity))
-            for name, quantity in plan.scenario.sweep.vary.items()
-        ],
-        beside=numbered[:1],
-        figures=numbered,
-        metrics=plan.metrics,
-        missing=[str(failure) for failure in missing],
-        latest=[(key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])],
-    )  # fmt: skip
+    return (
+        environment("podusv_cli.studies.tuning")
+        .get_template("tune.html.j2")
+        .render(
+            title=f"{plan.scenario.name}: gains",
+            folder=folder,
+            scenario=plan.scenario,
+            sweep=plan.scenario.sweep,
+            tune=plan.tune,
+            objective=plan.tune.objective,
+            laws=list(_laws(results)),
+            remarks=remarks(results),
+            words={name: about.row for name, about in plan.metrics.items()},
+            pairs=list(_pairs(results)),
+            few=FEW,
+            metric=results.shown_metrics[0] if results.shown_metrics else "",
+            gains=list(_gains(results)),
+            varied=[
+                (", ".join(quantity.targets(name)), in_words(quantity))
+                for name, quantity in plan.scenario.sweep.vary.items()
+            ],
+            beside=numbered[:1],
+            figures=numbered,
+            metrics=plan.metrics,
+            missing=[str(failure) for failure in missing],
+            latest=[
+                (key, value_text(value)) for key, value in flat((sessions(folder) or [{}])[-1])
+            ],
+        )
+    )
 
 
 def _laws(results: SearchResults) -> Iterator[dict[str, Any]]:
@@ -61,15 +67,18 @@ def _laws(results: SearchResults) -> Iterator[dict[str, Any]]:
     ordered: Any = results.laws.sort_values(keys).to_dict("records")
     for row in ordered:
         yield row | {
-            "before": intervals(row, "before"), "after": intervals(row, "after"),
+            "before": intervals(row, "before"),
+            "after": intervals(row, "after"),
             "failed": f"{percent(row, 'failed_before')} -> {percent(row, 'failed_after')}",
-            "rank": turned(row, "rank"), "better": turned(row, "better_than"),
+            "rank": count_change(row, "rank"),
+            "better": count_change(row, "better_than"),
             "change": ratio(row) if row["runs"] else "-",
-            "spread": spread(row), "place": place(row),
-        }  # fmt: skip
+            "spread": spread(row),
+            "place": place(row),
+        }
 
 
-def turned(row: Any, name: str) -> str:
+def count_change(row: Any, name: str) -> str:
     """A count before and after; a dash for a law that is not ranked."""
     return " -> ".join(
         "-" if pd.isna(row[f"{name}_{when}"]) else f"{row[f'{name}_{when}']}"
@@ -111,18 +120,21 @@ def place(row: Any) -> str:
 def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
     """Every pair of laws with its numbers before and after."""
     table = results.pairs
-    table = table[table.metric.isin(results.shown[:1])]
+    table = table[table.metric.isin(results.shown_metrics[:1])]
     by = {when: rows.to_dict("records") for when, rows in table.groupby("when")}
     for before, after in zip(by.get("before", ()), by.get("after", ()), strict=True):
         yield {
-            "a": before["a"], "b": before["b"], "before": ratio(before), "after": ratio(after),
+            "a": before["a"],
+            "b": before["b"],
+            "before": ratio(before),
+            "after": ratio(after),
             "wins": [f"{100 * pair['a_wins']:.3g} %" for pair in (before, after)],
             "losses": [f"{100 * pair['b_wins']:.3g} %" for pair in (before, after)],
-            "turned": _turned(before, after),
-        }  # fmt: skip
+            "turned": _order_change(before, after),
+        }
 
 
-def _turned(before: Any, after: Any) -> str:
+def _order_change(before: Any, after: Any) -> str:
     """Whether the search turned the order of two laws, beyond doubt."""
     if before["ratio_low"] > 1.0 > after["ratio_high"]:
         return f"{before['a']} overtakes"

@@ -14,7 +14,7 @@ import pandas as pd
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.studies.counting import statistics
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.counting.statistics import Interval
 from podusv_cli.studies.telling import summary
 from podusv_cli.studies.tuning.objective import (
@@ -23,16 +23,16 @@ from podusv_cli.studies.tuning.objective import (
     Outcomes,
     evaluate,
     excess,
-    named,
+    metrics_in,
     numbers_of,
     share_of,
 )
 from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.sampler import importances
-from podusv_cli.studies.tuning.searches import Compared, compared, places
+from podusv_cli.studies.tuning.searches import LawRatios, compare_laws, places
 from podusv_cli.studies.tuning.space import Gain
-from podusv_cli.studies.tuning.trials import FINISHED, Trial, best
-from podusv_cli.studies.tuning.validation import chosen, searched, tuned
+from podusv_cli.studies.tuning.trials import FINISHED, GainTrial, best
+from podusv_cli.studies.tuning.validation import choose_search, searched_names, tuned_name
 
 ALWAYS = (
     "iae",
@@ -50,8 +50,8 @@ class SearchResults:
     """A finished search: its trials by law, a list for each search, and the runs on fresh draws."""
 
     plan: TunePlan
-    trials: Mapping[str, Sequence[Sequence[Trial]]]
-    runs: Table
+    trials: Mapping[str, Sequence[Sequence[GainTrial]]]
+    runs: RunsTable
 
     @property
     def level(self) -> float:
@@ -60,7 +60,7 @@ class SearchResults:
         return self.plan.scenario.sweep.level
 
     @property
-    def spent(self) -> dict[str, int]:
+    def runs_spent(self) -> dict[str, int]:
         """The simulated runs of the search by law."""
         return {
             law: sum(trial.runs for repeat in repeats for trial in repeat)
@@ -68,26 +68,26 @@ class SearchResults:
         }
 
     @cached_property
-    def winners(self) -> dict[str, list[Trial]]:
+    def winners(self) -> dict[str, list[GainTrial]]:
         """The best trial of every search by law; none of a law that is kept as it is."""
         return {law: [best(one) for one in found] for law, found in self.trials.items()}
 
     @cached_property
-    def shown(self) -> list[str]:
+    def shown_metrics(self) -> list[str]:
         """The metrics of the tables."""
         trees = [self.plan.objective, *(inequality.tree for inequality in self.plan.inequalities)]
-        wanted = [name for tree in trees for name in named(tree, self.plan.metrics)]
+        wanted = [name for tree in trees for name in metrics_in(tree, self.plan.metrics)]
         return [n for n in dict.fromkeys([*wanted, *ALWAYS]) if n in self.runs.metrics]
 
     def after(self, law: str) -> str:
         """The name of a law after the search, its own where it is kept as it is."""
-        return tuned(law) if law in self.winners else law
+        return tuned_name(law) if law in self.winners else law
 
-    def winner(self, law: str) -> Trial:
+    def winner(self, law: str) -> GainTrial:
         """The trial whose gains are taken."""
-        return self.winners[law][chosen(self.trials[law])]
+        return self.winners[law][choose_search(self.trials[law])]
 
-    def met(self, name: str) -> Outcomes:
+    def outcomes_of(self, name: str) -> Outcomes:
         """The fresh runs of a law by the name of the table."""
         metrics = {n: self.runs.metric(name, n)[0] for n in self.runs.metrics}
         return Outcomes(metrics, ~self.runs.success(name)[0])
@@ -119,7 +119,7 @@ class SearchResults:
 
     def settles(self, law: str, when: str) -> bool:
         """Whether a law ends at its target in at least half of the fresh draws, before or after."""
-        met = self.met(law if when == "before" else self.after(law))
+        met = self.outcomes_of(law if when == "before" else self.after(law))
         scenario = self.plan.scenario.model_copy(update={"controller": self.plan.laws[law]})
         ends = [
             not failed and scenario.at_target({name: met.metrics[name][i] for name in met.metrics})
@@ -130,43 +130,43 @@ class SearchResults:
     @cached_property
     def searches(self) -> pd.DataFrame:
         """The table of `compared`."""
-        return self.compared.table()
+        return self.pairs_of_laws.table()
 
     @cached_property
-    def compared(self) -> Compared:
+    def pairs_of_laws(self) -> LawRatios:
         """Every pair of laws over all of their searches and the fresh draws."""
-        metric = self.shown[0]
+        metric = self.shown_metrics[0]
         runs = {}
         for law in self.plan.laws:
-            met = [self.met(name) for name in self._searched(law)]
+            met = [self.outcomes_of(name) for name in self._searched_names(law)]
             runs[law] = np.array([worst_where_unknown(of_law, metric).ravel() for of_law in met])
         assert self.plan.scenario.sweep
         seed, sets = self.plan.scenario.sweep.seed, self.plan.tune.training_sets
-        return compared(runs, self.level, seed, sets=sets)
+        return compare_laws(runs, self.level, seed, sets=sets)
 
-    def _searched(self, law: str) -> list[str]:
+    def _searched_names(self, law: str) -> list[str]:
         """The names of a law with the gains of each of its searches; its own where it has none."""
-        return searched(law, self.trials[law]) if law in self.trials else [law]
+        return searched_names(law, self.trials[law]) if law in self.trials else [law]
 
     def _better_than(self, law: str, when: str) -> int:
         """How many laws this one is better than in the typical draw, the whole interval of it."""
         pairs = self.pairs
         if not len(pairs):
             return 0
-        pairs = pairs[(pairs["when"] == when) & (pairs.metric == self.shown[0])]
+        pairs = pairs[(pairs["when"] == when) & (pairs.metric == self.shown_metrics[0])]
         ahead = (pairs.a == law) & (pairs.ratio_high < 1.0)
         return int((ahead | (pairs.b == law) & (pairs.ratio_low > 1.0)).sum())
 
     def _law(self, law: str) -> dict[str, Any]:
-        row: dict[str, Any] = {"law": law, "runs": self.spent.get(law, 0)}
+        row: dict[str, Any] = {"law": law, "runs": self.runs_spent.get(law, 0)}
         for when, name in (("before", law), ("after", self.after(law))):
-            runs = self.met(name)
+            runs = self.outcomes_of(name)
             failed = statistics.share(int(runs.failed.sum()), len(runs.failed), self.level)
             row |= failed.columns(f"failed_{when}")
             row |= self.objective(runs, self.plan.objective).columns(f"objective_{when}")
         pairs = self.pairs
-        own = pairs[(pairs["when"] == "tuning") & (pairs.a == tuned(law))]
-        own = own[own.metric == self.shown[0]]
+        own = pairs[(pairs["when"] == "tuning") & (pairs.a == tuned_name(law))]
+        own = own[own.metric == self.shown_metrics[0]]
         for end in ("ratio", "ratio_low", "ratio_high"):
             row[end] = float(own[end].iloc[0]) if len(own) else 1.0
         spread = self.spread(law)
@@ -188,27 +188,39 @@ class SearchResults:
         """Every inequality on the fresh draws, before and after, for every law."""
         return pd.DataFrame(
             [
-                {"law": law, "when": when, "inequality": inequality.text,
-                 **self._limit(inequality, name),
-                 "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0}
+                {
+                    "law": law,
+                    "when": when,
+                    "inequality": inequality.text,
+                    **self._limit(inequality, name),
+                    "held_in_training": law in self.winners and self.winner(law).excesses[i] <= 0.0,
+                }
                 for law in self.plan.laws
                 for when, name in (("before", law), ("after", self.after(law)))
                 for i, inequality in enumerate(self.plan.inequalities)
             ],
-            columns=["law", "when", "inequality", "value", "value_low", "value_high", "holds",
-                     "held_in_training"],
-        )  # fmt: skip
+            columns=[
+                "law",
+                "when",
+                "inequality",
+                "value",
+                "value_low",
+                "value_high",
+                "holds",
+                "held_in_training",
+            ],
+        )
 
     def _limit(self, inequality: Inequality, name: str) -> dict[str, Any]:
-        runs = self.met(name)
+        runs = self.outcomes_of(name)
         holds = excess(inequality, runs, self.plan.metrics) <= 0.0
         return {**self.objective(runs, inequality.tree).columns("value"), "holds": holds}
 
     def spread(self, law: str) -> list[float]:
         """The objective on the fresh draws of every search's winner, or of a law that is kept."""
         return [
-            evaluate(self.plan.objective, self.met(name), self.plan.metrics)
-            for name in self._searched(law)
+            evaluate(self.plan.objective, self.outcomes_of(name), self.plan.metrics)
+            for name in self._searched_names(law)
         ]
 
     @cached_property
@@ -218,21 +230,28 @@ class SearchResults:
         Empty where the runs have no total variation.
         """
         rows = [
-            {"law": law, "before": name == law, "error": median(self.met(name), self.shown[0]),
-             "variation": median(self.met(name), VARIATION)}
-            for law in self.plan.laws if VARIATION in self.runs.metrics
-            for name in dict.fromkeys((law, *self._searched(law)))
-        ]  # fmt: skip
+            {
+                "law": law,
+                "before": name == law,
+                "error": median(self.outcomes_of(name), self.shown_metrics[0]),
+                "variation": median(self.outcomes_of(name), VARIATION),
+            }
+            for law in self.plan.laws
+            if VARIATION in self.runs.metrics
+            for name in dict.fromkeys((law, *self._searched_names(law)))
+        ]
         return pd.DataFrame(rows, columns=["law", "before", "error", "variation"])
 
     @cached_property
     def pairs(self) -> pd.DataFrame:
         """Two laws in the same fresh draws: all before, all after, and each after and before."""
-        known = {name: about for name, about in self.plan.metrics.items() if name in self.shown}
+        known = {
+            name: about for name, about in self.plan.metrics.items() if name in self.shown_metrics
+        }
         compared = [
             ("before", {law: law for law in self.plan.laws}),
             ("after", {law: self.after(law) for law in self.plan.laws}),
-            *(("tuning", {tuned(law): tuned(law), law: law}) for law in self.winners),
+            *(("tuning", {tuned_name(law): tuned_name(law), law: law}) for law in self.winners),
         ]
         tables = [
             pd.DataFrame(rows).assign(when=when)
@@ -247,32 +266,42 @@ class SearchResults:
         return pd.DataFrame(
             [
                 {
-                    "law": law, "gain": gain.key, **_ends(gain),
-                    "before": gain.own, "after": self.winner(law).gains[gain.key],
+                    "law": law,
+                    "gain": gain.key,
+                    **_ends(gain),
+                    "before": gain.own,
+                    "after": self.winner(law).gains[gain.key],
                     "at": gain.bound(self.winner(law).gains[gain.key]),
                     "repeats": " ".join(str(t.gains[gain.key]) for t in self.winners[law]),
                 }
-                for law in self.winners for gain in self.plan.gains[law]
+                for law in self.winners
+                for gain in self.plan.gains[law]
             ],
             columns=["law", "gain", "low", "high", "before", "after", "at", "repeats"],
-        )  # fmt: skip
+        )
 
     @cached_property
     def history(self) -> pd.DataFrame:
         """Every trial in its order, with the best so far."""
         return pd.DataFrame(
-            [row for law, all_ in self.trials.items() for repeat, trials in enumerate(all_, 1)
-             for row in _history(law, repeat, trials)]
-        )  # fmt: skip
+            [
+                row
+                for law, all_ in self.trials.items()
+                for repeat, trials in enumerate(all_, 1)
+                for row in _history(law, repeat, trials)
+            ]
+        )
 
     @cached_property
     def importance(self) -> pd.DataFrame:
         """How much each gain matters, with the least and the most of searches and of parts."""
         rows = [
             {"law": law, "gain": gain.key, **_range([part.get(gain.key, 0.0) for part in parts])}
-            for law in self.trials for parts in [list(self._importances(law))] if parts
+            for law in self.trials
+            for parts in [list(self._importances(law))]
+            if parts
             for gain in self.plan.gains[law]
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
 
     def _importances(self, law: str) -> Iterator[dict[str, float]]:
@@ -318,16 +347,23 @@ def _range(values: Sequence[float]) -> dict[str, float]:
     return {"importance": float(np.mean(values)), "low": min(values), "high": max(values)}
 
 
-def _history(law: str, repeat: int, trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+def _history(law: str, repeat: int, trials: Sequence[GainTrial]) -> Iterator[dict[str, Any]]:
     spent, leader = 0, (math.inf, math.inf)
     for trial in trials:
         spent += trial.runs
         if trial.status == FINISHED:
             leader = min(leader, (trial.excess, trial.value))
         yield {
-            "law": law, "repeat": repeat, "trial": trial.number, "batch": trial.batch,
-            "status": trial.status, "runs": trial.runs, "spent": spent,
-            "objective": trial.value, "failures": trial.failures,
-            "excess": trial.excess, "best": leader[1],
+            "law": law,
+            "repeat": repeat,
+            "trial": trial.number,
+            "batch": trial.batch,
+            "status": trial.status,
+            "runs": trial.runs,
+            "spent": spent,
+            "objective": trial.value,
+            "failures": trial.failures,
+            "excess": trial.excess,
+            "best": leader[1],
             "gains": " ".join(f"{key}={number}" for key, number in trial.gains.items()),
-        }  # fmt: skip
+        }

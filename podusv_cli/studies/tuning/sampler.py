@@ -47,9 +47,9 @@ class Sampler:
     def ask(self, batch: int, count: int) -> list[dict[str, Any]]:
         """The gains of a batch's trials; the first of all are the scenario's."""
         with _quiet():
-            self._study.sampler = self._made(batch)
+            self._study.sampler = self._sampler_for(batch)
             self._asked = [self._study.ask() for _ in range(count)]
-            asked = [self._suggested(trial) for trial in self._asked]
+            asked = [self._suggest(trial) for trial in self._asked]
         if batch == 0:  # the scenario's own may have more digits, or lie outside of the ranges
             asked[0] = {gain.key: gain.own for gain in self._gains}
         return asked
@@ -62,7 +62,7 @@ class Sampler:
                     trial.set_constraint(str(place), _finite(excess))
                 self._study.tell(trial, _finite(number))
 
-    def _made(self, batch: int) -> Any:
+    def _sampler_for(self, batch: int) -> Any:
         text = json.dumps([*self._seed, batch])
         seed = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
         samplers = self._optuna.samplers
@@ -70,7 +70,7 @@ class Sampler:
             n_startup_trials=STARTUP, multivariate=True, constant_liar=True, seed=seed
         )
 
-    def _suggested(self, trial: Any) -> dict[str, Any]:
+    def _suggest(self, trial: Any) -> dict[str, Any]:
         return {gain.key: self._one(trial, gain) for gain in self._gains}
 
     def _one(self, trial: Any, gain: Gain) -> Any:
@@ -97,11 +97,13 @@ def importances(
     module = optuna()
     kinds = module.distributions
     space = {
-        gain.key: kinds.CategoricalDistribution(list(gain.words)) if gain.words
-        else kinds.IntDistribution(int(gain.low), int(gain.high)) if gain.whole
+        gain.key: kinds.CategoricalDistribution(list(gain.words))
+        if gain.words
+        else kinds.IntDistribution(int(gain.low), int(gain.high))
+        if gain.whole
         else kinds.FloatDistribution(gain.low, gain.high, log=gain.log)
         for gain in gains
-    }  # fmt: skip
+    }
     with _quiet():
         study = module.create_study()
         for trial, number in zip(tried, values, strict=True):

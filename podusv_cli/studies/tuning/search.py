@@ -21,7 +21,7 @@ from podusv_cli.studies.tuning.objective import Outcomes, evaluate, excess
 from podusv_cli.studies.tuning.plan import TunePlan
 from podusv_cli.studies.tuning.sampler import Sampler
 from podusv_cli.studies.tuning.space import with_gains
-from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, Trial
+from podusv_cli.studies.tuning.trials import CUT, FINISHED, PRUNED, GainTrial
 
 FIRST = 4  # a trial is judged after one in so many draws
 WORSE = 1.5  # times the best: a trial that is worse by more is pruned
@@ -40,12 +40,12 @@ class Attempt:
     results: list[UnitResult]
 
     @property
-    def met(self) -> int:
+    def draws_met(self) -> int:
         """How many draws it has met."""
         return sum(result.unit.count for result in self.results)
 
 
-class Search:
+class GainSearch:
     """The search for the gains of a law with one of the tuner's seeds."""
 
     def __init__(self, plan: TunePlan, law: str, number: int, folder: Path) -> None:
@@ -54,8 +54,8 @@ class Search:
         assert plan.scenario.sweep
         seed = [plan.scenario.sweep.seed, number, law]
         self._sampler = Sampler(plan.gains[law], seed)
-        self.trials: list[Trial] = []
-        self.leader: Trial | None = None  # of the trials so far
+        self.trials: list[GainTrial] = []
+        self.leader: GainTrial | None = None  # of the trials so far
         self._kept = trials.read(folder, self.name)
         self._batch = 0
         self._attempts: list[Attempt] = []
@@ -67,7 +67,7 @@ class Search:
         return f"{self.law}-{self.number}"
 
     @property
-    def spent(self) -> int:
+    def runs_spent(self) -> int:
         """How many runs its trials took."""
         return sum(trial.runs for trial in self.trials)
 
@@ -81,11 +81,11 @@ class Search:
 
         Batches that an earlier session has finished are told to the sampler.
         """
-        while (left := self.plan.tune.budget - self.spent) > 0:
+        while (left := self.plan.tune.budget - self.runs_spent) > 0:
             self._ask(left)
-            kept = self._known()
+            kept = self._known_trials()
             if kept is not None:
-                self._told(kept)
+                self._tell_sampler(kept)
             elif units := self._first_units():
                 return units
         return []
@@ -114,7 +114,7 @@ class Search:
         stream = self.plan.stream(self.number)
         return Attempt(gains, draws, self.plan.variant(named, stream, draws) if taken else None, [])
 
-    def _known(self) -> list[Trial] | None:
+    def _known_trials(self) -> list[GainTrial] | None:
         """The trials of this batch in the file; none for a batch that a smaller budget cut.
 
         Raises StorageError where the file has other gains than those asked for.
@@ -135,22 +135,22 @@ class Search:
         """The units that take every attempt to so many draws; those refused fail at once."""
         units = []
         for place, attempt in enumerate(self._attempts):
-            unit = Unit(self.law, 0, attempt.met, until - attempt.met)
+            unit = Unit(self.law, 0, attempt.draws_met, until - attempt.draws_met)
             if not unit.count or self._is_over(attempt):
                 continue
             if attempt.plan:
                 units.append((place, attempt.plan, unit))
             else:
-                attempt.results.append(self._refused(unit))
+                attempt.results.append(self._refuse_unit(unit))
         self._waiting = len(units)
         return units
 
-    def _refused(self, unit: Unit) -> UnitResult:
+    def _refuse_unit(self, unit: Unit) -> UnitResult:
         nothing = np.full(unit.count, np.nan)
         status = np.full(unit.count, STATUSES.index("invalid"), np.uint8)
         return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
 
-    def done(self, place: int, result: UnitResult) -> list[tuple[int, StudyPlan, Unit]]:
+    def take_result(self, place: int, result: UnitResult) -> list[tuple[int, StudyPlan, Unit]]:
         """Take in a unit; the units that follow once all of its step are there."""
         self._attempts[place].results.append(result)
         self._waiting -= 1
@@ -165,32 +165,37 @@ class Search:
 
     def _end(self) -> None:
         """Keep the trials of a batch."""
-        self._told(list(self._made()))
+        self._tell_sampler(list(self._make_trials()))
         trials.write(self._folder, self.name, self.trials)
 
     def _is_over(self, attempt: Attempt) -> bool:
         """Whether a trial is pruned: a sound one of earlier batches is far better."""
-        if not self.trials or attempt.met < self.first:
+        if not self.trials or attempt.draws_met < self.first:
             return False
         value = self._value(self._first(attempt))
         sound = [t for t in self.trials if t.status == FINISHED and t.excess == 0.0]
         return any(_far(trial.first, value) for trial in sound)
 
-    def _made(self) -> Iterator[Trial]:
+    def _make_trials(self) -> Iterator[GainTrial]:
         tune = self.plan.tune
         for place, attempt in enumerate(self._attempts):
-            runs, met = self._runs(attempt), attempt.met
+            runs, met = self._runs(attempt), attempt.draws_met
             status = (
                 FINISHED if met == tune.train else CUT if attempt.draws < tune.train else PRUNED
             )
-            yield Trial(
-                len(self.trials) + place, self._batch, attempt.gains, met, status,
+            yield GainTrial(
+                len(self.trials) + place,
+                self._batch,
+                attempt.gains,
+                met,
+                status,
                 self._value(runs),
                 tuple(excess(text, runs, self.plan.metrics) for text in self.plan.inequalities),
-                self._value(self._first(attempt)), float(np.mean(runs.failed)),
-            )  # fmt: skip
+                self._value(self._first(attempt)),
+                float(np.mean(runs.failed)),
+            )
 
-    def _told(self, made: Sequence[Trial]) -> None:
+    def _tell_sampler(self, made: Sequence[GainTrial]) -> None:
         self._sampler.tell([t.value for t in made], [t.excesses for t in made])
         self.trials += made
         self.leader = trials.best(self.trials)

@@ -28,7 +28,7 @@ Indices = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Compared:
+class LawRatios:
     """All pairs of laws: the logarithms of their ratios a/b, and of those in every sample."""
 
     pairs: tuple[tuple[str, str], ...]
@@ -53,10 +53,13 @@ class Compared:
     def table(self) -> pd.DataFrame:
         """The ratio of every pair with an interval; all intervals hold together."""
         rows = [
-            (*pair, np.exp(ratio) if np.isfinite(ratio) else _sided(ratio),
-             *_ends(ratio, each, self._width))
+            (
+                *pair,
+                np.exp(ratio) if np.isfinite(ratio) else _one_sided(ratio),
+                *_ends(ratio, each, self._width),
+            )
             for pair, ratio, each in zip(self.pairs, self.ratios, self.samples, strict=True)
-        ]  # fmt: skip
+        ]
         return pd.DataFrame(rows, columns=COLUMNS)
 
     @property
@@ -90,7 +93,9 @@ class Compared:
         return np.asarray(np.all(ahead, axis=0))
 
 
-def compared(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1) -> Compared:
+def compare_laws(
+    runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1
+) -> LawRatios:
     """All pairs of laws over their searches.
 
     `runs` are numbers of each law, shape (search, draw), infinite for a run that failed. Of `sets`
@@ -106,7 +111,7 @@ def compared(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int =
     draws = next(iter(runs.values())).shape[1] if runs else 1
     met = random.integers(draws, size=(SAMPLES, draws))
     trained = random.integers(sets, size=(SAMPLES, 1, sets))
-    samples = {law: _sampled(table, met, trained, random) for law, table in runs.items()}
+    samples = {law: _sample_reached(table, met, trained, random) for law, table in runs.items()}
     pairs = tuple(combinations(runs, 2))
     reached = {law: float(np.median(np.median(table, axis=1))) for law, table in runs.items()}
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -117,21 +122,21 @@ def compared(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int =
         few = np.sqrt(sets / (sets - 1)) if sets > 1 else 1.0
         centre = np.where(np.isfinite(ratios), ratios, 0.0)[:, None]
         spread = centre + few * (spread - centre)
-    return Compared(pairs, ratios, spread, level)
+    return LawRatios(pairs, ratios, spread, level)
 
 
-def ratios(
-    runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1
-) -> pd.DataFrame:  # fmt: skip
-    """The table of `compared`.
+def ratios(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1) -> pd.DataFrame:
+    """The table of `compare_laws`.
 
     A pair of which a sample is not finite has no interval, unless all samples are infinite on one
     side.
     """
-    return compared(runs, level, seed, sets=sets).table()
+    return compare_laws(runs, level, seed, sets=sets).table()
 
 
-def _sampled(table: Vector, met: Indices, trained: Indices, random: np.random.Generator) -> Vector:
+def _sample_reached(
+    table: Vector, met: Indices, trained: Indices, random: np.random.Generator
+) -> Vector:
     """What a law reaches in each sample of training sets, of its searches, and of the draws."""
     by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
     if len(table) == 1:
@@ -143,7 +148,7 @@ def _sampled(table: Vector, met: Indices, trained: Indices, random: np.random.Ge
     return np.asarray(np.median(np.take_along_axis(by_search, searches, axis=1), axis=1))
 
 
-def _sided(ratio: float) -> float:
+def _one_sided(ratio: float) -> float:
     """A ratio of which one side, or both, failed."""
     return 1.0 if np.isnan(ratio) else float(np.exp(ratio))
 

@@ -17,7 +17,7 @@ from podusv_cli.scenario.conflicts import of_numbers
 from podusv_cli.scenario.keys import limits
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.tune import AROUND, Range, Tune
-from podusv_cli.studies.making.plan import changed
+from podusv_cli.studies.making.plan import change_law
 
 DIGITS = 4  # of a gain that is tried, so that a scenario shows all of them
 BOUNDARY = 0.02  # of a range: a gain that is nearer to an end is at its bound
@@ -129,7 +129,7 @@ def _is_gain(law: Controller, key: str, scenario: Scenario) -> bool:
 def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
     """The law with other gains; None where it refuses them."""
     try:
-        return changed(law, new)
+        return change_law(law, new)
     except ValidationError:
         return None
 
@@ -137,7 +137,7 @@ def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
 def _of(wanted: float | Range, key: str, own: Any, field: Any) -> list[Gain]:
     if isinstance(wanted, float):
         return [_around(wanted, key, own, field)]
-    (way,) = wanted.given
+    (way,) = wanted.given_keys
     return WAYS[way](getattr(wanted, way), key, own, field)
 
 
@@ -171,16 +171,17 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
         if not having:
             yield (
                 name,
-                f"unknown gain{did_you_mean(name, _known(laws))}; write a key of a law, or law.key",
+                f"unknown gain{did_you_mean(name, _known_gains(laws))}; "
+                "write a key of a law, or law.key",
             )
         yield from (
             (name, text)
             for n, single in having.items()
-            for text in _refused(n, single, key, content)
+            for text in _refusals_of(n, single, key, content)
         )
 
 
-def _known(laws: Mapping[str, Scenario]) -> list[str]:
+def _known_gains(laws: Mapping[str, Scenario]) -> list[str]:
     own = [key for law in laws.values() for key in keys(law.controller)]
     return [
         *dict.fromkeys(own),
@@ -188,7 +189,7 @@ def _known(laws: Mapping[str, Scenario]) -> list[str]:
     ]
 
 
-def _refused(label: str, scenario: Scenario, key: str, content: Range) -> Iterator[str]:
+def _refusals_of(label: str, scenario: Scenario, key: str, content: Range) -> Iterator[str]:
     """What is wrong with a range for one law: the values that its scenario does not take."""
     law = scenario.controller
     own = getattr(law, key)

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
+from podusv_cli.core import json_text
 from podusv_cli.storage import files, json_files
 
 FOLDER = "trials"
@@ -18,7 +19,7 @@ FINISHED, PRUNED, CUT = "finished", "pruned", "cut"
 
 
 @dataclass(frozen=True)
-class Trial:
+class GainTrial:
     """Gains that were tried, on how many draws, and what came of it.
 
     `status` is `finished`; `pruned` after a part of the draws; or `cut`, where the budget was used
@@ -42,10 +43,10 @@ class Trial:
         return sum(max(0.0, over) for over in self.excesses)
 
 
-def write(folder: Path, name: str, trials: Sequence[Trial]) -> None:
+def write(folder: Path, name: str, trials: Sequence[GainTrial]) -> None:
     """Write the trials of a search. Raises StorageError."""
     content = {"format": FORMAT, "trials": [asdict(trial) for trial in trials]}
-    files.write_bytes(folder / FOLDER / f"{name}.json", json_files.encode(content))
+    files.write_bytes(folder / FOLDER / f"{name}.json", json_text.encode(content))
 
 
 class Stored(BaseModel):
@@ -62,11 +63,11 @@ class Stored(BaseModel):
     first: float | None
     failures: float
 
-    def trial(self) -> Trial:
+    def trial(self) -> GainTrial:
         """The trial itself."""
         infinite = {"value": _number(self.value), "first": _number(self.first)}
         excesses = tuple(map(_number, self.excesses))
-        return Trial(**(self.model_dump() | infinite | {"excesses": excesses}))
+        return GainTrial(**(self.model_dump() | infinite | {"excesses": excesses}))
 
 
 class File(BaseModel):
@@ -76,7 +77,7 @@ class File(BaseModel):
     trials: list[Stored]
 
 
-def read(folder: Path, name: str) -> list[Trial]:
+def read(folder: Path, name: str) -> list[GainTrial]:
     """The trials of a search that are there; none where it has not begun. Raises StorageError."""
     path = folder / FOLDER / f"{name}.json"
     if not path.exists():
@@ -89,7 +90,7 @@ def _number(number: float | None) -> float:
     return math.inf if number is None else number
 
 
-def best(trials: Sequence[Trial]) -> Trial:
+def best(trials: Sequence[GainTrial]) -> GainTrial:
     """The finished trial that wins: inequalities first, then the objective, then the earlier."""
     finished = [trial for trial in trials if trial.status == FINISHED]
     least = min(trial.excess for trial in finished)

@@ -10,30 +10,30 @@ from pathlib import Path
 
 from podusv_cli.storage import files
 from podusv_cli.storage.run_folder import STUDY
-from podusv_cli.studies.counting.runs_file import Table
+from podusv_cli.studies.counting.runs_file import RunsTable
 from podusv_cli.studies.making import record
-from podusv_cli.studies.making.dispatch import Executor, Tally, dispatch
+from podusv_cli.studies.making.dispatch import Executor, StudyTally, dispatch
 from podusv_cli.studies.making.store import RUNS, UNITS, Store
 from podusv_cli.studies.tuning.plan import VALIDATE, Contestant, TunePlan
-from podusv_cli.studies.tuning.trials import Trial, best
+from podusv_cli.studies.tuning.trials import GainTrial, best
 
 FOLDER = "validation"
-Searched = Mapping[str, Sequence[Sequence[Trial]]]  # the trials by law, a list for each search
+Searched = Mapping[str, Sequence[Sequence[GainTrial]]]  # the trials by law, a list for each search
 
 
-def tuned(law: str) -> str:
+def tuned_name(law: str) -> str:
     """The name of a law with the gains that were found; no law's own name has a space."""
     return f"{law} tuned"
 
 
-def searched(law: str, searches: Sequence[Sequence[Trial]]) -> list[str]:
+def searched_names(law: str, searches: Sequence[Sequence[GainTrial]]) -> list[str]:
     """The names of a law with the gains that each of its searches found."""
     names = [f"{law} repeat {number + 1}" for number in range(len(searches))]
-    names[chosen(searches)] = tuned(law)
+    names[choose_search(searches)] = tuned_name(law)
     return names
 
 
-def chosen(searches: Sequence[Sequence[Trial]]) -> int:
+def choose_search(searches: Sequence[Sequence[GainTrial]]) -> int:
     """Which search found the gains that are taken: it gained most on its training draws.
 
     That is beside the scenario's own gains on the same draws, its first trial, since searches on
@@ -54,15 +54,19 @@ def contestants(plan: TunePlan, trials: Searched) -> dict[str, Contestant]:
     for law in plan.laws:
         found[law] = law, {}
         searches = trials.get(law, ())
-        names = searched(law, searches) if searches else ()
+        names = searched_names(law, searches) if searches else ()
         found |= {name: (law, best(one).gains) for name, one in zip(names, searches, strict=True)}
     return found
 
 
 def validate(
-    plan: TunePlan, trials: Searched, folder: Path, started: str, executor: Executor,
-    tell: Callable[[Tally], None],
-) -> Table:  # fmt: skip
+    plan: TunePlan,
+    trials: Searched,
+    folder: Path,
+    started: str,
+    executor: Executor,
+    tell: Callable[[StudyTally], None],
+) -> RunsTable:
     """Simulate what is missing of the validation; its runs.
 
     Raises PodusvError, StorageError and KeyboardInterrupt; finished units are kept.
@@ -83,7 +87,7 @@ def _clear(store: Store) -> None:
     folder = store.folder
     if not (folder / STUDY).exists():
         return
-    begun = record.begun(folder)
+    begun = record.read_identity(folder)
     if begun.identity == store.about.identity and begun.draws <= store.about.draws:
         return
     with files.storage_errors(f"cannot remove old runs in {folder}"):

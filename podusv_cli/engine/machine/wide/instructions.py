@@ -18,16 +18,62 @@ SIZES = {"double": NUMBER, "i64": NUMBER, "ptr": NUMBER, "float": 4, "i32": 4, "
 NUMBERS = {"double", "float", "i64", "i32", "i16", "i8", "i1"}
 DIVISIONS = ("sdiv", "udiv", "srem", "urem")
 LANEWISE = {  # an operation of one type, with its result of this type, of i1 or of another one
-    "add", "sub", "mul", "shl", "lshr", "ashr", "and", "or", "xor", "fadd", "fsub", "fmul", "fdiv",
-    "frem", "fneg", "freeze", "fcmp", "icmp", "fptosi", "fptoui", "sitofp", "uitofp", "zext",
-    "sext", "trunc", "bitcast", "fpext", "fptrunc", *DIVISIONS,
-}  # fmt: skip
+    "add",
+    "sub",
+    "mul",
+    "shl",
+    "lshr",
+    "ashr",
+    "and",
+    "or",
+    "xor",
+    "fadd",
+    "fsub",
+    "fmul",
+    "fdiv",
+    "frem",
+    "fneg",
+    "freeze",
+    "fcmp",
+    "icmp",
+    "fptosi",
+    "fptoui",
+    "sitofp",
+    "uitofp",
+    "zext",
+    "sext",
+    "trunc",
+    "bitcast",
+    "fpext",
+    "fptrunc",
+    *DIVISIONS,
+}
 # LLVM's own functions of exact results, for vectors, too; the last argument of some is a flag.
 EXACT = {
-    "fabs", "sqrt", "floor", "ceil", "trunc", "rint", "nearbyint", "round", "roundeven", "copysign",
-    "smax", "smin", "umax", "umin", "abs", "fshl", "fshr", "ctpop", "ctlz", "cttz", "is.fpclass",
-    "scmp", "ucmp",
-}  # fmt: skip
+    "fabs",
+    "sqrt",
+    "floor",
+    "ceil",
+    "trunc",
+    "rint",
+    "nearbyint",
+    "round",
+    "roundeven",
+    "copysign",
+    "smax",
+    "smin",
+    "umax",
+    "umin",
+    "abs",
+    "fshl",
+    "fshr",
+    "ctpop",
+    "ctlz",
+    "cttz",
+    "is.fpclass",
+    "scmp",
+    "ucmp",
+}
 FLAGGED = ("abs", "ctlz", "cttz", "is.fpclass")
 SPOKEN_TO_COMPILER = ("llvm.lifetime", "llvm.assume", "llvm.experimental.noalias")
 MOST_CHEAP = 12  # instructions of a block that takes no longer than to jump over it
@@ -96,8 +142,13 @@ class Instructions(Values):
 
     def _select(self, instruction: Instruction) -> None:
         (condition, *_), differs = instruction.operands, self.differs(instruction.name)
-        chosen = self.typed(instruction.typed[:1], differs and self.differs(condition))
-        self.set(instruction, f"select {chosen}, {self.typed(instruction.typed[1:], differs)}")
+        chosen = self.operands_with_types(
+            instruction.typed_operands[:1], differs and self.differs(condition)
+        )
+        self.set(
+            instruction,
+            f"select {chosen}, {self.operands_with_types(instruction.typed_operands[1:], differs)}",
+        )
 
     def _alloca(self, instruction: Instruction) -> None:
         if instruction.operands != ["1"]:
@@ -110,9 +161,13 @@ class Instructions(Values):
         if self.masks.points_at(instruction.name) == LANES_MEMORY:
             kind = room(kind)
         if not self.differs(instruction.name):
-            self.set(instruction, f"getelementptr {kind}, {self.typed(instruction.typed, False)}")
+            operands = self.operands_with_types(instruction.typed_operands, False)
+            self.set(instruction, f"getelementptr {kind}, {operands}")
             return
-        parts = [self.typed([(o, k)], o.startswith("%")) for o, k in instruction.typed]
+        parts = [
+            self.operands_with_types([(o, k)], o.startswith("%"))
+            for o, k in instruction.typed_operands
+        ]
         self.set(instruction, f"getelementptr {kind}, {', '.join(parts)}")
 
     def _check_size(self, instruction: Instruction, pointer: str, kind: str) -> None:
@@ -193,10 +248,8 @@ class Instructions(Values):
             self._call_in_lanes(instruction, "llvm.sqrt.f64" if name == "sqrt" else name)
         else:
             self._declare(name, instruction.kind, instruction.kinds[:-1])
-            self.set(
-                instruction,
-                f'call {instruction.kind} @"{name}"({self.typed(instruction.typed[:-1], False)})',
-            )
+            operands = self.operands_with_types(instruction.typed_operands[:-1], False)
+            self.set(instruction, f'call {instruction.kind} @"{name}"({operands})')
 
     def _declare(self, name: str, kind: str, kinds: list[str]) -> None:
         self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'
@@ -207,12 +260,12 @@ class Instructions(Values):
             map(self.differs, instruction.operands)
         ):
             raise NotForLanes(f"a call that not every lane makes: {instruction.words}")
-        given = self.typed(instruction.typed[:-1], False)
+        given = self.operands_with_types(instruction.typed_operands[:-1], False)
         self.put(f"call void {self.plain(instruction.operands[-1])}({given})")
 
     def _call_in_lanes(self, instruction: Instruction, name: str) -> None:
         """A function without effects: one of exact results for all lanes, else lane by lane."""
-        operands = instruction.typed[:-1]
+        operands = instruction.typed_operands[:-1]
         short = re.sub(r"(\.[if]\d+)+$", "", name.removeprefix("llvm."))
         if not name.startswith("llvm.") or short not in EXACT:
             self._declare(name, instruction.kind, instruction.kinds[:-1])
@@ -226,7 +279,9 @@ class Instructions(Values):
             )
             return
         flags = [f"{kind} {o}" for o, kind in operands[-1:] if short in FLAGGED]
-        given = [self.typed([o], True) for o in operands[: len(operands) - len(flags)]] + flags
+        given = [
+            self.operands_with_types([o], True) for o in operands[: len(operands) - len(flags)]
+        ] + flags
         ending = re.sub(r"\.([if]\d+)", rf".v{LANES}\1", name.removeprefix(f"llvm.{short}"))
         kinds = [lanes(kind) for _, kind in operands[: len(operands) - len(flags)]]
         kinds += [kind for _, kind in operands[len(kinds) :]]

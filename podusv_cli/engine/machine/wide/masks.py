@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import Any
 
-from podusv_cli.engine.machine.wide.order import END, Level, Loop, Node, Order
-from podusv_cli.engine.machine.wide.scalar_ir import Function, Instruction, NotForLanes
+from podusv_cli.engine.machine.wide.order import END, BlockLoop, Node, NodeLevel, Order
+from podusv_cli.engine.machine.wide.scalar_ir import Instruction, IrFunction, NotForLanes
 
 EVERY = "every"  # the mask of all lanes
 # What a call gives that is the same in all lanes, whatever it is given.
@@ -24,13 +24,13 @@ LANES_MEMORY, PLAIN_MEMORY = "lanes", "plain"
 class Masks:
     """`memory` tells by argument whether what it points at has a number for every lane."""
 
-    def __init__(self, function: Function, memory: dict[str, str]) -> None:
+    def __init__(self, function: IrFunction, memory: dict[str, str]) -> None:
         """Raises NotForLanes for pointers that are computed in a way that cannot be followed."""
         self.function, self.order, self.memory = function, Order(function), dict(memory)
         self.values = function.values
         self.differing: set[str] = set()
         self.joins: set[int] = set()  # blocks whose phis take numbers from several masks
-        self.ragged: set[Loop] = set()  # loops that the lanes leave in different rounds
+        self.ragged: set[BlockLoop] = set()  # loops that the lanes leave in different rounds
         self.readers: dict[str, list[Instruction]] = defaultdict(list)
         for row in function.blocks:
             for instruction in row:
@@ -98,11 +98,11 @@ class Masks:
         return len(targets) > 1 and last.operands[0] in self.differing
 
     def _parts(self, node: Node) -> bool:
-        return node in self.ragged if isinstance(node, Loop) else self.splits(node)
+        return node in self.ragged if isinstance(node, BlockLoop) else self.splits(node)
 
     def _wait(self) -> None:
         """By level and node, which nodes wait while control is there."""
-        self.waiting: dict[Loop | None, dict[Node, set[Node]]] = {}
+        self.waiting: dict[BlockLoop | None, dict[Node, set[Node]]] = {}
         for loop, level in self.order.levels.items():
             waiting: dict[Node, set[Node]] = {node: set() for node in level.place}
             self.waiting[loop] = waiting
@@ -128,23 +128,23 @@ class Masks:
     def _find_masks(self) -> None:
         """By block its mask."""
         self.of: dict[int, Any] = {}
-        self.entering: dict[Loop, Any] = {}
+        self.entering: dict[BlockLoop, Any] = {}
         self._find_masks_in(None)
 
-    def _find_masks_in(self, loop: Loop | None) -> None:
+    def _find_masks_in(self, loop: BlockLoop | None) -> None:
         level = self.order.levels[loop]
         before: dict[Node, Any] = {}
         held = set().union(*self.waiting[loop].values())
         for node in level.nodes:
-            block = node.header if isinstance(node, Loop) else node
+            block = node.header if isinstance(node, BlockLoop) else node
             before[node] = self._mask(level, node, block, before, held)
-            if isinstance(node, Loop):
+            if isinstance(node, BlockLoop):
                 self.entering[node] = before[node]
                 self._find_masks_in(node)
             else:
                 self.of[node] = before[node]
 
-    def _mask(self, level: Level, node: Node, block: int, before: Any, held: set[Node]) -> Any:
+    def _mask(self, level: NodeLevel, node: Node, block: int, before: Any, held: set[Node]) -> Any:
         if node not in level.parent:
             if level.loop is None:
                 return EVERY

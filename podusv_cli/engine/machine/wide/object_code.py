@@ -63,7 +63,7 @@ def bitcode(function: Any, prototype: Any) -> bytes:
     result = "i64" if prototype._restype_ else ""
     name = scalar.fndesc.llvm_func_name
     machine = finish.neutral_machine()
-    made = widening.widened(module, name, memory, result, machine)
+    made = widening.widen_module(module, name, memory, result, machine)
     return finish.bare(made, widening.NAME)
 
 
@@ -84,7 +84,7 @@ def _memory(kind: Any) -> str:
 def _mark(name: str, result: Any = None) -> Any:
     """A call that numba's code has for a primitive of `core.kernel`, and that widening replaces."""
 
-    def typed(given: Any) -> Any:
+    def type_mark(given: Any) -> Any:
         kinds = [types.unliteral(kind) for kind in given]
         back = result or kinds[0]
 
@@ -98,7 +98,7 @@ def _mark(name: str, result: Any = None) -> Any:
         return back(*kinds), code
 
     llvm.add_symbol(f"podusv.{name}", 1)  # numba links its code, too, which nobody calls
-    return typed
+    return type_mark
 
 
 SHARED, ANY = _mark("shared"), _mark("lanes_any", types.boolean)
@@ -106,13 +106,13 @@ TRUE, NUMBERS = _mark("lane_true", types.boolean), _mark("lane_numbers")
 
 
 @intrinsic
-def _filled(typing: Any, whole: Any, count: Any) -> Any:
+def _no_padding(typing: Any, whole: Any, count: Any) -> Any:
     """`kernel.padded_rounds`: a register holds several lanes, and no rounds."""
     return types.int64(types.int64, types.int64), lambda c, b, s, arguments: arguments[1]
 
 
 PRIMITIVES = compile_numba.PRIMITIVES | {
-    kernel.padded_rounds: _filled,
+    kernel.padded_rounds: _no_padding,
     kernel.shared: intrinsic(lambda typing, number: SHARED([number])),
     kernel.lanes_any: intrinsic(lambda typing, mask: ANY([mask])),
     kernel.lane_true: intrinsic(lambda typing, mask, lane: TRUE([mask, lane])),
@@ -121,7 +121,7 @@ PRIMITIVES = compile_numba.PRIMITIVES | {
 
 
 @cache
-def inlined(function: Any) -> Any:
+def inline_wide(function: Any) -> Any:
     """The kernel and all kernels it calls, as a numba function to be compiled into its caller."""
     if function in PRIMITIVES:
         return PRIMITIVES[function]
@@ -138,5 +138,5 @@ def _with_inlined(function: Any) -> Any:
         raise TypeError(
             f"{line}: shared is for podusv's own kernels, whose runs are sorted by what is shared"
         )
-    inner = {name: inlined(called) for name, called in named.items()}
+    inner = {name: inline_wide(called) for name, called in named.items()}
     return kernel.with_globals(function, function.__qualname__, **inner)

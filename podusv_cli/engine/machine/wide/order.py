@@ -12,28 +12,28 @@ from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from podusv_cli.engine.machine.wide.scalar_ir import RETURN, Function, NotForLanes
+from podusv_cli.engine.machine.wide.scalar_ir import RETURN, IrFunction, NotForLanes
 
 END = -2  # where a level ends: the next round of its loop, or the function's return
 
 
 @dataclass(eq=False)
-class Loop:
+class BlockLoop:
     """The blocks of a loop; it is entered at its header only."""
 
     header: int
     blocks: set[int]
-    outer: Loop | None = None
+    outer: BlockLoop | None = None
 
 
 Node = Any  # a block's number, or a Loop
 
 
 @dataclass(eq=False)
-class Level:
+class NodeLevel:
     """The nodes of a level in order; the place of END is the last."""
 
-    loop: Loop | None
+    loop: BlockLoop | None
     successors: dict[Node, list[Node]]
     nodes: list[Node] = field(default_factory=list)
     place: dict[Node, int] = field(default_factory=dict)
@@ -76,7 +76,7 @@ def dominators(order: list[Any], leads: Mapping[Any, Iterable[Any]]) -> dict[Any
 class Order:
     """Loops and levels of a function."""
 
-    def __init__(self, function: Function) -> None:
+    def __init__(self, function: IrFunction) -> None:
         """Raises NotForLanes for a loop with several ways in."""
         self.successors = dict(enumerate(function.successors))
         self.leads: dict[int, list[int]] = defaultdict(list)
@@ -84,13 +84,13 @@ class Order:
             for target in dict.fromkeys(targets):
                 self.leads[target].append(block)
         self.loops = self._loops()
-        self.inner: dict[int, Loop | None] = dict.fromkeys([*self.successors, RETURN])
+        self.inner: dict[int, BlockLoop | None] = dict.fromkeys([*self.successors, RETURN])
         for loop in self.loops:  # the outer ones first
             loop.outer = self.inner[loop.header]
             self.inner |= dict.fromkeys(loop.blocks, loop)
         self.levels = {loop: self._level(loop) for loop in [None, *self.loops]}
 
-    def _loops(self) -> list[Loop]:
+    def _loops(self) -> list[BlockLoop]:
         order = depth_first(0, self.successors)
         above = dominators(order, self.leads)
         place = {block: i for i, block in enumerate(order)}
@@ -101,7 +101,7 @@ class Order:
                     if target not in above[block]:
                         raise NotForLanes("a loop with several ways in")
                     self._gather(bodies.setdefault(target, {target}), block)
-        loops = [Loop(header, body) for header, body in bodies.items()]
+        loops = [BlockLoop(header, body) for header, body in bodies.items()]
         return sorted(loops, key=lambda loop: -len(loop.blocks))
 
     def _gather(self, body: set[int], block: int) -> None:
@@ -112,20 +112,20 @@ class Order:
                 body.add(leading)
                 waiting += self.leads[leading]
 
-    def around(self, block: int, without: int) -> Iterable[Loop]:
+    def around(self, block: int, without: int) -> Iterable[BlockLoop]:
         """The loops that a block is in and another one is not, from the inside."""
         loop = self.inner[block]
         while loop is not None and without not in loop.blocks:
             yield loop
             loop = loop.outer
 
-    def node(self, loop: Loop | None, block: int) -> Node:
+    def node(self, loop: BlockLoop | None, block: int) -> Node:
         """The node of a loop's level that a way to this block leads to."""
         if block == RETURN or (loop and (block == loop.header or block not in loop.blocks)):
             return END
         return self.holder(loop, block)
 
-    def holder(self, loop: Loop | None, block: int) -> Node:
+    def holder(self, loop: BlockLoop | None, block: int) -> Node:
         """The node of a loop's level that has a block of the loop."""
         inner: Any = self.inner[block]
         if inner is loop:
@@ -134,20 +134,20 @@ class Order:
             inner = inner.outer
         return inner
 
-    def _targets(self, loop: Loop | None) -> dict[Node, list[Node]]:
+    def _targets(self, loop: BlockLoop | None) -> dict[Node, list[Node]]:
         """Where every node of a level leads."""
         nodes: list[Node] = [b for b in self.successors if self.inner[b] is loop]
         nodes += [inner for inner in self.loops if inner.outer is loop]
         targets = {}
         for node in nodes:
-            inside: set[int] = node.blocks if isinstance(node, Loop) else {node}
+            inside: set[int] = node.blocks if isinstance(node, BlockLoop) else {node}
             ways = [s for b in sorted(inside) for s in self.successors[b]]
             leaving = [s for s in ways if s not in inside or s == node]
             targets[node] = list(dict.fromkeys(self.node(loop, s) for s in leaving))
         return targets
 
-    def _level(self, loop: Loop | None) -> Level:
-        level = Level(loop, self._targets(loop))
+    def _level(self, loop: BlockLoop | None) -> NodeLevel:
+        level = NodeLevel(loop, self._targets(loop))
         order = depth_first(loop.header if loop else 0, level.successors)
         leads, below = defaultdict(list), defaultdict(list)
         for node in order:

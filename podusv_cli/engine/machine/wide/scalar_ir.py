@@ -30,13 +30,13 @@ class Instruction:
     sources: list[int] = field(default_factory=list)  # of a phi: the block of every operand
 
     @property
-    def typed(self) -> list[tuple[str, str]]:
+    def typed_operands(self) -> list[tuple[str, str]]:
         """Every operand with its type."""
         return list(zip(self.operands, self.kinds, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
-class Function:
+class IrFunction:
     """Blocks begin with block 0; every block ends with `br` or `ret`."""
 
     arguments: list[tuple[str, str]]  # name and type
@@ -49,7 +49,7 @@ class Function:
         return {value.name: value for row in self.blocks for value in row if value.name}
 
 
-def prepared(module: Any, name: str, machine: Any) -> Any:
+def prepare_function(module: Any, name: str, machine: Any) -> Any:
     """The function with all that it calls inside it, its variables in registers."""
     for function in module.functions:
         if not function.is_declaration and function.name != name:
@@ -77,9 +77,9 @@ def prepared(module: Any, name: str, machine: Any) -> Any:
     return module.get_function(name)
 
 
-def read(function: Any, unread: tuple[str, ...]) -> Function:
+def read(function: Any, unread: tuple[str, ...]) -> IrFunction:
     """The function as values, without stores to arguments in `unread`. Raises NotForLanes."""
-    kinds = _named(function)
+    kinds = _shorten_names(function)
     rows = [list(block.instructions) for block in function.blocks]
     lines = [line.strip() for line in str(function).splitlines() if line.startswith("  ")]
     if len(lines) != sum(map(len, rows)):
@@ -92,10 +92,10 @@ def read(function: Any, unread: tuple[str, ...]) -> Function:
     arguments = [(f"%{a.name}", kinds[a.name]) for a in function.arguments]
     successors = [_successors(row[-1]) for row in blocks]
     _clean(blocks, unread)
-    return Function(arguments, blocks, successors)
+    return IrFunction(arguments, blocks, successors)
 
 
-def _named(function: Any) -> dict[str, str]:
+def _shorten_names(function: Any) -> dict[str, str]:
     """Give short names to all values and blocks; the type of every value by its name."""
     kinds = {}
     for i, argument in enumerate(function.arguments):
@@ -116,11 +116,15 @@ def _read(instruction: Any, block: int, line: str, kinds: dict[str, str]) -> Ins
     name = instruction.name
     opcode = instruction.opcode
     return Instruction(
-        opcode, f"%{name}" if name else "", kinds.get(name, "void"),
-        [text for text, _ in operands], [kind for _, kind in operands],
-        line.split(" = ", 1)[1] if name else line, block,
+        opcode,
+        f"%{name}" if name else "",
+        kinds.get(name, "void"),
+        [text for text, _ in operands],
+        [kind for _, kind in operands],
+        line.split(" = ", 1)[1] if name else line,
+        block,
         [int(b.name[1:]) for b in instruction.incoming_blocks] if opcode == "phi" else [],
-    )  # fmt: skip
+    )
 
 
 def _operand(operand: Any, kinds: dict[str, str]) -> tuple[str, str]:
@@ -143,7 +147,7 @@ def _successors(last: Instruction) -> list[int]:
         return [RETURN]
     if last.opcode != "br":
         raise NotForLanes(f"a block that ends with {last.opcode}")
-    goals = [int(name[1:]) for name, kind in last.typed if kind == "label"][::-1]
+    goals = [int(name[1:]) for name, kind in last.typed_operands if kind == "label"][::-1]
     if len(goals) > len(set(goals)):
         raise NotForLanes("a branch with one way")
     return goals

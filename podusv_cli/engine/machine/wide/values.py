@@ -100,7 +100,7 @@ class Values:
             self.known[key] = self.everywhere(self.plain(name), kind)
         return self.known[key]
 
-    def typed(self, operands: list[tuple[str, str]], wide: bool) -> str:
+    def operands_with_types(self, operands: list[tuple[str, str]], wide: bool) -> str:
         """Operands with their types, each as it is or in every lane."""
         if wide:
             return ", ".join(f"{lanes(kind)} {self.wide(o, kind)}" for o, kind in operands)

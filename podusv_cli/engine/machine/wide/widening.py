@@ -11,14 +11,20 @@ import llvmlite.binding as llvm
 
 from podusv_cli.engine.machine.wide.instructions import Instructions, is_cheap
 from podusv_cli.engine.machine.wide.masks import PLAIN_MEMORY, Masks
-from podusv_cli.engine.machine.wide.order import END, Level, Loop, Node
-from podusv_cli.engine.machine.wide.scalar_ir import EXCEPTION, RESULT, RETURN, prepared, read
+from podusv_cli.engine.machine.wide.order import END, BlockLoop, Node, NodeLevel
+from podusv_cli.engine.machine.wide.scalar_ir import (
+    EXCEPTION,
+    RESULT,
+    RETURN,
+    prepare_function,
+    read,
+)
 from podusv_cli.engine.machine.wide.values import ALL_FALSE, MASK
 
 NAME = "podusv_lanes"
 
 
-def widened(module: Any, name: str, memory: list[str], result: str, machine: Any) -> Any:
+def widen_module(module: Any, name: str, memory: list[str], result: str, machine: Any) -> Any:
     """An optimised module with the function `name` of a module for lanes, called NAME.
 
     `memory` tells for every argument what it points at (`masks`); the function was compiled
@@ -26,7 +32,7 @@ def widened(module: Any, name: str, memory: list[str], result: str, machine: Any
     for none) is written, and where an exception. Raises NotForLanes.
     """
     unread = (EXCEPTION,) if result else (RESULT, EXCEPTION)
-    function = read(prepared(module, name, machine), unread)
+    function = read(prepare_function(module, name, machine), unread)
     kinds = [PLAIN_MEMORY, PLAIN_MEMORY, *memory]
     names = [argument for argument, _ in function.arguments]
     masks = Masks(function, {a: kind for a, kind in zip(names, kinds, strict=True) if kind})
@@ -56,22 +62,32 @@ class Blocks(Instructions):
         (first, _), _, *rest = self.function.arguments
         given = ", ".join(f"{kind} {name}" for name, kind in rest)
         places = [f"  {first} = alloca {result}", *(f"  {place}" for place in self.places)]
-        return "\n".join([
-            f"define {result} @{NAME}({given}) #0 {{", "begin:", *places, "  br label %at.0",
-            *self.text, "end:", f"  %result = load {result}, ptr {first}",
-            f"  ret {result} %result", "}", *self.declared.values(),
-            "attributes #0 = { nounwind }", "attributes #1 = { nounwind willreturn memory(none) }",
-        ])  # fmt: skip
+        return "\n".join(
+            [
+                f"define {result} @{NAME}({given}) #0 {{",
+                "begin:",
+                *places,
+                "  br label %at.0",
+                *self.text,
+                "end:",
+                f"  %result = load {result}, ptr {first}",
+                f"  ret {result} %result",
+                "}",
+                *self.declared.values(),
+                "attributes #0 = { nounwind }",
+                "attributes #1 = { nounwind willreturn memory(none) }",
+            ]
+        )
 
-    def _level(self, loop: Loop | None) -> None:
+    def _level(self, loop: BlockLoop | None) -> None:
         level = self.masks.order.levels[loop]
         for node in level.nodes:
-            if isinstance(node, Loop):
+            if isinstance(node, BlockLoop):
                 self._loop(level, node)
             else:
                 self._block(level, node)
 
-    def _loop(self, level: Level, loop: Loop) -> None:
+    def _loop(self, level: NodeLevel, loop: BlockLoop) -> None:
         """A loop; one that lanes leave in different rounds ends when none is left in it."""
         header, ragged = loop.header, loop in self.masks.ragged
         self.label(f"at.loop.{header}")
@@ -88,17 +104,17 @@ class Blocks(Instructions):
             then = self._first(level, {*self._waiting(level, loop), *level.successors[loop]})
             self.put(f"br i1 {self.any(mask)}, label %at.{header}, label %{then}")
 
-    def _waiting(self, level: Level, node: Node) -> set[Node]:
+    def _waiting(self, level: NodeLevel, node: Node) -> set[Node]:
         return self.masks.waiting[level.loop][node]
 
-    def _first(self, level: Level, targets: set[Node]) -> str:
+    def _first(self, level: NodeLevel, targets: set[Node]) -> str:
         """The label of the node that comes first."""
         node = level.first(targets)
         if node == END:
             return f"round.{level.loop.header}" if level.loop else "end"
-        return f"at.loop.{node.header}" if isinstance(node, Loop) else f"at.{node}"
+        return f"at.loop.{node.header}" if isinstance(node, BlockLoop) else f"at.{node}"
 
-    def _block(self, level: Level, block: int) -> None:
+    def _block(self, level: NodeLevel, block: int) -> None:
         row, waiting = self.function.blocks[block], self._waiting(level, block)
         self.label(f"at.{block}")
         begins = block not in level.parent
@@ -119,7 +135,7 @@ class Blocks(Instructions):
         shared = [*self.masks.of.values(), *self.masks.entering.values()].count(block) > 1
         return not shared and is_cheap(self.function.blocks[block])
 
-    def _begin(self, level: Level) -> None:
+    def _begin(self, level: NodeLevel) -> None:
         """No lane is in any block of a level yet, but in the first one."""
         masks = [f"%mask.{b}" for b in level.nodes[1:] if self.masks.of.get(b) == b]
         if level.loop in self.masks.ragged:
@@ -127,7 +143,7 @@ class Blocks(Instructions):
         for mask in masks:
             self.put(f"store {MASK} {ALL_FALSE}, ptr {mask}")
 
-    def _leave(self, level: Level, block: int) -> None:
+    def _leave(self, level: NodeLevel, block: int) -> None:
         """Go on from a block, with what every way takes along."""
         targets, waiting = self.function.successors[block], self._waiting(level, block)
         if self.masks.splits(block):
@@ -148,7 +164,7 @@ class Blocks(Instructions):
                 self._take_along(block, target, way)
                 self.put(f"br label %{self._goal(level, waiting, target)}")
 
-    def _goal(self, level: Level, waiting: set[Node], target: int) -> str:
+    def _goal(self, level: NodeLevel, waiting: set[Node], target: int) -> str:
         """The label to go on at where all lanes of a block go to one target."""
         loop = level.loop
         node = self.masks.order.node(loop, target)
