@@ -11,19 +11,21 @@ from typing import Annotated
 import typer
 
 from podusv_cli.cli import options
+from podusv_cli.cli.demo import DISPLAYS, SCENARIO
 from podusv_cli.cli.terminal import echo
-
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def live(
-    config: options.Config,
+    config: Annotated[
+        str, typer.Argument(metavar="CONFIG", help="The scenario; without it, that of the demo.")
+    ] = SCENARIO,
     assign: options.Assignments = None,
     controller: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="Of `controllers`, to be shown; repeatable."),
     ] = None,
     trust: options.Trust = False,
+    plugin: options.Plugins = None,
     port: Annotated[int, typer.Option(min=0, help="Port; 0: any that is free.")] = 0,
     browser: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the page in a browser.")
@@ -37,7 +39,7 @@ def live(
     from podusv_cli.process.local_page import serve
     from podusv_cli.workflows.live import Live
 
-    shown = Live(config, assign or (), controller or (), trust)
+    shown = Live(config, assign or (), controller or (), trust, plugin or ())
     shown.frame({}, (), rest=True, wanted=True)  # errors are for the terminal, and code is compiled
 
     # A command is over before its garbage counts; this one stays, and looks through none of what is

@@ -81,5 +81,5 @@ def _round_numbers(
     numbers: Sequence[float] | Vector, digits: int = MILLIMETRES
 ) -> list[float | None]:
     """The numbers in the room that the page has for them; None for none."""
-    within = np.clip(numbers, -FAR, FAR).tolist()
-    return [None if math.isnan(x) else round(x, digits) for x in within]
+    within = np.round(np.clip(numbers, -FAR, FAR), digits).tolist()
+    return [None if math.isnan(x) else x for x in within]

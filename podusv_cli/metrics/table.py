@@ -251,13 +251,13 @@ def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
 
 def _asked_span(layout: Measured) -> dict[str, float]:
     """The constants that tell which instants count."""
-    what = f"{describe(layout.loop.path)}, asked where it ends"
     try:
         return spans.constants(layout)
-    except LawError as error:
-        raise LawError(f"{what}: {error}") from error
     except Exception as error:  # a plug-in's path may raise anything
-        raise LawError(f"{what}: {in_a_line(error)}") from error
+        # Described here alone: to look for a class in its source takes as long as a run.
+        what = f"{describe(layout.loop.path)}, asked where it ends"
+        said = str(error) if isinstance(error, LawError) else in_a_line(error)
+        raise LawError(f"{what}: {said}") from error
 
 
 def _ask_accumulator(

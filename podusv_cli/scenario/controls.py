@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from podusv_cli.core.component import Component
@@ -30,7 +30,15 @@ AFTER = (
     "control",
     "simulation",
 )
-TIMES = ("control.period", "simulation.duration")  # whole numbers of steps
+# How a loop dies: these stand together, before all others.
+LOOP = "sampling, delay and noise"
+LINK = ("command", "delay")  # of an actuator; a scenario may lack the section
+FIRST = ("control.period", "actuator.command.delay", "measurement.kind")
+OF_SENSORS = ("delay", "noise")
+PLACES = ("path", "points")
+MOST_PLACES = 24  # waypoints that may be moved one by one
+MOST_LATE = 100  # steps to which the slider of a time that is 0 reaches
+STEPPED = ("period", "delay", "duration")  # names of times that are whole numbers of steps
 
 
 @dataclass(frozen=True)
@@ -57,15 +65,30 @@ class Knob:
 
 
 def controls(scenario: Scenario, laws: Sequence[str]) -> list[Knob]:
-    """Those of these laws (`controller`, `controllers.pid`), then of the sections in AFTER."""
+    """Those of a loop's timing, of these laws (`controller`, `controllers.pid`), then of AFTER."""
     ruled = {*scenario.keys_by_rule()}
     seas = list(scenario.disturbances())
     names = [n for name in AFTER for n in (seas if name == "disturbance" else [name])]
-    return [
+    found = [
         control
         for part in (*laws, *names)
         for control in _of_part(scenario, part, route(part), ruled)
     ]
+    first = [_put_first(control) for control in found if _is_of_loop(control)]
+    first.sort(key=lambda control: [*FIRST, control.key].index(control.key))
+    return [*first, *(control for control in found if not _is_of_loop(control))]
+
+
+def _is_of_loop(control: Knob) -> bool:
+    """Whether it is a time or a noise between the vessel and its law."""
+    of_sensor = control.part.startswith("measurement.") and control.name in OF_SENSORS
+    return control.key in FIRST or of_sensor
+
+
+def _put_first(control: Knob) -> Knob:
+    """The control under LOOP, where a sensor's value is called by the sensor, too."""
+    sensor = control.part.partition(".")[2] if control.part.startswith("measurement.") else ""
+    return replace(control, part=LOOP, name=f"{sensor} {control.name}".strip())
 
 
 def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Knob]:
@@ -83,12 +106,36 @@ def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Ite
             yield from _of_part(scenario, f"{part}.{name}", (*at, name), ruled)
         elif found := _control(scenario, part, (*at, name), key.keys[name], content):
             yield Knob(**found, by_rule=(*at, name) in ruled)
+        elif (*at, name) == PLACES and 0 < len(content or ()) <= MOST_PLACES:
+            yield from _of_waypoints((*at, name), content)
+        elif name == LINK[0] and part == "actuator" and content is None:
+            delay = key.keys[name].keys[LINK[1]]
+            if found := _control(scenario, part, (*at, *LINK), delay, delay.default):
+                yield Knob(**found)
+
+
+def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob]:
+    """North and east of each point, within as much as the points are apart."""
+    reach = max(max(axis) - min(axis) for axis in zip(*points, strict=True)) or 1.0
+    for row, point in enumerate(points):
+        for column, (name, now) in enumerate(zip(("north", "east"), point, strict=True)):
+            yield Knob(
+                key=dotted_key((*at, row, column)),
+                part="waypoints",
+                name=f"waypoint {row + 1} {name}",
+                meaning="",
+                value=now,
+                default="",
+                unit="m",
+                low=now - reach,
+                high=now + reach,
+            )
 
 
 def _control(
     scenario: Scenario, part: str, at: Route, key: Key, content: Any
 ) -> dict[str, Any] | None:
-    place, default = dotted_key(at), key.default
+    place, default, section = dotted_key(at), key.default, str(at[0]).removesuffix("s")
     words = {
         "key": place,
         "part": part,
@@ -96,7 +143,7 @@ def _control(
         "value": content,
         "unit": key.unit,
         "range": key.range,
-        "meaning": (key.field and key.field.description) or f"which {part.partition('.')[0]} it is",
+        "meaning": (key.field and key.field.description) or f"which {section} it is",
         "default": "" if default is NO_DEFAULT else as_yaml(default),
     }
     choices = choices_of(key) or (("true", "false") if bool in key.types else ())
@@ -105,9 +152,15 @@ def _control(
         return {**words, "value": shown, "choices": choices}
     if isinstance(content, (int, float)) and not isinstance(content, bool):
         usual = default if isinstance(default, (int, float)) else 0.0
-        quantum = scenario.simulation.step if place in TIMES else float(is_whole(key))
+        is_stepped = key.name in STEPPED and key.unit == "s"
+        quantum = scenario.simulation.step if is_stepped else float(is_whole(key))
         length = scenario.vessel.length if key.unit == "m" else 0.0
-        return {**words, **_span(key, float(content), float(usual), length), "quantum": quantum}
+        span = _span(key, float(content), float(usual), length)
+        if is_stepped and span.get("log"):
+            span["low"] = max(span["low"], quantum)
+        elif is_stepped:
+            span["high"] = max(float(content), MOST_LATE * quantum)
+        return {**words, **span, "quantum": quantum}
     return None
 
 

@@ -9,16 +9,19 @@ import re
 import shlex
 import time
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from podusv_cli.comparison.claims import ParsedClaim
+from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import PodusvError, ScenarioError, StorageError, UsageError, in_a_line
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown_word
-from podusv_cli.engine.running.simulate import run
+from podusv_cli.core.recording import Recording
+from podusv_cli.engine.running.simulate import run_together
 from podusv_cli.figures.chase import chase
 from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.traces import FIRST, traces
@@ -31,33 +34,84 @@ from podusv_cli.scenario.controls import Knob, controls
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded, load, load_text
 from podusv_cli.scenario.model import Scenario
-from podusv_cli.scenario.plugins import of_files
+from podusv_cli.scenario.plugins import kinds_of, of_files
 from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted_key, plain, route
-from podusv_cli.workflows.execute import Stopwatch, monitor_case, simulate_case, summary
+from podusv_cli.workflows.compare import compare
+from podusv_cli.workflows.execute import monitor_case, summary, warm_up
+from podusv_cli.workflows.live_verdicts import (
+    claims_about,
+    limits_in_words,
+    margins_of,
+    past_run_of,
+    verdicts_on,
+)
+from podusv_cli.workflows.request import Request
 
 FRAMES = 300  # places of a track on the map
 WHOLE = ("simulation", "control", "log", "metrics")  # sections of which numbers are loaded, too
+LINK = ("actuator", "command")  # a section that a scenario may lack is loaded, too
 MOST_STEPS = 400_000  # a run of more does not follow a hand
+ADDED = r"controllers\.[A-Za-z]\w*\.kind"  # the key of a law that the page adds
+# What every question to the page has, beside its name.
+QUESTIONS = {
+    "frame": ("moved", "signals", "rest", "controls"),
+    "margins": ("moved",),
+    "report": ("moved",),
+    "save": ("moved", "name"),
+}
 Moved = Mapping[str, float | str]  # values by key
+
+
+@dataclass(frozen=True)
+class Base:
+    """A scenario that is loaded, into which numbers are put while values move.
+
+    `has_nominal`: the file gives what the laws are told of the hull. `several`: it has
+    `controllers`. `unread` are sentences about claims that these laws have no signals for.
+    """
+
+    cases: dict[str, Case]
+    claims: Sequence[ParsedClaim]
+    unread: Sequence[str]
+    has_nominal: bool
+    several: bool
 
 
 @dataclass
 class Live:
-    """A scenario's file, what `--set` gave beside it, and the laws that are shown."""
+    """A scenario's file, what `--set` and `--plugin` gave beside it, and the laws shown."""
 
     source: str
     given: Sequence[str] = ()
     laws: Sequence[str] = ()
     trust: bool = False  # whether plug-in files of somebody's folder may be executed
+    files: Sequence[str] = ()  # plug-ins beside the scenario's own
     offered: dict[str, tuple[str, ...]] = field(default_factory=dict)  # words by key; none: numbers
     _puts: dict[str, tuple[Any, Case]] = field(default_factory=dict)  # the last one of each law
-    _bases: dict[str, tuple[dict[str, Case], bool]] = field(default_factory=dict)  # by words
+    _bases: dict[str, Base] = field(default_factory=dict)  # by words
 
     def load(self, moved: Moved) -> Loaded:
         """The scenario with the values moved. Raises ScenarioError."""
-        moves, checks = [*self.given, *assignments_of(moved)], (unknown_codes, limits())
-        return load(self.source, moves, checks, plugged=of_files(self.trust))
+        checks = (unknown_codes, limits())
+        return load(self.source, self.assignments(moved), checks, self.files, of_files(self.trust))
+
+    def assignments(self, moved: Moved) -> list[str]:
+        """The values moved after those given, as `--set` takes them.
+
+        Where a law is added beside a `controller`, that is put among `controllers` first.
+        """
+        is_added = any(re.fullmatch(ADDED, key) for key in moved)
+        first = self._law_of_its_own if is_added else []
+        return [*self.given, *first, *assignments_of(moved)]
+
+    @cached_property
+    def _law_of_its_own(self) -> list[str]:
+        loaded = self.load({})
+        if loaded.scenario.controllers:
+            return []
+        (label,) = loaded.scenario.labels()
+        return [f"controllers={json.dumps({label: plain(loaded.root.mapping['controller'])})}"]
 
     def singles(self, scenario: Scenario) -> dict[str, Scenario]:
         """The scenario of each law that is shown, by label. Raises UsageError."""
@@ -65,7 +119,8 @@ class Live:
         for law in self.laws:
             if law not in known:
                 raise UsageError(unknown_word(f"controller {law!r}", law, known))
-        return {law: known[law] for law in self.laws or known}
+        added = [label for label in known if label not in self._labels]
+        return {law: known[law] for law in [*self.laws, *added] or known} if self.laws else known
 
     def controls(self, scenario: Scenario) -> list[Knob]:
         """All that may be moved."""
@@ -79,14 +134,19 @@ class Live:
 
     def answer(self, name: str, asked: Mapping[str, Any]) -> dict[str, Any]:
         """What the page asks for; what podusv refuses as `refused`, sentences by key."""
-        wanted = ("moved", "name") if name == "save" else ("moved", "signals", "rest", "controls")
-        if lacking := [key for key in wanted if key not in asked]:
-            return {"refused": [{"key": "", "text": f"the question lacks {', '.join(lacking)}"}]}
+        answers: dict[str, Callable[..., dict[str, Any]]] = {
+            "frame": self.frame,
+            "margins": self.margins,
+            "report": self.report,
+            "save": self.save,
+        }
+        if name not in answers:
+            return _refused(unknown_word(f"question {name!r}", name, answers))
+        if lacking := [key for key in QUESTIONS[name] if key not in asked]:
+            return _refused(f"the question lacks {', '.join(lacking)}")
         try:
             moved = self.check_offered(asked["moved"])
-            if name == "save":
-                return self.save(moved, str(asked["name"]))
-            return self.frame(moved, asked["signals"], asked["rest"], asked["controls"])
+            return answers[name](moved, *(asked[key] for key in QUESTIONS[name][1:]))
         except ScenarioError as error:
             faults = [fault for fault in error.faults if isinstance(fault, Fault)]
             self.offered |= {
@@ -94,10 +154,10 @@ class Live:
             }
             return {"refused": [{"key": fault.key, "text": fault.text} for fault in faults]}
         except (PodusvError, OSError) as error:
-            return {"refused": [{"key": "", "text": str(error)}]}
+            return _refused(str(error))
         except Exception as error:  # of podusv, of a law, or of a question that no page of it asks
             traceback.print_exc()
-            return {"refused": [{"key": "", "text": f"{in_a_line(error)}; the terminal has more"}]}
+            return _refused(f"{in_a_line(error)}; the terminal has more")
 
     def check_offered(self, moved: Mapping[str, Any]) -> Moved:
         """Numbers and words at keys that the page was offered. Raises UsageError for others.
@@ -106,8 +166,10 @@ class Live:
         """
         if not moved.keys() <= self.offered.keys():
             kinds = {key: kind for key, kind in moved.items() if key.endswith(".kind")}
+            self.offered |= {key: self.kinds for key in kinds if re.fullmatch(ADDED, key)}
             known = kinds if kinds.keys() <= self.offered.keys() else {}
-            self.controls(self.load(known).scenario)
+            if all(kind in (self.offered[key] or [kind]) for key, kind in known.items()):
+                self.controls(self.load(known).scenario)
         for key, value in moved.items():
             words = self.offered.get(key, ("",))
             if not (value in words if words else isinstance(value, (int, float))):
@@ -127,37 +189,35 @@ class Live:
             self._bases.clear()
             self._puts.clear()
             loaded = self.load(moved)
-            cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
+            base = self._base_of(loaded)
+            cases = base.cases
         else:
-            cases = self._moving(moved)
+            base, cases = self._moving(moved)
         scenario = next(iter(cases.values())).scenario
         steps = scenario.time_grid().steps
         if steps > MOST_STEPS:
             raise UsageError(f"{steps} steps; a page follows at most {MOST_STEPS}: simulate less")
-        runs, findings, numbers = [], dict[str, list[str]](), {}
-        for label, case in cases.items():
+        runs, findings, numbers = list[PastRun](), dict[str, list[str]](), {}
+        for label, recording in self._recordings(cases, rest).items():
+            case = cases[label]
             if rest:
-                recording, _ = monitor_case(case, simulate_case(case, Stopwatch()))
+                recording, _ = monitor_case(case, recording)
                 for found in (*find_before_run(case), *postflight(case.scenario, recording)):
                     findings.setdefault(str(found), []).append(label)
-            else:
-                recording = vars(case).get("run") or run(
-                    case.plan, compiled=scenario.simulation.compiled
-                )
-                vars(case)["run"] = recording
-            if recording.status == "interrupted":
-                raise KeyboardInterrupt  # which a march takes for its own end
             numbers[label] = summary(case, recording, Extras())
-            runs.append(PastRun(label, case.about, recording, plugins=scenario.plugged))
+            runs.append(past_run_of(label, case, recording, numbers[label], base.claims))
         shown = dress_runs(runs)
         told: dict[str, Any] = {
             "chase": chase(shown, FRAMES),
             "curves": traces(shown, [n for n in signals or FIRST if any(r.has(n) for r in shown)]),
             "numbers": _table(scenario, numbers),
             "endings": {r.label: r.recording.message for r in runs if r.recording.message},
-            "command": self.command(moved),
+            "limits": {label: limits_in_words(numbers[label]) for label in numbers},
+            "verdicts": verdicts_on(base.claims, runs, cases, at_rest=rest),
+            "command": self.command(moved, [*cases]),
         }
         if rest:
+            findings |= {sentence: [*cases] for sentence in base.unread}
             told["findings"] = [[text, labels] for text, labels in findings.items()]
         if wanted:
             known = list(
@@ -167,21 +227,71 @@ class Live:
                 "controls": [asdict(c) for c in self.controls(loaded.scenario)],
                 "signals": known,
                 "name": loaded.scenario.name,
+                "kinds": self.kinds,
+                "several": base.several,
+                "alone": self._labels[0] if len(self._labels) == 1 else "",
+                "added": [x for x in cases if x not in self._labels],
             }
         return told | {"cpu": time.thread_time() - began}
 
-    def _moving(self, moved: Moved) -> dict[str, Case]:
+    def _recordings(self, cases: Mapping[str, Case], rest: bool) -> dict[str, Recording]:
+        """A run of each law, several at once; one whose own values did not move keeps its run."""
+        compiled = next(iter(cases.values())).scenario.simulation.compiled
+        if rest:
+            for case in cases.values():
+                warm_up(case)
+        missing = [case for case in cases.values() if rest or "run" not in vars(case)]
+        for case, recording in zip(
+            missing, run_together([case.plan for case in missing], compiled=compiled), strict=True
+        ):
+            if recording.status == "interrupted":
+                raise KeyboardInterrupt  # which a march takes for its own end
+            vars(case)["run"] = recording
+        return {label: vars(case)["run"] for label, case in cases.items()}
+
+    def margins(self, moved: Moved) -> dict[str, Any]:
+        """The margins of every law's loops, about the steady motion at the end of the run."""
+        loaded = self.load(moved)
+        cases = self._base_of(loaded).cases
+        return {"margins": {label: margins_of(case) for label, case in cases.items()}}
+
+    def report(self, moved: Moved) -> dict[str, Any]:
+        """The report of what is shown, in a folder of results as `podusv compare` makes it."""
+        request = Request(
+            self.assignments(moved),
+            plugins=self.files,
+            trust=self.trust,
+            force=True,
+            argv=shlex.split(self.command(moved, self._labels)),
+        )
+        done = compare([Path(self.source)], request)
+        if done.status == "interrupted":
+            raise KeyboardInterrupt
+        page = done.folder / "report.html"
+        return {"file": str(page.resolve()), "page": page.read_text("utf-8")}
+
+    def _base_of(self, loaded: Loaded) -> Base:
+        cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
+        claims, unread = list[ParsedClaim](), tuple[str, ...]()
+        try:
+            claims = claims_about(parse_claims(loaded), [*cases])
+        except ScenarioError as error:  # a law of another kind may lack what a claim is about
+            unread = tuple(map(str, error.faults))
+        several = bool(loaded.scenario.controllers)
+        return Base(cases, claims, unread, "nominal" in loaded.root.mapping, several)
+
+    def _moving(self, moved: Moved) -> tuple[Base, dict[str, Case]]:
         """A case for each law, whose numbers are put into one that was loaded with the words."""
-        words = {k: x for k, x in moved.items() if isinstance(x, str) or route(k)[0] in WHOLE}
+        words = {k: x for k, x in moved.items() if isinstance(x, str) or _is_loaded(route(k))}
         known = json.dumps(words)
         if known not in self._bases:
-            loaded = self.load(words)
-            cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
-            self._bases = {known: (cases, "nominal" in loaded.root.mapping)}
-        cases, told = self._bases[known]
-        return {label: self._put(label, case, moved, words, told) for label, case in cases.items()}
+            self._bases = {known: self._base_of(self.load(words))}
+        base = self._bases[known]
+        return base, {
+            label: self._put(label, case, moved, words, base) for label, case in base.cases.items()
+        }
 
-    def _put(self, label: str, case: Case, moved: Moved, words: Moved, told: bool) -> Case:
+    def _put(self, label: str, case: Case, moved: Moved, words: Moved, base: Base) -> Case:
         new: dict[Route, Any] = {}
         for key, number in moved.items():
             steps = route(key)
@@ -189,7 +299,9 @@ class Live:
                 new["controller", *steps[2:]] = number
             elif steps[0] != "controllers" and key not in words:
                 new[steps] = number
-                if steps[0] == "vessel" and not told:  # the law is told what the hull is
+                if (
+                    steps[0] == "vessel" and not base.has_nominal
+                ):  # the law is told what the hull is
                     new["nominal", *steps[1:]] = number
         before, same = self._puts.get(label, (None, case))
         if before == (words, new):
@@ -197,7 +309,7 @@ class Live:
         try:
             scenario = with_values(case.scenario, new) if new else case.scenario
         except ValueRefused as error:
-            own = f"controllers.{label}" if self.laws or self._labels[1:] else "controller"
+            own = f"controllers.{label}" if base.several else "controller"
             place, _, said = str(error).partition(": ")  # where no single value is to blame
             key = dotted_key(error.steps).replace("controller", own, 1) or place
             text = str(error) if error.steps else said
@@ -215,27 +327,34 @@ class Live:
         self._puts[label] = (words, new), made
         return made
 
-    def command(self, moved: Moved) -> str:
-        """The command line that makes the same runs."""
-        verb = "compare" if len(self.laws or self._labels) > 1 else "run"
-        only = ["--controller", self.laws[0]] if len(self.laws) == 1 else []
-        sets = [word for text in (*self.given, *assignments_of(moved)) for word in ("--set", text)]
-        return shlex.join(["podusv", verb, self.source, *only, *sets])
+    def command(self, moved: Moved, labels: Sequence[str]) -> str:
+        """The command line that makes the same runs, of the laws with these labels."""
+        verb = "compare" if len(labels) > 1 else "run"
+        only = ["--controller", labels[0]] if self.laws and len(labels) == 1 else []
+        sets = [word for text in self.assignments(moved) for word in ("--set", text)]
+        plugins = [word for file in self.files for word in ("--plugin", file)]
+        trust = ["--trust"] if self.trust else []
+        return shlex.join(["podusv", verb, self.source, *only, *sets, *plugins, *trust])
+
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of laws that may be added."""
+        return tuple(kinds_of(type(self.load({}).scenario), "controller"))
 
     @cached_property
     def _labels(self) -> tuple[str, ...]:
         return self.load({}).scenario.labels()
 
-    def save(self, moved: Moved, name: str) -> dict[str, Any]:
+    def save(self, moved: Moved, name: Any) -> dict[str, Any]:
         """Write what differs into NAME.yaml in this folder. Raises StorageError where it is there.
 
         It loads to the very scenario that is shown, or is written whole.
         """
-        if not re.fullmatch(r"\w[\w-]*", name):
+        if not re.fullmatch(r"\w[\w-]*", str(name)):
             raise UsageError(f"{name!r} is no name; letters, digits, _ and -")
         file, loaded = Path(f"{name}.yaml"), self.load(moved)
         changed: dict[str, Any] = {}
-        for key in [*(text.partition("=")[0] for text in self.given), *moved]:
+        for key in [text.partition("=")[0] for text in self.assignments(moved)]:
             steps, inner, node = route(key), changed, loaded.root
             end = next((i for i, step in enumerate(steps) if isinstance(step, int)), len(steps))
             for step in steps[: end - 1]:
@@ -244,7 +363,7 @@ class Live:
         base = self.source if self.source.startswith("podusv:") else os.path.relpath(self.source)
         text = yaml_text({"extends": base, **changed})
         own = {name: getattr(loaded.scenario, name) for name in ("name", "description")}
-        new = load_text(text, str(file), plugged=of_files(self.trust)).scenario
+        new = load_text(text, str(file), (), (), self.files, of_files(self.trust)).scenario
         if new.model_copy(update=own) != loaded.scenario:
             raise StorageError(f"{file}: what differs does not load to what is shown")
         try:
@@ -252,8 +371,20 @@ class Live:
                 out.write(text)
         except FileExistsError:
             raise StorageError(f"{file} is there already; take another name") from None
-        verb = "compare" if len(self.laws or self._labels) > 1 else "run"
-        return {"file": str(file.resolve()), "text": text, "command": f"podusv {verb} {file}"}
+        verb = "compare" if len(self.singles(loaded.scenario)) > 1 else "run"
+        plugins = "".join(f" --plugin {shlex.quote(name)}" for name in self.files)
+        command = f"podusv {verb} {file}{plugins}"
+        return {"file": str(file.resolve()), "text": text, "command": command}
+
+
+def _refused(sentence: str) -> dict[str, Any]:
+    """An answer that says why there is none."""
+    return {"refused": [{"key": "", "text": sentence}]}
+
+
+def _is_loaded(steps: Route) -> bool:
+    """Whether a number cannot be put into a scenario that is loaded already."""
+    return steps[0] in WHOLE or steps[: len(LINK)] == LINK
 
 
 def assignments_of(moved: Moved) -> list[str]:
@@ -266,7 +397,7 @@ def assignments_of(moved: Moved) -> list[str]:
 
 def _table(scenario: Scenario, numbers: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
     """The headline metrics: name, words, unit, and a number or a word for each run."""
-    first = [m.about for m in headlines_first(scenario.known_metrics()) if m.about.headline]
+    first = [m.about for m in headlines_first(scenario.known_metrics()) if m.headline]
     return [
         {
             "name": a.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import signal
@@ -61,6 +62,45 @@ def test_both_ways_to_a_scenario_give_the_numbers_of_run(live: Live, moved, podu
     numbers = {name: x for name, x in shown.items() if isinstance(x, float) and name != "law_ns"}
     assert len(numbers) > 3
     assert numbers == {name: metrics[name] for name in numbers}
+
+
+EVERY = (
+    OWN,
+    "podusv:demo.yaml",
+    "podusv:mu_2017/corrected.yaml",
+    "podusv:pod/kept.yaml",
+    "podusv:laws/rivals.yaml",
+    "podusv:laws/legs.yaml",
+)
+
+
+def moved_at_random(control: Mapping[str, Any], drawn: np.random.Generator) -> float:
+    """A number that a control's slider leads to; one of few figures, as the page sends it."""
+    low, high, now = control["low"], control["high"], control["value"]
+    far = now * drawn.uniform(0.5, 2.0) if control["log"] else drawn.uniform(low, high)
+    quantum = control["quantum"]
+    number = float(f"{round(far / quantum) * quantum if quantum else far:.3g}")
+    return int(number) if quantum == 1.0 else number
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("source", EVERY)
+def test_every_value_gives_the_same_both_ways(source: str) -> None:
+    live, drawn = Live(source), np.random.default_rng(1)
+    found = live.frame({}, (), rest=True, wanted=True)["controls"]
+    numbers = [one for one in found if not one["choices"]]
+    assert len(numbers) > 40
+    for control in numbers:
+        if control["key"] in ("simulation.duration", "simulation.step"):
+            continue
+        moved = {control["key"]: moved_at_random(control, drawn)}
+        moving, rest = (framed(live, moved, rest=rest) for rest in (False, True))
+        if "refused" in rest:
+            keys = [[fault["key"] for fault in one["refused"]] for one in (moving, rest)]
+            assert keys[0] == keys[1], moved
+        else:
+            for part in ("numbers", "curves", "chase", "endings", "command"):
+                assert moving[part] == rest[part], (moved, part)
 
 
 def test_a_refused_value_has_the_sentence_of_podusv_at_its_key_and_the_page_goes_on(live) -> None:
@@ -291,3 +331,12 @@ def test_a_path_of_other_letters_is_no_token(served: tuple[str, str]) -> None:
 def test_a_question_that_lacks_something_is_answered_in_a_sentence(live: Live) -> None:
     (refused,) = live.answer("frame", {"moved": {}})["refused"]
     assert refused["text"] == "the question lacks signals, rest, controls"
+
+
+def test_a_value_that_moves_has_no_source_code_looked_at(live: Live, monkeypatch) -> None:
+    """To find where a class is written takes as long as a run; only an error says it."""
+    framed(live, {"controller.K_Pu": 78.0}, rest=False)
+    looked_at = []
+    monkeypatch.setattr(inspect, "getsourcelines", lambda obj: looked_at.append(obj) or ([], 1))
+    assert "refused" not in framed(live, {"controller.K_Pu": 79.0}, rest=False)
+    assert looked_at == []

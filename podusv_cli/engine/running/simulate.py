@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -15,10 +15,10 @@ from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
 from podusv_cli.engine.running.check import ask_part, check_law
-from podusv_cli.engine.running.thread import Ending, MarchStatus, march
+from podusv_cli.engine.running.thread import Ending, MarchStatus, Work, march, march_together
 from podusv_cli.engine.step import rk4
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.engine.step.layout import STEPS, Layout, Parts, Vectors
+from podusv_cli.engine.step.layout import BEFORE, STEPS, Layout, Parts, Vectors
 from podusv_cli.process.interrupts import interrupts_deferred
 
 # Over instants first .. last - 1, see `rk4.advance`; a third number stands for the grid's steps
@@ -61,10 +61,8 @@ def run(
     march and keeps what was logged. `compiled=False` runs the same kernels as plain Python.
     `allocate` gives the room for the logged rows; the recording's signals are views of it.
     """
-    about, grid, layout = plan.about, plan.grid, plan.layout
-    plan.loop.check_fit(grid.step)
-    vectors, last = plan.vectors(grid.rows, allocate), layout.steps + 1
-    advance = partial(marcher(plan, compiled)(vectors, layout, grid.step), 0, last)
+    about = plan.about
+    vectors, last, advance = begin_march(plan, compiled, allocate)
     with np.errstate(all="ignore"), interrupts_deferred():
         ending = march(
             advance,
@@ -73,6 +71,31 @@ def run(
             progress and (lambda reached: progress(reached / last)),
         )
         return replace(recording_of(plan, vectors, ending), about=about)
+
+
+def begin_march(
+    plan: Plan, compiled: bool, allocate: Allocate = np.empty
+) -> tuple[Vectors, int, Callable[[], int]]:
+    """The vectors of a loop at its start, the instant after the last, and the march up to it."""
+    plan.loop.check_fit(plan.grid.step)
+    vectors, last = plan.vectors(plan.grid.rows, allocate), plan.layout.steps + 1
+    advance = marcher(plan, compiled)(vectors, plan.layout, plan.grid.step)
+    return vectors, last, partial(advance, 0, last)
+
+
+def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Recording]:
+    """Integrate several loops at once, each in a thread of its own; the recordings of `run`.
+
+    An interrupt ends all marches and keeps what was logged.
+    """
+    begun = [begin_march(plan, compiled) for plan in plans]
+    works = [Work(advance, vectors.under_way) for vectors, _, advance in begun]
+    with np.errstate(all="ignore"), interrupts_deferred():
+        endings = march_together(works, [last for _, last, _ in begun])
+        return [
+            replace(recording_of(plan, vectors, ending), about=plan.about)
+            for plan, (vectors, *_), ending in zip(plans, begun, endings, strict=True)
+        ]
 
 
 def to_end(
@@ -152,7 +175,7 @@ def why(plan: Plan, vectors: Vectors, ending: Ending) -> str:
 
 
 def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
-    now = np.concatenate([[at], vectors.s, vectors.row])
+    now = np.concatenate([[at], vectors.s, vectors.row[:-BEFORE]])
     named = zip(labels, now, strict=True)
     bad = next((name for name, x in named if not abs(x) <= rk4.LARGEST), "?")
     return f"{bad} is not finite"

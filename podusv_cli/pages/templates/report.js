@@ -170,6 +170,9 @@ const chaseOn = (stage) => {
   addEventListener("resize", place);
   return {
     seek, toggle,
+    // Pixels of the map for metres north and east, and metres for pixels.
+    toMap(north, east) { const { k, ox, oy } = frame(); return [ox + k * east, oy - k * north]; },
+    toWorld(x, y) { const { k, ox, oy } = frame(); return [(oy - y) / k, (x - ox) / k]; },
     // Runs to show at a time, by default at that of the runs before.
     show(data, t = now) {
       const first = !runs.length;
