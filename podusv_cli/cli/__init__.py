@@ -87,7 +87,7 @@ class Commands(typer.core.TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the first word names; an error for an unknown one."""
-        if args and args[0] in MEANT:
+        if args and args[0] in MEANT and args[0] not in installed_commands():
             ctx.fail(f"No such command {args[0]!r}: {MEANT[args[0]]}.")
         return super().resolve_command(ctx, args)
 

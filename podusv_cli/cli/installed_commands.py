@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import EntryPoint, distributions
+from types import FunctionType
 from typing import Any
 
 import typer
@@ -33,16 +34,22 @@ def installed_commands() -> dict[str, EntryPoint]:
 def load_command(name: str) -> Any:
     """The command of this name, as typer makes it of the function that the entry point names.
 
-    One that cannot be imported is a command too, whose only act is to say so.
+    What is none is a command too, whose only act is to say why; so the others stay in the help.
     """
     point = installed_commands()[name]
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    settings: dict[str, Any] = {}
     try:
         function = point.load()
-    except Exception as error:
-        function = _refusing(f"podusv {name}: {point.value} cannot be imported: {in_a_line(error)}")
-        settings = {"ignore_unknown_options": True, "allow_extra_args": True}
+        if not isinstance(function, FunctionType):
+            raise TypeError(f"it is a {type(function).__name__}, and a command is a function")
+        return _command_of(name, function)
+    except (Exception, SystemExit) as error:
+        why = f"podusv {name}: {point.value} is no command: {in_a_line(error)}"
+        return _command_of(name, _refusing(why), takes_anything=True)
+
+
+def _command_of(name: str, function: Callable[..., None], *, takes_anything: bool = False) -> Any:
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    settings = {"ignore_unknown_options": takes_anything, "allow_extra_args": takes_anything}
     app.command(name, context_settings=settings)(with_exit_codes(function))
     return typer.main.get_command(app)
 

@@ -70,6 +70,13 @@ class Run:
     past: PastRun
     given: Scenario | None = None  # of which it was made here
 
+    def __getstate__(self) -> dict[str, Any]:
+        """With the numbers of its log: its folder may be gone, or another run's, where it is read.
+
+        Raises StorageError for a log that cannot be read.
+        """
+        return {"past": replace(self.past, log=self.past.recording), "given": self.given}
+
     @property
     def label(self) -> str:
         """What it is called: by its law, or as a comparison calls it."""

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from comparison_samples import past_run
 
+import podusv
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.process.workers import run_all
@@ -132,3 +133,15 @@ def test_a_folder_of_before_about_json_opens_with_what_its_scenario_says(
     assert run.about == new.about
     assert run.compared_metrics() == pytest.approx(new.compared_metrics(), rel=0, nan_ok=True)
     assert (run.until, run.check("underactuated")) == (20.0, new.check("underactuated"))
+
+
+def test_a_run_of_python_s_keeps_its_log_wherever_its_folder_goes(folder: Path, tmp_path: Path):
+    """Pickled, it has the numbers: the folder may be gone, or hold another run."""
+    place = tmp_path / "run"
+    shutil.copytree(folder, place)
+    run = podusv.open_run(place)
+    kept = pickle.dumps(run)
+    shutil.rmtree(place)
+    back = pickle.loads(kept)
+    assert back.label == run.label
+    np.testing.assert_array_equal(back["z_e"], podusv.open_run(folder)["z_e"])

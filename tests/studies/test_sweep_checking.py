@@ -363,3 +363,17 @@ def test_what_contradicts_itself_without_a_draw_is_said_once():
     with pytest.raises(ScenarioError) as told:
         load_text(TEXT, "a.yaml", ["control.period=0.123"], [sweep_faults])
     assert str(told.value).count("0.123 s is no whole number of steps") == 1
+
+
+# Beside N_rdot = -20 the mass matrix needs the added mass of sway.
+HEAVY = ["vessel.Y_rdot=-50", "vessel.N_vdot=-50", "vessel.Y_vdot=-400", "vessel.N_rdot=-20"]
+BOTH = "vessel.Y_vdot: {choice: [0, -400]}, vessel.N_rdot: {choice: [-300, -20]}"
+
+
+def test_a_value_that_only_the_other_quantity_s_values_hide_is_told_at_the_one_to_blame():
+    """Of two lists side by side each pair is sound: 0 with -300, -400 with -20."""
+    (line,) = told(vary(f"{BOTH}, start.y: {{uniform: [0, 1]}}"), HEAVY)
+    assert "sweep.vary.vessel.Y_vdot: " in line
+    assert "with vessel.Y_vdot = 0" in line
+    sound = "vessel.Y_vdot: {choice: [-300, -400]}, vessel.N_rdot: {choice: [-300, -20]}"
+    assert told(vary(sound), HEAVY) == []

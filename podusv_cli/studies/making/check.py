@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,7 @@ TRIED = np.array([0.000871, 0.381966, 0.998713])
 # draw other than whole numbers
 REAL = ("uniform", "normal", "lognormal", "log_uniform", "triangular", "angle")
 MOST_TRIED = 50  # values of a choice
+MOST_ROUNDS = 12  # of all pairings of the values of a few quantities
 FREE_NAME = "; a quantity with a name of your own needs `keys`, as in keys: [vessel.m, vessel.I_z]"
 Faults = Iterator[tuple[Route, str]]
 
@@ -214,9 +217,7 @@ def _are_taken_together(
     A loop is built for each round, not for each quantity. A round that fails says nothing of which
     quantity is to blame: then each has to be tried alone.
     """
-    values_of = {name: _values_to_try(quantity) for name, quantity in quantities.items()}
-    rounds = max(map(len, values_of.values()), default=0)
-    draws = [{name: v[i % len(v)] for name, v in values_of.items()} for i in range(rounds)]
+    draws = _rounds({name: _values_to_try(quantity) for name, quantity in quantities.items()})
     try:
         return all(
             _structure(draw_scenario(single, quantities, draw)) == own[law]
@@ -225,6 +226,21 @@ def _are_taken_together(
         )
     except ValueRefused:
         return False
+
+
+def _rounds(values: Mapping[str, list[Any]]) -> list[dict[str, Any]]:
+    """Every value of each quantity at least once; all pairings, where these are few.
+
+    Two values that each go with the scenario's own may contradict each other.
+    """
+    if math.prod(map(len, values.values())) <= MOST_ROUNDS:
+        return [dict(zip(values, chosen, strict=True)) for chosen in product(*values.values())]
+    ways = [dict.fromkeys(values, 1), {name: (-1) ** i for i, name in enumerate(values)}]
+    return [
+        {name: v[way[name] * i % len(v)] for name, v in values.items()}
+        for way in ways  # all upwards, then every second one downwards
+        for i in range(max(map(len, values.values())))
+    ]
 
 
 def _values_to_try(quantity: Quantity) -> list[Any]:
