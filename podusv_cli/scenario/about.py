@@ -31,6 +31,16 @@ def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
         raise LawError(f"{what} cannot be had: {in_a_line(error)}") from error
 
 
+def identify_of(about: RunAbout | None) -> Identify | None:
+    """What a finished run says that a log beside it calls its quantities; None where it does not.
+
+    `about` is None of a folder that an older podusv wrote.
+    """
+    if about is None or not about.log_columns:
+        return None
+    return Identify(columns=about.log_columns, frame=about.log_frame)
+
+
 def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
     law, approach = scenario.controller, scenario.controller.approach()
     return RunAbout(

@@ -32,9 +32,9 @@ class Case:
     identify: Identify | None = None
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Case:
+    def of(cls, scenario: Scenario, identify: Identify | None = None) -> Case:
         """Of a scenario that nobody has planned yet."""
-        return cls(scenario, scenario.plan())
+        return cls(scenario, scenario.plan(), identify)
 
     @cached_property
     def reference(self) -> Reference:

@@ -16,6 +16,7 @@ from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.findings.finding import unknown_codes
+from podusv_cli.scenario.about import identify_of
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
@@ -159,10 +160,9 @@ def _open_members(path: Path, request: Request, *, alone: bool) -> Members:
 def from_folder(path: Path, files: Sequence[str] = ()) -> Members:
     """The finished runs of a folder; `files` are plug-ins. Raises UsageError, StorageError."""
     members = members_of(path, files)
-    abouts = [member.about for member in members if member.about.log_columns]
-    called = [Identify(columns=about.log_columns, frame=about.log_frame) for about in abouts]
+    called = filter(None, (identify_of(member.about) for member in members))
     labels = [member.label for member in members]
-    return Members(path.resolve().name, members, labels, identify=next(iter(called), None))
+    return Members(path.resolve().name, members, labels, identify=next(called, None))
 
 
 def from_scenario(loaded: Loaded, *, alone: bool) -> Members:

@@ -15,7 +15,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Status
 from podusv_cli.process.extras import Failure
 from podusv_cli.process.workers import INTERRUPTED, available_workers
-from podusv_cli.scenario.about import about_of
+from podusv_cli.scenario.about import about_of, identify_of
 from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.limits import disk_needed, limits
 from podusv_cli.scenario.load import load_stored
@@ -121,16 +121,18 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
     with _passing(request) as place:
         target, text = request.out or place / "again", original.resolved_yaml
         task = RunTask(scenario, text, target, request.force, argv=request.argv)
-        return Repetition({label: _hold_against(original, execute(task, advance))}, {})
+        case = Case.of(scenario, identify_of(original.about))
+        done = execute(task, advance, case=case)
+        return Repetition({label: _hold_against(original, done)}, {})
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     again = [
         Member(
             run.path.name,
-            about_of(scenario),
+            about_of(scenario, identify_of(run.about)),
             run.resolved_yaml,
-            case=Case.of(scenario),
+            case=Case.of(scenario, identify_of(run.about)),
             text=run.resolved_yaml,
         )
         for run, scenario in runs

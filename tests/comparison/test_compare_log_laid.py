@@ -18,6 +18,8 @@ from podusv_cli.core.errors import PodusvError
 from podusv_cli.figures.curves import AFTER
 from podusv_cli.figures.shown import dress_runs
 from podusv_cli.figures.trajectory import views
+from podusv_cli.workflows.request import Request
+from podusv_cli.workflows.rerun import rerun
 
 OTTER = """
 vessel: {preset: otter}
@@ -129,6 +131,8 @@ def test_a_finished_run_says_what_the_columns_of_a_log_are_called():
     t, x, y, psi = (run[name][0:76:4] for name in ("time", "x", "y", "psi"))
     log("LOG.csv", "t,north,east,psi", np.column_stack([t, x, y + 0.7, psi]))
     assert numbers(compared("run", "LOG.csv"), "run")[1] == pytest.approx(0.7)
+    rerun(Path("run"), Request(out=Path("again"), figures=False))
+    assert numbers(compared("again", "LOG.csv"), "again")[1] == pytest.approx(0.7)
     compared("names.yaml", "LOG.csv")
     Path("both").rename("kept")
     assert numbers(compared("kept", "LOG.csv"), "momentum")[1] == pytest.approx(0.7)

@@ -35,8 +35,8 @@ AFTER_A_RUN = {
     "the metrics": (execute, "summary"),
     "the law's cost": (execute, "law_costs"),
     "warnings": (execute, "postflight"),
-    "theory.json with the stability monitor's signals": (ideal_weights, "fitted"),
-    "figures": (execute, "_drawn"),
+    "theory.json with the stability monitor's signals": (ideal_weights, "fit_weights"),
+    "figures": (execute, "_draw_figures"),
 }
 AFTER_RUNS = {
     "the laws' times": (compare, "law_costs"),
@@ -45,7 +45,7 @@ AFTER_RUNS = {
     "comparison.md": (table, "as_markdown"),
     "comparison.tex": (table, "as_latex"),
     "claims.md": (claims, "as_markdown"),
-    "figures": (outputs, "drawn"),
+    "figures": (outputs, "draw_comparison"),
     "report.html": (report, "page"),
 }
 

@@ -16,7 +16,7 @@ from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.registry import kinds
+from podusv_cli.core.registry import kinds, scan_package
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
@@ -290,6 +290,7 @@ def test_a_file_that_cannot_be_imported_is_named(tmp_path, monkeypatch, text):
     monkeypatch.syspath_prepend(tmp_path)
     for name in ("own_laws", "own_laws.mine"):
         monkeypatch.delitem(sys.modules, name, raising=False)
+    scan_package.cache_clear()  # the package has other content now
     with pytest.raises(LawError) as found:
         kinds("own_laws", Controller)
     assert str(found.value) == IMPORTED[text]

@@ -313,7 +313,7 @@ def test_a_fault_after_an_interrupt_is_told(podusv, monkeypatch):
 
 
 @pytest.mark.parametrize(("number", "code"), SIGNALS)
-@pytest.mark.parametrize("stage", ["_drawn", "_cost", "_write"])
+@pytest.mark.parametrize("stage", ["_draw_figures", "_cost", "_write"])
 def test_a_run_that_is_interrupted_after_its_simulation_is_whole(
     podusv, number, code, stage, monkeypatch
 ):

@@ -154,7 +154,7 @@ def test_an_interrupt_that_became_another_exception_is_one(tmp_path):
     assert not extras.missing
 
 
-@pytest.mark.parametrize("way", ["made", "attempt"])
+@pytest.mark.parametrize("way", ["make_or_record", "attempt"])
 def test_extras_that_fail_are_missing_and_what_cannot_be_stored_is_an_error(way):
     def unstorable():
         raise StorageError("the disk is full")
