@@ -50,12 +50,12 @@ def _entry(path: Path) -> dict[str, Any]:
 def opened(folder: Path) -> tuple[Any, ...]:
     """All that plot, compare, rerun and diff take from a run folder."""
     (part,) = members.from_folder(folder)
-    assert part.run
-    log = part.run.recording
+    assert part.folder
+    log = part.folder.recording
     numbers = {name: array.tobytes() for name, array in {**log.signals, **log.fixed}.items()}
     text = log_reader.resolved_yaml(folder / "log.h5")
     again = load_stored(part.resolved, "resolved.yaml").scenario  # as rerun takes it
-    told = log.status, log.controller, log.message, part.run.metrics, part.about
+    told = log.status, log.controller, log.message, part.folder.metrics, part.about
     return numbers, text, again, *told
 
 
