@@ -35,16 +35,21 @@ MEANINGS = {
     141: "the reader of a pipe closed it",
     143: "terminated",
 }
-PLEASE_REPORT = "This is a bug in podusv. Please report it with the lines above."
+PLEASE_REPORT = "This is a bug in {}. Please report it with the lines above."
 
 
-def with_exit_codes(command: Callable[Given, None]) -> Callable[Given, None]:
-    """Wrap a command so that its errors become an exit code and a message on stderr."""
+def with_exit_codes(
+    command: Callable[Given, None], package: str = "podusv"
+) -> Callable[Given, None]:
+    """Wrap a command so that its errors become an exit code and a message on stderr.
+
+    `package` is what the command comes from, which has to know of a bug in it.
+    """
 
     @wraps(command)
     def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
         with interrupts_caught() as interrupts:
-            code = _exit_code(lambda: command(*args, **kwargs), interrupts)
+            code = _exit_code(lambda: command(*args, **kwargs), interrupts, package)
             interrupts.ending = interrupts.number > 0
             # Code inside raises one code for all interrupts; the shell expects the signal's own.
             signalled = code == INTERRUPTED and interrupts.number
@@ -53,7 +58,7 @@ def with_exit_codes(command: Callable[Given, None]) -> Callable[Given, None]:
     return run
 
 
-def _exit_code(command: Callable[[], None], interrupts: Interrupts) -> int:
+def _exit_code(command: Callable[[], None], interrupts: Interrupts, package: str) -> int:
     try:
         command()
     except (typer.Abort, typer.BadParameter):
@@ -65,12 +70,12 @@ def _exit_code(command: Callable[[], None], interrupts: Interrupts) -> int:
         if interrupts.number and is_bug:  # a library may turn an interrupt into any exception
             _print_error(f"podusv: interrupted, and then {type(error).__name__}: {error}")
             return INTERRUPTED
-        return report_error(error)
+        return report_error(error, package)
     return 0
 
 
-def report_error(error: BaseException) -> int:
-    """Print an error and return its exit code."""
+def report_error(error: BaseException, package: str = "podusv") -> int:
+    """Print an error and return its exit code; a bug is one of the `package`."""
     if isinstance(error, KeyboardInterrupt):
         _print_error(str(error) or "interrupted")
         return INTERRUPTED
@@ -83,7 +88,9 @@ def report_error(error: BaseException) -> int:
     if isinstance(error, OSError):
         _print_error(f"podusv: {error}")
         return StorageError.exit_code
-    _print_error(*"".join(traceback.format_exception(error)).splitlines(), PLEASE_REPORT)
+    _print_error(
+        *"".join(traceback.format_exception(error)).splitlines(), PLEASE_REPORT.format(package)
+    )
     return BUG
 
 

@@ -50,7 +50,8 @@ def load_command(name: str) -> Any:
 def _command_of(name: str, function: Callable[..., None], *, takes_anything: bool = False) -> Any:
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     settings = {"ignore_unknown_options": takes_anything, "allow_extra_args": takes_anything}
-    app.command(name, context_settings=settings)(with_exit_codes(function))
+    package = getattr(installed_commands()[name].dist, "name", name)
+    app.command(name, context_settings=settings)(with_exit_codes(function, package))
     return typer.main.get_command(app)
 
 

@@ -66,7 +66,8 @@ def open_session(
     """A scenario that waits for demands, in place of the controller that it names.
 
     A demand holds for `period` seconds, by default `control.period`: a whole number of steps.
-    Raises ScenarioError, LawError, and UsageError without a period or with too many of them.
+    Raises ScenarioError, LawError, and UsageError for a period that is
+    missing, that the scenario does not take, or that would come too often.
 
     >>> import podusv
     >>> session = podusv.open_session("podusv:own_vessel.yaml", period=0.1)
@@ -98,7 +99,7 @@ def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
     try:
         return with_values(held, {("control", "period"): period}), period
     except ValueRefused as error:
-        raise UsageError(f"period: {error}") from error
+        raise UsageError(str(error)) from error
 
 
 class Session:

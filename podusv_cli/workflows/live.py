@@ -141,9 +141,9 @@ class Live:
             "save": self.save,
         }
         if name not in answers:
-            return _refused(unknown_word(f"question {name!r}", name, answers))
+            return _refusal(unknown_word(f"question {name!r}", name, answers))
         if lacking := [key for key in QUESTIONS[name] if key not in asked]:
-            return _refused(f"the question lacks {', '.join(lacking)}")
+            return _refusal(f"the question lacks {', '.join(lacking)}")
         try:
             moved = self.check_offered(asked["moved"])
             return answers[name](moved, *(asked[key] for key in QUESTIONS[name][1:]))
@@ -154,10 +154,10 @@ class Live:
             }
             return {"refused": [{"key": fault.key, "text": fault.text} for fault in faults]}
         except (PodusvError, OSError) as error:
-            return _refused(str(error))
+            return _refusal(str(error))
         except Exception as error:  # of podusv, of a law, or of a question that no page of it asks
             traceback.print_exc()
-            return _refused(f"{in_a_line(error)}; the terminal has more")
+            return _refusal(f"{in_a_line(error)}; the terminal has more")
 
     def check_offered(self, moved: Mapping[str, Any]) -> Moved:
         """Numbers and words at keys that the page was offered. Raises UsageError for others.
@@ -377,7 +377,7 @@ class Live:
         return {"file": str(file.resolve()), "text": text, "command": command}
 
 
-def _refused(sentence: str) -> dict[str, Any]:
+def _refusal(sentence: str) -> dict[str, Any]:
     """An answer that says why there is none."""
     return {"refused": [{"key": "", "text": sentence}]}
 

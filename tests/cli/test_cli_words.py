@@ -252,7 +252,7 @@ def test_a_bug_shows_its_trace_and_asks_for_a_report(capsys):
     assert outcome(ZeroDivisionError("oops")) == 1
     err = capsys.readouterr().err
     assert err.startswith("Traceback (most recent call last):\n")
-    assert err.endswith(f"ZeroDivisionError: oops\n{PLEASE_REPORT}\n")
+    assert err.endswith(f"ZeroDivisionError: oops\n{PLEASE_REPORT.format('podusv')}\n")
 
 
 def test_a_name_that_is_no_text_is_shown_escaped(tmp_path):

@@ -257,6 +257,17 @@ def test_its_command_is_one_of_podusvs(place):
     assert "No such command 'wides'" in podusv(place, "wides", code=2)
 
 
+def test_a_bug_in_a_package_s_command_is_one_of_the_package(place):
+    command = place / "site/my_lab/widest.py"
+    text = command.read_text()
+    command.write_text(text.replace("    reached = {", "    1 / 0\n    reached = {"))
+    try:
+        said = podusv(place, "widest", "c/los", code=1)
+    finally:
+        command.write_text(text)
+    assert "This is a bug in my-lab. Please report it" in said
+
+
 @pytest.mark.parametrize(
     ("name", "thing", "says"),
     [

@@ -24,7 +24,9 @@ AXES = 3  # surge, sway, yaw
 LOW_COS, LOW_SIN, HIGH_COS, HIGH_SIN, MOST_ASTERN, MOST_AHEAD, FIXED, SECTOR = range(8)
 # Room for all pods: sectors, columns C_i, and the forces g_i with three numbers more.
 SECTORS, COLUMNS, FORCES = SECTOR * MOST_PODS, 2 * AXES * MOST_PODS, 2 * MOST_PODS + 3
-ITERATIONS, TRIALS = 60, 30
+# Where a thrust is at its limit the part of a step that is level can be 1e-7 of it. A search that
+# ends before it has found that part goes too far, and three such steps can come back to the first.
+ITERATIONS, TRIALS = 60, 100
 SETTLED, LEVEL = 1e-9, 0.1
 
 

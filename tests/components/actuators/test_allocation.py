@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import POD
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear, minimize
 
@@ -169,12 +169,11 @@ LAYOUTS = {
     priority=st.sampled_from(["yaw", "surge"]),
 )
 def test_no_other_thrusts_and_angles_cost_less(layout, surge, yaw, size, sway, priority):
-    assume((layout, priority) != ("one aside", "surge"))  # see below
     assert_no_other_costs_less(layout, surge, yaw, size, sway, priority)
 
 
-@pytest.mark.xfail(strict=True, reason="it stays at -0.01 rad; -0.27 rad costs less")
-def test_one_pod_aside_that_prefers_surge_finds_the_least_cost():
+def test_a_search_along_a_step_ends_where_the_step_is_level():
+    """With 30 trials three steps came back to the first: -0.01 rad in place of -0.27 rad."""
     assert_no_other_costs_less("one aside", 0.875, 1.0, 0.3, 0.0, "surge")
 
 
