@@ -94,6 +94,8 @@ def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
         raise UsageError(
             "for how long does a demand hold? give period=0.1 [s], or the scenario a control.period"
         )
+    if not math.isfinite(period):
+        raise UsageError(f"period is {period}; give a finite time [s], as in period=0.1")
     ends = f"0.0, 0, 0\n{2.0 * single.simulation.duration!r}, 0, 0"
     held = single.model_copy(update={"controller": Schedule(between="hold", rows=ends)})
     try:

@@ -191,7 +191,9 @@ def test_without_a_period_or_with_too_many_there_is_no_session():
         podusv.open_session("podusv:own_vessel.yaml")
     for period, says in (
         (0.0, "for how long does a demand hold"),
-        (math.nan, "period = nan; must be a number not below 0"),
+        (math.nan, "period is nan; give a finite time"),
+        (math.inf, "period is inf; give a finite time"),
+        (0.033, "no whole number of steps of 0.01 s; try 0.03"),
     ):
         with pytest.raises((UsageError, ScenarioError), match=says):
             podusv.open_session("podusv:own_vessel.yaml", period=period)
