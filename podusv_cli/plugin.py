@@ -75,6 +75,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    """What was renamed, with a warning, and what draws, imported late as matplotlib is slow."""
     from importlib import import_module
 
     if name in RENAMED:

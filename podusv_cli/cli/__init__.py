@@ -110,6 +110,7 @@ if not NAMED:
 
 
 def _show_version(wanted: bool) -> None:
+    """Print the version and end the command, where `--version` was given."""
     if wanted:
         typer.echo(f"podusv {__version__}")
         raise typer.Exit

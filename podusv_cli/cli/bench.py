@@ -67,6 +67,7 @@ def bench(
 
 
 def _report(done: Benched) -> None:
+    """Print a leaderboard for each vessel, and where the report is."""
     from podusv_cli.studies.bench.standing import by_vessel, leaderboard_rows
 
     for vessel, runs in by_vessel(done.runs).items():

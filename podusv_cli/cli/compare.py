@@ -136,6 +136,7 @@ def compare(
 
 
 def _report(done: Compared, verbose: bool, metrics: Sequence[str]) -> None:
+    """Print the comparison; `verbose` adds all metrics and the time [s] that each part took."""
     echo_comparison(done, metrics, whole=verbose)
     result = done.result
     if verbose:
@@ -171,6 +172,7 @@ def echo_comparison(done: Compared, metrics: Sequence[str] = (), *, whole: bool 
 
 
 def _echo_whole(done: Compared, metrics: Sequence[str]) -> None:
+    """Print all metrics, or those named, of all runs, with the notes below the table."""
     from podusv_cli.comparison.table import cells, head, note, window
 
     result = done.result

@@ -34,6 +34,10 @@ def complete_from_cache(
 
     @wraps(known, assigned=("__name__", "__doc__"), updated=())
     def complete(context: typer.Context, incomplete: str) -> Offered:
+        """The words that begin with `incomplete`, from the file of words if it is of this state.
+
+        Words of the plug-ins on the command line are asked anew each time, and never kept.
+        """
         if context.params.get("plugin"):
             return _beginning(incomplete, known(_plugins(context) or ()))
         from podusv_cli.process.code_folder import write

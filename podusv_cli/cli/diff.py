@@ -46,6 +46,7 @@ def diff(
 
 
 def _report(label: str, difference: RunDifference) -> None:
+    """Print what differs between two runs, under `label` where there are several pairs."""
     if label:
         echo_entry(label)
     if difference.same:
@@ -64,6 +65,7 @@ def _show_changes(what: str, changes: Mapping[str, Change]) -> None:
 
 
 def _show_metrics(difference: RunDifference) -> None:
+    """Print a table of the metrics that differ, and say where the runs end at different times."""
     from podusv_cli.comparison.run_difference import relative
     from podusv_cli.core.plugins import installed_plugins
     from podusv_cli.metrics.table import metrics_with
@@ -87,6 +89,7 @@ def _show_metrics(difference: RunDifference) -> None:
 
 
 def _show_log(log: LogDifference) -> None:
+    """Print the largest difference of each signal, its share of the peak, and its time [s]."""
     rows = [
         [d.signal, d.unit, _number(d.gap), _number(d.relative_to_peak), _number(d.time)]
         for d in log.largest

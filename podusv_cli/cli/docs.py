@@ -44,6 +44,7 @@ def docs(
 
 
 def _list(wanted: str) -> None:
+    """Print the sections that have the words, `SHOWN` of them at most."""
     from podusv_cli.workflows.docs import search
 
     hits = search(wanted)

@@ -61,6 +61,7 @@ def doubt(
 
 
 def _report(done: Doubted) -> None:
+    """Print a row for each claim, and where the report is."""
     from podusv_cli.doubt.outputs import HEAD, row
 
     echo_table(list(HEAD), [row(answer) for answer in done.answers])

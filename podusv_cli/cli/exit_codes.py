@@ -48,6 +48,7 @@ def with_exit_codes(
 
     @wraps(command)
     def run(*args: Given.args, **kwargs: Given.kwargs) -> None:
+        """The command as typer calls it; it always ends by typer.Exit."""
         with interrupts_caught() as interrupts:
             code = _exit_code(lambda: command(*args, **kwargs), interrupts, package)
             interrupts.ending = interrupts.number > 0
@@ -59,6 +60,10 @@ def with_exit_codes(
 
 
 def _exit_code(command: Callable[[], None], interrupts: Interrupts, package: str) -> int:
+    """Run a command; 0, or the exit code of its error, which is printed.
+
+    typer's own errors pass: it prints them itself. `package` is whose code a traceback blames.
+    """
     try:
         command()
     except (typer.Abort, typer.BadParameter):

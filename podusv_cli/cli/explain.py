@@ -75,6 +75,7 @@ def _echo_figure(name: str | None, plugins: Known) -> bool:
 
 
 def _echo_finding(kind: FindingKind) -> None:
+    """Print what a finding says, when it does, and what to do."""
     condition = f"condition: {kind.condition}" if kind.condition else ""
     remedy = f"remedy: {kind.remedy}" if kind.remedy else ""
     facts = f"finding {kind.when} a run, {kind.about}"
@@ -82,6 +83,7 @@ def _echo_finding(kind: FindingKind) -> None:
 
 
 def _echo(row: ExplainRow) -> None:
+    """Print a key's row: meaning, type, unit, range and default, or the keys in it."""
     where = f"in {', '.join(row.kinds)}" if row.kinds else ""
     if row.type in ("keys", "kinds"):
         inside = f"{row.type}: {', '.join(row.choices)}" if row.choices else ""

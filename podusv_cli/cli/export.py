@@ -85,6 +85,7 @@ def export(
 
 
 def _check(folder: Path, *, trusted: bool) -> None:
+    """Compare an exported law with its samples, and exit with 0 or `DIFFERS`."""
     from podusv_cli.export.check import check  # heavy imports only when needed
 
     results = check(folder, trusted=trusted)

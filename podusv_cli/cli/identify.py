@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 def _show_columns(log: Path, as_json: bool) -> None:
+    """Print the columns of a log, or as JSON; warnings go to the standard error."""
     from podusv_cli.identify.logs.listing import listing
 
     found = listing(log)
@@ -28,6 +29,7 @@ def _show_columns(log: Path, as_json: bool) -> None:
 
 
 def _report_columns(found: Listing) -> None:
+    """Print a row for each column, and a section `identify` to begin with."""
     rows = [
         [c.name, f"{c.rate:.4g}", f"{c.least:.5g}", f"{c.most:.5g}", f"{c.missing:.1%}", c.guess]
         for c in found.columns
@@ -99,6 +101,7 @@ def identify(
 
 
 def _report(done: Identified) -> None:
+    """Print the forces, the scores (of the judged logs, if there are any), and what stays open."""
     from podusv_cli.identify.outputs import FORCES, SCORES, force_rows, score_rows
     from podusv_cli.identify.phrases import open_words, summary
 

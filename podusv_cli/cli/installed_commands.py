@@ -48,6 +48,10 @@ def load_command(name: str) -> Any:
 
 
 def _command_of(name: str, function: Callable[..., None], *, takes_anything: bool = False) -> Any:
+    """A function of an installed package as a command of click, with podusv's exit codes.
+
+    `takes_anything` is for one that only refuses: it has to get as far as its sentence.
+    """
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     settings = {"ignore_unknown_options": takes_anything, "allow_extra_args": takes_anything}
     package = getattr(installed_commands()[name].dist, "name", name)
@@ -56,6 +60,8 @@ def _command_of(name: str, function: Callable[..., None], *, takes_anything: boo
 
 
 def _refusing(why: str) -> Callable[[], None]:
+    """A command in place of one that cannot be loaded; it raises LawError with `why`."""
+
     def refuse() -> None:
         raise LawError(why)
 

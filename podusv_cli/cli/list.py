@@ -115,12 +115,14 @@ def _size(presets: Presets, name: str, plugins: Known) -> str:
 
 
 def _figures(plugins: Known) -> Entries:
+    """Name, caption and an empty note of every figure."""
     from podusv_cli.figures.drawing import figures_with  # matplotlib is slow to import
 
     yield from ((name, sheet.caption, "") for name, sheet in figures_with(plugins).items())
 
 
 def _findings(plugins: Known) -> Entries:
+    """Name, meaning and a note on when it is looked for of every finding."""
     from podusv_cli.findings.finding import finding_kinds  # imports half of podusv
 
     for name, finding in finding_kinds(plugins).items():

@@ -49,6 +49,7 @@ def live(
     gc.set_threshold(10_000)
 
     def print_address(address: str) -> None:
+        """Print the page's address, and open it where there is a display."""
         import webbrowser
 
         has_display = sys.platform == "darwin" or any(map(os.environ.get, DISPLAYS))

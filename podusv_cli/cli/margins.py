@@ -92,6 +92,7 @@ def margins(
 
 
 def _report(result: MarginsOfLaws) -> None:
+    """Print the motion, poles and margins of each law."""
     for label, law in result.laws.items():
         echo_entry(label, _motion(law), *_remarks(law), f"poles [1/s]: {_poles(law)}")
     echo_table(HEAD, [row for label, law in result.laws.items() for row in _rows(label, law)])
@@ -100,6 +101,7 @@ def _report(result: MarginsOfLaws) -> None:
 
 
 def _motion(law: LoopMargins) -> str:
+    """The steady motion about which the loop is linear, in one line with units."""
     linear, course = law.linear, law.linear.course
     u, v, r = (x if abs(x) > STILL else 0.0 for x in linear.motion)
     b_u, b_v, b_r = linear.load
@@ -112,6 +114,7 @@ def _motion(law: LoopMargins) -> str:
 
 
 def _remarks(law: LoopMargins) -> list[str]:
+    """What was left out, where the loop is open or singular, and whether it is unstable."""
     said = [f"without {what}" for what in law.left_out]
     said += [f"the {axis} loop is open: the load does not answer the motion" for axis in law.open]
     if law.linear.singular:
@@ -135,6 +138,7 @@ def _poles(law: LoopMargins) -> str:
 
 
 def _rows(label: str, law: LoopMargins) -> list[list[str]]:
+    """Table rows of a law: margins of each load's loop, then those of all loops together."""
     from podusv_cli.theory.loop_margins import NUMBERS
 
     rows = []

@@ -90,6 +90,7 @@ def optimum(
 
 
 def _report(done: Optimum) -> None:
+    """Print the stages of the search, and how far podusv's own run of the optimum departs."""
     name = done.minimised
     unit = done.run.rows[name].unit
     rows = [

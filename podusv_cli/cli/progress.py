@@ -60,6 +60,7 @@ def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
     with ExitStack() as stack:
 
         def draw(name: str, fraction: float, patience: float) -> None:
+            """Move the bar `name` to `fraction`; no bar is drawn before `patience` [s] are over."""
             if not bars.live.is_started and time.monotonic() - began > patience:
                 stack.callback(_stop, bars)
                 bars.start()
@@ -96,6 +97,7 @@ def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
     begins: list[float] = []
 
     def tell(fraction: float) -> None:
+        """Note that `fraction` of the work is done; print `text` once if it takes long."""
         begins.append(time.monotonic())
         if fraction < 1.0 and begins[-1] - begins[0] > seconds:
             begins[:] = [math.inf]  # from here on less has passed than nothing
@@ -159,6 +161,7 @@ class StudyLine:
         self._erase()
 
     def _erase(self) -> None:
+        """Remove the line, if there is one; a closed pipe is no error here."""
         if self._wanted and self._last:
             with suppress(OSError):
                 typer.echo(ERASED, nl=False, err=True)

@@ -133,6 +133,7 @@ def _tell(done: Swept, *, as_json: bool, quiet: bool) -> None:
 
 
 def _report(done: Swept) -> None:
+    """Print how many runs are made, and of a study with results its table and verdicts."""
     if done.results is None:
         echo(f"{done.tally.made} of {done.tally.wanted} runs are made; {_next(done)}")
         for line in done.missing_runs:

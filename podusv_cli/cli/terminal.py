@@ -86,6 +86,7 @@ def echo_entry(name: str, *lines: str, facts: str = "") -> None:
     name, facts, lines = visible(name), visible(facts), tuple(map(visible, lines))
 
     def wrap_indented(text: str, indent: str) -> str:
+        """A paragraph within the terminal's width; its first line begins with `indent`."""
         return textwrap.fill(
             text, width, initial_indent=indent, subsequent_indent="    ", break_on_hyphens=False
         )

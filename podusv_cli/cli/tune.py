@@ -64,6 +64,7 @@ def tune(
 
 
 def _report(done: Tuned) -> None:
+    """Print ranks and objective of each law before and after tuning, and remarks."""
     from podusv_cli.studies.tuning.remarks import remarks
     from podusv_cli.studies.tuning.report import count_change, intervals, percent, ratio, spread
 

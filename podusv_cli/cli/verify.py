@@ -75,6 +75,7 @@ def verify(
 
 
 def _report(done: Verification) -> None:
+    """Print numbers by step for each run, the rankings, and whether all are converged."""
     for label, run in done.runs.items():
         _show_run(label, run, done)
     if done.rankings:
@@ -92,6 +93,7 @@ def _report(done: Verification) -> None:
 
 
 def _show_run(label: str, run: RunVerification, done: Verification) -> None:
+    """Print a run's numbers at each step, their order and error, and where one ended early."""
     steps = [f"{level.step:.6g} s" for level in run.levels]
     rows = [
         [name, done.units.get(name, "m"), *_cells(e, done.tolerance)]
@@ -106,6 +108,7 @@ def _show_run(label: str, run: RunVerification, done: Verification) -> None:
 
 
 def _cells(e: StepEstimate, tolerance: float) -> list[str]:
+    """Table cells of one number: its value at each step, order, relative error, verdict."""
     values = ["-" if math.isnan(value) else f"{value:.6g}" for value in e.values]
     order = "-" if math.isnan(e.order) else f"{e.order:.1f}"
     error = "-" if math.isinf(e.relative) else f"{e.relative:.1e}"
@@ -113,6 +116,7 @@ def _cells(e: StepEstimate, tolerance: float) -> list[str]:
 
 
 def _show_rankings(rankings: dict[str, Ranking]) -> None:
+    """Print the order of the laws by each metric."""
     echo("ranking, smallest first:")
     for name, rank in rankings.items():
         echo_entry(f"  {name}", _in_order(rank))
@@ -120,6 +124,7 @@ def _show_rankings(rankings: dict[str, Ranking]) -> None:
 
 
 def _in_order(rank: Ranking) -> str:
+    """A ranking in words: labels in order, which are equal, which are too close to tell."""
     if not rank.same:
         return "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
     first = rank.orders[0]

@@ -106,6 +106,7 @@ def judge(
 def _verdict(
     parsed: ParsedClaim, runs: Mapping[str, ClaimedRun], metrics: Mapping[str, MetricAbout]
 ) -> RunsVerdict:
+    """A claim's verdict: its premise first; an untestable one gets no answer, only numbers."""
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and (given := evaluation.holds(parsed.given)) is not True:
         doubts = "; ".join(dict.fromkeys(evaluation.doubts))

@@ -140,6 +140,7 @@ def reduce_curve(
 
 
 def _refuse_thinned_log(text: str, label: str, run: ClaimedRun) -> CannotTell:
+    """Why a claim on a signal cannot be judged where not every step is logged."""
     return CannotTell(
         f"{text}: {label} logs only one step in {run.every}, and the signal is unknown in between; "
         "log every step (log.every: 1), or use a metric, which sees every step"

@@ -197,6 +197,7 @@ class Evaluation(Walk):
         refuse(node, "no meaning here; write run.metric or run.signal")
 
     def _call(self, node: ast.Call) -> Quantity:
+        """The value of a function of signals or numbers. Raises ExpressionError."""
         name = known_name(function(node), [*REDUCERS, *OPERATIONS, "rate"], "function")
         if name in REDUCERS:
             return self._or_doubt(lambda: self._reduce(name, node))
@@ -208,12 +209,14 @@ class Evaluation(Walk):
         return curves.rate(self._curve(node.args[0]))
 
     def _curve(self, node: ast.expr) -> Curve:
+        """The signal that a node stands for. Raises ExpressionError for a number."""
         curve = self.value(node)
         if not isinstance(curve, Curve):
             refuse(node, "a number where a signal is needed")
         return curve
 
     def _reduce(self, name: str, node: ast.Call) -> float:
+        """A number from a signal, over all times or between two [s]. Raises ExpressionError."""
         wanted = " and ".join(["a signal", *filter(None, [SETTINGS.get(name)])])
         count = 1 + (name in SETTINGS)
         if len(node.args) not in (count, count + 2):

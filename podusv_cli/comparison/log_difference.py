@@ -84,6 +84,7 @@ class Deviation:
 
 
 def _ratio(gap: float, whole: float) -> float:
+    """The gap in parts of `whole`; inf where the whole is 0."""
     if gap == 0 or math.isinf(gap):
         return gap
     return gap / whole if whole else math.inf
@@ -138,6 +139,7 @@ class LogDifference:
 
 
 def _as_json(d: Deviation) -> dict[str, Any]:
+    """A deviation as `podusv diff --json` prints it."""
     return {
         "signal": d.signal,
         "time": d.time,
@@ -234,6 +236,7 @@ def _place_of_maximum(array: Any) -> Place:
 
 
 def _deviation(pair: _Pair, place: Place) -> Deviation:
+    """The deviation of two arrays at one place, with the peak of both for comparison."""
     inner = place if pair.times is None else place[1:]
     index = f"[{','.join(map(str, inner))}]" if inner else ""
     both = np.abs(np.concatenate([pair.one.ravel(), pair.other.ravel()]))

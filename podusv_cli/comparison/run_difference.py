@@ -120,6 +120,7 @@ def scenario_changes(one: str, other: str) -> dict[str, Change]:
 
 
 def _tree(resolved: str) -> dict[str, Any]:
+    """The keys and values of a resolved scenario. Raises StorageError."""
     faults: list[Fault] = []
     node = read(resolved, "resolved scenario", faults)
     tree = plain(node) if node else None

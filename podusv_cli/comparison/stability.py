@@ -43,6 +43,7 @@ def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
 
 
 def _failing(theory: Mapping[str, Any]) -> Iterator[str]:
+    """The conditions and assumptions of a theory.json that do not hold, in words."""
     for condition in theory["conditions"]:
         if not condition["holds"]:
             value, limit = _number(condition["value"], "g"), _number(condition["limit"])

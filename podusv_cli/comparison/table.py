@@ -262,6 +262,7 @@ def _format_number(number: float, digits: int = DIGITS) -> str:
 
 
 def _cell(number: float, first: float, best: float, digits: int) -> str:
+    """A number with `*` where it shows like the best one, and its ratio to the first run's."""
     if math.isnan(number):
         return "-"
     shown = _format_number(number, digits)

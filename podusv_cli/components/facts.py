@@ -229,6 +229,7 @@ class Facts:
             return f"no facts: {in_a_line(error)}"
 
     def _in_words(self) -> str:
+        """The facts with their units, in a sentence."""
         why = "the moment" if self.g_r == self.w_f else "the delay"
         return (
             f"F = {self.F:.4g} N, U = {self.U:.4g} m/s, N = {self.N:.4g} N m, r_top = "

@@ -21,6 +21,8 @@ def times(words: str, factor: Callable[[Facts], float]) -> Rule:
 
 
 def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
+    """The rule for a pole of an observer, which a slow measurement limits."""
+
     def of(facts: Facts, default: float) -> float:
         most = OBSERVED / facts.period if facts.period else math.inf
         return min(default * factor(facts), most)

@@ -183,6 +183,7 @@ class StudyAbout(StudyIdentity):
 
     @model_validator(mode="after")
     def _of_one_study(self) -> Self:
+        """Raises ValueError where names, laws or cells contradict each other."""
         if wrong := [name for name, about in self.metrics.items() if about.name != name]:
             raise ValueError(f"metrics: {wrong[0]} is called otherwise inside")
         if len({*self.measured} & {*self.metrics}) != len(self.measured):
@@ -263,6 +264,7 @@ class RunAbout(_PlainJson):
 
     @model_validator(mode="after")
     def _has_its_parts(self) -> Self:
+        """Raises ValueError where a part that readers ask for is missing."""
         try:
             parts = [self.section(key) for key in ("vessel", "path", "controller", *self.said)]
         except (LookupError, TypeError, ValueError):

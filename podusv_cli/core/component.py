@@ -155,6 +155,7 @@ class _Field(NamedTuple):
 
 @cache
 def _fields(kind: type[Component]) -> tuple[_Field, ...]:
+    """The fields of a component: name, allowed words, and whether it holds a float."""
     return tuple(
         _Field(
             name,
@@ -166,6 +167,7 @@ def _fields(kind: type[Component]) -> tuple[_Field, ...]:
 
 
 def _choices(component: Component) -> Iterator[str]:
+    """Names of the fields that select and count; those of a part after its own name."""
     for name, field in type(component).model_fields.items():
         content = getattr(component, name)
         if isinstance(content, Component):

@@ -109,6 +109,8 @@ Decorator = Callable[[Callable[..., Sentences]], FindingKind]
 
 
 def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
+    """The decorator for findings that are looked for before or after a run."""
+
     def kind_of(
         name: str,
         *,

@@ -70,11 +70,13 @@ class Plugin:
         return [thing.__name__ for thing in self._offers(room) if hasattr(thing, "__path__")]
 
     def _offers(self, room: str) -> Iterator[Any]:
+        """What the plug-in has for a room of podusv, imported where it is an entry point."""
         for place, thing in self.offers:
             if place in ("", room):
                 yield self._load_point(thing) if isinstance(thing, EntryPoint) else thing
 
     def _load_point(self, point: EntryPoint) -> Any:
+        """What an entry point names. Raises LawError where it cannot be imported."""
         try:
             return point.load()
         except Exception as error:
@@ -95,6 +97,7 @@ Plugins = tuple[Plugin, ...]
 
 
 def _inside(thing: Any) -> Iterator[Any]:
+    """All public things of a module; any other thing by itself."""
     if not isinstance(thing, ModuleType):
         yield thing
         return
@@ -127,6 +130,10 @@ def _module(name: str, path: str, text: str) -> ModuleType:
 
 
 def _execute_module(whole: str, path: str, text: str) -> ModuleType:
+    """The module of a plug-in's text, under the name `whole` in sys.modules.
+
+    Raises LawError with the line that failed.
+    """
     module = ModuleType(whole)
     module.__file__ = str(Path(path).resolve())
     vars(module)[TEXT] = text

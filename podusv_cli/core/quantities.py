@@ -46,6 +46,7 @@ def exponent(formula: str) -> str:
 
 
 def _in_words(amount: float, units: dict[str, float]) -> str:
+    """An amount in the largest of these units that it reaches; their sizes rise."""
     fitting = [unit for unit, size in units.items() if amount >= size] or [next(iter(units))]
     digits = f"{amount / units[fitting[-1]]:.2g}"
     return f"{float(digits):g} {fitting[-1]}"

@@ -105,6 +105,7 @@ def signals(*packages: str, plugins: Plugins = ()) -> list[Signal]:
 
 
 def _signals(thing: Any) -> Iterator[Signal]:
+    """The signals in a thing: itself, its `signal`, those of its class, tuple or dict."""
     inside = getattr(thing, "signal", None)
     if isinstance(thing, Signal):
         yield thing
@@ -140,6 +141,7 @@ def scan_package(package: str) -> tuple[tuple[str, Any], ...]:
 
 
 def _import_module(module: str) -> Any:
+    """The module of this name. Raises LawError where it cannot be imported."""
     try:
         return import_module(module)
     except SyntaxError as error:  # which names its place

@@ -99,6 +99,7 @@ def _is_number(cell: str) -> bool:
 
 
 def _check_counts(lines: list[TextLine], noun: str, layouts: Layouts) -> None:
+    """Raises ValueError for a line with another number of cells than a layout allows."""
     for number, cells in lines:
         if len(cells) not in layouts or len(cells) != len(lines[0].cells):
             wanted = " or ".join(f"{n} ({_list_names(names)})" for n, names in layouts.items())
@@ -111,6 +112,7 @@ def _list_names(names: Sequence[str]) -> str:
 
 
 def _numbers(lines: list[TextLine], noun: str) -> Vector:
+    """The cells as numbers (lines, cells). Raises ValueError for what is no finite number."""
     if wrong := _wrong_cell(lines, noun):
         raise ValueError(wrong)
     rows = np.array([cells for _, cells in lines], dtype=float)

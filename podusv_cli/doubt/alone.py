@@ -99,6 +99,10 @@ class TriedChoice:
         return [self._nearest(side, holding) for side in sides if side]
 
     def _nearest(self, turned: Sequence[TriedValue], holding: Sequence[float]) -> Turn:
+        """Where the answer turns nearest to the scenario's own value.
+
+        `turned` are trials with another answer, `holding` values with the same one.
+        """
         own = self.choice.own
         first = min(turned, key=lambda t: abs(t.value - own))
         inside = [
@@ -153,6 +157,7 @@ class _Side:
     """The values between the scenario's own and an end of the range, by their distance from it."""
 
     def __init__(self, choice: Choice, end: float, judge: Judge, base: Judged) -> None:
+        """The values of a choice between its own and `end`; `base` is judged at its own."""
         assert choice.range
         self.choice, self.end, self.judge, self.base = choice, end, judge, base
         self.scale, self.whole = choice.range.scale, abs(end - choice.own)
@@ -189,6 +194,7 @@ def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumb
     edges = number.turning(side.base.numbers[claim])
 
     def away(distance: float) -> float:
+        """How far the claim's number is from its limit at this distance; inf where unknown."""
         judged = side.judge_at(distance) if distance else side.base
         far = min(abs(number.of(judged.numbers.get(claim, {})) - edge) for edge in edges)
         return far if math.isfinite(far) else math.inf
@@ -201,6 +207,10 @@ def _look_nearer(side: _Side, places: list[float], claim: str, number: ClaimNumb
 def _golden(
     side: _Side, claim: str, away: Callable[[float], float], around: tuple[float, float, float]
 ) -> None:
+    """Narrow `around` (distances a < b < c) to where the claim's number is nearest its limit.
+
+    By the golden section; it stops where a crossing is found, or would need a steeper number.
+    """
     a, b, c = around
     for _ in range(LOOKS):
         slopes = (away(a) - away(b)) / (b - a), (away(c) - away(b)) / (c - b)

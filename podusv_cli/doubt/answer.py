@@ -85,6 +85,7 @@ class DoubtAnswer:
 
 
 def _word(answer: DoubtAnswer, turns: Sequence[Turn], turned: int) -> str:
+    """The word for an answer, from the nearest turn to the draws that turn it."""
     if answer.verdict.answer is None:
         return ""
     nearest = min((turn.share for turn in turns), default=math.nan)
@@ -129,6 +130,7 @@ def labels_of(claim: Any) -> frozenset[str]:
 
 
 def _answer(verdict: Verdict, tried: Tried) -> DoubtAnswer:
+    """All that was found of one claim: single turns, draws together, and what explains them."""
     claim, base, worlds = verdict.name, tried.base, tried.worlds
     labels = labels_of(verdict.claim)
     moved = [

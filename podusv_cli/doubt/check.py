@@ -21,6 +21,7 @@ def doubt_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def _faults_of_printed(scenario: Scenario) -> Faults:
+    """Keys in `doubt.printed` that the scenario has not."""
     assert scenario.doubt
     known = set(by_key(with_loads(scenario.singles())))
     sections = {key[:end] for key in known for end in range(len(key)) if key[end] in ".["}
@@ -33,6 +34,7 @@ def _faults_of_printed(scenario: Scenario) -> Faults:
 
 
 def _vary(scenario: Scenario) -> Faults:
+    """Keys in `doubt.vary` that cannot be moved."""
     assert scenario.doubt
     known = by_key(with_loads(scenario.singles()))
     for name, quantity in scenario.doubt.vary.items():

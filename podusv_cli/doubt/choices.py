@@ -142,6 +142,7 @@ def _leaves(scenario: Scenario) -> Iterator[tuple[Route, Any]]:
 
 
 def _within(part: Any, at: Route) -> Iterator[tuple[Route, Any]]:
+    """Route and content of each single value in a part; `at` is the part's own route."""
     if isinstance(part, Component):
         for name in type(part).model_fields:
             if name not in FIXED:
@@ -181,6 +182,7 @@ def _in_whole_steps(base: Choice, scenario: Scenario, route: Route) -> tuple[flo
         return ()
 
     def is_taken(value: float) -> bool:
+        """Whether the scenario takes this value at the route."""
         with suppress(ValueRefused):
             return bool(with_values(scenario, {route: value}))
         return False

@@ -86,6 +86,10 @@ def _strictly(tolerance: float) -> tuple[float, ...]:
 
 
 def _link(left: ast.expr, right: ast.expr, sign: ast.cmpop, tolerance: float) -> ClaimNumber:
+    """The number that a comparison is about, and the edges at which its answer turns.
+
+    An edge moves with `tolerance` as the claim's own comparison does.
+    """
     factors, between = SIDES.get(type(sign), _strictly)(tolerance), type(sign) not in SIDES
     with suppress(ValueError):  # not a plain number
         limit = float(ast.literal_eval(right))

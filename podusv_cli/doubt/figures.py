@@ -106,6 +106,7 @@ def _lanes(
     ranks = np.argsort(np.argsort(numbers))
 
     def follows(column: int) -> float:
+        """How closely the order of draws goes with a choice; the most negative is the closest."""
         with np.errstate(all="ignore"):
             correlation = np.corrcoef(ranks, draws.shares[order, column])[0, 1]
         return -abs(float(np.nan_to_num(correlation)))

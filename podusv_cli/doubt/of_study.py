@@ -39,6 +39,7 @@ def study_choices(scenario: Scenario) -> list[Choice]:
 
 
 def _laws(scenario: Scenario) -> Singles:
+    """The scenario of each law that the study has."""
     assert scenario.sweep
     wanted = scenario.sweep.laws
     return {

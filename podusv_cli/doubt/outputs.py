@@ -123,6 +123,7 @@ def table(answers: Sequence[DoubtAnswer]) -> Iterator[Sequence[Any]]:
 
 
 def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
+    """Head and rows of turns.csv."""
     yield "claim", "key", "own", "turns_at", "held", "unit", "distance", "share", "task"
     for answer in report.answers:
         for turn in (*answer.turns, *answer.neighbours):
@@ -140,6 +141,7 @@ def _turns(report: DoubtReport) -> Iterator[Sequence[Any]]:
 
 
 def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
+    """Head and rows of draws.csv: values, answers and numbers of each draw."""
     names = [(claim, text) for claim, own in report.tried.base.numbers.items() for text in own]
     yield (
         "draw",
@@ -155,6 +157,7 @@ def _draws(report: DoubtReport) -> Iterator[Sequence[Any]]:
 
 
 def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
+    """The report's figures; `extras` notes those that fail."""
     from podusv_cli.doubt.figures import sketches  # matplotlib is slow to import
     from podusv_cli.figures.sketch import render_sketches
 

@@ -37,6 +37,7 @@ def _times(alone: float, together: float) -> Way:
     """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
 
     def range_times(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
+        """Factors of the scenario's value, as far as the key takes both ends; None if it cannot."""
         ends = [_inside([own / f, own * f], key) for f in (alone, together)]
         if not own or any(low * high <= 0.0 for low, high in ends):
             return None
@@ -51,6 +52,7 @@ def _plus(scale: Callable[[Scenario], float], alone: float, together: float) -> 
     """A summand up to a share of a scale, inside the key's bounds."""
 
     def range_plus(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
+        """Summands to the scenario's value, in shares of `scale`; None where that is 0."""
         if not (unit := scale(scenario)):
             return None
         ends = [

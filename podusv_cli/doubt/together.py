@@ -55,6 +55,7 @@ def draw_worlds(choices: Sequence[Choice], seed: int, count: int) -> Draws:
 
 
 def _values(choice: Choice, shares: Vector) -> list[Any]:
+    """The values of a choice at these shares (draws,) of its distribution."""
     if choice.rows:
         return list(choice.rows.distribution.at(shares).tolist())
     assert choice.range
@@ -95,6 +96,7 @@ def _differences(parts: Any, turned: Any) -> Any:
 
 
 def _describe_part(choice: Choice, part: int, inside: Any, turned: Any) -> Explained:
+    """How answers turn inside a part of a choice and outside it; True in `turned` (draws,)."""
     shares = float(turned[inside].mean()), float(turned[~inside].mean())
     more = shares[0] > shares[1]
     word = (("below", "above"), ("near", "far from"))[part][more]

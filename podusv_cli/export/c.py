@@ -53,6 +53,7 @@ def render_file(name: str, about: Mapping[str, Any]) -> str:
 
 @cache  # templates are compiled once in a process
 def _environment() -> Environment:
+    """jinja2 for the templates of this folder; a name that is missing is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined  # slow to import
 
     return Environment(
@@ -136,12 +137,14 @@ def _texts(law: ExportedLaw) -> Mapping[str, str]:
 
 
 def _list(numbers: Sequence[ExportedNumber]) -> str:
+    """Names, units and meanings of numbers, for a comment in C."""
     return ",\n           ".join(
         _comment(f"{number.name} [{number.unit}] {number.meaning}") for number in _few(numbers)
     )
 
 
 def _few(numbers: Sequence[ExportedNumber], most: int = 40) -> Iterable[ExportedNumber]:
+    """The numbers, or the first `most` of them and a last one that says so."""
     return (
         numbers
         if len(numbers) <= most

@@ -128,6 +128,7 @@ def _samples(folder: Path, about: About) -> Vector:
 
 
 def _compare_samples(what: str, samples: Vector, about: About, step: Step) -> Checked:
+    """Compare an exported law with its samples (n, columns) by bits, to the first difference."""
     given, names = 1 + INPUTS, about.columns
     whose = "the run" if about.of_run else "the law by itself in podusv"
     for row in samples:
@@ -157,6 +158,7 @@ def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -
     library.podusv_law_start(law)
 
     def step(row: Vector) -> list[float]:
+        """Demand, signals and memory that the C library gives for the inputs of one sample."""
         state, target, loads = np.split(row[1:], [STATE, STATE + TARGET])
         demand = (ctypes.c_double * DEMAND)()
         library.podusv_law_step(law, *map(_vector, (state, target, loads)), demand)
@@ -196,6 +198,7 @@ def _fmu(path: Path, place: Path, about: About) -> Step:
     said = [v.valueReference for v in description.modelVariables if v.causality != "input"]
 
     def step(row: Vector) -> list[float]:
+        """The outputs that the FMU gives for the inputs of one sample."""
         slave.setReal(given, row[1 : 1 + len(given)].tolist())
         slave.doStep(float(row[0]), about.period)
         return [float(number) for number in slave.getReal(said)]

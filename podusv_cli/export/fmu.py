@@ -85,6 +85,7 @@ def fmu(
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:
+    """A ZIP archive with the same bytes whenever it is made."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in members.items():

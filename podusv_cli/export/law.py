@@ -152,6 +152,7 @@ class ExportedLaw:
         return {**adapters, STEP: Piece(law_alone.demand, PROTOTYPE)}
 
     def _entries(self) -> Iterator[tuple[str, Any, tuple[str, ...]]]:
+        """Part, kernel and names of constants of all that the exported step calls."""
         path, *others = self.plan.functions
         yield from others
         if self.layout.shown:
@@ -245,6 +246,7 @@ class ExportedLaw:
         pointers, sizes = signatures.pointers(c), signatures.whole_numbers(n)
 
         def step_law(sample: int, inputs: Vector) -> list[float]:
+            """Demand, signals and memory after sample number `sample` with these inputs."""
             c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
             c.row[n.tau : n.tau + len(LOAD_NUMBERS)] = inputs[given:]
             step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)

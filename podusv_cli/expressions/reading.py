@@ -67,6 +67,7 @@ def syntax_tree(text: str, example: str) -> ast.expr:
 
 
 def _is_zero(node: ast.expr) -> bool:
+    """Whether a node is the number 0, with any sign."""
     match node:
         case ast.UnaryOp(operand=part):
             return _is_zero(part)

@@ -65,6 +65,7 @@ def animate(runs: Sequence[Shown], name: str) -> bytes:
 
 
 def _frames(runs: Sequence[Shown]) -> Iterator[Image.Image]:
+    """The pictures of an animation: the whole track on the left, the hull near on the right."""
     with house_style():
         figure = Page(figsize=SIZE, dpi=DPI)
         canvas = FigureCanvasAgg(figure)
@@ -79,6 +80,7 @@ def _frames(runs: Sequence[Shown]) -> Iterator[Image.Image]:
 
 
 def _gif(frames: Iterator[Image.Image]) -> bytes:
+    """The pictures as a GIF."""
     first, *rest = (frame.quantize(colors=64, dither=Image.Dither.NONE) for frame in frames)
     buffer = io.BytesIO()
     first.save(buffer, "GIF", save_all=True, append_images=rest, duration=FRAME_MS, loop=0)
@@ -86,6 +88,7 @@ def _gif(frames: Iterator[Image.Image]) -> bytes:
 
 
 def _mp4(frames: Iterator[Image.Image]) -> bytes:
+    """The pictures as an MP4 film, by ffmpeg."""
     pictures = list(frames)
     size = "x".join(map(str, pictures[0].size))
     raw = ("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(1000 / FRAME_MS))
@@ -135,6 +138,7 @@ def stage(axes: Axes, runs: Sequence[Shown], *, near: bool = False) -> Callable[
     map_axes(axes, *bounds(runs))
 
     def move(t: float) -> None:
+        """Put hulls and tracks where they are at time `t` [s]."""
         if near:
             row = min(int(np.searchsorted(followed["time"], t)), len(followed["time"]) - 1)
             east, north = (float(followed[name][row]) for name in place)

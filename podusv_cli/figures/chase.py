@@ -52,6 +52,10 @@ def as_json(content: dict[str, Any]) -> str:
 
 
 def _track(run: Shown, frames: int) -> dict[str, Any]:
+    """What the page draws of a run: at most `frames` instants of its log, and its hull.
+
+    Numbers are rounded to what can be seen, as the page holds all of them.
+    """
     count = len(run.recording["time"])
     rows = np.linspace(0, count - 1, min(count, frames)).round().astype(int)
     names = ("time", *WHERE, *(("x_d", "y_d") if run.has("z_e") else ()))

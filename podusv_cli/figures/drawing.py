@@ -88,6 +88,7 @@ def draw_in_parallel(
     sheets = tuple(sheets)
 
     def job(sheet: Sheet, tell: Progress) -> tuple[dict[str, bytes], list[Failure]]:
+        """Draw one sheet in a process of its own: its files by name, and what failed."""
         own = Extras()
         with interrupts_enabled():
             drawn = partial(draw, runs, [sheet], formats, look)

@@ -207,6 +207,7 @@ def _lines(text: Any, shown: str) -> float:
 
 
 def _above(axes: Axes) -> float:
+    """The height of the titles above a panel [inch]; they may have several lines."""
     titles = [axes.get_title(loc=place) for place in ("left", "center", "right")]
     lines = max((1 + words.count("\n") for words in titles if words), default=0)
     return float(lines * LINE * float(axes.title.get_fontsize()) + GAP) * POINT
@@ -285,6 +286,7 @@ class Panel(Axes):
     name = "podusv"
 
     def _init_axis(self) -> None:  # where matplotlib has projections give their axes
+        """The axes of this panel instead of matplotlib's own, without clearing it twice."""
         self.xaxis, self.yaxis = Across(self, clear=False), Up(self, clear=False)
         for place, axis in (
             ("bottom", self.xaxis),

@@ -36,6 +36,10 @@ def signals_over_time(
     """
 
     def family(runs: Sequence[Shown], columns: int) -> Figure:
+        """The figure: a panel for each signal that changes.
+
+        Signals that stay as they are stand in the legend instead.
+        """
         held = constants(runs, names)
         shown = [name for name in names if name not in held and any(run.has(name) for run in runs)]
         figure, panels = grid(len(shown), columns)

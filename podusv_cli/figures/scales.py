@@ -68,6 +68,10 @@ def smallest_distance(runs: Sequence[Shown]) -> float:
 
 
 def _smallest_distance_of(run: Shown) -> float:
+    """The distance [m] at which an axis of distances begins for a run.
+
+    It is the way of one step, or less where much of the log is nearer to the target.
+    """
     stride = -(-len(run.recording["time"]) // SAMPLES)
     z_e, u = (np.abs(run.signal(name)[::stride]) for name in ("z_e", "u"))
     way = run.about.step * float(np.median(u))

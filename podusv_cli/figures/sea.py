@@ -51,6 +51,7 @@ def sea(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _single_waves(axes: Axes, runs: Sequence[Shown]) -> None:
+    """Draw the elevation over the last waves, which one can tell apart."""
     span = _last_waves(*max(runs, key=lambda run: run.end).during(ELEVATION, None))
     draw_signal(axes, runs, ELEVATION, span=span)
     axes.set_xlim(*span)

@@ -50,6 +50,7 @@ def _letter_panels(family: Family) -> Family:
 
     @wraps(family)
     def draw_lettered(runs: Sequence[Shown], columns: int) -> Figure:
+        """The figure, with (a), (b), ... before the titles where it has several panels."""
         figure = family(runs, columns)
         if len(figure.axes) > 1:
             letters = chain(ascii_lowercase, map("".join, product(ascii_lowercase, repeat=2)))

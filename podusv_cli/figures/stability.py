@@ -73,6 +73,7 @@ def stability(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _curves(axes: Axes, runs: Sequence[Shown]) -> None:
+    """Draw V over time on an axis of logarithms."""
     axes.set_yscale("log")
     axes.set_ylabel(MIXED)
     for run in runs:
@@ -123,6 +124,7 @@ def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
 
 
 def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
+    """Draw V' and its bound over time; bounds far beyond all rates are left out."""
     axes.set_ylabel(rf"${V_DOT.symbol}$ [{SUM}/s]")
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:

@@ -63,6 +63,7 @@ def _scalar(runs: Sequence[Shown]) -> list[str]:
 
 
 def _describe_signal(runs: Sequence[Shown], name: str) -> dict[str, Any]:
+    """What the page says of one signal, and the scale of its axis over all runs."""
     signal = about(runs, name)
     return {
         "name": name,

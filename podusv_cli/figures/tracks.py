@@ -60,6 +60,7 @@ def targets(runs: Sequence[Shown]) -> list[Target]:
 
 
 def _target(group: Sequence[Shown], *, only: bool) -> Target:
+    """The target that these runs have in common; `only` if there is no other."""
     longest = max(group, key=lambda run: run.end).recording
     word = "path" if group[0].about.follows else "target"
     if only:

@@ -181,6 +181,7 @@ def _between(first: Shown, run: Shown) -> tuple[Vector, Vector]:
 
 
 def _whole(axes: Axes, runs: Sequence[Shown]) -> None:
+    """Draw all tracks with hulls, starts and waypoints, east over north."""
     _draw_tracks(axes, targets(runs), runs, (0.0, max(run.end for run in runs)), runs)
     scale = enlargement(runs)
     for run in runs:

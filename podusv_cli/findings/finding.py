@@ -69,6 +69,7 @@ def postflight(scenario: Scenario, log: Recording) -> list[Finding]:
 
 
 def _findings(when: str, scenario: Scenario, *seen: object) -> list[Finding]:
+    """What is found before or after a run; `seen` is what the findings of that time look at."""
     known = finding_kinds(scenario.plugged).items()
     kinds = [kind for code, kind in known if kind.when == when and code not in scenario.silence]
     with np.errstate(all="ignore"):

@@ -73,6 +73,7 @@ def _sampled_too_fast(case: Case, cause: Cause) -> Sentences:
 
 
 def _stiff(cause: Cause) -> FindingKind:
+    """The finding on loops that RK4's step makes grow, for one cause."""
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
         f"stiff-{cause}",
@@ -84,6 +85,7 @@ def _stiff(cause: Cause) -> FindingKind:
 
 
 def _sampling_finding(cause: Cause) -> FindingKind:
+    """The finding on loops that the sampling period makes grow, for one cause."""
     what, loop, gains = LOOPS[cause]
     return warn_before_run(
         f"sampled-{cause}",

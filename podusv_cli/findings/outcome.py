@@ -49,6 +49,7 @@ def warn_of_saturation(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _windup(scenario: Scenario) -> str:
+    """What to do about a demand at its limits, which depends on the law's memory."""
     law, switching = scenario.controller, _switching(scenario)
     if switching:
         return (

@@ -36,6 +36,7 @@ def conditions(scenario: Scenario) -> Iterator[str]:
 
 
 def _summary(law: PolarBackstepping, scenario: Scenario) -> str:
+    """Which conditions of the proof fail, and the rate lambda, corrected and as printed."""
     bound = ultimate_bound(law, scenario.vessel)
     failed = [_short(condition) for condition in bound.conditions if not condition.holds]
     printed = [condition.name for condition in bound.conditions if not condition.holds_printed]

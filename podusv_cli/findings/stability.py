@@ -101,6 +101,7 @@ def _rk4(matrix: Vector, step: float) -> Vector:
 
 
 def _radius(matrix: Vector) -> float:
+    """The largest size of an eigenvalue; inf for a matrix without finite numbers."""
     if not np.isfinite(matrix).all():
         return np.inf
     return float(np.abs(np.linalg.eigvals(matrix)).max())
@@ -130,6 +131,7 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
     law, about = scenario.controller, axes(scenario, nu)
 
     def slow_gain(key: str) -> float:
+        """The rate [1/s] of the loop's fastest mode with half of this gain."""
         halved = law.model_copy(update={key: 0.5 * getattr(law, key)})
         own = [
             slower.fastest
@@ -150,6 +152,7 @@ def bursts(loop: Loop, bound: AdaptedBound, error: float, step: float) -> bool:
     matrix, count = loop.matrix, len(loop.memory) + 1
 
     def rates(s: Vector) -> Vector:
+        """The rates of `s`: velocity error [m/s], the loop's memory, estimated load b_hat [N]."""
         phi = s[0] / (4.0 * bound.partial)
         linear = matrix @ s[:count]
         linear[0] -= (s[-1] - bound.initial) * phi / bound.inertia

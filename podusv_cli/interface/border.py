@@ -39,6 +39,7 @@ def with_short_traceback(function: Callable[Given, Result]) -> Callable[Given, R
 
     @wraps(function)
     def call_shortened(*given: Given.args, **named: Given.kwargs) -> Result:
+        """The function's result; its own errors begin where the user called it."""
         __tracebackhide__ = True
         try:
             return function(*given, **named)

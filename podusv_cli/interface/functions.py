@@ -327,6 +327,7 @@ def request(out: Any, force: bool, figures: bool) -> Request:
 
 
 def _open_member(member: Member) -> Run:
+    """A finished run of a comparison's folder."""
     there = member.folder
     assert there is not None  # the members of a folder are finished
     warned = tuple(map(str, json_files.read_as(there.path / "metrics.json", _Noticed).warnings))
@@ -371,6 +372,10 @@ def _file(source: Any) -> Path | None:
 def _items(
     given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None, align: str
 ) -> list[Members]:
+    """What is compared: runs, then measured logs; `files` has the path of each given, if any.
+
+    Raises UsageError for changes where only finished runs are given.
+    """
     logs = [file for file in files if file and is_log(file)]
     others = [(source, f) for source, f in zip(given, files, strict=True) if f not in logs]
     folders = [file if file and file.is_dir() else None for _, file in others]

@@ -290,6 +290,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return self._task.observation(now).T.copy(), info
 
     def _check_actions(self, actions: Vector) -> Vector:
+        """Actions as numbers (environments, 2) [N, N m]. Raises UsageError."""
         if not self._marches:
             raise UsageError("podusv.gym: no episode has begun; call reset first")
         given = numbers(actions)

@@ -136,6 +136,7 @@ class EpisodeTask:
         return np.array([_finite(part, shape, "observe", now.time) for part in parts])
 
     def _check_reward(self, reward: str) -> str:
+        """The reward's metric. Raises UsageError for one that is not known on the way."""
         known = gathered_metrics(self.scenario)
         if reward in self.scenario.known_metrics() and reward not in known:
             raise UsageError(
@@ -148,6 +149,7 @@ class EpisodeTask:
         return reward
 
     def _limits(self, given: Limits | None) -> Vector:
+        """Largest surge force [N] and yaw moment [N m], (2,). Raises UsageError."""
         limits = numbers(self.scenario.actuator.limits() if given is None else given)
         if limits.shape != (OUTPUTS,) or not (limits >= 0.0).all():
             raise UsageError(
@@ -162,6 +164,7 @@ class EpisodeTask:
         return limits
 
     def _check_sweep(self) -> None:
+        """Raises UsageError for a grid, or draws of the controller, which is learned here."""
         if self.sweep.grid:
             raise UsageError(
                 f"podusv.gym: sweep.grid has several values of {', '.join(self.sweep.grid)}; an "

@@ -45,6 +45,7 @@ def columns(parameters: Mapping[str, Any]) -> Columns:
 
 
 def _column(key: str, given: Any) -> list[Any]:
+    """The values of one key, one a run. Raises ParameterError."""
     array = np.asarray(given, object)
     if array.ndim != 1:
         what = f"an array of shape {array.shape}" if array.ndim else f"{given!r:.60}"

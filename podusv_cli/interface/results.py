@@ -309,6 +309,7 @@ def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
 
 
 def _picture(runs: Mapping[str, Run]) -> str:
+    """The tracks as an image inside HTML."""
     from podusv_cli.figures.style import image
 
     content: Any = image(figure(runs, ("trajectory",), 1), "png")

@@ -170,6 +170,10 @@ class Session:
         return self.observe()
 
     def _check_demand(self, demand: Sequence[float] | Vector) -> tuple[float, float]:
+        """Surge force [N] and yaw moment [N m].
+
+        Raises UsageError, also after the end of the run.
+        """
         if self._status != "running":
             raise UsageError(
                 f"session: the run has {self._status} at t = {self._march.time:g} s and takes no "

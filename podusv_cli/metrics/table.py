@@ -133,6 +133,7 @@ class Metrics(Probe):
 
     @cached_property
     def _first(self) -> Vector:
+        """The vector of all accumulators at the start, each in its own part."""
         parts = [np.zeros(self.ahead)]
         parts += [np.array([*p.first, *[0.0] * (n - len(p.first))]) for p, n in self.parts]
         return np.concatenate(parts)

@@ -141,6 +141,10 @@ class _Program:
         told: Callable[[int], None],
         warm: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
+        """The problem with `n` segments; `told` hears the number of each iteration.
+
+        `warm` are IPOPT's options where the guess is nearly an optimum.
+        """
         ca = casadi()
         self.step = problem.duration / n
         self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
@@ -216,6 +220,7 @@ class _Program:
         """A function for every iteration: tells of it, and whether an interrupt waits."""
 
         def look() -> bool:
+            """Count an iteration, and say whether the user wants to stop."""
             self.iterations += 1
             self.told(self.iterations)
             return bool(here.number)

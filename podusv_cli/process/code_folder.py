@@ -73,6 +73,7 @@ def _demand(true: bool, otherwise: str) -> None:
 
 
 def _roots() -> Iterator[Path]:
+    """The folders in which code may be kept, the user's own choice first."""
     if given := os.environ.get("PODUSV_CACHE"):
         yield Path(given).absolute()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
@@ -105,6 +106,7 @@ def _check(folder: Path) -> None:
 
 
 def _is_marked(folder: Path) -> bool:
+    """Whether podusv made this folder; it removes nothing from any other."""
     with suppress(OSError):
         return (folder / MARK).read_bytes() == MARKED
     return False

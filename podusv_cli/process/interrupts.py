@@ -109,6 +109,7 @@ def interrupts_enabled() -> AbstractContextManager[None]:
 
 @contextmanager
 def _deferring(deferred: bool) -> Iterator[None]:
+    """Defer interrupts, or not, inside the block; one that waits is raised at its ends."""
     with interrupts_caught() as here:
         before, here.deferred = here.deferred, deferred
         try:

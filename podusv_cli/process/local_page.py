@@ -40,6 +40,10 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, port: int, page: Callable[[str], str]) -> None:
+        """At a port of this machine, 0 for any; `page` makes the HTML for a secret path.
+
+        The path is what keeps other users and pages of the web out.
+        """
         super().__init__((HOST, port), _Handler)
         self.base = f"/{secrets.token_urlsafe(16)}/"
         self.hosts = {f"{name}:{self.server_port}" for name in (HOST, "localhost")}
@@ -107,6 +111,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(code, sentence.encode(), TEXT)
 
     def _send(self, code: int, content: bytes, kind: str) -> None:
+        """Answer with an HTTP status `code` and content of this kind."""
         self.send_response(code)
         for name, text in {**HEADERS, "Content-Type": kind, "Content-Length": len(content)}.items():
             self.send_header(name, str(text))

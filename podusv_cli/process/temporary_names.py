@@ -55,6 +55,7 @@ def _machine() -> str:
 
 
 def _alive(process: int) -> bool:
+    """Whether a process of this number runs, whoever's it is."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

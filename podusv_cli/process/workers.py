@@ -114,6 +114,7 @@ def run_shares(
 
 
 def _one_by_one(jobs: Sequence[Job], tell: Progress) -> list[Outcome]:
+    """The outcome of each job, in this process; `tell` hears which share is done."""
     outcomes: list[Outcome] = []
     with interrupts_caught() as interrupts:
         for job in jobs:
@@ -160,6 +161,7 @@ class _Pool:
         done: Callable[[int, Outcome], None],
         progress: Report,
     ) -> None:
+        """Workers for numbered `jobs`; `done` gets each outcome, `progress` the fractions done."""
         self._jobs, self._done, self._progress = jobs, done, progress
         self._tries = Counter[int]()
         self._again: list[tuple[int, Job]] = []
@@ -223,6 +225,7 @@ class _Pool:
 
 
 def _work(job: Job, pipe: Connection, inherited: Iterable[Connection]) -> None:
+    """Run a job in a new process and send its outcome; `inherited` are others' ends of pipes."""
     for end in inherited:
         end.close()
     # A broken pipe means that the parent has ended.

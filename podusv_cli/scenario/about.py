@@ -42,6 +42,7 @@ def identify_of(about: RunAbout | None) -> Identify | None:
 
 
 def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
+    """What readers need of one run's scenario; `identify` gives the frame of measured logs."""
     law, approach = scenario.controller, scenario.controller.approach()
     return RunAbout(
         **_of_parts(scenario),

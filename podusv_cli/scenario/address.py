@@ -48,6 +48,7 @@ def _fields(kind: type[Component]) -> frozenset[str]:
 
 
 def _inside(whole: Any, step: str | int) -> Any:
+    """One step down: a field by name, an item of a list by index; else LookupError."""
     if isinstance(whole, Component) and step in _fields(type(whole)):
         return getattr(whole, str(step))
     if isinstance(whole, tuple) and isinstance(step, int):
@@ -125,6 +126,10 @@ def _section(scenario: Scenario, section: str, new: Mapping[Route, Any]) -> Any:
 
 
 def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Any]) -> Component:
+    """`old`, the part at route `at`, with new values; `new` has their routes below it.
+
+    Raises ValueRefused with the sentence of the key that cannot take its value.
+    """
     data: dict[str, Any] = {}
     for steps, number in new.items():
         name, inside = str(steps[0]), steps[1:]

@@ -50,6 +50,7 @@ def of_numbers(scenario: Scenario, sound: Scenario | None = None) -> Conflicts:
 
 
 def _of_times(scenario: Scenario) -> Conflicts:
+    """Periods [s] of laws, trials and the control loop that are no whole number of steps."""
     laws = scenario.laws()
     sampled = {
         f"{at}.{law.period_key}".rstrip("."): law.sample_period() for at, law in laws.items()
@@ -151,6 +152,7 @@ def _seeing(scenario: Scenario) -> Conflicts:
 
 
 def _names(scenario: Scenario) -> Conflicts:
+    """Labels of laws and names of claims that cannot become names of folders and columns."""
     for label in scenario.controllers:
         if not LABEL.fullmatch(label):
             yield f"controllers.{label}", LABEL_IN_WORDS

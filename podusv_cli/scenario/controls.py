@@ -92,6 +92,10 @@ def _put_first(control: Knob) -> Knob:
 
 
 def _of_part(scenario: Scenario, part: str, at: Route, ruled: set[Route]) -> Iterator[Knob]:
+    """The controls of the part at route `at`, shown under the heading `part`, and of parts in it.
+
+    `ruled` are the routes of values that a rule made of other values, not the user.
+    """
     component: Any = scenario
     way: Route = ()
     for step in at:
@@ -135,6 +139,7 @@ def _of_waypoints(at: Route, points: Sequence[Sequence[float]]) -> Iterator[Knob
 def _control(
     scenario: Scenario, part: str, at: Route, key: Key, content: Any
 ) -> dict[str, Any] | None:
+    """The fields of a `Knob` for one key, or None for content that no slider or list can set."""
     place, default, section = dotted_key(at), key.default, str(at[0]).removesuffix("s")
     words = {
         "key": place,

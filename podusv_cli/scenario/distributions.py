@@ -73,6 +73,7 @@ class Bounded(Component):
 
     @model_validator(mode="after")
     def _leaves_something(self) -> Self:
+        """Raises ValueError where `within` excludes nearly all of the distribution."""
         if self.within is not None:
             _check_order("within", self.within)
             left = self.shares[1] - self.shares[0]
@@ -119,6 +120,7 @@ def _halving_places(low: float, high: float) -> Vector:
 
 
 def _check_order(name: str, bounds: tuple[float, ...]) -> None:
+    """Raises ValueError where the first bound is not below the last, or both are too far apart."""
     low, high = bounds[0], bounds[-1]
     if not low < high:
         raise ValueError(f"{name}: {low:.15g} is not below {high:.15g}")
@@ -127,6 +129,7 @@ def _check_order(name: str, bounds: tuple[float, ...]) -> None:
 
 
 def _corners(name: str, corners: tuple[float, ...]) -> None:
+    """Raises ValueError unless low <= mode <= high and low < high."""
     low, mode, high = corners
     _check_order(name, corners)
     if not low <= mode <= high:
@@ -134,6 +137,7 @@ def _corners(name: str, corners: tuple[float, ...]) -> None:
 
 
 def _some(name: str, values: tuple[Any, ...]) -> None:
+    """Raises ValueError for no values, and for whole numbers that 64 bits do not hold."""
     if not values:
         raise ValueError(f"{name}: is empty; write the values to choose from")
     if any(isinstance(value, int) and abs(value) >= 2**63 for value in values):
@@ -146,18 +150,24 @@ def _uniform(bounds: Interval, u: Vector) -> Numbers:
 
 
 def _rising(name: str, bounds: Interval) -> None:
+    """Raises ValueError unless 0 < low < high, as the logarithm needs."""
     _check_order(name, bounds)
     if bounds[0] <= 0.0:
         raise ValueError(f"{name}: {bounds[0]:g} is not above 0")
 
 
 def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
+    """A number between the bounds for each `u` (n,) in [0, 1), uniform in its logarithm.
+
+    Clipped, as the exponential of a logarithm may miss a bound by a rounding.
+    """
     low, high = bounds
     ends = logarithm(np.array(bounds))
     return np.clip(exponential(ends[0] + u * (ends[1] - ends[0])), low, high)
 
 
 def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
+    """A number for each `u` (n,) in [0, 1) by the inverse of the distribution function."""
     low, mode, high = corners
     width, rise, fall = high - low, mode - low, high - mode
     up, down = low + np.sqrt(u * width * rise), high - np.sqrt((1.0 - u) * width * fall)
@@ -165,6 +175,10 @@ def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
 
 
 def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
+    """One of `values` for each `u` (n,) in [0, 1), all alike likely; an array of objects (n,).
+
+    It is filled and not made of the tuple: numpy would make strings of mixed values.
+    """
     chosen = np.empty(len(values), object)
     chosen[:] = values
     return chosen[_place(len(values), u)]
@@ -180,6 +194,7 @@ def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
 
 
 def _whole(name: str, bounds: tuple[int, int]) -> None:
+    """Raises ValueError for bounds that a float cannot hold exactly, or in the wrong order."""
     if max(map(abs, bounds)) > LARGEST:
         raise ValueError(f"{name}: whole numbers must lie between -2^53 and 2^53")
     _check_order(name, bounds)
@@ -248,6 +263,7 @@ class Distribution(Component):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
+        """Raises ValueError unless exactly one distribution is given, with sound numbers."""
         given = self.given_keys
         if len(given) != 1:
             ways = [n for n in type(self).model_fields if n not in ("keys", "rows")]

@@ -206,6 +206,7 @@ def _rows(keys: Iterable[Key]) -> list[ExplainRow]:
 
 
 def _row(key: Key) -> ExplainRow:
+    """What `podusv explain` shows of one key: a kind, a section of keys, or a value."""
     if key.is_kind:
         return ExplainRow(
             dotted_key(key.route), summary(key.model), "keys", choices=tuple(key.keys)
@@ -224,6 +225,7 @@ def _row(key: Key) -> ExplainRow:
 
 
 def _meaning(key: Key) -> str:
+    """What a key means: its field's description, or what it is one of."""
     if key.field is None:
         return f"one of `{dotted_key(key.path[:-1])}`"
     return key.field.description or f"which {key.path[-2]} it is"

@@ -32,6 +32,7 @@ class LogFile(Component):
 
     @model_validator(mode="after")
     def _forward(self) -> Self:
+        """Raises ValueError for a span that does not begin before it ends."""
         if self.span and not self.span[0] < self.span[1]:
             raise ValueError(f"span: {self.span[0]:g} s is not before {self.span[1]:g} s")
         return self
@@ -103,6 +104,7 @@ class Identify(Component):
     @field_validator("logs")
     @classmethod
     def _some_to_fit(cls, logs: tuple[LogFile, ...]) -> tuple[LogFile, ...]:
+        """Raises ValueError where no log is for the fit, or one stretch of a log comes twice."""
         if logs and not any(log.role == "fit" for log in logs):
             raise ValueError("all logs are for judging; at least one has to have role: fit")
         for one, other in combinations(logs, 2):
@@ -116,6 +118,7 @@ class Identify(Component):
     @field_validator("noise")
     @classmethod
     def _of_sensors(cls, noise: dict[str, float]) -> dict[str, float]:
+        """Raises ValueError for a name in `noise` that is no sensor's."""
         for name in noise:
             if name not in SENSORS:
                 raise ValueError(f"{name} is no sensor's deviation (allowed: {', '.join(SENSORS)})")

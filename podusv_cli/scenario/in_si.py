@@ -33,6 +33,10 @@ def _convert_node(node: Node, key: Key, usual: str) -> Node:
 
 
 def _entries(node: Node, key: Key, usual: str) -> Iterator[tuple[str, Node]]:
+    """The entries of a section, by name, with all numbers in SI units.
+
+    `usual` is the kind of a law that names none.
+    """
     kind = node.word("kind") or (usual if key.path[:1] == ("controllers",) else "")
     section = key.kinds.get(kind, key)
     for name, entry in node.mapping.items():
@@ -43,12 +47,14 @@ def _entries(node: Node, key: Key, usual: str) -> Iterator[tuple[str, Node]]:
 
 
 def _items(items: tuple[Node, ...], key: Key, usual: str) -> Iterator[Node]:
+    """The items of a list, with all numbers in SI units; `usual` as in `_entries`."""
     for place, item in enumerate(items):
         below = key.item(place)
         yield _convert_node(item, below, usual) if below else item
 
 
 def _has_text(node: Node) -> bool:
+    """Whether a word stands anywhere in the tree; `[10, kn]` is a number with its unit."""
     parts = [*node.mapping.values()] or node.content
     return (
         any(map(_has_text, parts)) if isinstance(parts, (list, tuple)) else isinstance(parts, str)

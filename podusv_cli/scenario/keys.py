@@ -168,6 +168,7 @@ class Key:
         return self._key(name, field) if field else None
 
     def _key(self, name: str, field: FieldInfo) -> Key:
+        """The key of the field `name` in this section."""
         model = self.section or self.model
         # A section that is left out is its default, whatever its own class would start with.
         given = isinstance(self.default, model)
@@ -278,6 +279,7 @@ class Key:
 
 
 def _scalars(annotation: Any) -> Iterator[Any]:
+    """The types of single values in an annotation; those within tuples one by one."""
     for member in members(annotation):
         if get_origin(member) is tuple:
             yield from (scalar for part in get_args(member) for scalar in _scalars(part))
@@ -348,6 +350,7 @@ def _is_list_of(parts: dict[str, type[Component]], annotation: Any) -> bool:
 
 
 def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
+    """How a mapping is described: kinds by name, or the first keys of the part without kinds."""
     mapping = "mappings of keys" if plural else "a mapping of keys"
     if "" not in parts:
         return f"{mapping} with kind {either(list(parts))}"
@@ -356,6 +359,7 @@ def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
 
 
 def _one(annotation: Any, plural: bool) -> str:
+    """How one member of an annotation is described to a user: `a list of 2 numbers`."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
         return either([str(word) for word in parts])

@@ -20,6 +20,10 @@ def merge_kept(root: Node, top: Key, dropped: list[str]) -> Node:
 
 
 def _merge_node(node: Node, key: Key, at: Route, dropped: list[str]) -> Node:
+    """The node with what it stands `instead_of` merged in below it, layer by layer.
+
+    `dropped` gathers the keys of lower layers that another kind, at route `at`, has no use for.
+    """
     if node.instead_of:
         base = _merge_node(node.instead_of, key, at, dropped)
         dropped += [*_lost_keys(base, node, key, at), *_sized_for_another(base, node, key, at)]

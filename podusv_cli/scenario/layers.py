@@ -113,6 +113,11 @@ def _mapping(
     most: int = MAX_NODES,
     above: tuple[str, ...] = (),
 ) -> Node | None:
+    """The tree of a text that is a mapping; None where it is none, with a fault for that.
+
+    `placed` says whether faults may give line and column, `most` how many values the text may have,
+    `above` the files that extend it, outermost first.
+    """
     node = read(text, source, faults, placed=placed, most=most, above=above)
     if node and not isinstance(node.content, dict):
         # The text is not shown: the file may be one that the user may not read.

@@ -113,6 +113,7 @@ def limits(
     insist = f", or insist with {insist}" if insist else ""
 
     def check_size(loaded: Loaded) -> list[tuple[str, str]]:
+        """Key and message of the first limit that the scenario exceeds; a list of one or none."""
         try:
             return list(islice(_too_large(loaded, allow_large, read_back, insist), 1))
         except LawError:  # `clashes` says which signals
@@ -122,6 +123,7 @@ def limits(
 
 
 def _too_large(loaded: Loaded, allow_large: bool, read_back: bool, insist: str) -> Conflicts:
+    """Key and message of each limit on steps and on the log's size [bytes] that is exceeded."""
     if not loaded.plans:  # values contradict each other
         return
     scenario, size = loaded.scenario, largest(loaded)

@@ -274,6 +274,7 @@ def values(scenario: Scenario) -> dict[str, Any]:
 
 
 def _leaves(data: dict[str, Any], above: Route) -> Iterator[tuple[Route, Any]]:
+    """Route and content of each value in nested dicts; `above` is the route of `data` itself."""
     for name, content in data.items():
         if isinstance(content, dict) and content:
             yield from _leaves(content, (*above, name))

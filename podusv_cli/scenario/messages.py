@@ -51,6 +51,7 @@ def with_defaults(key: Key | None, data: Any) -> Any:
 
 
 def _faults(root: Node, top: Key, error: ValidationError) -> Iterator[Fault]:
+    """A fault for each complaint of pydantic, but for those of what the loader copied in."""
     for complaint in error.errors(include_url=False):
         key = _key(top, complaint["loc"])
         if not _is_copied(root, key.path):
@@ -81,6 +82,7 @@ def _is_explained(root: Node, route: Route) -> bool:
 
 
 def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
+    """A key that `section` has not, with the key that may be meant or where it belongs."""
     name = str(complaint["loc"][-1])
     route = (*section.path, name)
     node = follow(root, route)[-1]
@@ -138,6 +140,7 @@ def _home(name: str, kinds: dict[str, Key]) -> str:
 
 
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
+    """A required key that is not there; a missing item is a fault of its list."""
     if isinstance(key.path[-1], int):
         yield from _wrong(root, _key(key.top, complaint["loc"][:-1]), complaint)
     elif not _is_explained(root, key.path):
@@ -146,6 +149,7 @@ def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
+    """A section without `kind`; its keys may tell which kind was meant."""
     route = (*section.path, "kind")
     if not _is_explained(root, route):
         node = follow(root, section.path)[-1]
@@ -156,6 +160,7 @@ def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _unknown_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
+    """A kind that `section` has not."""
     route = (*section.path, "kind")
     node = follow(root, route)[-1]
     what = f"kind {describe_found(node.content, node.text)}"
@@ -163,12 +168,14 @@ def _unknown_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _impossible(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
+    """What a part's own check said; it wrote the sentence, so it stands as it is."""
     if not _is_explained(root, key.path):
         mark = follow(root, key.path)[-1].mark
         yield Fault(mark, dotted_key(key.path), str(complaint["ctx"]["error"]))
 
 
 def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
+    """A value of the wrong type or out of range, with what is expected and what was found."""
     node = follow(root, key.path)[-1]
     if (
         isinstance(node.content, dict) and key.section

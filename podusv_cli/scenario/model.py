@@ -354,6 +354,10 @@ def scenario_class(plugins: Plugins) -> type[Scenario]:
 
 @cache
 def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
+    """The class Scenario whose kinds of parts include those of these plug-ins.
+
+    `_places` is no part of the result: it keeps plug-ins of one content from different files apart.
+    """
     kinds: dict[str, Any] = {
         name: any_of(f"podusv_cli.components.{name}s", base, plugins)
         for name, base in BASES.items()
@@ -376,6 +380,10 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
 def _unpickle(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
+    """The scenario that another process pickled; `files` are path and text of plug-ins.
+
+    `open_choice` is for a scenario with several laws, of which none was chosen.
+    """
     made = scenario_class((*(from_file(*one) for one in files), *installed_plugins()))(
         **data
     ).in_numbers()

@@ -204,6 +204,7 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
 
 
 def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
+    """A line of a file of points as a list of two numbers; faults for what is no such pair."""
     numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.

@@ -176,6 +176,7 @@ def _plugin(name: Node, wanted: Node, faults: list[Fault], trusted: bool) -> Plu
 
 
 def _package(name: Node, faults: list[Fault]) -> Plugin | None:
+    """The installed package of this name, or None and a fault."""
     packages = {plugin.name: plugin for plugin in installed_plugins()}
     if name.content not in packages:
         what = f"{quote(name.content)} is no file (these end in .py) and no installed package"
@@ -185,6 +186,10 @@ def _package(name: Node, faults: list[Fault]) -> Plugin | None:
 
 
 def _file(name: Node, faults: list[Fault]) -> Plugin | None:
+    """The plug-in of a Python file, or None and a fault.
+
+    A path in a YAML file is relative to that file; one of the command line is not.
+    """
     path = relative_to(name.mark.source, name.content) if name.mark.line else name.content
     text = read_text(path, name.mark, KEY, faults)
     if text is None:
@@ -197,6 +202,7 @@ def _file(name: Node, faults: list[Fault]) -> Plugin | None:
 
 
 def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
+    """Whether a plug-in has the digest that `wanted` asks for, if any; else a fault."""
     sha256 = wanted.mapping.get("sha256")
     if sha256 is None or sha256.content in ("", plugin.sha256):
         return True

@@ -149,6 +149,7 @@ def _name(root: Node, faults: list[Fault]) -> Node:
 
 
 def _vessel(root: Node, plugins: Plugins, faults: list[Fault]) -> Node:
+    """The tree with the keys of the vessel's preset in `vessel`."""
     given = root.mapping.get("vessel")
     if given is None:
         given = Node({}, root.mark, faulty=root.faulty)

@@ -106,7 +106,10 @@ def _balance(
 
     @cache  # a line and a circle have one speed and one turn rate each
     def steady(U: float, r: float) -> tuple[float, float]:
+        """Surge and sway [m/s] at speed over ground U [m/s] and turn rate r [rad/s]."""
+
         def excess(v: float) -> float:
+            """Sway force [N] left over at sway v [m/s]; 0 in steady motion."""
             u = math.sqrt(max(U * U - v * v, 0.0))
             _, across, turning = lacking(u, v, r, k)
             moment = yaw_moment(u, v, r, k) + turning + b_r

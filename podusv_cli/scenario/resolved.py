@@ -53,6 +53,7 @@ class _Fast(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc
 
 
 def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    """A word plain, any other text in double quotes, so that it is read back as text."""
     is_word = text.replace("_", "").isalnum() and isinstance(resolve(text), str) and text.isascii()
     style = None if is_word else '"'
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
@@ -64,6 +65,7 @@ def _list(dumper: yaml.SafeDumper, items: tuple[Any, ...]) -> yaml.SequenceNode:
 
 
 def _kind_first(dumper: yaml.SafeDumper, data: dict[str, Any]) -> yaml.MappingNode:
+    """A mapping with `kind` on top; the other keys keep their order."""
     ordered = sorted(data.items(), key=lambda entry: entry[0] != "kind")
     return dumper.represent_mapping("tag:yaml.org,2002:map", ordered, flow_style=False)
 

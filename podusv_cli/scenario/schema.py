@@ -147,6 +147,7 @@ def _choices(part: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _inside(word: str, part: Any) -> Any:
+    """The content of one keyword `word` of a JSON schema, rewritten from pydantic's dialect."""
     if word in ("properties", "patternProperties"):
         return {name: _convert_schema(schema) for name, schema in part.items()}
     if word == "$ref":

@@ -89,6 +89,10 @@ def _with_defaults(part: Component, facts: Facts | None) -> Component | None:
 def _settings(
     part: Component, base: Component | None, prefix: str = "", unit: str = ""
 ) -> Iterator[SettingAbout]:
+    """Each value of a part and of the parts in it, beside the value of `base` or its default.
+
+    `prefix` is the key of the part with a dot, `unit` that of the field it lies in.
+    """
     for name, field in type(part).model_fields.items():
         content = getattr(part, name)
         default = getattr(base, name) if base else field.get_default(call_default_factory=True)

@@ -98,12 +98,14 @@ class Quantity(Distribution):
 
     @model_validator(mode="after")
     def _readable(self) -> Self:
+        """Raises ValueError for a file of rows with one line, from which nothing can be drawn."""
         if self.rows and len(self.lines.rows) < 2:
             raise ValueError("rows: has a single line of numbers; nothing can be drawn from it")
         return self
 
     @model_validator(mode="after")
     def _of_numbers(self) -> Self:
+        """Raises ValueError for a relative quantity that chooses among words."""
         words = [word for word in self.distribution.choice or () if isinstance(word, (str, bool))]
         if self.relative and words:
             raise ValueError(f"{self.given_keys[0]}: needs numbers, choice has {words[0]!r}")

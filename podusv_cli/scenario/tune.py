@@ -39,6 +39,7 @@ class Range(Component):
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
+        """Raises ValueError unless exactly one range is given, with low < high."""
         if len(self.given_keys) != 1:
             found = " and ".join(self.given_keys) or "none"
             raise ValueError(
@@ -101,6 +102,7 @@ with warnings.catch_warnings(action="ignore", category=UserWarning):
 
         @model_validator(mode="after")
         def _sound(self) -> Self:
+            """Raises ValueError for a search space whose `around` or ranges are no such thing."""
             for name, content in self.space.items():
                 if name == AROUND and (not isinstance(content, float) or content <= 1.0):
                     raise ValueError("space.around: must be a number above 1, such as 10.0")

@@ -215,6 +215,7 @@ class _Reader:
         most: int,
         above: tuple[str, ...],
     ) -> None:
+        """The arguments of `read`; the reader goes through the events of `text` once."""
         self._text, self._source, self._placed, self._most = text, source, placed, most
         self._above = above
         self._events = _events(text)
@@ -223,6 +224,7 @@ class _Reader:
         self._last = Mark(source)
 
     def document(self) -> Node:
+        """The tree of the one document in the text. Raises _CannotContinue."""
         if self._text.startswith("\ufeff"):
             raise _CannotContinue(
                 self._mark(0, 0), "starts with a byte order mark; save as UTF-8 without BOM"
@@ -240,6 +242,7 @@ class _Reader:
         return node
 
     def _next(self) -> Any:
+        """The next event of PyYAML, whose errors become _CannotContinue with a place."""
         try:
             event: Any = next(self._events)
         except yaml.MarkedYAMLError as error:
@@ -256,6 +259,7 @@ class _Reader:
         return event
 
     def _syntax_error(self, error: yaml.MarkedYAMLError) -> _CannotContinue:
+        """PyYAML's error in words that a user of scenarios understands."""
         problem = error.problem or "unreadable"
         known = [text for part, text in SYNTAX.items() if part in problem]
         opened = any(part in problem for part in OPENING)
@@ -268,6 +272,7 @@ class _Reader:
         return _CannotContinue(place, text.format(problem=problem))
 
     def _mark(self, line: int, column: int) -> Mark:
+        """The place of a line and column that count from 0; only the file where text is secret."""
         if not self._placed:
             return Mark(self._source)
         return Mark(self._source, line + 1, column + 1, self._above)
@@ -279,6 +284,7 @@ class _Reader:
         self._faults.append(Fault(self._start(event), dotted_key(route), text))
 
     def _node(self, event: Any, route: Route) -> Node:
+        """The tree that begins with `event`, at `route`; aliases, anchors and tags are faults."""
         self._nodes += 1
         if self._nodes > self._most:
             raise _CannotContinue(self._start(event), f"more than {self._most:,} values")
@@ -297,12 +303,14 @@ class _Reader:
         return self._list(event, route) if is_list else self._mapping(event, route)
 
     def _scalar(self, event: Any, route: Route) -> Node:
+        """A single value; what stands in quotes stays text."""
         mark = self._start(event)
         take = text_node if event.style else plain_node
         node = take(event.value, mark, dotted_key(route), self._faults)
         return replace(node, faulty=node.faulty or bool(event.tag))
 
     def _list(self, event: Any, route: Route) -> Node:
+        """A list; without items where one of them is faulty, so that its length is not judged."""
         items: list[Node] = []
         while not isinstance(item := self._next(), yaml.SequenceEndEvent):
             items.append(self._node(item, (*route, len(items))))
@@ -310,6 +318,7 @@ class _Reader:
         return Node(() if faulty else tuple(items), self._start(event), faulty=faulty)
 
     def _mapping(self, event: Any, route: Route) -> Node:
+        """A mapping; a key that is given twice is a fault, with the line of the first."""
         entries: dict[str, Node] = {}
         while not isinstance(head := self._next(), yaml.MappingEndEvent):
             key = self._key(head, route, _decimal_comma(head, entries))

@@ -82,6 +82,7 @@ def entry_of(name: str) -> zipfile.ZipInfo:
 
 
 def _add(archive: zipfile.ZipFile, name: str, source: BinaryIO) -> None:
+    """Copy a file into the archive under `name`; the bytes are the same on every machine."""
     entry = entry_of(name)
     entry.file_size = source.seek(0, os.SEEK_END)  # beyond 4 GB it takes another form
     source.seek(0)
@@ -157,6 +158,10 @@ class Archive:
             raise self.fault(f"{name!r} is encrypted, or compressed in a way that podusv does not")
 
     def _check_whole(self, count: int) -> None:
+        """Raises StorageError for names that clash, or contents far too large for their archive.
+
+        `count` is how many entries the archive lists.
+        """
         if len(self._entries) < count:
             raise self.fault("it has two files of one name")
         folders = {str(p) for name in self._entries for p in PurePosixPath(name).parents}
@@ -171,6 +176,7 @@ class Archive:
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
+        """Turns what zipfile raises for a damaged archive into a StorageError."""
         try:
             yield
         except (zipfile.BadZipFile, EOFError, zlib.error, NotImplementedError) as error:

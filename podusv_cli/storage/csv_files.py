@@ -22,6 +22,7 @@ def lines(rows: Iterable[Sequence[object]], digits: str | None = None) -> str:
     """
 
     def cell(content: object) -> object:
+        """A cell as csv writes it; NaN as an empty one where there are `digits`."""
         if isinstance(content, str):
             return escaping.csv(content)
         if digits and isinstance(content, float):

@@ -200,6 +200,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _create(path: Path, content: bytes) -> None:
+    """Write a new file and wait until it is on the disk; a file that is there is an OSError."""
     descriptor, rest = os.open(path, _CREATE, 0o666), memoryview(content)
     try:
         while rest:

@@ -60,6 +60,7 @@ def parsed_as(text: str, path: Path, model: type[Model]) -> Model:
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The dict of a JSON object. Raises ValueError for a key that comes twice or does not show."""
     entries = dict(pairs)
     if len(entries) != len(pairs):
         ((twice, _),) = Counter(key for key, _ in pairs).most_common(1)
@@ -70,6 +71,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _finite(digits: str) -> float:
+    """A number of a JSON text. Raises ValueError for one that floats cannot hold, as 1e999."""
     number = float(digits)
     if not math.isfinite(number):
         raise ValueError(f"{digits:.40} is no finite number")

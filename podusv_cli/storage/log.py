@@ -152,6 +152,7 @@ def _fill(
 
 
 def _facts(recording: Recording, texts: Texts) -> dict[str, str]:
+    """The attributes of the whole log."""
     facts = {
         "Conventions": CONVENTIONS,
         "title": texts.title,
@@ -176,6 +177,7 @@ def _scales(
 
 
 def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
+    """The dimension scale 0, 1, ..., size - 1 of an axis without values, such as `pod`."""
     scale = file.create_dataset(axis, data=np.arange(size, dtype=np.int32))
     scale.make_scale(axis)
     describe(scale, {"units": "1", "long_name": AXES.get(axis, axis)})
@@ -183,6 +185,11 @@ def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
 
 
 def _dataset(file: h5py.File, name: str, array: Vector, compress: bool) -> h5py.Dataset:
+    """The dataset of an array; if it is not compressed, empty room that is filled later.
+
+    Its place in the file is fixed at once, so that rows can be written past HDF5; it notes no
+    times, so that equal logs have equal bytes.
+    """
     if compress and array.size:
         return file.create_dataset(name, data=array, dtype="<f8", **_COMPRESSED)
     made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -194,6 +201,7 @@ def _dataset(file: h5py.File, name: str, array: Vector, compress: bool) -> h5py.
 
 
 def _description(signal: Signal) -> dict[str, str]:
+    """The attributes of a signal's dataset."""
     facts = {"units": signal.unit, "long_name": signal.meaning, "symbol": signal.symbol}
     # The same as the dimension scales, for readers that do not follow references.
     facts["axes"] = " ".join(signal.dimensions)
@@ -214,6 +222,7 @@ def text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
 
 
 def _write_rows(out: BinaryIO, place: int, array: Vector, rows: slice) -> None:
+    """Write these rows of an array into the dataset that begins at byte `place` of the file."""
     part = np.ascontiguousarray(array[rows], dtype="<f8")
     if part.size:
         write_at(out, place + rows.start * part[0].nbytes, part.reshape(-1).data.cast("B"))

@@ -84,6 +84,7 @@ def _text(words: Any) -> str:
 
 
 def _status(file: h5py.File) -> Status:
+    """How the run ended. Raises ValueError for a word that podusv does not write."""
     status = _text(file.attrs["status"])
     if status not in get_args(Status):
         raise ValueError(f"unknown status {status!r}")
@@ -91,6 +92,7 @@ def _status(file: h5py.File) -> Status:
 
 
 def _signal(name: str, dataset: h5py.Dataset) -> Signal:
+    """What a log says of one of its signals; KeyError or ValueError where that is damaged."""
     unit, meaning, symbol, axes = (
         _text(dataset.attrs[fact]) for fact in ("units", "long_name", "symbol", "axes")
     )
@@ -112,6 +114,7 @@ def _check_lengths(datasets: Mapping[str, h5py.Dataset], about: Mapping[str, Sig
 
 
 def _array(dataset: h5py.Dataset, content: npt.NDArray[np.uint8]) -> Vector:
+    """A dataset's numbers; uncompressed ones straight from `content`, the file's mapped bytes."""
     place = dataset.id.get_offset()
     if place is None:  # compressed, or without numbers
         return np.asarray(dataset[()])

@@ -82,6 +82,7 @@ def source_tree(package: Path) -> dict[str, Any] | None:
 
 def _git(folder: Path, *words: str) -> str | None:
     # Variables that git itself sets, in its hooks for instance, would point to another checkout.
+    """What git says in a folder, or None where it says nothing within `GIT_PATIENCE`."""
     environment = {key: word for key, word in os.environ.items() if not key.startswith("GIT_")}
     environment["GIT_OPTIONAL_LOCKS"] = "0"
     try:
@@ -111,6 +112,7 @@ def processor() -> str | None:
 
 
 def _version(package: str) -> str | None:
+    """The version of an installed package, or None."""
     try:
         return version(package)
     except PackageNotFoundError:

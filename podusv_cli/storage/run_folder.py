@@ -50,6 +50,7 @@ def free_folder(folder: Path) -> Path:
 
 
 def _numbered_folders(folder: Path) -> Iterator[Path]:
+    """The folder, then the names beside it that end in -2, -3, and so on."""
     yield folder
     for number in count(2):
         yield folder.with_name(f"{folder.name}-{number}")
@@ -142,6 +143,7 @@ class RunWriter:
         return self._staging.final
 
     def _publish_beside(self) -> Path:
+        """Publish under the first free number, and return that folder."""
         for path in islice(_numbered_folders(self.final), 1, None):
             with suppress(Taken):
                 _check_replaceable(path, force=False)
@@ -151,6 +153,7 @@ class RunWriter:
         raise AssertionError("there is always another number")
 
     def _place(self, name: str) -> Path:
+        """Where the file `name` of this run is written, its folder made."""
         path = manifest.place(self.folder, name)
         files.make_folder(path.parent)
         return path
@@ -286,6 +289,7 @@ def open_run(folder: Path, *, optional: str = "") -> RunFolder:
 
 
 def _metrics(path: Path) -> dict[str, float | None]:
+    """The metrics of a metrics.json by name, None where one is not known. Raises StorageError."""
     metrics = json_files.read(path).get("metrics")
     if not isinstance(metrics, dict):
         raise StorageError(f"{path} holds no metrics")

@@ -68,6 +68,7 @@ class Staging:
         _remove_box(self._box, self.final)
 
     def _rename(self) -> None:
+        """Give the folder its final name. Raises Taken where something has it."""
         try:
             os.rename(self.folder, self.final)
         except OSError as error:
@@ -77,12 +78,14 @@ class Staging:
             raise Taken(text) from error
 
     def _replace(self) -> None:
+        """Put the folder in place of the old one, in one step where the system can."""
         if not self._exchange():
             with suppress(FileNotFoundError):
                 os.rename(self.final, _old(self._box))
             self._rename()
 
     def _exchange(self) -> bool:
+        """Swap new and old in one step; False where the file system cannot."""
         try:
             exchange(self.folder, self.final)
         except OSError as error:

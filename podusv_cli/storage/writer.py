@@ -52,6 +52,10 @@ def sole_writer(
 
 
 def _lock_folder(path: Path, patience: float, warn: Callable[[str], None]) -> BaseFileLock:
+    """A lock on a folder, held. Waits `patience` [s] for another process, and `warn` says so.
+
+    Raises StorageError where another one keeps it, or where there are no locks.
+    """
     from filelock import FileLock, Timeout  # 30 ms, for commands that write a study
 
     lock = FileLock(path, fallback_to_soft=False)  # a soft one outlives a process that is killed

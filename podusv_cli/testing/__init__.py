@@ -215,6 +215,7 @@ def picture(sheet: Sheet, count: int, columns: int) -> bytes:
 
 
 def _compare(one: Recording, other: Recording, *, rtol: float, atol: float) -> None:
+    """Raises AssertionError unless both runs finish with signals alike within rtol and atol."""
     assert one.status == other.status == "finished", one.message or other.message
     for name in one.signals:
         np.testing.assert_allclose(
@@ -268,6 +269,7 @@ def _to_read(given: Vector) -> Vector:
 
 
 def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    """All that a law's kernels write at time t [s] and state x (6,): demand, rates, signals."""
     memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
     outputs = [np.full(size, np.nan) for size in (2, len(memory), len(law.signals))]
@@ -291,6 +293,7 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 
 def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    """All that a path's kernels write at time t [s]: target and place."""
     out, place = np.full(len(TARGET), np.nan), np.zeros(len(path.places))
     k, table = bundle(path.constants_with(0.0)), path.table()
     if path.follows:
@@ -300,6 +303,7 @@ def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[V
 
 
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    """All that a disturbance's kernel writes at time t [s] and state x (6,)."""
     out, hull = np.full(3 + len(sea.signals), np.nan), usual_vessel()
     call(
         sea.evaluate,
@@ -315,6 +319,7 @@ def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 
 def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    """All that an actuator's kernel writes at time t [s]: force, rates, signals."""
     state, demand = _to_read(actuator.rest()), _to_read(random.normal(0.0, 5.0, 2))
     outputs = [np.full(size, np.nan) for size in (3, len(state), len(actuator.signals))]
     k = bundle(actuator.constants())
@@ -335,6 +340,7 @@ def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -
 
 
 def _measurement(sensors: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    """All that a measurement's kernel writes at an instant that is drawn."""
     seen = sensors.first(x, STEP)
     k, table = bundle(sensors.constants_with(STEP, 0)), sensors.table_for(STEP, STEPS)
     call(
@@ -351,6 +357,7 @@ def _measurement(sensors: Any, t: float, x: Vector, target: Vector, random: Any)
 
 
 def _estimator(estimator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
+    """All that an estimator's kernels write: its state after a correction, and its rates."""
     state, k = estimator.start(x, usual_vessel()), bundle(estimator.constants_with(usual_vessel()))
     seen = np.concatenate([x + random.normal(0.0, 0.1, 6), np.ones(12)])
     tau, rate, table = random.normal(0.0, 5.0, 3), np.full(len(state), np.nan), estimator.table()

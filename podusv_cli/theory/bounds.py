@@ -143,6 +143,10 @@ Axes = tuple[_Axis, _Axis]
 
 
 def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+    """The bound of the corrected proof: rate lambda [1/s], Delta, and what they come from.
+
+    Without observations it has the rate only. `axes` are surge and yaw.
+    """
     surge, yaw = axes
     candidates = {
         "z_e, y_u": surge.slowest(),
@@ -163,6 +167,7 @@ def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | No
 
 
 def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
+    """The bound as the paper prints it, like the corrected one."""
     surge, yaw = axes
     candidates = {
         "z_e": surge.k,
@@ -226,6 +231,7 @@ def _half_square(x: float) -> float:
 
 
 def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[GainCondition, ...]:
+    """What gains must exceed, by the corrected proof and by the printed one."""
     surge, yaw = axes
     why = "must outweigh -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out"
     if surge.cross:

@@ -101,6 +101,7 @@ def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
     least = SINGULAR * float(np.trace(square)) or 1.0
 
     def weights(f: Vector, c: float) -> Vector:
+        """The weights (nodes,) that fit `f` (rows,); c is the weight of their own size."""
         right = network_output(phi.T, f) if tall else f
         solved = np.linalg.solve(square + max(c, least) * np.eye(len(square)), right)
         return np.asarray(solved if tall else network_output(phi.T, solved))

@@ -99,6 +99,7 @@ def loop_margins(
 
 
 def _left_out(loop: ClosedLoop, grid: TimeGrid, linear: Linear) -> Iterator[str]:
+    """What of the loop its linear model has not."""
     if loop.measured:
         yield "measurement and estimator"
     if grid.hold_every:

@@ -179,6 +179,7 @@ def _traces(
     now: Replayed,
     unknown: tuple[ideal_weights.IdealWeights, bounds.Pair],
 ) -> Traces:
+    """All that the proof is about, over the rows of a log (rows,): V, its rate, remainders."""
     ideal, b = unknown
     e = error_rates(log, now, law)
     factors = ideal_weights.exponents(law.network, log)
@@ -235,6 +236,7 @@ class _Bounds:
         return Window(since, observed, bound, sway, _largest(value), largest_v, kept)
 
     def _observe_rows(self, rows: slice) -> bounds.Observed:
+        """What the proof takes as bounded, as large as it was in these rows."""
         start, ideal = self.law.network.initial_weight, self.ideal
         W = (float(np.linalg.norm(weights - start)) for weights in (ideal.W_u, ideal.W_r))
         return bounds.Observed(

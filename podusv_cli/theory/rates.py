@@ -82,6 +82,10 @@ def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors
 
 
 def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> SightLine:
+    """The geometry of the line of sight and its rates, over the rows of a log (rows,).
+
+    Where the law holds its direction, near the target, the line does not turn.
+    """
     s, d, u, v = now.signals, now.rates, log["u"], log["v"]
     psi_e, psi_d, distance = s["psi_e"], s["psi_d"], s["z_e"]
     turn = np.where(np.cos(psi_e - psi_d + log["psi"]) < 0.0, -1.0, 1.0)

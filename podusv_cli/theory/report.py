@@ -73,6 +73,7 @@ def _visited_ranges(monitored: Monitored) -> dict[str, list[float]]:
 
 
 def _window(window: Window) -> dict[str, Any]:
+    """A window of time as theory.json has it."""
     return {
         "since": window.since,
         "largest_V": window.largest_V,
@@ -85,6 +86,7 @@ def _window(window: Window) -> dict[str, Any]:
 
 
 def _bound(bound: Bound) -> dict[str, Any]:
+    """A bound as theory.json has it."""
     return {
         "lambda": bound.lambda_,
         "Delta": bound.Delta,

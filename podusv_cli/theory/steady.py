@@ -107,6 +107,7 @@ def linearise(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = 
 
 
 def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
+    """The loop linear about `q`, the state in the target's frame; states at rest are left out."""
     jacobian, reach = frame.jacobian(q)
     states = len(q)
     heights = (abs(jacobian[:states]) * _size(q)).max(axis=1)
@@ -164,6 +165,7 @@ class _Frame:
     """The loop as a target sees it that moves on a course, its load held."""
 
     def __init__(self, plan: Plan, along: Course, s: Vector, compiled: bool) -> None:
+        """The frame that moves along the course, from state `s` at its begin."""
         self.labels = plan.names
         self.course = along
         column = {name: i - 1 for i, name in enumerate(self.labels)}
@@ -242,6 +244,7 @@ class _Frame:
         raise NotConvergedError(self._restless(left))
 
     def _restless(self, left: _Left) -> str:
+        """Why no steady motion was found, for the user."""
         pace = abs(self.row(left.q)[: len(left.q)]) / _size(left.q)
         return (
             f"no steady motion was found: the run is {math.hypot(*self.start[:2]):.3g} m from the "
@@ -289,6 +292,7 @@ class _Frame:
         return np.asarray(((above - below) / (2.0 * steps[:, None])).T)
 
     def _no_derivative(self, q: Vector, state: int) -> str:
+        """Why there is no derivative by one of the states, for the user."""
         distance = math.hypot(*q[:2])
         why = (
             "a limit, dead zone or step of law or actuator lies there, or damping with |r| or |v| "

@@ -80,6 +80,10 @@ def estimate_position(positions: Sequence[np.ndarray], length: float) -> StepEst
 def _estimate(
     values: tuple[float, float, float], coarse: float, fine: float, scale: float
 ) -> StepEstimate:
+    """Order and error of three values with steps h, h/2, h/4.
+
+    `coarse` and `fine` are the sizes of their differences, `scale` that of the number itself.
+    """
     if not math.isfinite(coarse + fine):
         return StepEstimate(values, math.nan, math.inf, scale)
     negligible = ROUNDING * max(scale, coarse, fine)

@@ -91,6 +91,11 @@ def bench(
 def _simulate_cases(
     every: Sequence[BenchCase], request: Request, progress: Progress | None
 ) -> Iterator[BenchRun]:
+    """The runs of all cases, in order; `progress` hears which share of the cases is done.
+
+    A case whose process ended is tried again law by law, to find the one that ends it.
+    """
+
     def advance(position: int, fraction: float) -> None:
         if progress:
             progress("cases", (position + fraction) / len(every))
@@ -143,6 +148,7 @@ def _run_all(
 
 
 def _play(case: BenchCase, tell: Callable[[float], None]) -> list[BenchRun]:
+    """The runs of one case, one a law; `tell` hears when they are done."""
     runs = play(case)
     tell(1.0)
     return runs

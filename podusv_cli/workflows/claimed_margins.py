@@ -52,6 +52,7 @@ def _names_in_claim(claim: ParsedClaim) -> Iterator[tuple[str, str]]:
 
 
 def _with_margins(run: PastRun, scenario: Scenario, wanted: set[str], extras: Extras) -> PastRun:
+    """The run with those margins among its numbers that claims want, as far as there are any."""
     what = f"margins of {run.label}"
     if extras.interrupted:
         return run

@@ -115,6 +115,7 @@ def sections(name: str) -> tuple[Section, ...]:
 
 
 def _sections(name: str, text: str) -> Iterator[Section]:
+    """The sections of a page of Markdown; `#` within a block of code begins none."""
     level, heading, lines, in_code = 0, "", list[str](), False
     for line in text.splitlines():
         in_code ^= bool(FENCE.match(line))

@@ -135,6 +135,10 @@ def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
     """What judges the claims in a world; `runs` are those that a world does not move."""
 
     def judge(world: World) -> Judged:
+        """Answers and numbers of all claims where the world's values are put in.
+
+        Laws that the world does not touch keep their runs.
+        """
         labels = dict.fromkeys(label for label, _ in world)
         try:
             moved = {label: _change_scenario(subject, label, world) for label in labels}
@@ -154,6 +158,7 @@ def judging(subject: Subject, runs: Mapping[str, PastRun]) -> Judge:
 
 
 def _change_scenario(subject: Subject, label: str, world: World) -> Scenario:
+    """The scenario of the law `label` in a world; a drawn hull first, single values over it."""
     new = {at: value for (law, at), value in world.items() if law == label}
     hull = new.pop(HULL, None)
     single = (subject.hulls[hull] if hull else subject.singles)[label]

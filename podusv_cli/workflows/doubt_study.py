@@ -62,6 +62,7 @@ class Studies:
 
 
 def _numbers(verdict: StudyVerdict) -> dict[str, float]:
+    """The estimates of a verdict by the name of their statistic and cell."""
     return {
         f"{part.statistic} at {part.cell}" if part.cell else part.statistic: part.estimate
         for part in verdict.parts
@@ -111,6 +112,7 @@ def _failures_of(alone: Sequence[TriedChoice]) -> Iterator[Failure]:
 
 
 def _trials(studies: Studies, choice: Choice, loaded: Loaded) -> list[TriedValue]:
+    """A study for each value of a choice, numbered from 1, and what it answers."""
     return [
         TriedValue(
             value, studies.judge(_name(choice, i), overrides(choice, value, loaded.scenario))[0]

@@ -35,6 +35,7 @@ def write(config: Path, wanted: Identify) -> list[Path]:
 
 
 def _log(single: Scenario) -> str:
+    """The text of a CSV file with the run of a scenario, in the units of `COLUMNS`."""
     single.ready()
     recording = to_end(single.plan())
     columns = [

@@ -265,6 +265,7 @@ def summary(case: Case, recording: Recording, extras: Extras) -> dict[str, float
 
 
 def _cost(case: Case, recording: Recording) -> dict[str, float]:
+    """Measured and counted cost of the law, by metric; {} for a run without an instant."""
     if not len(recording["time"]):
         return {}
     timed = law_costs([(case.plan, recording)])[0] if case.scenario.simulation.compiled else {}
@@ -314,6 +315,7 @@ def _write(
     metrics: dict[str, float],
     warnings: Sequence[Finding],
 ) -> None:
+    """Put scenario, plug-ins, metrics and findings into the run's folder."""
     writer.add("scenario.yaml", task.text.encode())
     for name, text in task.scenario.plugin_files().items():
         writer.add(name, text.encode())
@@ -328,6 +330,7 @@ def _write(
 def _draw_figures(
     task: RunTask, recording: Recording, about: RunAbout | None, extras: Extras
 ) -> dict[str, bytes]:
+    """PNG files of the wanted figures by name; `extras` notes those that fail."""
     if not (task.figures and about):
         return {}
     from podusv_cli.figures.drawing import (  # matplotlib is slow to import

@@ -150,6 +150,7 @@ def join_members(groups: Sequence[Members]) -> Members:
 
 
 def _open_members(path: Path, request: Request, *, alone: bool) -> Members:
+    """The members of a comparison in a folder or scenario; `alone` if nothing else is given."""
     if path.is_dir():
         return from_folder(path, request.plugins)
     fits = limits(request.allow_large, read_back=True)

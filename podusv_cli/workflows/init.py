@@ -70,6 +70,7 @@ def init(name: str, out: Path | None = None) -> Begun:
 
 
 def _scenario(name: str, out: Path | None) -> Begun:
+    """Write a shipped scenario, its schema and example logs where the user wants them."""
     source = f"{shipped.PREFIX}{name}.yaml"
     config = out or Path(f"{name}.yaml".rpartition("/")[2])
     schema = config.with_name(SCHEMA)

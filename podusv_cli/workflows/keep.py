@@ -60,6 +60,7 @@ def keep(
 
 
 def _task(folder: Path, plan: StudyPlan, run: KeptRun, request: Request) -> RunTask:
+    """The run of a draw whose log the study keeps, as `execute` takes it."""
     scenario = scenario_of_draw(plan, run.law, run.cell, run.draw)
     return RunTask(
         scenario,

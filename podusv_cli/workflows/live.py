@@ -107,6 +107,7 @@ class Live:
 
     @cached_property
     def _law_of_its_own(self) -> list[str]:
+        """`--set` that makes the one `controller` an entry of `controllers`, if it is none yet."""
         loaded = self.load({})
         if loaded.scenario.controllers:
             return []
@@ -271,6 +272,7 @@ class Live:
         return {"file": str(page.resolve()), "page": page.read_text("utf-8")}
 
     def _base_of(self, loaded: Loaded) -> Base:
+        """What is reused as long as no word changes: cases, and claims that they can answer."""
         cases = {n: loaded.case(s) for n, s in self.singles(loaded.scenario).items()}
         claims, unread = list[ParsedClaim](), tuple[str, ...]()
         try:
@@ -292,6 +294,10 @@ class Live:
         }
 
     def _put(self, label: str, case: Case, moved: Moved, words: Moved, base: Base) -> Case:
+        """The case of a law with the moved numbers put in. Raises ScenarioError.
+
+        `words` are moved values that are no numbers; `base` was loaded with them already.
+        """
         new: dict[Route, Any] = {}
         for key, number in moved.items():
             steps = route(key)

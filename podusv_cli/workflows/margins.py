@@ -40,6 +40,7 @@ class MarginsOfLaws:
 
 
 def _as_json(law: LoopMargins) -> dict[str, Any]:
+    """A law's margins as the JSON of `podusv margins`, all in SI units."""
     linear = law.linear
     return {
         "at": linear.course.time,
@@ -86,6 +87,7 @@ def margins(config: Path, request: Request, at: float | None = None) -> MarginsO
 
 
 def _of_laws(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> MarginsOfLaws:
+    """Margins of each law at the time `at` [s]; raises the first error if none has any."""
     laws: dict[str, LoopMargins] = {}
     failed: dict[str, LawError | NotConvergedError] = {}
     for label, plan in plans.items():
@@ -99,6 +101,7 @@ def _of_laws(plans: Mapping[str, Plan], at: float | None, *, compiled: bool) -> 
 
 
 def _check_formats(formats: Sequence[str]) -> None:
+    """Raises UsageError for a format of images that there is not."""
     from podusv_cli.figures.drawing import check_names  # matplotlib is slow to import
 
     check_names((), formats)

@@ -153,6 +153,7 @@ def _made_again(path: Path, files: Collection[str]) -> Sequence[str]:
 
 
 def _first_row(path: Path) -> list[str]:
+    """The heads of a CSV file's columns. Raises StorageError."""
     try:
         return next(csv.reader(read_text(path).splitlines()[:1]), [])
     except csv.Error as error:
@@ -160,6 +161,7 @@ def _first_row(path: Path) -> list[str]:
 
 
 def _check_member(path: Path, optional: str) -> RunFolder:
+    """The finished run in a folder, with its log sound. Raises StorageError."""
     run = open_run(path, optional=optional)
     if run.has_log and (wrong := _fault(run.recording)):
         raise StorageError(f"{path / LOG}: damaged, or not a log of a run: {wrong}")

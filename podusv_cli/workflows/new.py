@@ -27,6 +27,7 @@ DEFAULTS = {"path": "line", "disturbance": "none", "law": "pid", "more": ""}
 
 
 def _figures() -> Iterable[str]:
+    """The names of all figures of podusv."""
     from podusv_cli.figures.drawing import FIGURES  # matplotlib is slow to import
 
     return FIGURES
@@ -128,6 +129,7 @@ def new(what: str, name: str) -> WrittenFiles:
 
 
 def _check_name(what: str, name: str) -> None:
+    """Raises UsageError for a name that is no identifier, or taken by a part of podusv."""
     if not re.fullmatch("[a-z][a-z0-9_]{0,29}", name) or keyword.iskeyword(name):
         raise UsageError(f"{name!r}: a name here is at most 30 of a-z, 0-9 and _, like my_law")
     if name in PARTS[what].taken():
@@ -135,6 +137,7 @@ def _check_name(what: str, name: str) -> None:
 
 
 def _words(what: str, name: str) -> dict[str, str]:
+    """What stands for each placeholder in the template of a part."""
     own = {word: text.replace("$name", name) for word, text in PARTS[what].words.items()}
     return (
         DEFAULTS

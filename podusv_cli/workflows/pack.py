@@ -193,6 +193,7 @@ def _sessions(origins: Iterable[_PackOrigin]) -> list[_PackSession]:
 def _contents(
     name: str, listed: Manifest, sizes: Mapping[str, int], sessions: Sequence[_PackSession]
 ) -> PackedContents:
+    """What a packed folder has and lacks; `sizes` [bytes] by name, `sessions` oldest first."""
     made_by = sessions[-1].model_dump() if sessions else {}
     kinds = (kind for mark, kind in KINDS.items() if mark in listed.files)
     ends = {name: PurePosixPath(name).suffix for name in sizes}

@@ -48,6 +48,7 @@ def plain_blocks(markdown: str) -> str:
 
 
 def _format_code(block: re.Match[str]) -> str:
+    """A block of LaTeX as a code block of plain text, with its indent."""
     indent = block[1]
     lines = ["```", *plain(block[2]).splitlines(), "```"]
     return "\n".join(indent + line for line in lines)
@@ -124,6 +125,7 @@ class _LatexReader:
         return _join(symbols)
 
     def _read_symbol(self) -> _MathSymbol:
+        """The next symbol, group or command."""
         token = self._take()
         if token == "{":
             return _MathSymbol(self._read_rest_of_group())
@@ -134,6 +136,7 @@ class _LatexReader:
         return self._read_command(token[1:])
 
     def _read_command(self, name: str) -> _MathSymbol:
+        """What a command stands for, such as `frac`, with the groups that it takes."""
         readers: dict[str, Callable[[], _MathSymbol]] = {
             "frac": self._read_fraction,
             "tfrac": self._read_fraction,
@@ -151,12 +154,14 @@ class _LatexReader:
         return _MathSymbol(NAMES.get(name, name if name.isalpha() else name.strip(",;!") or " "))
 
     def _read_fraction(self) -> _MathSymbol:
+        """A fraction on one line; brackets only where they are needed."""
         over, under = self._read_group(), self._read_group()
         over = f"({over})" if re.search(r" [-+x] |, ", _without_brackets(over)) else over
         under = f"({under})" if re.search(r"[\s/+-]", _without_brackets(under)) else under
         return _MathSymbol(f"{over}/{under}")
 
     def _read_environment(self) -> _MathSymbol:
+        """Cases or a matrix on one line, up to its `end`."""
         kind = self._read_words()
         rows = self.read_rows()
         self._take()
@@ -172,6 +177,7 @@ class _LatexReader:
         return str(self._read_symbol())
 
     def _read_rest_of_group(self) -> str:
+        """The text up to the closing brace, which is taken, too."""
         inside = self._read_cell()
         self._take()
         return inside
@@ -213,6 +219,7 @@ def _format_index(index: str) -> str:
 
 
 def _format_power(power: str) -> str:
+    """An exponent after `^`; a star or prime stands by itself."""
     if power in ("*", "'"):
         return power
     return f"^{power}" if re.fullmatch(r"-?[\w.]+", power) else f"^({power})"

@@ -225,6 +225,7 @@ def _check_not_finished(out: Path, names: Iterable[str]) -> None:
 
 
 def _list_folder(folder: Path) -> frozenset[str]:
+    """The files that a finished folder lists; none where there is no manifest."""
     with suppress(StorageError):
         return frozenset(manifest.read(folder).files)
     return frozenset()

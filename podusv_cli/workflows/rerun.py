@@ -106,6 +106,7 @@ def rerun(path: Path, request: Request, progress: Progress | None = None) -> Rep
 
 
 def _scenario(run: RunFolder, request: Request) -> Scenario:
+    """The resolved scenario of a run, with code from its folder where that is trusted."""
     return load_stored(
         run.resolved_yaml,
         str(run.path / run_folder.RESOLVED),
@@ -115,6 +116,7 @@ def _scenario(run: RunFolder, request: Request) -> Scenario:
 
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
+    """Simulate one run again and compare it with what there was."""
     ((original, scenario),) = runs
     label = original.path.name or str(original.path)
     advance = partial(progress, label) if progress else None
@@ -127,6 +129,7 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
+    """Simulate the runs of a comparison again and compare each with what there was."""
     again = [
         Member(
             run.path.name,

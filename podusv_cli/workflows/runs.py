@@ -122,6 +122,7 @@ def _below(root: Path) -> Iterator[ListedRun]:
 
 
 def _read(folder: Path, mark: str) -> ListedRun:
+    """What `podusv runs` lists of a folder; `mark` is the file that tells its kind."""
     kind, scenario, model = KINDS[mark]
     try:
         about = json_files.read_as(folder / mark, model) if model else _Told()
@@ -178,6 +179,7 @@ def _tree(run: ListedRun) -> Node | None:
 
 
 def _keys(tree: Node, prefix: str = "") -> Iterator[str]:
+    """The dotted keys of all values in a tree; `prefix` is the key of the tree with a dot."""
     for name, entry in tree.mapping.items():
         yield f"{prefix}{name}"
         yield from _keys(entry, f"{prefix}{name}.")

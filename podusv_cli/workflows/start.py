@@ -100,6 +100,7 @@ def start_from(preset: str, out: Path) -> Path:
 
 
 def _write_new(out: Path, text: str) -> Path:
+    """Write a scenario that loads, and its schema. Raises StorageError where `out` exists."""
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
     _check(text, out)
@@ -122,6 +123,7 @@ def _check(text: str, out: Path) -> None:
 
 
 def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
+    """Hull and thrusters of the boat that a user describes. Raises UsageError."""
     thrusters = _thrusters(boat)
     given = {"length": (boat.length, "m"), "beam": (boat.beam, "m"), "mass": (boat.mass, "kg")}
     if boat.speed:
@@ -183,6 +185,7 @@ def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
 
 
 def _thrusters(boat: Boat) -> Thrusters:
+    """Thrusters from words as `EXAMPLE` has them. Raises UsageError."""
     match = THRUSTERS.fullmatch(boat.thrusters.strip())
     if not match:
         raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}")
@@ -203,6 +206,7 @@ def _thrusters(boat: Boat) -> Thrusters:
 
 
 def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
+    """The scenario's text for a boat of these dimensions; `known` says if its speed was given."""
     numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
@@ -210,6 +214,7 @@ def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
 
 
 def _of_preset(preset: str) -> str:
+    """The scenario's text for a vessel of podusv with its thrusters."""
     boat = (
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
@@ -218,6 +223,10 @@ def _of_preset(preset: str) -> str:
 
 
 def _fill_template(title: str, boat: str, study: str) -> str:
+    """The scenario's text: `boat` and `study` are YAML; a task that suits the boat is worked out.
+
+    Speed, legs and duration follow from the hull, so that it can keep up.
+    """
     scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
@@ -259,6 +268,7 @@ FAST = {  # where that time constant alone would ask for more than full thrust a
 
 
 def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]:
+    """The lines of `vessel`; `numbers` are the estimated derivatives by name, in SI units."""
     top = f"{hull.top_speed:.3g} m/s at full thrust{'' if known else ' (a guess, Fn 0.4)'}"
     yield "vessel: # `estimated` is no measurement; podusv docs start has the errors to expect"
     yield "  source: estimated from length, beam and mass by podusv start; no number was measured"
@@ -274,6 +284,7 @@ def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]
 
 
 def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
+    """The lines of `actuator`: a pod for each thruster."""
     turning = "fixed" if not thrusters.turn else "turning"
     yield f"actuator: # {turning} thrusters; n from -1 to 1, so T_nn is the largest thrust [N]"
     yield "  kind: pod"

@@ -70,6 +70,7 @@ def open_store(study: Path) -> Store:
 
 
 def _of_before(study: Path) -> Scenario:
+    """The scenario of a study that an older podusv wrote. Raises UsageError."""
     try:
         return kept_scenario(study).scenario
     except ScenarioError as error:

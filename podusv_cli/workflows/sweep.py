@@ -133,6 +133,7 @@ def _march_study(
     seen = StudyTally(0)
 
     def tell_tally(tally: StudyTally) -> None:
+        """Keep the latest tally, for what is told after an interrupt, and pass it on."""
         nonlocal seen
         seen = tally
         tell(tally)

@@ -72,6 +72,7 @@ def is_verified(resolved: str) -> bool:
 
 
 def _mark(resolved: str) -> Path | None:
+    """The file whose being there says that this scenario is verified; None without a folder."""
     folder = code_folder.code_folder(object_cache.translators())
     digest = sha256(f"{podusv_cli.__version__}\n{resolved}".encode()).hexdigest()[:16]
     return folder / f"{digest}.verified" if folder else None

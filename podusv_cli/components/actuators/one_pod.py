@@ -61,6 +61,7 @@ class Pod(Component):
 
     @model_validator(mode="after")
     def _turning(self) -> Self:
+        """Raises ValueError for a pod that turns and says not how fast."""
         if self.rudder and self.angle_limit == 0.0:
             raise ValueError("has a rudder that cannot turn; give it an angle_limit above 0")
         missing = [name for name in ("angle_rate", "angle_lag") if getattr(self, name) is None]

@@ -154,6 +154,7 @@ class Pods(Actuator):
 
     @model_validator(mode="after")
     def _steerable(self) -> Self:
+        """Raises ValueError for pods that cannot make force and moment apart from each other."""
         if not 1 <= len(self.pods) <= MOST_PODS:
             raise ValueError(f"has {len(self.pods)} pods; 1 to {MOST_PODS} are possible")
         if not any((pod.angle_limit > 0 and pod.x != 0) or pod.y != 0 for pod in self.pods):
@@ -176,6 +177,7 @@ class Pods(Actuator):
 
     @model_validator(mode="after")
     def _there(self) -> Self:
+        """Raises ValueError where a pod is to fail that there is not."""
         if self.failure and self.failure.pod >= len(self.pods):
             raise ValueError(
                 f"has no pod {self.failure.pod} that could fail: its {len(self.pods)} are counted "
@@ -185,6 +187,7 @@ class Pods(Actuator):
 
     @model_validator(mode="after")
     def _computable(self) -> Self:
+        """Raises ValueError for thrust or moment beyond `STRONGEST`."""
         most = [
             max(
                 pod.T_nn * pod.n_max * pod.n_max,

@@ -71,6 +71,7 @@ class Network(Component):
 
     @model_validator(mode="after")
     def _check_span(self) -> Self:
+        """Raises ValueError for nodes, widths or ranges that make no network."""
         if not self.centers and any(n < 1 for n in self.nodes):
             raise ValueError(f"every axis needs at least one node, got {list(self.nodes)}")
         if self.count > MOST_NODES:

@@ -78,6 +78,7 @@ class Pid(TrackingController):
 
     @model_validator(mode="after")
     def _tracks(self) -> Self:
+        """Raises ValueError for gains of 0 where the shortfall is fed back over them."""
         if self.wants_loads() and min(self.K_Pu, self.K_Pr) <= 0:
             raise ValueError(
                 "anti_windup: auxiliary feeds the shortfall back over K_Pu and K_Pr, which have to "

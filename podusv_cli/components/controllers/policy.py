@@ -96,12 +96,14 @@ class Policy(Controller):
     @field_validator("content")
     @classmethod
     def _readable(cls, content: str | None) -> str | None:
+        """Raises ValueError for a file that holds no network."""
         if content is not None:
             _network(content)
         return content
 
     @model_validator(mode="after")
     def _check_weights(self) -> Self:
+        """Raises ValueError where no file is named."""
         if self.content is None:
             raise ValueError(
                 "weights is missing; name a safetensors file, as in weights: policy.safetensors"

@@ -73,6 +73,7 @@ def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
 
 
 def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
+    """The array of a tensor; `numbers` is the file behind its header. Raises ValueError."""
     begin, end = tensor.data_offsets
     if tensor.dtype not in KINDS:
         raise ValueError(f"{name} has numbers {tensor.dtype}; save it as {' or '.join(KINDS)}")
@@ -156,6 +157,7 @@ def _layers(arrays: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]
 def _check_shapes(
     layers: list[tuple[str, Vector, Vector]], inputs: int, outputs: int, names: tuple[str, ...]
 ) -> None:
+    """Raises ValueError unless each layer (name, weight, bias) takes what the one before gives."""
     before, who = inputs, f"the observation ({', '.join(names)})"
     for name, weight, bias in layers:
         if weight.ndim != 2 or weight.shape[1] != before:
@@ -173,6 +175,7 @@ def _check_shapes(
 
 
 def _fill(part: Vector, shape: tuple[int, ...]) -> Vector:
+    """An array of this shape with `part` in its first corner, zeros elsewhere."""
     whole = np.zeros(shape)
     whole[tuple(slice(size) for size in part.shape)] = part
     return whole

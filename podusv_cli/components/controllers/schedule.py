@@ -98,6 +98,7 @@ class Schedule(Controller):
 
     @model_validator(mode="after")
     def _check_content(self) -> Self:
+        """Raises ValueError where no file is named."""
         if not self.rows:
             raise ValueError("file is missing; name a CSV file with columns t, tau_u, tau_r")
         return self

@@ -213,6 +213,7 @@ class TrackingController(Controller):
 
     @model_validator(mode="after")
     def _aims(self) -> Self:
+        """Raises ValueError for a reference that needs a standoff and has none."""
         if self.standoff_reference == "crab" and self.standoff <= 0:
             raise ValueError("standoff_reference: crab needs a standoff above 0")
         return self

@@ -46,6 +46,7 @@ class FromFile(Disturbance):
 
     @model_validator(mode="after")
     def _check_content(self) -> Self:
+        """Raises ValueError where no file is named."""
         if not self.rows:
             raise ValueError("file is missing; name a CSV file with columns t, b_u, b_v, b_r")
         return self

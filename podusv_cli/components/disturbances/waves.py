@@ -142,6 +142,7 @@ class Waves(Disturbance):
 
     @model_validator(mode="after")
     def _has_waves(self) -> Self:
+        """Raises ValueError for limits of frequency that leave out much of the energy."""
         if self.lowest >= self.highest:
             raise ValueError(
                 f"lowest {self.lowest:g} must be below highest {self.highest:g}, both in terms of "

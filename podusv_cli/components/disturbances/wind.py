@@ -124,6 +124,7 @@ class Wind(Disturbance):
 
     @model_validator(mode="after")
     def _blows(self) -> Self:
+        """Raises ValueError for limits of frequency in the wrong order, or no wind that high."""
         if self.lowest >= self.highest:
             raise ValueError(
                 f"lowest {self.lowest:g} Hz must be below highest {self.highest:g} Hz; 0.0017 and "
@@ -179,6 +180,7 @@ class Wind(Disturbance):
         return rows.ravel()
 
     def _density(self, frequency: Vector) -> Vector:
+        """Spectral density of gusts [m2/s] at these frequencies [Hz], (n,)."""
         if self.gusts == "norsok":
             return spectra.norsok(frequency, self.speed, self.at)
         return spectra.harris(frequency, self.speed, self.drag)

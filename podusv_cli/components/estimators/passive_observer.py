@@ -102,6 +102,7 @@ class PassiveObserver(Estimator):
 
     @model_validator(mode="after")
     def _published_conditions(self) -> Self:
+        """Raises ValueError where the conditions of its proof do not hold."""
         if not 1.0 / self.T_b < self.omega_b < self.omega_0 < self.omega_c:
             raise ValueError(
                 "the passive observer needs 1/T_b < omega_b < omega_0 < omega_c: "

@@ -79,6 +79,7 @@ class Waypoints(Path):
 
     @model_validator(mode="after")
     def _check_way(self) -> Self:
+        """Raises ValueError for points of which no way can be made."""
         if len(self.points) < 2:
             raise ValueError(f"needs at least two points, has {len(self.points)}")
         with np.errstate(all="ignore"):
@@ -94,6 +95,7 @@ class Waypoints(Path):
         return self
 
     def _check_fillet(self, times: Vector) -> None:
+        """Raises ValueError for a fillet that does not fit; `times` (legs,) are durations [s]."""
         if self.fillet > 0 and self.legs == "spline":
             raise ValueError("a spline has no corners; write legs: straight, or leave fillet out")
         if self.fillet > times.min():

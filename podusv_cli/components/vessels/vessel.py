@@ -76,6 +76,7 @@ class Vessel(Component):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        """Raises ValueError for a mass matrix that is not positive definite."""
         m11, m22, m33, symmetric = self.m11, self.m22, self.m33, (self.m23 + self.m32) / 2
         if m11 <= 0 or m22 <= 0 or m22 * m33 <= symmetric * symmetric:
             raise ValueError(

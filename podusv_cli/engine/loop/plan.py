@@ -337,6 +337,10 @@ def _numbers(constants: Mapping[str, float]) -> Vector:
 
 
 def _sample_steps(law: Controller, grid: TimeGrid) -> int:
+    """How many steps a sampled law holds its output; 0 for one that is continuous.
+
+    Raises ValueError for a period that is no whole number of steps, or of the loop's own period.
+    """
     period = law.sample_period()
     if law.takes_samples() and not period:
         return grid.hold_every or 1

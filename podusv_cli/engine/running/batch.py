@@ -89,6 +89,7 @@ def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
     work = Work(function, run.vectors.under_way, bell)
 
     def endings(stopped: bool) -> list[Ending]:
+        """How the run ended; cut short if it was `stopped` before its last instant."""
         if stopped and work.good_instants < last:
             return [Ending(work.good_instants, "interrupted")]
         return [work.ending(last)]
@@ -202,6 +203,7 @@ class _Runs:
         progress: Callable[[float], None] | None,
         lanes: bool | None,
     ) -> None:
+        """The arguments of `simulate_many`; nothing marches yet."""
         self._loops, self._grid, self._batch, self._probe = loops, grid, batch, probe
         self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)
@@ -322,6 +324,7 @@ class _Runs:
         self._progress(self._over / len(self._loops))
 
     def _stop(self) -> None:
+        """Stop all threads at their next instant, and note how far each run came."""
         stopped = [thread for thread in self._busy if not thread.work.over]
         for thread in stopped:
             thread.work.stop()
@@ -333,6 +336,7 @@ class _Runs:
 
 
 def _blank(count: int, probe: Probe) -> Batch:
+    """A batch of `count` runs of which none has begun: NaN, and interrupted."""
     return Batch(
         status=np.full(count, "interrupted"),
         cause=np.full(count, "", object),

@@ -82,6 +82,7 @@ def _constant(error: BaseException | None) -> str:
 
 
 def _check_declared(plan: Plan) -> None:
+    """Raises LawError where memory, table or constants are not what the law declares."""
     law = plan.loop.controller
     _check_signals(plan)
     memory, declared = plan.first_memory, (len(plan.states["law"]),)
@@ -117,6 +118,7 @@ def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
 
 
 def _ask(plan: Plan) -> None:
+    """Raises LawError for an output that the law does not write at the first instant."""
     law, (tau, rate, signals) = plan.loop.controller, evaluate_law(plan, UNWRITTEN)
     slots = [f"the rate of {name}" for name in plan.states["law"]]
     names = (*DEMAND, *(part.name for part in law.signals), *slots)

@@ -62,6 +62,7 @@ def marcher(
     *adapters, march = map(compile.routine, every)
 
     def ready(lanes: Lanes, h: float) -> March:
+        """A function that marches these runs side by side, with step `h` [s]."""
         vectors = lanes.vectors
         pointers = signatures.pointers(vectors, signatures.LANE_VECTOR)
         sizes = signatures.whole_numbers(lanes.layout)
@@ -161,6 +162,11 @@ class Lanes:
         return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
 
     def _ending(self, lane: int, reached: int, last: int) -> Ending:
+        """How the run in a lane ended; its state, row and metrics go back to its own vectors.
+
+        `reached` is the instant that the others came to. A run that diverged stopped earlier, and
+        its numbers of that instant were put aside in `ends`.
+        """
         own, ended, n = self.runs[lane], self.under_way[REACHED + lane], self.layout
         together = Vectors(*self.vectors)
         kept = [vector[lane::LANES] for vector in (together.s, together.row, together.seen)]

@@ -51,6 +51,7 @@ def replayer(
     law = compile.entry("law", loop.controller.law, tuple(constants))
 
     def read_time() -> float:
+        """The time of one evaluation of the law [ns], over all rounds."""
         began = time.thread_time_ns()  # of the processor: what else it does is not the law's
         replay(law, rounds, count, width, *vectors)
         return float((time.thread_time_ns() - began) / (rounds * count))
@@ -83,6 +84,10 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     run = _rates_runner(plan, compiled)
 
     def at(rows: Vector, given: Vector | None = None) -> Vector:
+        """Rates and signals (rows, states + columns) at each state in `rows` (rows, states).
+
+        `given` (rows, 2) are demands that act instead of those of the law.
+        """
         out, there, sizes = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
         if given is not None:  # as if they had been on their way to the actuator
             line = np.concatenate([np.zeros(DEMANDS), given.ravel()])
@@ -104,6 +109,7 @@ def rates_replay(plan: Plan, *, compiled: bool = True) -> Callable[[Recording], 
     rates = rates_at(plan, compiled=compiled)
 
     def replay_rates(recording: Recording) -> Replayed:
+        """Rates and signals at each instant of a log, by name."""
         out = rates(np.column_stack([recording[name] for name in state]))
         return Replayed(
             by_name(labels[1:split], out[:, : split - 1], about),

@@ -141,6 +141,7 @@ def marcher(
     adapters, routine = [compile.entry(*part) for part in plan.functions], compile.routine(march)
 
     def over(vectors: Vectors, layout: Layout, h: float) -> March:
+        """A function that marches one run over these vectors, with step `h` [s]."""
         pointers, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
 
         def march(first: int, last: int, steps: int = layout.steps) -> int:
@@ -175,6 +176,7 @@ def why(plan: Plan, vectors: Vectors, ending: Ending) -> str:
 
 
 def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
+    """Which state or signal is the first that is not finite, or beyond `LARGEST`."""
     now = np.concatenate([[at], vectors.s, vectors.row[:-BEFORE]])
     named = zip(labels, now, strict=True)
     bad = next((name for name, x in named if not abs(x) <= rk4.LARGEST), "?")
@@ -182,6 +184,7 @@ def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
 
 
 def _last_words(signals: Mapping[str, Vector]) -> str:
+    """The last logged values, for the message of a run that diverged."""
     last = ", ".join(
         f"{name} {signals[name][-1]:.4g}"
         for name in ("time", *STATE, *DEMAND)

@@ -122,6 +122,7 @@ class Work:
 
     def _run(self) -> None:
         # Looked up by the thread itself, since the system crashes if the thread has ended.
+        """Call the function in its thread; its result or error stays with the work."""
         look_up = getattr(time, "pthread_getcpuclockid", None)
         self._clock = (
             partial(time.clock_gettime, look_up(get_ident())) if look_up else time.process_time

@@ -66,6 +66,7 @@ def profiles(made: pd.DataFrame) -> Figure:
 
 
 def _profile(axes: Axes, made: pd.DataFrame) -> None:
+    """Draw for each law the share of cases [%] with a ratio to the best of at most x."""
     ratios = np.geomspace(1.0, WORST, 300)
     for place, law in enumerate(made.law.unique()):
         color, linestyle, _ = nth_style(place)
@@ -105,6 +106,7 @@ def _fold_name(law: str) -> str:
 
 
 def _small(axes: Axes, runs: Sequence[BenchRun]) -> None:
+    """Draw the tracks of one case, east over north; those that fail in another colour."""
     axes.set(xticks=[], yticks=[], aspect="equal")
     for spine in axes.spines.values():
         spine.set_linewidth(0.3)

@@ -71,6 +71,7 @@ def as_markdown(made: pd.DataFrame) -> str:
 
 
 def _table(made: pd.DataFrame) -> str:
+    """The leaderboard as a table of Markdown."""
     head, *rows = leaderboard_rows(made)
     lines = [head, *([markdown(law), *texts] for law, *texts in rows)]
     joined = [f"| {' | '.join(line)} |\n" for line in lines]
@@ -102,6 +103,7 @@ def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[PageCell]:
 
 
 def _cell(ratio: float, why: str) -> PageCell:
+    """A cell of the heat map; the colour goes with the logarithm of the ratio to the best."""
     if not math.isfinite(ratio):
         return PageCell(CROSS, "#f6d5c3", "#7a2b00", why)
     depth = min(math.log(ratio) / math.log(DARKEST), 1.0)

@@ -51,6 +51,7 @@ def play(case: BenchCase) -> list[BenchRun]:
 
 
 def _play_case(case: BenchCase) -> Iterator[BenchRun]:
+    """The run of each law of a case; one that podusv refuses counts as crashed."""
     for law, scenario in case.laws.items():
         try:
             yield _run(case, law, scenario)
@@ -64,6 +65,7 @@ def crashed_run(case: BenchCase, law: str, cause: str) -> BenchRun:
 
 
 def _run(case: BenchCase, law: str, scenario: Scenario) -> BenchRun:
+    """Simulate one law in one case, and judge whether it ends at its target."""
     plan = scenario.plan(_thin_grid(scenario.time_grid()))
     recording = to_end(plan, compiled=scenario.simulation.compiled)
     numbers = plan.probe.summary(recording.seen) if recording.seen is not None else {}

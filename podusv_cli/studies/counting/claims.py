@@ -169,6 +169,7 @@ class _Evaluation(Logic):
         return all_of([Condition.of(self._hold_link(link)) for link in links])
 
     def _hold_link(self, link: Link) -> Iterator[bool | None]:
+        """Whether a comparison holds, cell by cell; None where the draws do not decide."""
         if link.text not in self.samples:
             self.samples[link.text] = self._sample_statistic(link.call)
         for sample in self.samples[link.text]:
@@ -229,6 +230,7 @@ def _is_number(node: ast.expr) -> bool:
 
 
 def _statistic(node: ast.expr) -> ast.Call:
+    """The call of a statistic over all draws. Raises ExpressionError for anything else."""
     if not isinstance(node, ast.Call):
         refuse(node, f"no statistic of all draws; write one of {', '.join(STATISTICS)}")
     known_name(function(node), STATISTICS, "statistic")
@@ -242,6 +244,7 @@ def _check_bound(call: ast.Call, bound: float) -> None:
 
 
 def _verdict(parsed: ParsedStudyClaim, tried: _Evaluation) -> StudyVerdict:
+    """A claim's verdict with its numbers, and what it would be without the broken runs."""
     runs, answers = tried.runs, tried.answers
     broken = sum(int(np.sum(runs.broken(law) & runs.done(law))) for law in parsed.parsed.laws)
     others = replace(tried, whole=False, samples={}) if broken else tried

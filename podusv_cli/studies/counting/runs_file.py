@@ -165,6 +165,7 @@ class RunsTable:
         columns: dict[str, Any] = {}
 
         def note(name: str, thing: Any) -> None:  # returns None, so that all are visited
+            """Keep the column of a drawn quantity: numbers, or words as text."""
             if isinstance(thing, h5py.Dataset):
                 content = thing[()]
                 columns[name] = np.char.decode(content) if content.dtype.kind == "S" else content
@@ -190,6 +191,7 @@ class RunsTable:
                         yield self._unit(position, law, cell, part, status[cell])
 
     def _unit(self, place: int, law: str, cell: int, rows: range, status: Codes) -> UnitResult:
+        """The results of these rows (draws) of a law and cell; `status` has all draws' codes."""
         part = slice(rows.start, rows.stop)
         return UnitResult(
             Unit(law, cell, rows.start, len(rows)),

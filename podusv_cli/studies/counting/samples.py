@@ -142,9 +142,12 @@ def _condition(call: ast.Call, walk: OverLaws) -> Condition:
 
 
 def _share(call: ast.Call, walk: OverLaws) -> Sampler:
+    """Counts the draws in which a condition holds."""
     held = _condition(call, walk)
 
     def sample(label: str, cell: int, used: Mask) -> Share:
+        """The count in a cell among the draws `used` (draws,); unknown where it is undecided."""
+
         def count(where: Mask) -> int:
             return int(np.sum(where[cell] & used))
 
@@ -157,9 +160,12 @@ def _share(call: ast.Call, walk: OverLaws) -> Sampler:
 
 
 def _discordant(call: ast.Call, walk: OverLaws) -> Sampler:
+    """Counts the draws in which one of two conditions holds and the other does not."""
     first, second = (_condition(share, walk) for share in call.args if isinstance(share, ast.Call))
 
     def sample(label: str, cell: int, used: Mask) -> Discordant:
+        """The count in a cell among the draws `used` (draws,), and those that are undecided."""
+
         def count(where: Mask) -> int:
             return int(np.sum(where[cell] & used))
 
@@ -198,6 +204,7 @@ def part_of(call: ast.Call, wording: Wording) -> tuple[ast.expr, float]:
 
 
 def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
+    """Takes the quantile at share `q` of a number over the draws."""
     values = walk.side(node)
 
     def sample(label: str, cell: int, used: Mask) -> Quantile:
@@ -208,6 +215,7 @@ def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
 
 
 def _arguments(call: ast.Call, count: int, wanted: str) -> list[ast.expr]:
+    """The arguments of a call. Raises ExpressionError unless there are `count`."""
     if len(call.args) != count:
         refuse(call, f"{function(call)} takes {wanted}")
     return call.args

@@ -51,6 +51,7 @@ def cells(loaded: Loaded, check: Check | None = None) -> tuple[Cell, ...]:
 def _make_cells(
     loaded: Loaded, check: Check | None, faults: dict[Hashable, None]
 ) -> Iterator[Cell]:
+    """The cells of the grid in order, last key fastest; faults of those that do not load."""
     grid = _grid(loaded)
     for index, nodes in enumerate(product(*grid.values())):
         each = [tree_with(key, node, loaded.root) for key, node in zip(grid, nodes, strict=True)]
@@ -102,6 +103,7 @@ def _check_grid(loaded: Loaded) -> None:
 
 
 def _wrong(key: str, nodes: tuple[Node, ...]) -> Iterator[str]:
+    """What is wrong with a key of the grid and its values."""
     steps = route(key)
     if not nodes:
         yield "is empty; write the values of the cells"
@@ -110,6 +112,7 @@ def _wrong(key: str, nodes: tuple[Node, ...]) -> Iterator[str]:
 
 
 def _fault(loaded: Loaded, key: str, text: str) -> Fault:
+    """A fault at a key of the grid, or at the grid itself."""
     place = ("sweep", "grid", *([key] if key else []))
     node = find(loaded.root, place)
     mark = node.key_mark or node.mark if node else loaded.root.mark

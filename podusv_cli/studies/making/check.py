@@ -80,6 +80,7 @@ def singles(scenario: Scenario) -> dict[str, Scenario]:
 
 
 def _laws(scenario: Scenario, sweep: Sweep) -> Faults:
+    """Laws of the study that the scenario has not, or that are named twice."""
     labels = scenario.labels()
     for place, label in enumerate(sweep.laws):
         if label not in labels:
@@ -96,6 +97,7 @@ def _metric_names(scenario: Scenario) -> Faults:
 
 
 def _vary(laws: Mapping[str, Scenario], plans: Mapping[str, Plan], sweep: Sweep) -> Faults:
+    """Drawn quantities whose name, key or values no law can take; one fault each if possible."""
     own = {law: replace(plans[law], probe_for=no_probe).structure for law in laws}
     taken = {
         *AXES,
@@ -280,6 +282,7 @@ def _wrong_values(
 def _scenario_or_refusal(
     name: str, quantity: Quantity, scenario: Scenario, value: Any
 ) -> Scenario | str:
+    """The scenario with this draw, or the sentence that says why it cannot be."""
     try:
         return draw_scenario(scenario, {name: quantity}, {name: value})
     except ValueRefused as error:
@@ -292,6 +295,7 @@ def _structure(scenario: Scenario) -> Any:
 
 
 def _twice(sweep: Sweep) -> Faults:
+    """Keys that two quantities draw, or that the grid sets as well."""
     keys = [(name, key) for name, q in sweep.vary.items() for key in q.targets(name)]
     counts, of_rows = Counter(key for _, key in keys), set[str]()
     for name, key in keys:
@@ -320,6 +324,7 @@ def gathered_metrics(scenario: Scenario) -> dict[str, Metric]:
 
 
 def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
+    """Kept runs by a metric or a draw that there is not."""
     metrics = gathered_metrics(scenario)
     for name in sweep.keep.worst:
         if name not in metrics:
@@ -334,6 +339,7 @@ def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
 
 
 def _claims(scenario: Scenario, sweep: Sweep) -> Faults:
+    """Claims and a condition of success that cannot be read, or not be judged in this design."""
     if sweep.claims and not sweep.independent:
         remedy = f"`claims: {{{next(iter(sweep.claims))}: null}}`"
         yield (

@@ -73,6 +73,7 @@ def connect_cluster(address: str, study: StudyText, identity: str) -> Iterator[C
 
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
+    """A client of the scheduler at `address`. Raises UsageError without Dask, StorageError."""
     try:
         from distributed import Client
     except ImportError:
@@ -141,6 +142,7 @@ class Cluster:
             self._check(worker, future, max(0.1, end - time.monotonic()))
 
     def _check(self, worker: str, future: Any, patience: float) -> None:
+        """Raises UsageError where a worker cannot load the study, or computes with other code."""
         try:
             report = future.result(timeout=patience)
         except TimeoutError:  # it is slow, or gone
@@ -183,6 +185,7 @@ class Cluster:
         return not alone and len(self._running) < max(1, WINDOW * sum(self._threads.values()))
 
     def _next(self, units: Units) -> UnitTask | None:
+        """The next unit to hand out, or None where nothing can be handed out now."""
         if self._again:
             return self._again.popleft()
         if not self._suspects:
@@ -207,6 +210,7 @@ class Cluster:
         )
 
     def _submit(self, task: UnitTask) -> None:
+        """Hand a unit to the cluster; its future is put into `_finished` when it is done."""
         future = self._client.submit(
             remote.make_unit,
             self._study.text,
@@ -229,6 +233,7 @@ class Cluster:
         return future, self._reply(future) if future in self._running else None
 
     def _reply(self, future: Any) -> Reply:
+        """What a worker answered; a unit that killed its workers is a failure of that unit."""
         if future.status == "error":
             error = future.exception()
             killed = type(error).__name__ == KILLED
@@ -242,6 +247,7 @@ class Cluster:
         return reply
 
     def _receive(self, task: UnitTask, reply: Reply, done: Done) -> None:
+        """Pass on an outcome, or plan the unit again where the worker is to blame."""
         if reply.outcome is None:
             self._refused[reply.worker] = (
                 f"worker {reply.worker} got no units, because it computes with something else: "

@@ -124,6 +124,7 @@ class _Shares:
     """
 
     def __init__(self, units: Units, done: Done, workers: int) -> None:
+        """Deal `units` to so many workers, several units a job where they are short."""
         self._units, self._done, self._workers = units, done, workers
         self._parts = dict[int, list[tuple[int, StudyPlan, Unit]]]()
         self._again = deque[tuple[int, StudyPlan, Unit]]()
@@ -132,6 +133,7 @@ class _Shares:
         return self
 
     def __next__(self) -> tuple[int, Job]:
+        """A number, and the job that makes one share; raises StopIteration at the end."""
         parts = [self._again.popleft()] if self._again else self._take_share()
         number = parts[0][0]
         self._parts[number] = parts
@@ -203,6 +205,7 @@ class StudyDriver:
         return {key: sum(map(len, ranges)) for key, ranges in self._gaps.items() if ranges}
 
     def _next(self) -> Unit | None:
+        """The next range of draws that is missing, or None when all are handed out."""
         if self._halves:
             return self._halves.popleft()
         if self.failure or time.monotonic() > self._until:
@@ -239,6 +242,7 @@ class StudyDriver:
             self.failure = outcome
 
     def _keep(self, result: UnitResult) -> None:
+        """Write a unit's result, and tell how many runs are made."""
         self.store.write(result)
         self.tally.made += result.unit.count
         self.tally.failed += int(np.count_nonzero(result.status != STATUSES.index("finished")))

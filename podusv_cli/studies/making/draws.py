@@ -102,6 +102,10 @@ def drawing(scenario: Scenario, vary: Mapping[str, Quantity]) -> Callable[[Draw]
     ]
 
     def scenario_of(draw: Draw) -> Scenario:
+        """The scenario with a draw's values put in.
+
+        Raises ValueRefused, which names the quantity.
+        """
         new = {
             steps: quantity.value(own, draw[name], place)
             for steps, name, quantity, own, place in targets

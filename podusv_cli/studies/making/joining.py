@@ -55,6 +55,7 @@ class SeenRuns:
             known[:], origins[:] = new_digests, len(self._stores) - 1
 
     def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
+        """Raises StorageError: the draws in `other` (count,) have other numbers in `earlier`."""
         unit, folder = new.unit, self._stores[-1].folder
         first = unit.first + int(np.argmax(other))
         names = ", ".join(_differing(new, earlier, first))
@@ -94,6 +95,7 @@ def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
 
 
 def _run(result: UnitResult, draw: int) -> dict[str, Any]:
+    """All numbers of one draw of a unit, by name."""
     row = draw - result.unit.first
     arrays: dict[str, Any] = {**result.metrics, "status": result.status, "until": result.until}
     return {name: array[row] for name, array in arrays.items()} | {"cause": result.causes[row]}
@@ -112,6 +114,7 @@ def mixture(folder: Path) -> str:
 
 def _machines(folder: Path) -> list[str]:
     # A session that was killed has no end, and does not know how many runs it made.
+    """The machines that made a study's runs, each once, in the order of sessions."""
     made = (
         session for session in sessions(folder) if session["runs"] or session["finished"] is None
     )
@@ -125,6 +128,7 @@ def machines(folder: Path) -> str:
 
 
 def _machine(session: Mapping[str, Any]) -> str:
+    """Processor and versions of a session, which decide the bits of its runs."""
     platform, packages = session["platform"], session["packages"]
     return (
         f"{platform['processor']} ({platform['libc']}, podusv {session['podusv']}, "

@@ -132,6 +132,7 @@ def _extent(
 
 
 def _labels(file: h5py.File, axis: str, labels: Any) -> h5py.Dataset:
+    """The dimension scale of an axis that has labels or numbers."""
     content = _label_array(labels) if isinstance(labels[0], str) else labels
     scale = file.create_dataset(axis, data=content)
     scale.make_scale(axis)
@@ -185,6 +186,7 @@ def _fill(
 
 
 def _blank(out: Any, extent: Extent, content: float) -> None:
+    """Fill the room of a dataset with one number, block by block."""
     for start in range(extent.offset, extent.end, BLOCK):
         count = (min(BLOCK, extent.end - start)) // extent.kind.itemsize
         write_at(out, start, extent.content(np.full(count, content)))

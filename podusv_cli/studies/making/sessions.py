@@ -118,6 +118,7 @@ class SessionLog:
             self._write(sessions(self._folder))
 
     def _write(self, noted: list[dict[str, Any]]) -> None:
+        """Write the sessions anew, this one at its place among them."""
         noted[self._place : self._place + 1] = [self._origin]
         content = {"format": 1, "sittings": noted}
         files.write_bytes(self._folder / NAME, json_text.encode(content))

@@ -178,6 +178,7 @@ class Store:
         return table
 
     def _check_metrics(self, fit: bool) -> None:
+        """Raises StorageError unless the metrics of study.json and of the runs `fit`."""
         if not fit:
             raise StorageError(
                 f"cannot read {self.folder / STUDY}: damaged, it has other metrics than the runs; "

@@ -47,10 +47,12 @@ def bars(claim: ParsedStudyClaim, verdict: StudyVerdict) -> Iterator[Bar]:
 
 
 def _bar(link: Link, part: Statistic) -> Bar:
+    """One number of a claim as a bar: places along it are in percent of its axis."""
     shares = isinstance(link.call.func, ast.Name) and link.call.func.id in (SHARE, FAILURES)
     first, last = _axis(link, part, shares=shares)
 
     def place(number: float) -> float:
+        """Where a number lies along the axis [%]; beyond the ends, at the end."""
         return round(100.0 * (min(max(number, first), last) - first) / (last - first), 2)
 
     bound = place(link.bound)
@@ -71,6 +73,7 @@ def _axis(link: Link, part: Statistic, *, shares: bool) -> tuple[float, float]:
 
 
 def _words(link: Link, part: Statistic, *, shares: bool) -> str:
+    """A number of a claim, its interval, and the bound that it is compared with."""
     at = f" at {part.cell}" if part.cell else ""
     interval = Interval(part.estimate, part.low, part.high).text(FORMS[shares])
     bound = digits(link.bound * (100.0 if shares else 1.0), ".4g") + (" %" if shares else "")

@@ -88,6 +88,7 @@ def _bands(level: float) -> str:
 
 
 def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
+    """The curves of one metric in one cell, a law each."""
     values, level = _metric_by_law(results, name, cell), results.level
     if values:
         yield Sketch(
@@ -100,6 +101,7 @@ def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
 
 
 def _ratios(results: Results, name: str) -> Iterator[Sketch]:
+    """The ratios of one metric between two laws in the same draw."""
     pairs, cells, level = results.pairs, results.runs.cells[:MOST_CELLS], results.level
     if len(pairs) and len(rows := pairs[(pairs.metric == name) & pairs.cell.isin(cells)]):
         yield Sketch(
@@ -113,6 +115,7 @@ def _ratios(results: Results, name: str) -> Iterator[Sketch]:
 
 
 def _failures(results: Results, cell: int) -> Iterator[Sketch]:
+    """Failures over the threshold, for each metric that success limits, in one cell."""
     level = results.level
     for name, threshold, values in _thresholds(results, cell):
         yield Sketch(
@@ -145,6 +148,7 @@ def _thresholds(results: Results, cell: int) -> Iterator[tuple[str, float, dict[
 def _limit_axis(
     results: Results, name: str, others: Sequence[ast.expr], cell: int
 ) -> dict[str, Vector]:
+    """For each law the metric `name` of its runs (n,) in one cell; inf where `others` fail."""
     runs, limited = results.runs, dict[str, Vector]()
     rest = ast.BoolOp(ast.And(), [ast.Name(FINISHED), *others])
     for law in runs.laws:
@@ -156,6 +160,7 @@ def _limit_axis(
 
 
 def _heatmaps(results: Results) -> Iterator[Sketch]:
+    """Failures and medians over the grid: first key across, all others down."""
     grid = results.about.grid
     if not grid:
         return
@@ -185,6 +190,7 @@ def _panel(results: Results, law: str, name: str, across: int) -> Vector:
 
 
 def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
+    """What one metric depends on in one cell, if it depends on anything."""
     table = results.sensitivity
     if not len(table):
         return
@@ -202,6 +208,7 @@ def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
 
 
 def _funnel(tracks: Mapping[str, Sequence[Track]]) -> Iterator[Sketch]:
+    """Distance to the target over time of the kept runs, by law."""
     if count := sum(map(len, tracks.values())):
         yield Sketch(
             "funnel",

@@ -80,6 +80,7 @@ def _failed_runs(runs: RunsTable, law: str, count: int) -> Iterator[KeptRun]:
 
 
 def _worst(results: Results, law: str, name: str, count: int) -> Iterator[KeptRun]:
+    """The `count` successful runs of a law with the largest `name`, over all cells."""
     runs = results.runs
     values = np.where(runs.success(law), runs.metric(law, name), np.nan)
     order = np.argsort(-values, axis=None, kind="stable")[: min(count, np.isfinite(values).sum())]
@@ -89,6 +90,7 @@ def _worst(results: Results, law: str, name: str, count: int) -> Iterator[KeptRu
 
 
 def _name_runs(runs: RunsTable, law: str, draws: Iterable[int]) -> Iterator[KeptRun]:
+    """The runs of a law in these draws, in each cell, as far as they are made."""
     done = runs.done(law)
     for draw in draws:
         for cell in range(len(runs.cells)):
@@ -110,6 +112,7 @@ def find_kept(folder: Path, results: Results, extras: Extras) -> list[Kept]:
 
 
 def _open_kept(path: Path, kept_run: KeptRun, results: Results, extras: Extras) -> Kept:
+    """A kept run opened and compared with the table; None in it where it cannot be opened."""
     if not path.exists():
         return Kept(kept_run, None)
     try:
@@ -154,6 +157,7 @@ def tracks(kept: Sequence[Kept], extras: Extras) -> dict[str, list[Track]]:
 
 
 def _track(kept: Kept) -> Track | None:
+    """Times [s] and distances z_e [m] of a kept run, `POINTS` at most; None without them."""
     if kept.run is None or "z_e" not in kept.run.recording:
         return None
     log = kept.run.recording

@@ -114,6 +114,7 @@ def as_frame(runs: RunsTable) -> pd.DataFrame:
 
 
 def _frame(runs: RunsTable, law: str, cell: int) -> pd.DataFrame:
+    """A row for each draw of a law and cell that was tried: place, draw, ending, metrics."""
     done = runs.tried(law)[cell]
     import pandas as pd  # slow to import
 

@@ -131,6 +131,7 @@ def _worst(runs: RunsTable, law: str, mask: Mask) -> Any:
 
 
 def _row(results: Results, drawn: Mapping[str, Any], place: tuple[str, int, int]) -> RunRow:
+    """A row of the report's table of runs; `place` is (law, cell, draw)."""
     runs, (law, cell, draw) = results.runs, place
     until = float(runs.until(law)[cell, draw])
     status = STATUSES[int(runs.status(law)[cell, draw])]

@@ -133,6 +133,7 @@ class Results:
         return head, rows
 
     def _row(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
+        """A law's share of failures and medians as text; `mine` are its summary rows by metric."""
         if not mine:  # no run yet
             return ["-"] * (1 + len(self.shown_metrics))
         failed = f"{Interval.of(next(iter(mine.values())), 'failed'):.3g%}"
@@ -179,6 +180,7 @@ def judge_study(about: StudyAbout, runs: RunsTable) -> Results:
 
 
 def _frame(rows: summary.Rows) -> pd.DataFrame:
+    """Rows as a table of pandas."""
     import pandas as pd  # slow to import
 
     return pd.DataFrame(rows)

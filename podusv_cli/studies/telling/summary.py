@@ -131,6 +131,7 @@ def _columns(runs: StudyRuns, law: str, cell: int, metrics: Known) -> Iterator[t
 
 
 def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, Any]:
+    """Failed draws of a law in a cell: counts, and their share with its interval."""
     done: Mask = runs.done(law)[cell]
     failed, n = int(np.sum(done & ~runs.success(law)[cell])), int(np.sum(done))
     return {
@@ -143,6 +144,7 @@ def _failures(runs: StudyRuns, law: str, cell: int, level: float) -> dict[str, A
 
 
 def _quantiles(values: Vector, level: float) -> dict[str, Any]:
+    """Quantiles of a metric over draws (n,) with intervals; `level` is their confidence."""
     columns: dict[str, Any] = {"unknown": int(np.isnan(values).sum())}
     intervals = statistics.quantiles(values, QUANTILES, level)
     for q, interval in zip(QUANTILES, intervals, strict=True):
@@ -151,6 +153,7 @@ def _quantiles(values: Vector, level: float) -> dict[str, Any]:
 
 
 def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
+    """Two laws in the same draws (n,): wins, ties and ratio; less than `margin` apart is a tie."""
     compared = statistics.pairs(a, b, margin)
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {

@@ -30,6 +30,7 @@ def tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def _study(scenario: Scenario) -> Faults:
+    """What keeps the scenario's study from being tuned on."""
     if scenario.sweep is None:
         yield (("tune",), "needs the key sweep: its `vary` says what is drawn (podusv docs tuning)")
     elif scenario.sweep.grid:
@@ -41,6 +42,7 @@ def _study(scenario: Scenario) -> Faults:
 
 
 def _budget(tune: Tune) -> Faults:
+    """A budget that is less than one batch."""
     least = tune.batch * tune.train
     if tune.budget < least:
         yield (
@@ -51,6 +53,7 @@ def _budget(tune: Tune) -> Faults:
 
 
 def _expressions(scenario: Scenario, tune: Tune) -> Faults:
+    """An objective or inequality that cannot be read."""
     metrics = {n: m for n, m in scenario.known_metrics().items() if m.accumulator}
     try:
         parse_objective(tune.objective, metrics)

@@ -61,7 +61,7 @@ def sketches(results: SearchResults) -> Iterator[Sketch]:
 
 
 def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
-
+    """Figures of the searches: history, ratios, importance, and slices of each tuned law."""
     yield Sketch(
         "history",
         f"best {objective} on the training draws so far, a curve for each search: the curves begin "
@@ -90,6 +90,7 @@ def _of_searches(results: SearchResults, objective: str) -> Iterator[Sketch]:
 
 
 def _slices(results: SearchResults, law: str, objective: str) -> Sketch:
+    """The figure of all trials of a law over each of its gains."""
     tried = pd.DataFrame(
         [
             {
@@ -178,6 +179,7 @@ def effort(table: pd.DataFrame, metric: str) -> Figure:
 
 
 def _draw_range(axes: Axes, y: float, law: Any, when: str, fill: str) -> None:
+    """Draw a law's objective at height `y`: its interval as a line, the estimate as a dot."""
     estimate, low, high = (law[f"objective_{when}{end}"] for end in ("", "_low", "_high"))
     colour = nth_style(0)[0] if when == "before" else nth_style(1)[0]
     if np.isfinite([low, high]).all():
@@ -261,6 +263,7 @@ def slices(
 
 
 def _slice(axes: Axes, gain: Gain, tried: pd.DataFrame, winner: Any) -> None:
+    """Draw the trials over one gain; lines at the gain that was found and the scenario's own."""
     if gain.words:
         places = {word: place for place, word in enumerate(gain.words)}
         x = tried[gain.key].map(places)

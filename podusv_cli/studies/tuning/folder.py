@@ -109,6 +109,7 @@ def _identity(plan: TunePlan) -> dict[str, Any]:
 
 
 def _content(plan: TunePlan, history: Sequence[Any], started: str) -> dict[str, Any]:
+    """What tune.json says; `started` is when this run of the command began."""
     tune = plan.tune
     asked = {
         "budget": tune.budget,
@@ -159,6 +160,7 @@ def tuned_yaml(results: SearchResults) -> bytes:
 
 
 def _tell_results(results: SearchResults) -> str:
+    """The sentence at the head of tuned.yaml."""
     tune = results.plan.tune
     searches: Sequence[str] = [f"{tune.budget} runs", f"{tune.train} draws"]
     what = tune.objective

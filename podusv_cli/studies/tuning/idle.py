@@ -44,6 +44,7 @@ def find_idle(plan: TunePlan, workers: int) -> dict[str, tuple[str, ...]]:
 
 
 def _of_law(plan: TunePlan, law: str, progress: Progress) -> tuple[str, ...]:
+    """The gains of a law that change no run when they change."""
     left = list(plan.gains[law])
     for place, point in enumerate(_points(plan, law)):
         run = partial(_run, plan, law, place % plan.tune.train)
@@ -53,6 +54,7 @@ def _of_law(plan: TunePlan, law: str, progress: Progress) -> tuple[str, ...]:
 
 
 def _points(plan: TunePlan, law: str) -> Iterator[Gains]:
+    """Gains to try: the scenario's own, then drawn ones."""
     gains = plan.gains[law]
     yield {gain.key: gain.own for gain in gains}
     assert plan.scenario.sweep
@@ -78,6 +80,8 @@ def _run(plan: TunePlan, law: str, draw: int, gains: Gains) -> UnitResult | None
 
 
 def _differ(one: UnitResult, other: UnitResult) -> bool:
+    """Whether two results differ in any bit; NaN equals NaN."""
+
     def numbers(result: UnitResult) -> Sequence[Any]:
         return [result.status, result.until, *result.metrics.values()]
 

@@ -145,6 +145,10 @@ def excess(inequality: Inequality, runs: Outcomes, metrics: Mapping[str, Metric]
 
 
 def _evaluate(node: ast.expr, walk: OfGains, worst: float) -> Any:
+    """The value of an expression; `worst` is what stands for a failed run, inf or -inf.
+
+    Its sign follows the operators, so that a failure never improves the whole.
+    """
     match node:
         case ast.Constant():
             return np.float64(literal(node))

@@ -64,6 +64,7 @@ def _power(results: SearchResults) -> Iterator[str]:
 
 
 def _remark_unsettled(results: SearchResults) -> Iterator[str]:
+    """Laws that have no rank, since they seldom end at their target."""
     laws = results.laws[results.laws.rank_after.isna()].law
     if len(laws):
         yield (
@@ -73,6 +74,7 @@ def _remark_unsettled(results: SearchResults) -> Iterator[str]:
 
 
 def _once(results: SearchResults) -> Iterator[str]:
+    """Too few searches or training sets to order laws by."""
     tune = results.plan.tune
     if len(results.plan.laws) < 2:
         return
@@ -90,6 +92,7 @@ def _once(results: SearchResults) -> Iterator[str]:
 
 
 def _verdict(row: dict[str, Any]) -> str:
+    """Which law of a pair is better, by the interval of their ratio."""
     if row["ratio_high"] < 1.0:
         return f"{row['a']} is better"
     if row["ratio_low"] > 1.0:
@@ -98,18 +101,21 @@ def _verdict(row: dict[str, Any]) -> str:
 
 
 def _remark_kept(results: SearchResults) -> Iterator[str]:
+    """Laws without gains."""
     for law in results.plan.laws:
         if law not in results.winners:
             yield f"{law} has no gains, kept as it is"
 
 
 def _idle(results: SearchResults) -> Iterator[str]:
+    """Gains that no run depends on."""
     for law, keys in results.plan.idle.items():
         if keys:
             yield f"{law}: not searched, as no run depends on it: {', '.join(keys)}"
 
 
 def _unsound(results: SearchResults) -> Iterator[str]:
+    """Laws whose best trial breaks an inequality, or has no value."""
     for law in results.winners:
         trial = results.winner(law)
         broken = [
@@ -124,6 +130,7 @@ def _unsound(results: SearchResults) -> Iterator[str]:
 
 
 def _few(results: SearchResults) -> Iterator[str]:
+    """Laws with too few whole trials for their gains."""
     few = []
     for law in results.winners:
         whole = min(sum(t.status == FINISHED for t in trials) for trials in results.trials[law])
@@ -138,6 +145,7 @@ def _few(results: SearchResults) -> Iterator[str]:
 
 
 def _remark_overfitted(results: SearchResults) -> Iterator[str]:
+    """Laws whose chosen search is not the best one on fresh draws."""
     for law in results.winners:
         reached = results.spread(law)
         taken = reached[results.winners[law].index(results.winner(law))]
@@ -163,6 +171,7 @@ def _beyond(results: SearchResults) -> Iterator[str]:
 
 
 def _bounds(results: SearchResults) -> Iterator[str]:
+    """Gains that were found at an end of their range."""
     rows = results.gains[results.gains["at"] != ""].to_dict("records")
     at_ends = []
     for row in rows:

@@ -144,6 +144,7 @@ def _order_change(before: Any, after: Any) -> str:
 
 
 def _gains(results: SearchResults) -> Iterator[dict[str, Any]]:
+    """The rows of the report's table of gains, as text."""
     units = {law: units_of(own) for law, own in results.plan.laws.items()}
     share = results.importance.set_index(["law", "gain"]) if len(results.importance) else None
     rows: Any = results.gains.to_dict("records")

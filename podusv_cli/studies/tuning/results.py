@@ -158,6 +158,7 @@ class SearchResults:
         return int((ahead | (pairs.b == law) & (pairs.ratio_low > 1.0)).sum())
 
     def _law(self, law: str) -> dict[str, Any]:
+        """A law's row: failures and objective before and after, their ratio, spread of searches."""
         row: dict[str, Any] = {"law": law, "runs": self.runs_spent.get(law, 0)}
         for when, name in (("before", law), ("after", self.after(law))):
             runs = self.outcomes_of(name)
@@ -212,6 +213,7 @@ class SearchResults:
         )
 
     def _limit(self, inequality: Inequality, name: str) -> dict[str, Any]:
+        """The value of an inequality's left side on fresh draws, and whether it holds."""
         runs = self.outcomes_of(name)
         holds = excess(inequality, runs, self.plan.metrics) <= 0.0
         return {**self.objective(runs, inequality.tree).columns("value"), "holds": holds}
@@ -348,6 +350,7 @@ def _range(values: Sequence[float]) -> dict[str, float]:
 
 
 def _history(law: str, repeat: int, trials: Sequence[GainTrial]) -> Iterator[dict[str, Any]]:
+    """A row for each trial of a search: runs spent so far, and the best value so far."""
     spent, leader = 0, (math.inf, math.inf)
     for trial in trials:
         spent += trial.runs

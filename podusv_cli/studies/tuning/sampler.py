@@ -63,6 +63,7 @@ class Sampler:
                 self._study.tell(trial, _finite(number))
 
     def _sampler_for(self, batch: int) -> Any:
+        """An Optuna sampler whose seed depends on the search and `batch` only."""
         text = json.dumps([*self._seed, batch])
         seed = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "little")
         samplers = self._optuna.samplers
@@ -74,6 +75,7 @@ class Sampler:
         return {gain.key: self._one(trial, gain) for gain in self._gains}
 
     def _one(self, trial: Any, gain: Gain) -> Any:
+        """The value of one gain that Optuna suggests for a trial."""
         if gain.words:
             return trial.suggest_categorical(gain.key, list(gain.words))
         if gain.whole:

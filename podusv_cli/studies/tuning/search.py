@@ -109,6 +109,7 @@ class GainSearch:
         ]
 
     def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
+        """These gains with so many draws to meet; without a plan where the law refuses them."""
         taken = with_gains(self.plan.laws[self.law], gains)
         named = {self.law: (self.law, gains)}
         stream = self.plan.stream(self.number)
@@ -146,6 +147,7 @@ class GainSearch:
         return units
 
     def _refuse_unit(self, unit: Unit) -> UnitResult:
+        """The result of a unit whose gains the law refuses: no run, all invalid."""
         nothing = np.full(unit.count, np.nan)
         status = np.full(unit.count, STATUSES.index("invalid"), np.uint8)
         return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
@@ -157,6 +159,7 @@ class GainSearch:
         return [] if self._waiting else self._next()
 
     def _next(self) -> list[tuple[int, StudyPlan, Unit]]:
+        """The next units: of this batch, or of the one after it."""
         more = self._units(self._attempts[0].draws)
         if more:
             return more
@@ -177,6 +180,7 @@ class GainSearch:
         return any(_far(trial.first, value) for trial in sound)
 
     def _make_trials(self) -> Iterator[GainTrial]:
+        """The trials of the batch that is over: finished, pruned, or cut short by the budget."""
         tune = self.plan.tune
         for place, attempt in enumerate(self._attempts):
             runs, met = self._runs(attempt), attempt.draws_met
@@ -196,6 +200,7 @@ class GainSearch:
             )
 
     def _tell_sampler(self, made: Sequence[GainTrial]) -> None:
+        """Give the sampler what came out, and choose the leader of all trials."""
         self._sampler.tell([t.value for t in made], [t.excesses for t in made])
         self.trials += made
         self.leader = trials.best(self.trials)

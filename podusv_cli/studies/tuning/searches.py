@@ -154,6 +154,10 @@ def _one_sided(ratio: float) -> float:
 
 
 def _ends(ratio: float, spread: Vector, width: float) -> tuple[float, float]:
+    """Interval of a ratio from its logarithm, and the logarithms of single searches (n,).
+
+    `width` is in standard deviations; without finite numbers it is all or nothing.
+    """
     if np.isfinite(spread).all():
         half = width * spread.std()
         return float(np.exp(ratio - half)), float(np.exp(ratio + half))

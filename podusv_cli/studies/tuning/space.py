@@ -107,6 +107,7 @@ def keys(law: Controller) -> list[str]:
 
 
 def _numbers(law: Controller) -> Iterator[tuple[str, Any]]:
+    """Keys and contents of a law that are one value each."""
     for key in type(law).model_fields:
         content = getattr(law, key)
         if key != "kind" and isinstance(content, (bool, int, float, str)):
@@ -135,6 +136,7 @@ def with_gains(law: Controller, new: Mapping[str, Any]) -> Controller | None:
 
 
 def _of(wanted: float | Range, key: str, own: Any, field: Any) -> list[Gain]:
+    """The gains to search at one key; `own` is the scenario's value there."""
     if isinstance(wanted, float):
         return [_around(wanted, key, own, field)]
     (way,) = wanted.given_keys
@@ -182,6 +184,7 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
 
 
 def _known_gains(laws: Mapping[str, Scenario]) -> list[str]:
+    """All keys of gains, alone and with the law's name before them."""
     own = [key for law in laws.values() for key in keys(law.controller)]
     return [
         *dict.fromkeys(own),
