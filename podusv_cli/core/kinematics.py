@@ -27,6 +27,7 @@ def direction(x: float, y: float) -> float:
     return arctangent(y + 0.0, x + 0.0)
 
 
+# Writes rate (3) [m/s, m/s, rad/s].
 @kernel
 def earth_velocity(x: Vector, rate: Vector) -> None:
     """Rates of (x, y, psi) from the state (x, y, psi, u, v, r); paper (3)."""

@@ -56,6 +56,7 @@ class Terms(NamedTuple):
 PARTS = INPUTS + len(STATE) + len(TARGET)  # numbers of `write_moment`
 
 
+# x (6), target (6); writes signals (20).
 @kernel
 def write_moment(x: Vector, target: Vector, signals: Vector) -> None:
     """Write `seen`, `state` and `target` of a moment into `signals`, one after the other."""

@@ -25,6 +25,7 @@ NOW = BEFORE + 2 * SIX
 SIZE = NOW + 2 * SIX
 
 
+# packed: the upper triangle, row by row, of a matrix (order, order). Writes lower (6, 6).
 @kernel
 def factor(packed: Vector, order: int, lower: Vector) -> bool:
     """Cholesky factor of the first six rows of a packed upper triangle; whether there is one."""
@@ -39,6 +40,7 @@ def factor(packed: Vector, order: int, lower: Vector) -> bool:
     return True
 
 
+# error (6) is overwritten; lower (6, 6) as `factor` writes it.
 @kernel
 def normalised_square(error: Vector, lower: Vector) -> float:
     """error^T P^-1 error, with the factor of P."""
@@ -51,6 +53,7 @@ def normalised_square(error: Vector, lower: Vector) -> float:
     return square
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vector) -> None:
     """Gather squared errors and squared innovations over the steady window.

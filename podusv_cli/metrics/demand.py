@@ -12,6 +12,7 @@ from podusv_cli.metrics.spans import ANEW, WITHIN
 PEAK_U, PEAK_R, TV_U, TV_R, LAST_U, LAST_R, SETTLED, SIZE = range(8)
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(steady: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the largest demands, and the sum of their changes."""

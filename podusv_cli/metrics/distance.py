@@ -27,6 +27,7 @@ RADIUS = 2 * INTEGRALS
 ACROSS, ALONG, SETTLED = range(3, 6)
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(t: float, weight: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather integrals of z_e and |z_e - standoff|, and when z_e came within a radius."""
@@ -39,6 +40,7 @@ def watch(t: float, weight: float, row: Vector, k: Any, seen: Vector) -> None:
     settle(t, z_e, k.settling_radius, RADIUS, seen)
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch_settled(
     t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector

@@ -10,6 +10,7 @@ from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gather
 TIME, EFFORT_U, EFFORT_R, ENERGY, SATURATED, INTEGRALS = range(6)
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather squared loads, their work, and the time in saturation."""

@@ -12,6 +12,7 @@ TIME, POSITION, HEADING, VELOCITY, YAW_RATE, INTEGRALS = range(6)
 SIZE = 2 * INTEGRALS
 
 
+# given (6) the estimate, s (6) the truth; writes square (4) [m2, rad2, m2/s2, rad2/s2].
 @kernel
 def square_errors(given: Vector, s: Vector, square: Vector) -> None:
     """The squared errors of an estimate: position, heading, velocity, yaw rate."""
@@ -23,6 +24,7 @@ def square_errors(given: Vector, s: Vector, square: Vector) -> None:
     square[3] = r * r
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the squared errors of the estimate, where it jumps the mean of both sides.

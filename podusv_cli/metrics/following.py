@@ -16,6 +16,7 @@ LARGEST = 2 * INTEGRALS
 DONE, ARRIVED, SIZE = range(LARGEST + 1, LARGEST + 4)
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vector) -> None:
     """Gather the cross-track error and the legs that are done."""

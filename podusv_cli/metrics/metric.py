@@ -40,6 +40,7 @@ def standoff_of(layout: Measured) -> dict[str, float]:
     return {"standoff": approach.standoff if approach else 0.0}
 
 
+# Changes seen at `position`; amounts of the last instant lie `integrals` numbers behind.
 @kernel
 def add(seen: Vector, integrals: int, position: int, amount: float) -> None:
     """Add to an integral, and store the amount as that of the last instant."""

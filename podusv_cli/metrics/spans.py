@@ -26,6 +26,9 @@ LATE, OVER, AHEAD = range(3)
 MARK = ("at", "from", "then_at", "then_from")
 
 
+# t [s]; weight [s] of this instant in an integral; steady: BEFORE, WITHIN or ANEW; s (states) and
+# row (columns) of the closed loop; k constants; seen: the accumulator's own numbers, which it
+# changes.
 @kernel
 def all_kernels(
     t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
@@ -39,12 +42,15 @@ def by_time(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vecto
     all_kernels(t, weight, WITHIN if t >= k.steady_from else BEFORE, s, row, k, seen)
 
 
+# s (states); `at` and `then_at` are places in it.
 @kernel
 def is_passed(s: Vector, at: int, least: float, then_at: int, then_least: float) -> bool:
     """Whether a number is larger than another, or as large and the next one large enough."""
     return bool(s[at] > least or (s[at] == least and s[then_at] >= then_least))
 
 
+# Arguments as those of `all_kernels`. seen begins with LATE and OVER, which say where on the path
+# the run is.
 @kernel
 def by_path(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Show every instant to all kernels, up to that at which the path is over."""

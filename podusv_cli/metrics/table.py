@@ -53,6 +53,7 @@ COUNT = 0  # placeholder: how many numbers `first_kernel` gathers
 WATCH = ("t", "weight", "steady", "s", "row", "k", "seen")
 
 
+# Arguments as those of `spans.all_kernels`.
 @kernel
 def first_kernel(
     t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
@@ -60,6 +61,7 @@ def first_kernel(
     """Placeholder of the first accumulator's kernel; does nothing after the last one."""
 
 
+# Arguments as those of `spans.all_kernels`.
 @kernel
 def other_kernels(
     t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector

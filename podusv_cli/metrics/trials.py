@@ -20,6 +20,7 @@ PHASE, LARGEST, INITIAL, FIRST, SECOND, RATE, REACHED, ZIGZAGGED = range(OWN, OW
 TRACK, HEAD, STOPPED, SURGE, AHEAD, STILL = range(OWN, OWN + 6)
 
 
+# s (states); seen is laid out as above.
 @kernel
 def begin(t: float, s: Vector, k: Any, seen: Vector) -> bool:
     """Whether the trial is under way; notes the state at its start."""
@@ -35,6 +36,7 @@ def begin(t: float, s: Vector, k: Any, seen: Vector) -> bool:
     return True
 
 
+# share of the step [1], t [s], before [m/s]; seen has the way and time of the last instant. In m.
 @kernel
 def last_part(share: float, t: float, before: float, seen: Vector) -> float:
     """Of the way of the last step what lies beyond a share of it; `before` is the speed before."""
@@ -42,6 +44,7 @@ def last_part(share: float, t: float, before: float, seen: Vector) -> float:
     return float(0.5 * (at + seen[SPEED]) * (1.0 - share) * (t - seen[LATEST]))
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the way along and across the approach at turns by 90 and 180 degrees."""
@@ -61,6 +64,7 @@ def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
         seen[LATEST] = t
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather how far the heading goes on after the second and third execute."""
@@ -90,6 +94,7 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
             seen[LARGEST] = 0.0
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the way until the surge speed passes zero."""

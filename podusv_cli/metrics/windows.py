@@ -26,6 +26,8 @@ Radii = tuple[tuple[str, float], ...]  # m
 NONE: tuple[Windows, Radii] = ((), ())
 
 
+# t [s], z_e [m]; `before` [s] and `z_e_before` [m] are of the last instant; `own` are this window's
+# numbers in seen.
 @kernel
 def window(
     t: float, z_e: float, standoff: float, before: float, z_e_before: float, own: Vector
@@ -39,6 +41,7 @@ def window(
         own[BEYOND] = max(own[BEYOND], abs(z_e - standoff))
 
 
+# t [s], z_e and radius [m]; changes seen from `at` on.
 @kernel
 def settle(t: float, z_e: float, radius: float, at: int, seen: Vector) -> None:
     """Gather when z_e last came within the radius, by a straight line between two instants.

@@ -68,6 +68,8 @@ def reach(n: float, delta: float, flow: float, pod: Vector, k: Any) -> Reach:
     return Reach(low, high, max(0.0, astern), max(0.0, ahead))
 
 
+# Reads state (2 count: speeds [1/s], then angles [rad]), demand (2) [N, N m], a row of `table` for
+# each pod. Writes thrusts T (count) and angles delta (count); True where they make the demand.
 @kernel
 def allocate(
     state: Vector, demand: Vector, flows: Vector, k: Any, table: Vector, T: Vector, delta: Vector
@@ -89,6 +91,7 @@ def allocate(
     return by_least_squares(state, demand, flows, k, table, T, delta)
 
 
+# Arguments and outputs as those of `allocate`.
 @kernel
 def by_least_squares(
     state: Vector, demand: Vector, flows: Vector, k: Any, table: Vector, T: Vector, delta: Vector
@@ -134,6 +137,8 @@ def by_least_squares(
     return meets_demand(demand, all_u, all_r, k, table, T, delta)
 
 
+# `at` is what the pod can reach within a step. Writes `sector` in the order of FIXED, LOW_COS, ...;
+# `pod`, its row of the table, is not needed here.
 @kernel
 def shape(at: Reach, pod: Vector, most: float, sector: Vector) -> None:
     """The pod's sector, in parts of its `most` thrust."""
@@ -143,6 +148,8 @@ def shape(at: Reach, pod: Vector, most: float, sector: Vector) -> None:
     sector[FIXED] = 1.0 if at.high <= at.low else 0.0
 
 
+# demand (2) [N, N m]; T (count) [N], delta (count) [rad]. `all_u` [N] and `all_r` [N m] are what
+# all pods together could give, and set what counts as equal.
 @kernel
 def meets_demand(
     demand: Vector, all_u: float, all_r: float, k: Any, table: Vector, T: Vector, delta: Vector
@@ -159,6 +166,8 @@ def meets_demand(
     return bool(met_u and met_r)
 
 
+# Reads T (count) [N], flows (count) [m/s] and the angles that `command` has behind its first
+# `count` numbers. Writes command (2 count): speeds [1/s], then angles [rad].
 @kernel
 def settings(count: int, T: Vector, flows: Vector, k: Any, table: Vector, command: Vector) -> bool:
     """Propeller speeds for these thrusts, at the angles in `command`, and angles of rudders.

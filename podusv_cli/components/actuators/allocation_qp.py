@@ -30,6 +30,8 @@ ITERATIONS, TRIALS = 60, 100
 SETTLED, LEVEL = 1e-9, 0.1
 
 
+# The point (p_x, p_y) is in parts of the largest thrust; side 1 is ahead, -1 astern. Writes out
+# (5): the nearest point (2) and its derivative (3).
 @kernel
 def nearest(p_x: float, p_y: float, sector: Vector, side: float, out: Vector) -> None:
     """The nearest point of the sector, then the derivative of that point (xx, xy, yy)."""
@@ -62,6 +64,9 @@ def nearest(p_x: float, p_y: float, sector: Vector, side: float, out: Vector) ->
     out[2], out[3], out[4] = free * cos * cos, free * cos * sin, free * sin * sin
 
 
+# C (count, 3, 2) gives the axes' forces for those of the pods, tau (3) are the forces wanted, sides
+# (count) are 1 or -1, sectors (count, SECTOR) as `allocation.shape` writes them; `eps` weighs the
+# thrust.
 @kernel
 def pull(
     count: int,
@@ -99,6 +104,7 @@ def pull(
                 ] * (xy * c[2 * b] + yy * c[2 * b + 1])
 
 
+# Reads curve (6) and slope (3) as `pull` writes them; writes out (3).
 @kernel
 def ascent(curve: Vector, slope: Vector, out: Vector) -> None:
     """Newton's direction curve^-1 slope by Cholesky; curve is at least the unit matrix."""
@@ -115,6 +121,8 @@ def ascent(curve: Vector, slope: Vector, out: Vector) -> None:
     out[0] = (a - l10 * out[1] - l20 * out[2]) / l00
 
 
+# Arguments as those of `pull`. Changes y (3) until the slope is less than `settled`; g and slope
+# belong to that y.
 @kernel
 def climb(
     count: int,
@@ -138,6 +146,7 @@ def climb(
         along(count, C, tau, sides, sectors, eps, way, y, g, slope, curve)
 
 
+# Arguments as those of `pull`; `way` (3) is Newton's direction. Changes y (3), g, slope and curve.
 @kernel
 def along(
     count: int,
@@ -175,6 +184,7 @@ def along(
             part = low + (high - low) * rise_low / (rise_low - rise_high)
 
 
+# Arguments as those of `pull`; y begins at 0.
 @kernel
 def on_these_sides(
     count: int, C: Vector, tau: Vector, sides: Vector, sectors: Vector, eps: float, g: Vector
@@ -195,6 +205,8 @@ def on_these_sides(
     return cost
 
 
+# C, tau and sectors as in `pull`. All 2^count choices of ahead or astern are tried: on given sides
+# the problem is convex, and pods are few.
 @kernel
 def several_pods(
     count: int, C: Vector, tau: Vector, sectors: Vector, eps: float, best: Vector

@@ -32,6 +32,7 @@ ROUNDS = 20  # of Newton's method
 SATURATION = Signal("saturated", "1", "1 while the actuator limits what the law asked for", "sat")
 
 
+# Changes tau (3) [N, N, N m].
 @kernel
 def lose_evenly(k: Any, tau: Vector) -> None:
     """The loads that are left of those that `drive` wrote, once the actuator has failed."""
@@ -39,6 +40,7 @@ def lose_evenly(k: Any, tau: Vector) -> None:
         tau[i] *= k.failure_effectiveness
 
 
+# Copies demand (3) into tau (3) [N, N, N m].
 @kernel
 def pass_loads(demand: Vector, tau: Vector) -> None:
     """Loads as they stand in a log."""

@@ -50,6 +50,8 @@ TURNING = 0.25  # of an angle's lag, that a moment is late by
 SMALL = 1e-3  # of what the pods can do, for finite differences
 
 
+# Reads x (6) through the water, and state (2 count: speeds [1/s], then angles [rad]). Writes tau
+# (3) [N, N, N m], thrusts (count) [N] and flows (count) [m/s].
 @kernel
 def act(
     x: Vector, state: Vector, k: Any, table: Vector, tau: Vector, thrusts: Vector, flows: Vector
@@ -68,6 +70,7 @@ def act(
         tau[2] += pod[X] * across - pod[Y] * along
 
 
+# Reads state and command, each (2 count: speeds [1/s], then angles [rad]). Writes rate (2 count).
 @kernel
 def follow(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) -> bool:
     """Rates of speeds and angles: first-order lags within limits; whether any is at its limit."""
@@ -83,6 +86,7 @@ def follow(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) 
     return limited
 
 
+# Reads command (2 count). Writes flags at SPEED_LIMITED and ANGLE_LIMITED: 1 or 0.
 @kernel
 def at_limits(command: Vector, k: Any, table: Vector, flags: Vector) -> None:
     """Whether any speed, any angle is commanded to its limit."""
@@ -96,6 +100,8 @@ def at_limits(command: Vector, k: Any, table: Vector, flags: Vector) -> None:
             flags[ANGLE_LIMITED] = 1.0
 
 
+# Reads state (2 count). Writes rate (2 count) and signals: flags, (commands, read), power (count)
+# [W].
 @kernel
 def pursue(state: Vector, k: Any, table: Vector, rate: Vector, signals: Vector) -> None:
     """Rates towards the commands that are in the signals; the flags of limits, and the power."""

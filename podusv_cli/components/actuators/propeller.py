@@ -77,6 +77,7 @@ def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     return math.sqrt(x[3] * x[3] + x[4] * x[4])
 
 
+# n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table.
 @kernel
 def thrust(n: float, flow: float, pod: Vector, k: Any) -> float:
     """Thrust [N] at the propeller speed n: T_nn |n| n + T_nV flow |n|, or as printed flow n."""
@@ -92,6 +93,7 @@ def force(T: float, delta: float) -> tuple[float, float]:
     return T * cosine, T * sine
 
 
+# n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table.
 @kernel
 def speed_for(T: float, flow: float, pod: Vector, k: Any) -> float:
     """A propeller speed n with thrust(n) = T [N]: never astern for T >= 0, never ahead for T < 0.

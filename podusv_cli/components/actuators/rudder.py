@@ -55,6 +55,8 @@ def slant(delta: float, pod: Vector) -> float:
     return float(direction(along, across))
 
 
+# flow [m/s] is the advance speed, `pod` its row of the table. Writes out (2): speed [1/s], angle
+# [rad].
 @kernel
 def steer_rudder(T: float, angle: float, flow: float, pod: Vector, k: Any, out: Vector) -> bool:
     """Propeller speed and rudder angle for a force T [N] at an angle [rad]; whether they make it.

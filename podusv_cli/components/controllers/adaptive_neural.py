@@ -31,6 +31,8 @@ def shunting_rate(alpha: float, beta: float, A: float, B: float) -> float:
     return -decay * beta + (decay if math.isnan(B) else B) * alpha
 
 
+# x, target and beta (2) are as `polar_backstepping` has them. Writes rate[0]; returns beta_u [m/s]
+# and its rate.
 @kernel
 def surge_shunting(
     e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any
@@ -40,6 +42,7 @@ def surge_shunting(
     return beta[0], rate[0]
 
 
+# As `surge_shunting` for yaw: writes rate[1]; returns beta_r [rad/s] and its rate.
 @kernel
 def yaw_shunting(
     e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any, tau_u: float

@@ -43,6 +43,7 @@ LEARNS = math.radians(5.0)  # within it the cross-track integral learns
 LEARNT_MOST = 0.1  # rad
 
 
+# x (6) state, target (6); returns m/s and rad/s.
 @kernel
 def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
     """Wanted speed and yaw rate of the position controller."""
@@ -56,6 +57,7 @@ def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
     return u_d, sideways / max(u_d, SLOWEST)
 
 
+# x (6) state, target (6), angle_i [rad] the integral; returns m/s, rad/s, rad/s.
 @kernel
 def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, float, float]:
     """Wanted speed and yaw rate of L1 guidance, and the rate of the integral's angle."""

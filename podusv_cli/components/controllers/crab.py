@@ -39,6 +39,7 @@ class OnPath(NamedTuple):
     turn: float  # rate of the heading [rad/s]
 
 
+# x (6) state, target (6), memory of the law, in which the sway that has settled lies at crab_at.
 @kernel
 def on_path(x: Vector, memory: Vector, target: Vector, k: Any) -> OnPath:
     """v = V sin beta, u = +-V cos beta and r = chi' -+ beta' in the sway equation.
@@ -62,6 +63,7 @@ def on_path(x: Vector, memory: Vector, target: Vector, k: Any) -> OnPath:
     return OnPath(speed, side, sine, cosine, sway_rate, turn - side * crab_rate)
 
 
+# x (6) state, target (6); reads memory and writes rate, three numbers at crab_at.
 @kernel
 def observe_sway(x: Vector, memory: Vector, target: Vector, k: Any, rate: Vector) -> None:
     """Rates of the observer of the sway load, and of v_s; nothing without this option."""
@@ -74,6 +76,8 @@ def observe_sway(x: Vector, memory: Vector, target: Vector, k: Any, rate: Vector
         rate[at + SETTLED] = on_path(x, memory, target, k).sway_rate
 
 
+# x (6) state, target (6); `room` (6) is where another target is put. Returns which of both is aimed
+# at.
 @kernel
 def take_aim(x: Vector, memory: Vector, target: Vector, k: Any, room: Vector) -> Vector:
     """What the law points at: the target itself, or the standoff ahead along psi_c.

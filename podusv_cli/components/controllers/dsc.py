@@ -19,6 +19,8 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, kernel, specialise
 
 
+# The first-order filter of dynamic surface control. Writes rate[0]; returns beta_u [m/s] and its
+# rate.
 @kernel
 def surge_lag(
     e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any
@@ -28,6 +30,7 @@ def surge_lag(
     return beta[0], rate[0]
 
 
+# As `surge_lag` for yaw: writes rate[1]; returns beta_r [rad/s] and its rate.
 @kernel
 def yaw_lag(
     e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any, tau_u: float

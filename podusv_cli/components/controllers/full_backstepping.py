@@ -26,6 +26,7 @@ from podusv_cli.components.vessels.plant import surge_force, sway_force
 from podusv_cli.core.kernel import Vector, kernel, specialise
 
 
+# x (6) state, target (6); in m/s2.
 @kernel
 def alpha_u_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
     """Rate of alpha_u (21), the expansion that the paper calls X_1 in (40)."""
@@ -40,6 +41,7 @@ def alpha_u_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
     return float((k.k_ze * z_e_dot + along + e.Q * w - v_dot * e.sin_e + swing) / e.cos_e)
 
 
+# x (6) state, target (6); in rad/s2.
 @kernel
 def alpha_r_rate(e: Tracking, x: Vector, target: Vector, k: Any, tau_u: float) -> float:
     """Rate of alpha_r (30), the paper's X_2 in (44), for the surge force tau_u [N]."""
@@ -57,6 +59,7 @@ def alpha_r_rate(e: Tracking, x: Vector, target: Vector, k: Any, tau_u: float) -
     return float(turn_rate / e.distance + k.k_psie * (w - r))
 
 
+# Without a filter: returns alpha_u [m/s] and its exact rate; beta and rate stay as they are.
 @kernel
 def surge_full(
     e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any
@@ -65,6 +68,7 @@ def surge_full(
     return e.alpha_u, alpha_u_rate(e, x, target, k)
 
 
+# Without a filter: returns alpha_r [rad/s] and its exact rate; beta and rate stay as they are.
 @kernel
 def yaw_full(
     e: Tracking, x: Vector, target: Vector, beta: Vector, rate: Vector, k: Any, tau_u: float

@@ -41,6 +41,7 @@ class Frame(NamedTuple):
     sin_off: float
 
 
+# x (6) state, target (6).
 @kernel
 def course_frame(x: Vector, target: Vector, k: Any) -> Frame:
     """Errors along and across; the course of a target at rest is the line of sight."""
@@ -73,6 +74,7 @@ def line_of_sight(
     return -arctangent(across, ahead), -rate / (ahead * ahead + across * across)
 
 
+# x (6) state; in m/s.
 @kernel
 def wanted_speed(x: Vector, at: Frame, k: Any) -> float:
     """The surge velocity with which the speed along the course is the target's, plus k_s along.

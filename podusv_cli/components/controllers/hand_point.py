@@ -49,6 +49,7 @@ def hand_target(psi_f: float, rate: float, bend: float, target: Vector, k: Any) 
     )
 
 
+# x (6) state, target (6); psi_f [rad] is the filtered heading.
 @kernel
 def hand_errors(x: Vector, psi_f: float, target: Vector, k: Any) -> Hand:
     """What the hand point lacks to the velocity of constant-bearing guidance."""
@@ -78,6 +79,7 @@ def hand_errors(x: Vector, psi_f: float, target: Vector, k: Any) -> Hand:
     )
 
 
+# x (6) state; along and across [m/s2], loads [N, N, N m]. Writes tau (2) [N, N m].
 @kernel
 def push(
     x: Vector, along: float, across: float, b_u: float, b_v: float, b_r: float, k: Any, tau: Vector

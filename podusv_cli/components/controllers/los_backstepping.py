@@ -36,6 +36,7 @@ MEMORY = (
 )
 
 
+# x (6) state, target (6).
 @kernel
 def sight(x: Vector, target: Vector, k: Any) -> float:
     """Angle [rad] to where a circle about the ship meets the path; across it, where it does not."""
@@ -46,6 +47,7 @@ def sight(x: Vector, target: Vector, k: Any) -> float:
     return float(course + arctangent(sine, math.sqrt(1.0 - sine * sine)))
 
 
+# memory and rate: the angle stands at 1, its derivatives at 2 and 3. `sighted` [rad], w [rad/s].
 @kernel
 def filter_angle(memory: Vector, sighted: float, w: float, rate: Vector) -> None:
     """Rates of the filtered angle and of its two derivatives: a triple pole at -w."""

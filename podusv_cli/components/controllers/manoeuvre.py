@@ -27,6 +27,7 @@ STEERING = Signal(
 )
 
 
+# Writes tau (2) [N, N m] and signals[0], the angle [rad].
 @kernel
 def steer_thrust(angle: float, side: float, k: Any, tau: Vector, signals: Vector) -> None:
     """The demand of a thrust that acts `lever` behind the origin and steers at `angle` [rad].

@@ -34,6 +34,7 @@ def answer_force(r: float, memory: Vector, k: Any) -> float:
     return float(-k.m22 * memory[MORE] * r)
 
 
+# x (6) state. Reads memory and changes rate at V_HAT, R_HAT, PHI, LAG and MORE.
 @kernel
 def adapt(x: Vector, memory: Vector, k: Any, rate: Vector) -> None:
     """Rates of what is learnt, within +-0.2 U; the observer is told the force that is known of."""

@@ -35,6 +35,7 @@ class LevelledGain(NamedTuple):
     rate: float  # 1/s2
 
 
+# x (6) state, target (6).
 @kernel
 def see_target(x: Vector, target: Vector, k: Any) -> Seen:
     """Distance, velocity and acceleration of the target along and across the bow."""
@@ -62,6 +63,7 @@ def level_gain(gain: float, at: Seen, closing: float) -> LevelledGain:
     return LevelledGain(kappa, -kappa * q2 * slope * closing)
 
 
+# x (6) state, `at` the target as `see_target` sees it, k_b [1/s].
 @kernel
 def guidance(x: Vector, at: Seen, along: LevelledGain, k_b: float, k: Any) -> Wanted:
     """V_c and its surge rate: the gain k_b across the target's course, and `along` along it.

@@ -39,6 +39,7 @@ LOAD_SWAY = 6  # position in the memory, behind the observer
 V_L = Signal("v_l", "m/s", "sway velocity that the loads and the target's turn cause", "v_l")
 
 
+# a and v_l [m/s] are surge and sway, turn in rad/s, memory has the observed loads; in m/s2.
 @kernel
 def load_sway_rate(a: float, v_l: float, turn: float, memory: Vector, k: Any) -> float:
     """v_l': the sway of a hull that keeps to the target's turn under the observed loads."""
@@ -47,6 +48,7 @@ def load_sway_rate(a: float, v_l: float, turn: float, memory: Vector, k: Any) ->
     return float(across / k.neutral_mass)
 
 
+# x (6) state; memory has the observed loads.
 @kernel
 def moment_for(alpha: float, x: Vector, memory: Vector, k: Any) -> float:
     """The yaw moment [N m] for r' = alpha [rad/s2] under the observed loads.

@@ -157,6 +157,8 @@ def _table(network: Network) -> Vector:
     return rows.ravel()
 
 
+# Gaussians of the factors at velocity (u, v, r) of x. table (6, count): centres, then exponents
+# 1/(2 width^2), by axis; writes out (count). `needed` of them count, the rest fills registers.
 @kernel
 def _evaluate(x: Vector, count: int, needed: int, table: Vector, out: Vector) -> None:
     u, v, r = x[3], x[4], x[5]
@@ -167,6 +169,7 @@ def _evaluate(x: Vector, count: int, needed: int, table: Vector, out: Vector) ->
         out[i] = exponential(-e_u[i] * du * du - e_v[i] * dv * dv - e_r[i] * dr * dr)
 
 
+# x (6) state; table as in `_evaluate`. Writes phi (nodes).
 @kernel
 def activate(x: Vector, k: Any, table: Vector, phi: Vector, work: Vector) -> None:
     """Node outputs (14) at Z = (u, v, r) into `phi`; `work` holds the factors.
@@ -181,6 +184,7 @@ def activate(x: Vector, k: Any, table: Vector, phi: Vector, work: Vector) -> Non
             phi[i * plane + j] = work[plane + i] * work[j]
 
 
+# All arrays (count); returns f_u and f_r.
 @kernel
 def weigh(count: int, W_u: Vector, W_r: Vector, phi: Vector) -> tuple[float, float]:
     """Outputs W . Phi (15) of both networks."""
@@ -191,6 +195,7 @@ def weigh(count: int, W_u: Vector, W_r: Vector, phi: Vector) -> tuple[float, flo
     return f_u, f_r
 
 
+# weights, phi and rate are (count); writes rate.
 @kernel
 def adapt(
     count: int,

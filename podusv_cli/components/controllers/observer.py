@@ -47,6 +47,7 @@ def sway_yaw_rates(sway: float, yaw: float, k: Any) -> tuple[float, float]:
     return v_rate, (yaw - k.by_sway * sway) / (k.m33 - k.by_sway * k.m23)
 
 
+# x (6) state, tau (2) [N, N m]. Reads memory and writes rate at U_HAT, V_HAT, R_HAT, B_U, B_V, B_R.
 @kernel
 def observe(x: Vector, memory: Vector, tau: Vector, k: Any, rate: Vector) -> None:
     """Rates of the observer as if the demand `tau` acted; `after_saturation` adds what differs."""

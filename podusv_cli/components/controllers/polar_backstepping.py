@@ -71,6 +71,7 @@ def lemma(error: float, k: Any) -> float:
     return float(error / (4.0 * k.partial))
 
 
+# Reads memory and writes rate, two numbers at k.auxiliary.
 @kernel
 def compensation(memory: Vector, k: Any, rate: Vector) -> tuple[float, float]:
     """(xi_u, xi_r), what the loads fell short as a velocity; 0 without anti-windup.

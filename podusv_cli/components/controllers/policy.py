@@ -35,6 +35,7 @@ INPUTS, OUTPUTS = len(OBSERVED), 2
 RELU, CLIP = 1.0, 1.0  # the places of "relu" and "clip" among the choices, as kernels know them
 
 
+# x (6) state, target (6); writes signals (8).
 @kernel
 def observe(x: Vector, target: Vector, signals: Vector) -> None:
     """Write what a policy is given of a state and a target into `signals`, as `OBSERVED`.
@@ -50,6 +51,7 @@ def observe(x: Vector, target: Vector, signals: Vector) -> None:
     signals[6] = cosine * target[3] - sine * target[2]
 
 
+# given (inputs), out (outputs); returns the part of `weights` with the next layer.
 @kernel
 def layer(inputs: int, outputs: int, given: Vector, weights: Vector, out: Vector) -> Vector:
     """Write W given + b, of `weights` with b first and then W column by column; what is behind."""

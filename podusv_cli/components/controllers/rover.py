@@ -52,6 +52,7 @@ def kept_within(integral: float, rate: float, most: float) -> float:
     return 0.0 if abs(integral) >= most and rate * integral > 0.0 else rate
 
 
+# x (6) state, target (6).
 @kernel
 def path_course(x: Vector, target: Vector) -> float:
     """Direction of the target's path; of a target at rest, that of the line to it [rad]."""
@@ -60,6 +61,7 @@ def path_course(x: Vector, target: Vector) -> float:
     return direction(target[2], target[3])
 
 
+# x (6) state, target (6); in m/s.
 @kernel
 def approach_speed(x: Vector, target: Vector, gain: float, k: Any) -> float:
     """The target's speed, and `gain` [1/s] times how far it is ahead, within U."""

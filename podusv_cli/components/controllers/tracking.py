@@ -84,6 +84,7 @@ class Bearing(NamedTuple):
     held: bool
 
 
+# x (6) state, target (6); memory has the direction that is held.
 @kernel
 def bearing(x: Vector, memory: Vector, target: Vector, k: Any) -> Bearing:
     """(18), (19); the direction is held where the distance is not above `hold_below`.
@@ -108,6 +109,7 @@ def fold(psi_e: float, k: Any) -> float:
     return -math.pi if psi_e > 0.0 else math.pi
 
 
+# x (6) state, target (6); memory has what is held between samples.
 @kernel
 def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
     """Errors (18), (19) and virtual controls (21), (30) in the reading that `k` asks for."""
@@ -150,6 +152,7 @@ def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
     )
 
 
+# x (6) state, target (6); writes memory at PSI_D_HELD and PSI_D_RATE_HELD.
 @kernel
 def hold(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:
     """Remember psi_d and form its wrapped backward difference (Remark 5), once a sample."""

@@ -48,6 +48,7 @@ def aim(wanted: Wanted, v_s: float, k: Any) -> Aim:
     return Aim(side, math.sqrt(a * a + w * w), direction(side * a, side * w))
 
 
+# x (6) state, memory has the observed load. Reads tau[1] [N m], writes tau[0] [N]; returns m/s.
 @kernel
 def surge_demand(x: Vector, memory: Vector, wanted: Wanted, at: Aim, k: Any, tau: Vector) -> float:
     """Write the surge demand, as far as the velocity points the right way; the wanted velocity.

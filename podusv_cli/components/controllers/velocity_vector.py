@@ -29,6 +29,7 @@ from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
 
+# x (6) state, target (6).
 @kernel
 def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
     """V_c and its rate, as the hull sees them."""
@@ -46,6 +47,7 @@ def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
     )
 
 
+# v and a [m/s] are sway and wanted surge, turn in rad/s; memory has the observed loads.
 @kernel
 def settled_sway(v: float, a: float, turn: float, memory: Vector, k: Any) -> float:
     """The sway velocity T_v ahead, at the wanted surge velocity and turn.

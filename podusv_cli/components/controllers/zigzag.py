@@ -19,6 +19,7 @@ MEMORY = (SIDE, HEADING, NEXT, LOOKED, RATE)
 AT_SIDE, AT_HEADING, AT_NEXT, AT_TIME, AT_RATE, SIZE = range(6)  # positions in the memory
 
 
+# left [rad], side 1 or -1, r [rad/s], t [s]; memory has time and yaw rate of the last instant.
 @kernel
 def within(left: float, side: float, r: float, t: float, memory: Vector) -> float:
     """After which share of the step the heading will have turned by `left` more; 1 if not in it."""

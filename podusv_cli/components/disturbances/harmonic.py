@@ -60,6 +60,8 @@ class Harmonic(Component):
         return sum(moving, abs(mean))
 
 
+# Reads table (3 count): frequencies [rad/s], then factors of cosine and of sine. Writes b (3) [N,
+# N, N m].
 @kernel
 def harmonic(t: float, k: Any, table: Vector, b: Vector) -> None:
     """Equation (52), scaled."""
@@ -72,6 +74,7 @@ def harmonic(t: float, k: Any, table: Vector, b: Vector) -> None:
     b[2] = k.scale * (k.b_r_mean + waves[2] + waves[5])
 
 
+# Reads the heading x[2]. Writes b (3) [N, N, N m] in the body frame.
 @kernel
 def fixed_to_earth(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
     """The same with the forces to the north and to the east."""

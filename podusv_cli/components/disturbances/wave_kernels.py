@@ -15,6 +15,7 @@ TURN = 2.0 * math.pi
 PAIRS, LONG_ROOM, FACES, SHORT_ROOM = 4 * LANES, 9 * LANES, 8 * LANES, 15 * LANES
 
 
+# sums (n, LANES): partial sums side by side, so that they fit the registers.
 @kernel
 def _add_parts(sums: Vector, which: int) -> float:
     """One sum from its eight parts."""
@@ -24,6 +25,7 @@ def _add_parts(sums: Vector, which: int) -> float:
     return float(low + high)
 
 
+# The envelope's cosine part is sum number `which`, its sine part the one behind it.
 @kernel
 def _square(sums: Vector, which: int) -> float:
     """Squared magnitude of an envelope."""
@@ -31,6 +33,7 @@ def _square(sums: Vector, which: int) -> float:
     return c * c + s * s
 
 
+# Reads x (6) and b[5]; writes b[6] and b[7] [m/s]. The rate (north, east) is in m/s.
 @kernel
 def _hull_axes(north: float, east: float, x: Vector, b: Vector) -> None:
     """b[6], b[7] = u_w, v_w of the rate (north, east) of the motion, with psi_w in b[5]."""
@@ -40,6 +43,8 @@ def _hull_axes(north: float, east: float, x: Vector, b: Vector) -> None:
     b[7] = (c - 1.0) * x[4] - s * x[3] + c_psi * east - s_psi * north
 
 
+# t [s]; `way` [m] is the place along the waves' direction over 2 pi; table holds `count` numbers
+# each of frequency [1/s], phase [turns], wave number [rad/m] and amplitude [m].
 @kernel
 def _wave(t: float, way: float, i: int, count: int, table: Vector) -> tuple[float, float]:
     """Cosine and sine of a component's phase, times its amplitude; `way` is in turns."""
@@ -48,6 +53,8 @@ def _wave(t: float, way: float, i: int, count: int, table: Vector) -> tuple[floa
     return a * c, a * s
 
 
+# Reads x (6). Writes b: drift load (3) [N, N, N m], then the motion's signals and the elevation
+# [m].
 @kernel
 def long_crested(
     t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0, stage: float = 0.0
@@ -66,6 +73,7 @@ def long_crested(
     b[2] = k.drift_arm * b[1]
 
 
+# c and s are component i's cosine and sine. Changes sums (4, LANES) in lane j: ends, then sides.
 @kernel
 def _add_reflected(
     j: int, i: int, c: float, s: float, count: int, table: Vector, sums: Vector
@@ -78,6 +86,7 @@ def _add_reflected(
     sums[3 * LANES + j] += sides * s
 
 
+# Returns that of bow and stern, and that of the sides.
 @kernel
 def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float, float]:
     """Their squared magnitudes. Sums lie in the kernel of their loop, or it gets no vector code."""
@@ -93,6 +102,8 @@ def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float,
     return _square(sums, 0), _square(sums, 2)
 
 
+# (c_gamma, s_gamma) is the waves' direction against the bow. Writes b from 3 on; returns the two
+# squared magnitudes.
 @kernel
 def _long_motion(
     t: float,
@@ -137,6 +148,7 @@ def _long_motion(
     return _square(sums, 0), _square(sums, 2)
 
 
+# Arguments and outputs as those of `long_crested`.
 @kernel
 def short_crested(
     t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0, stage: float = 0.0
@@ -152,6 +164,8 @@ def short_crested(
         _short_motion(t, x, c_psi, s_psi, k, table, b)
 
 
+# c and s are component i's cosine and sine, (c_gamma, s_gamma) its direction against the bow.
+# Changes sums (8, LANES) in lane j.
 @kernel
 def _facing(
     j: int,
@@ -178,6 +192,8 @@ def _facing(
     sums[7 * LANES + j] += left * s
 
 
+# The mean drift load b (3) [N, N, N m] from the envelopes: what comes from ahead less what comes
+# from astern, likewise from port and starboard.
 @kernel
 def _drift(sums: Vector, k: Any, b: Vector) -> None:
     b[0] = k.drift_u * (_square(sums, 0) - _square(sums, 2))
@@ -185,6 +201,7 @@ def _drift(sums: Vector, k: Any, b: Vector) -> None:
     b[2] = k.drift_arm * b[1]
 
 
+# Reads x (6); (c_psi, s_psi) is the heading. Writes b (3) [N, N, N m].
 @kernel
 def _short_envelopes(
     t: float, x: Vector, c_psi: float, s_psi: float, k: Any, table: Vector, b: Vector
@@ -204,6 +221,7 @@ def _short_envelopes(
     _drift(sums, k, b)
 
 
+# Reads x (6); (c_psi, s_psi) is the heading. Writes all of b, as `long_crested` does.
 @kernel
 def _short_motion(
     t: float, x: Vector, c_psi: float, s_psi: float, k: Any, table: Vector, b: Vector

@@ -25,6 +25,8 @@ SPEED = Signal("V_w", "m/s", "wind speed at the height where it acts, with gusts
 FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
 
 
+# t [s]; table holds `count` numbers each of frequency [1/s], phase [turns], amplitude [m/s].
+# Returns m/s.
 @kernel
 def _gust(t: float, count: int, table: Vector) -> float:
     """The sum of all components, by sixteen partial sums, in groups of four."""
@@ -42,6 +44,7 @@ def _gust(t: float, count: int, table: Vector) -> float:
     return total
 
 
+# u_r and v_r [m/s]; writes b (3) [N, N, N m].
 @kernel
 def blendermann(u_r: float, v_r: float, k: Any, b: Vector) -> None:
     """Load of the wind on a hull that moves by (u_r, v_r) through the air.

@@ -69,6 +69,7 @@ INNOVATIONS = (
 )
 
 
+# packed (45), row by row; writes full (9, 9). N is 9.
 @kernel
 def unpack_triangle(packed: Vector, full: Vector) -> None:
     """A symmetric matrix from its upper triangle."""
@@ -80,6 +81,7 @@ def unpack_triangle(packed: Vector, full: Vector) -> None:
             at += 1
 
 
+# f (6, 9), packed P (45), q (9) the diagonal of Q; writes rate (45), packed as P is.
 @kernel
 def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
     """P' = F P + P F^T + Q; F has entries in rows 0 to 5 and columns 2 to 8 alone."""
@@ -101,6 +103,8 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
         rate[at - N + i] += q[i]
 
 
+# h (6) is the derivative, `innovation` measured less expected, sigma its deviation. Changes state:
+# estimate (9), then packed P (45).
 @kernel
 def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> float:
     """Correct estimate and covariance by the measured value i, whose derivative is h.
@@ -130,6 +134,7 @@ def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -
     return variance
 
 
+# delay [s]; reads the estimate in state (9); writes h (6).
 @kernel
 def derivative(i: int, delay: float, state: Vector, h: Vector) -> float:
     """h of the measured value i, and by how much a late position is ahead of the one measured."""
@@ -144,6 +149,7 @@ def derivative(i: int, delay: float, state: Vector, h: Vector) -> float:
     return float(delay * (state[3] * ahead + state[4] * aside))
 
 
+# Writes q (9): by which variance velocities and loads wander in a second.
 @kernel
 def wanderings(k: Any, q: Vector) -> None:
     """The diagonal of Q."""

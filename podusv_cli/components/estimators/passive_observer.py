@@ -63,6 +63,8 @@ STATES = (
 )
 
 
+# drift [m/s or rad/s] is the pose's rate without correction, e [m or rad] measured less expected.
+# Reads state and writes rate at axis i (0, 1, 2: x, y, psi).
 @kernel
 def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rate: Vector) -> None:
     """Rates of everything but the velocities on axis i; `gain` is its K_3."""
@@ -75,6 +77,7 @@ def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rat
     rate[SEEN + i] = drift + swell
 
 
+# Reads velocities state[3:6]; changes b (3) [N, N, N m].
 @kernel
 def add_nonlinear_forces(state: Vector, k: Any, b: Vector) -> None:
     """Add to the load what leaves linear damping alone of the nominal vessel's forces."""

@@ -21,6 +21,7 @@ def sign(x: float, variance: float) -> float:
     return 1.0 if x >= 0.0 else -1.0
 
 
+# `unsure_v` and `unsure_r` are variances, which round the kink of |v| and |r|. Writes s (3, 3).
 @kernel
 def force_slopes(
     u: float, v: float, r: float, unsure_v: float, unsure_r: float, k: Any, s: Vector
@@ -40,6 +41,7 @@ def force_slopes(
     s[8] -= k.coriolis * (k.m23 * u)
 
 
+# Changes f (6, WIDTH).
 @kernel
 def accelerate_column(
     column: int, surge: float, sway: float, yaw: float, k: Any, f: Vector
@@ -51,6 +53,7 @@ def accelerate_column(
     f[5 * WIDTH + column] = (k.m22 * yaw - k.m32 * sway) / determinant
 
 
+# state (6 or more), b (3) [N, N, N m]; (cosine, sine) is the heading. Writes f (6, WIDTH).
 @kernel
 def slopes(
     state: Vector,

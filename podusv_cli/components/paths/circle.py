@@ -10,6 +10,7 @@ from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
 
+# Writes target (6): position [m], velocity, acceleration, each north and east.
 @kernel
 def on_circle(radius: float, angle: float, rate: float, target: Vector) -> None:
     """Target at `angle` [rad] of a circle about the origin, turning at constant `rate` [rad/s]."""

@@ -35,6 +35,7 @@ LEG, E_CT, ALONG = range(3)  # their positions
 PASSED = 1.0  # the place of "passed" among the choices of `switch`
 
 
+# Reads (x[0], x[1]) and the corners (n, 2) [m] in table. Writes at (5).
 @kernel
 def leg_frame(x: Vector, leg: int, table: Vector, at: Vector) -> None:
     """at = direction of a leg (cosine, sine), its length, and the vessel along and across it."""

@@ -14,6 +14,7 @@ from podusv_cli.core.kernel import Vector, kernel
 LITERAL, VELOCITY, SINE = range(3)
 
 
+# The line up to the switch; writes target (6), as `circle.on_circle` does.
 @kernel
 def _straight(t: float, k: Any, target: Vector) -> None:
     target[0] = k.speed * t
@@ -22,12 +23,15 @@ def _straight(t: float, k: Any, target: Vector) -> None:
     target[3] = target[4] = target[5] = 0.0
 
 
+# Path (53) as printed, `s` [s] after the switch: a circle about the line's end, onto which the
+# target jumps. Writes target (6).
 @kernel
 def _literal(s: float, k: Any, target: Vector) -> None:
     on_circle(k.amplitude, k.rate * s, k.rate, target)
     target[0] += k.speed * k.switch
 
 
+# Path (53) read as the target's velocity; `s` [s] is the time since the switch. Writes target (6).
 @kernel
 def _velocity(s: float, k: Any, target: Vector) -> None:
     # The printed cosine and sine taken as speeds: a circle of radius amplitude/rate to port or
@@ -38,6 +42,8 @@ def _velocity(s: float, k: Any, target: Vector) -> None:
     target[1] += radius
 
 
+# Only the second printed component, as a swing across the line that goes on; `s` [s] as above.
+# Writes target (6).
 @kernel
 def _sine(s: float, k: Any, target: Vector) -> None:
     _straight(k.switch + s, k, target)

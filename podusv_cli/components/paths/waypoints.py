@@ -20,6 +20,8 @@ WIDTH = 9  # numbers in the table for each knot
 LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know it
 
 
+# table: `count` times [s], then the four coefficients of north and of east for each stretch. Writes
+# target (6), as `circle.on_circle` does.
 @kernel
 def along(t: float, k: Any, table: Vector, target: Vector) -> None:
     """The spline and its derivatives, by Horner's rule."""
@@ -35,6 +37,7 @@ def along(t: float, k: Any, table: Vector, target: Vector) -> None:
         target[4 + axis] = 6.0 * table[c] * s + 2.0 * table[c + 1]
 
 
+# Writes target (6), and `shown` (6) with corners rounded.
 @kernel
 def along_shown(t: float, k: Any, table: Vector, target: Vector, shown: Vector) -> None:
     """The same, and what the law is shown."""

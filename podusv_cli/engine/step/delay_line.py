@@ -41,6 +41,7 @@ def delay_line(delay: float, grid: TimeGrid) -> Vector:
     return numbers
 
 
+# `line` is the ring of demands, laid out as above; writes BEGAN and NEXT.
 @kernel
 def begin_step(k: int, t: float, line: Vector) -> None:
     """Note that step k begins at time t."""
@@ -50,6 +51,7 @@ def begin_step(k: int, t: float, line: Vector) -> None:
         line[NEXT] = STAGES * k % int(count)
 
 
+# demand (2) [N, N m]; changes `line` at GIVEN, and the place that NEXT points to.
 @kernel
 def pass_on(demand: Vector, line: Vector) -> None:
     """Take this stage's demand, and give the actuator that of the same stage a delay before."""

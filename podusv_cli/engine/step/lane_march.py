@@ -14,6 +14,7 @@ from podusv_cli.engine.step.rk4 import arrive, finite, named_layout, named_vecto
 REACHED = STOP + 1  # in `under_way`: how many instants each lane reached, below 0 while it marches
 
 
+# `vector` has LANES numbers, one a lane, for each of `count`; writes out (count).
 @kernel
 def copy_lane(lane: int, count: int, vector: Any, out: Vector) -> None:
     """The numbers of one lane."""
@@ -30,6 +31,8 @@ def follow_lane(lane: int, other: int, count: int, vector: Any) -> None:
         numbers[i * LANES + lane] = numbers[i * LANES + other]
 
 
+# c are the vectors, n the layout, `size` the length of the probe's numbers. Writes `under_way` at
+# REACHED, and `ends` (LANES, states + columns + size).
 @kernel
 def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, ends: Vector) -> int:
     """Keep state, row and probe's numbers of lanes that end here; how many lanes go on.
@@ -55,6 +58,7 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
     return living
 
 
+# `under_way` holds the instant, a flag to stop and where each lane ended; `ends` as in `end_lanes`.
 @spread
 @kernel
 def advance_lanes(

@@ -14,6 +14,8 @@ from podusv_cli.engine.step.sampled import remember, sample_and_hold
 named_vectors, named_layout = unpacker(Vectors._fields), unpacker(Layout._fields)
 
 
+# path, law, sample and after are compiled parts; vectors and layout as in `rk4.advance`. Leaves the
+# demand in the row.
 @kernel
 def demand(
     path: Function,

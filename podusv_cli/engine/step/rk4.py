@@ -42,6 +42,7 @@ coefficients = unpacker(COEFFICIENTS)
 named_vectors, named_layout = unpacker(Vectors._fields), unpacker(Layout._fields)
 
 
+# s (6 or more) state, flow (2) [m/s, rad]; writes x (6).
 @kernel
 def through_water(s: Vector, flow: Vector, x: Vector) -> None:
     """x = the vessel's state with (u, v) relative to water that flows at (V_c, beta_c)."""
@@ -52,6 +53,8 @@ def through_water(s: Vector, flow: Vector, x: Vector) -> None:
     x[4] -= flow[0] * sine
 
 
+# s (states); writes ds from 6 on, and the row from n.tau on. c are the vectors, n says where things
+# lie.
 @kernel
 def drive(t: float, s: Vector, ds: Vector, demand: Vector, p: Parts, c: Vectors, n: Layout) -> None:
     """The actuator's loads, rates and signals, from the vessel's motion through the water."""
@@ -72,6 +75,7 @@ def drive(t: float, s: Vector, ds: Vector, demand: Vector, p: Parts, c: Vectors,
     )
 
 
+# s (states); writes the row from n.b on.
 @kernel
 def load(t: float, s: Vector, p: Parts, c: Vectors, n: Layout, again: bool, stage: bool) -> None:
     """Put the disturbance at t and s into the row; in a stage within a step its load is enough.
@@ -90,6 +94,7 @@ def load(t: float, s: Vector, p: Parts, c: Vectors, n: Layout, again: bool, stag
         )
 
 
+# s (states); writes ds (states) and the row (columns).
 @kernel
 def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, again: bool) -> None:
     """Right-hand side of the closed loop at time t, whose load is in the row; fills the row.
@@ -134,6 +139,7 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
     plant(s, tau, b, coefficients(c.vessel), ds)
 
 
+# s (states); reads the target in row and writes row[DISTANCE] [m].
 @kernel
 def measure(s: Vector, row: Vector) -> None:
     """The distance to the target (18)."""
@@ -141,6 +147,7 @@ def measure(s: Vector, row: Vector) -> None:
     row[DISTANCE] = math.sqrt(x_e * x_e + y_e * y_e)
 
 
+# Changes c.s; c.stages (5, states) holds k1 to k4 and the state of a stage.
 @kernel
 def step(t: float, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
@@ -170,6 +177,7 @@ def finite(count: int, vector: Vector) -> bool:
     return bad == 0
 
 
+# Writes the row of c.log that belongs to instant k.
 @kernel
 def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
     """Log t, s and the row."""
@@ -182,6 +190,7 @@ def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
         out[1 + n.states + i] = row[i]
 
 
+# h [s]; `first` is the instant at which this march began, before which no stage is known.
 @kernel
 def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Measure, sample and evaluate instant k."""
@@ -252,6 +261,7 @@ def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: La
     return last
 
 
+# rows (count, width); tau (2) and out are overwritten by each call: only the time matters.
 @kernel
 def evaluate_all(
     law: Function,

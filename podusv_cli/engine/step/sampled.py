@@ -17,6 +17,7 @@ from podusv_cli.engine.step.layout import (
 )
 
 
+# Reads memory; writes rate, both as long as the law's memory. c are the vectors, n the layout.
 @kernel
 def held_rates(
     t: float, memory: Vector, rate: Vector, law: Function, after: Function, c: Vectors, n: Layout
@@ -39,6 +40,7 @@ def held_rates(
         after(t, memory, tail(row, n.demand), tail(row, n.tau), c.law, c.law_table, rate)
 
 
+# Changes the law's memory in c.s. h and `passing` [s] differ where the law's own time stands still.
 @kernel
 def remember(
     t: float, passing: float, h: float, law: Function, after: Function, c: Vectors, n: Layout
@@ -59,6 +61,7 @@ def remember(
         memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
+# Changes the law's memory in c.s, and c.held: time, state, target, demand, signals.
 @kernel
 def sample_and_hold(
     k: int,
@@ -100,6 +103,7 @@ def sample_and_hold(
         )
 
 
+# Writes c.sensed, the row and the estimate in c.s.
 @kernel
 def perceive(
     k: int, t: float, measurement: Function, correct: Function, c: Vectors, n: Layout
