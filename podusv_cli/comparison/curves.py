@@ -56,7 +56,7 @@ class Curve:
     runs: Mapping[str, ClaimedRun]
 
     def at(self, times: Vector) -> Vector:
-        """The values at these times, interpolated where the log has others."""
+        """The values at `times` (n,) [s], interpolated where the log has others; shape (n,)."""
         if np.array_equal(self.time[: len(times)], times):
             return self.values[: len(times)]
         return np.asarray(np.interp(times, self.time, self.values))
@@ -96,7 +96,7 @@ def pointwise(operation: Callable[..., Any], parts: Sequence[Quantity]) -> Quant
 
 
 def common_times(curves: Sequence[Curve]) -> Vector:
-    """The first curve's times, as far as all curves go."""
+    """The first curve's times (n,) [s], as far as all curves go."""
     if not curves or not all(len(curve.time) for curve in curves):
         return np.zeros(0)
     times: Vector = curves[0].time

@@ -82,7 +82,7 @@ class _ExampleRun:
         return True
 
     def signal(self, name: str) -> Vector:
-        """Two samples. Raises ExpressionError unless the signal is one number over time."""
+        """Two samples (2,). Raises ExpressionError unless the signal is one number over time."""
         about = self.signals.get(name)
         if about and about.fixed:
             raise ExpressionError(f"{name!r} does not run over time")

@@ -21,7 +21,7 @@ ENDINGS = ("status", "controller", "message")
 
 
 def differing(one: Vector, other: Vector) -> Truths:
-    """Where two arrays of one shape differ in any bit; two NaN count as equal."""
+    """Where two arrays of one shape differ in any bit, in that shape; two NaN count as equal."""
     equal = _bits(one) == _bits(other)
     return np.asarray(~(equal | (np.isnan(one) & np.isnan(other))))
 
@@ -205,7 +205,7 @@ def _pair_signals(one: Recording, other: Recording) -> Iterator[_Pair]:
 
 
 def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
-    """The common times, and their rows in each recording.
+    """The common times (n,) [s], and their rows in each recording.
 
     Where logs of one length differ in less than half of their times, these are damaged values on
     one grid, and the logs are compared row by row.

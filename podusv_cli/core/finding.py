@@ -141,7 +141,7 @@ def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:
 
 
 def times_of(log: Recording, mask: Mask) -> str:
-    """`at 3.1 s`, `from 3.1 s to 4 s`, `3 times between 3.1 s and 80 s`."""
+    """`at 3.1 s`, `from 3.1 s to 4 s`, `3 times between 3.1 s and 80 s`; `mask` is (rows,)."""
     changes = np.flatnonzero(np.diff(mask, prepend=False, append=False))
     begins, ends = changes[::2], changes[1::2] - 1
     first, last = log["time"][begins[0]], log["time"][ends[-1]]

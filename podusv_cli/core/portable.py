@@ -44,7 +44,7 @@ CENTRAL, TAIL, FAR_TAIL = (
 
 
 def _polynomial(x: Vector, coefficients: tuple[float, ...]) -> Vector:
-    """Horner's scheme, the highest power first."""
+    """Horner's scheme at x (n,), the highest power first."""
     result = np.full_like(x, coefficients[0])
     for coefficient in coefficients[1:]:
         result = result * x + coefficient
@@ -52,7 +52,7 @@ def _polynomial(x: Vector, coefficients: tuple[float, ...]) -> Vector:
 
 
 def logarithm(x: Vector) -> Vector:
-    """ln x, to two units in the last place."""
+    """ln x of x (n,), to two units in the last place."""
     mantissa, exponent = np.frexp(x)
     low = mantissa < math.sqrt(0.5)
     mantissa, exponent = np.where(low, 2.0 * mantissa, mantissa), exponent - low
@@ -62,7 +62,7 @@ def logarithm(x: Vector) -> Vector:
 
 
 def exponential(x: Vector) -> Vector:
-    """e^x, to two units in the last place."""
+    """e^x of x (n,), to two units in the last place."""
     n = np.rint(x * LOG2_E)
     r = (x - n * LN2[0]) - n * LN2[1]
     return np.ldexp(_polynomial(r, E[::-1]), n.astype(np.int32))
@@ -73,7 +73,7 @@ def _ratio(x: Vector, part: tuple[tuple[float, ...], tuple[float, ...]]) -> Vect
 
 
 def standard_normal(u: Vector) -> Vector:
-    """The standard normal number that a share u of all are below."""
+    """The standard normal numbers (n,) that a share u (n,) of all are below."""
     q = u - 0.5
     z = q * _ratio(0.180625 - q * q, CENTRAL)
     out = np.abs(q) > 0.425

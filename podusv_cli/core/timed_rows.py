@@ -133,7 +133,10 @@ def _wrong_cell(lines: list[TextLine], noun: str) -> str:
 
 
 def _in_order(rows: Vector, order: list[int], header: TextLine, noun: str) -> Vector:
-    """The rows with their columns in this order; behind a header that does not name each, as is."""
+    """The rows with their columns in this order; behind a header that does not name each, as is.
+
+    Shape (rows, columns) before and after.
+    """
     if order == sorted(order):
         return rows
     if len(order) != rows.shape[1]:

@@ -101,7 +101,11 @@ def _lanes(
     numbers: Vector,
     order: Sequence[int],
 ) -> list[int]:
-    """The columns of the draws that explain the turns, then those that the number follows."""
+    """The columns of the draws that explain the turns, then those that the number follows.
+
+    `numbers` and `order` are (draws,): the claim's number, and the draws from its least to its
+    largest.
+    """
     draws = report.tried.draws
     ranks = np.argsort(np.argsort(numbers))
 

@@ -71,7 +71,8 @@ def explain_turns(
 ) -> list[Explained]:
     """The parts of choices in which more draws turn than chance has it, the clearest first.
 
-    Of the draws in which the claim's answer is known. The band is that of the clearest of all
+    `turned` and `known` are (draws,); only draws in which the claim's answer is known count.
+    `acting` says by name which choices change the number. The band is that of the clearest of all
     choices after the turned draws are shuffled.
     """
     rows = [i for i, choice in enumerate(draws.choices) if acting.get(choice.name, False)]
@@ -106,7 +107,7 @@ def _describe_part(choice: Choice, part: int, inside: Any, turned: Any) -> Expla
 def count_turns(
     claim: str, worlds: Sequence[Judged], base: Judged
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Which draws turn a claim's verdict, and in which its answer is known."""
+    """Which draws turn a claim's verdict, and in which its answer is known; both (draws,)."""
     turned = np.array([world.turns(claim, base) for world in worlds], bool)
     known = np.array([world.answers.get(claim) is not None for world in worlds], bool)
     return turned, known

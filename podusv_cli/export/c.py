@@ -106,6 +106,7 @@ def literal(number: float) -> str:
 
 
 def _lines(numbers: Vector) -> list[list[str]]:
+    """Numbers (n,) as lines of C, in hexadecimal: every bit stays."""
     words = [literal(number) for number in numbers.tolist()]
     return [words[i : i + IN_A_LINE] for i in range(0, len(words), IN_A_LINE)]
 

@@ -112,7 +112,7 @@ def _files_in_manifest(folder: Path) -> Collection[str]:
 
 
 def _samples(folder: Path, about: About) -> Vector:
-    """The samples, a row each."""
+    """The samples (samples, columns). Raises StorageError."""
     try:
         with (folder / SAMPLES).open(newline="") as lines:
             names, *rows = csv.reader(lines)
@@ -158,7 +158,7 @@ def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -
     library.podusv_law_start(law)
 
     def step(row: Vector) -> list[float]:
-        """Demand, signals and memory that the C library gives for the inputs of one sample."""
+        """Demand, signals and memory that the C library gives for a sample's row (columns,)."""
         state, target, loads = np.split(row[1:], [STATE, STATE + TARGET])
         demand = (ctypes.c_double * DEMAND)()
         library.podusv_law_step(law, *map(_vector, (state, target, loads)), demand)
@@ -198,7 +198,7 @@ def _fmu(path: Path, place: Path, about: About) -> Step:
     said = [v.valueReference for v in description.modelVariables if v.causality != "input"]
 
     def step(row: Vector) -> list[float]:
-        """The outputs that the FMU gives for the inputs of one sample."""
+        """The outputs that the FMU gives for the inputs of one sample, a row (columns,)."""
         slave.setReal(given, row[1 : 1 + len(given)].tolist())
         slave.doStep(float(row[0]), about.period)
         return [float(number) for number in slave.getReal(said)]

@@ -223,8 +223,8 @@ class ExportedLaw:
     def samples(self, log: Recording) -> Vector:
         """A row for each sample of a run: time, inputs, demand, signals, memory.
 
-        The loads of a row are those in the row of the log before, after which they do not change
-        where the actuator has no states.
+        Shape (samples, columns). The loads of a row are those in the row of the log before, after
+        which they do not change where the actuator has no states.
         """
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)
@@ -246,7 +246,7 @@ class ExportedLaw:
         pointers, sizes = signatures.pointers(c), signatures.whole_numbers(n)
 
         def step_law(sample: int, inputs: Vector) -> list[float]:
-            """Demand, signals and memory after sample number `sample` with these inputs."""
+            """Demand, signals and memory after sample number `sample`; `inputs` are (inputs,)."""
             c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
             c.row[n.tau : n.tau + len(LOAD_NUMBERS)] = inputs[given:]
             step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)
@@ -266,7 +266,7 @@ class ExportedLaw:
         return samples[:, 1 : 1 + len(STATE) + len(TARGET) + len(LOAD_NUMBERS)]
 
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
-        """The target at these rows of a log; on a path that is followed it is beside the vessel."""
+        """The target (rows, 6) at these rows of a log; on a followed path, beside the vessel."""
         path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):

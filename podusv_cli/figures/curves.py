@@ -40,7 +40,10 @@ class Beyond(SymmetricalLogLocator):
 
 
 def thin_curve(t: Vector, y: Vector, points: int = 1500) -> tuple[Vector, Vector]:
-    """At most about `points` samples that keep every extreme: the least and largest of each bin."""
+    """At most about `points` samples that keep every extreme: the least and largest of each bin.
+
+    `t` [s] and `y` are (n,) both before and after.
+    """
     if len(t) <= points:
         return t, y
     width = -(-len(t) // (points // 2))
@@ -95,7 +98,7 @@ def _way(y: Vector) -> float:
 
 
 def _draw_components(axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool) -> None:
-    """All components of a vector over time, thin, with one name."""
+    """All components of a vector over time, thin, with one name; curve is t (n,) and (n, parts)."""
     t, vectors = curve
     for number, y in enumerate(vectors.reshape(len(t), -1).T):
         name = run.line_style["label"] if not number else f"_{number}"
@@ -153,7 +156,7 @@ def differ(run: Shown, name: str, other: str) -> bool:
 
 
 def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any) -> Line2D:
-    """Plot a curve over time, thinned; the vertical scale fits it only where it is `fitted`."""
+    """Plot a curve (t, y), each (n,), thinned; the scale fits it only where it is `fitted`."""
     t, y = thin_curve(*curve)
     if fitted:
         return axes.plot(t, y, **look)[0]
@@ -167,7 +170,10 @@ def draw_curve(axes: Axes, curve: tuple[Vector, Vector], *, fitted: bool, **look
 def draw_own(
     axes: Axes, run: Shown, curve: tuple[Vector, Vector], *, fitted: bool, **look: Any
 ) -> Line2D:
-    """Plot a curve of a run, grey after the end of its path: no metric and no scale counts that."""
+    """Plot a curve (t, y) of a run, grey after the end of its path.
+
+    No metric and no scale counts what comes after that.
+    """
     t, y = curve
     last = int(np.searchsorted(t, run.counts_to, side="right"))
     if 0 < last < len(t):

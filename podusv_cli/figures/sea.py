@@ -60,7 +60,10 @@ def _single_waves(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _last_waves(t: Vector, zeta: Vector) -> Span:
-    """From the upward crossing of 0 with which the last waves begin, to the end."""
+    """From the upward crossing of 0 with which the last waves begin, to the end [s].
+
+    `t` [s] and the elevation `zeta` [m] are (n,).
+    """
     upward = np.flatnonzero((zeta[:-1] < 0.0) & (zeta[1:] >= 0.0))
     first = upward[-WAVES] if len(upward) >= WAVES else 0
     return float(t[first]), float(t[-1])

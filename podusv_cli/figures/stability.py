@@ -186,7 +186,7 @@ def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
 
 
 def _means(values: Vector) -> Vector:
-    """Means of neighbours, at most POINTS of them."""
+    """Means of neighbours in values (n,), at most POINTS of them."""
     width = -(-len(values) // POINTS)
     starts = np.arange(0, len(values), width)
     return np.asarray(np.add.reduceat(values, starts) / np.diff([*starts, len(values)]))

@@ -283,7 +283,7 @@ def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
 
 
 def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
-    """At which instants, after the approach, the run has come to its leg.
+    """At which instants (rows,), after the approach, the run has come to its leg.
 
     At a change of legs the error begins anew, with up to the radius of acceptance. That is the
     corner's until the vessel crosses the leg, or is as near to it as on half of the leg.

@@ -82,6 +82,6 @@ def _course(log: Recording, rows: Mask) -> Vector:
 
 
 def _rotate_to_course(x: Vector, y: Vector, course: Vector) -> tuple[Vector, Vector]:
-    """A vector in the earth's frame as along and across a course."""
+    """A vector (x, y) in the earth's frame as along and across a course [rad]; each (rows,)."""
     cosine, sine = np.cos(course), np.sin(course)
     return x * cosine + y * sine, y * cosine - x * sine

@@ -202,14 +202,17 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _arrives(errors: Vector, fraction: float, radius: float) -> bool:
-    """Whether errors that fall as in this fraction of a run reach the radius in as long a run."""
+    """Whether errors (rows,) [m] that fall as in this fraction of a run reach the radius [m].
+
+    In as long a run.
+    """
     half = -(-len(errors) // 2)
     earlier, later = float(errors[:half].mean()), float(errors[-half:].mean())
     return (earlier - later) / (0.5 * fraction) > later - radius
 
 
 def _reversals(part: dict[str, Vector], turned: float) -> str | None:
-    """What a zig-zag has not come to."""
+    """What a zig-zag has not come to; `turned` is its change of heading so far [rad]."""
     count = int((np.diff(np.sign(part["delta_s"])) != 0.0).sum())
     if count >= REVERSALS:
         return None
@@ -220,13 +223,13 @@ def _reversals(part: dict[str, Vector], turned: float) -> str | None:
 
 
 def _turn(part: dict[str, Vector], turned: float) -> str | None:
-    """What a turning circle has not come to."""
+    """What a turning circle has not come to; `turned` is its change of heading [rad]."""
     degrees = f"the circle turns by {np.degrees(turned):.0f} deg, and its diameter needs 180"
     return degrees if turned < np.pi else None
 
 
 def _way(part: dict[str, Vector], turned: float) -> str | None:
-    """What a stopping trial has not come to."""
+    """What a stopping trial has not come to; `part` has its signals since it began."""
     if part["u"][0] <= 0.0:
         return "the hull does not go ahead when it is to stop; give it more speed"
     slowest = float(part["u"].min())

@@ -87,7 +87,10 @@ def delay_margin(loop: Loop, most: float) -> float:
 
 
 def _chebyshev(count: int) -> Vector:
-    """The matrix of derivatives at cos(j pi/count), j = 0 .. count (Trefethen 2000, cheb.m)."""
+    """The matrix (count + 1, count + 1) of derivatives at cos(j pi/count), j = 0 .. count.
+
+    Trefethen 2000, cheb.m.
+    """
     x = np.cos(np.pi * np.arange(count + 1) / count)
     c = np.where(np.arange(count + 1) % 2, -1.0, 1.0)
     c[[0, -1]] *= 2.0
@@ -96,6 +99,7 @@ def _chebyshev(count: int) -> Vector:
 
 
 def _rk4(matrix: Vector, step: float) -> Vector:
+    """The matrix by which one step [s] of RK4 multiplies the state of x' = matrix x; (n, n)."""
     unit, z = np.eye(len(matrix)), step * matrix
     return np.asarray(unit + z @ (unit + z @ (unit + z @ (unit + z / 4.0) / 3.0) / 2.0))
 
@@ -121,13 +125,16 @@ def axes(scenario: Scenario, nu: Vector) -> tuple[Axis, Axis]:
 
 
 def loops(scenario: Scenario, nu: Vector, cause: Cause | None = None) -> list[Loop]:
-    """The velocity loops of the scenario's law at a velocity; all, or those of one cause."""
+    """The velocity loops of the scenario's law at nu (3,); all, or those of one cause."""
     every = scenario.controller.velocity_loops(axes(scenario, nu), nu)
     return [loop for loop in every if cause in (None, loop.cause)]
 
 
 def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
-    """The law's gain whose halving slows a loop most; the loop's own key where several do."""
+    """The law's gain whose halving slows a loop most; the loop's own key where several do.
+
+    `nu` (3,) [m/s, m/s, rad/s] is the velocity at which the loop is linear.
+    """
     law, about = scenario.controller, axes(scenario, nu)
 
     def slow_gain(key: str) -> float:

@@ -242,14 +242,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return seen, rewards, dead, cut, info
 
     def _own_rewards(self, before: Moment) -> Vector:
-        """Those of the user's function, for runs that went on."""
+        """Rewards (environments,) of the user's function, for runs that went on."""
         going = [place for march in self._marches for place in march.places]
         rewards = np.zeros(self.num_envs)
         rewards[going] = self._task.reward_gained(before, self._moment())[going]
         return rewards
 
     def _rewards(self) -> Vector:
-        """What runs gained since they were asked last."""
+        """What runs gained since they were asked last, (environments,)."""
         rewards = np.zeros(self.num_envs)
         for march in self._marches:
             gathered = self._metrics.one(self._task.metric, march.gathered_so_far())

@@ -67,7 +67,7 @@ def write_moment(x: Vector, target: Vector, signals: Vector) -> None:
 
 
 def moment(time: Any, parts: Vector, demand: Vector) -> Moment:
-    """A moment of what `write_moment` has written; all are copies."""
+    """A moment of what `write_moment` has written, `parts` (20,) or (20, runs); all are copies."""
     own, target = parts.copy(), INPUTS + len(STATE)  # where the target begins
     # One number, too, is numpy's: over no time a rate is NaN then, and no ZeroDivisionError.
     return Moment(np.float64(time), own[:INPUTS], own[INPUTS:target], own[target:], demand.copy())
@@ -107,7 +107,7 @@ class EpisodeTask:
         return len(self.observation(first))
 
     def moment_of(self, session: Session, demand: Vector) -> Moment:
-        """The next instant of a session, after this demand."""
+        """The next instant of a session, after this demand (2,) [N, N m]."""
         now, parts = session.observe(), np.zeros(PARTS)
         write_moment(now.state, now.target, parts)
         return moment(now.time, parts, demand)
@@ -125,7 +125,10 @@ class EpisodeTask:
         return _finite(given, np.shape(now.time), "reward", now.time, idle)
 
     def observation(self, now: Moment) -> Vector:
-        """What an agent is given of a moment. Raises UsageError for no list of numbers."""
+        """What an agent is given of a moment, (numbers,).
+
+        Raises UsageError for no list of numbers.
+        """
         if self._observe is None:
             return now.seen.copy()  # of which an agent may make what it likes
         given, shape = self._observe(now), np.shape(now.time)
@@ -180,7 +183,10 @@ class EpisodeTask:
                     )
 
     def observed_bounds(self) -> Vector:
-        """The largest magnitude of each number of an observation; of the usual one, pi at last."""
+        """The largest magnitude of each number of an observation (numbers,).
+
+        Of the usual one pi comes last.
+        """
         most = np.full(self.numbers, np.inf)
         if self._observe is None:
             most[-1] = np.pi  # an angle

@@ -96,6 +96,7 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 
 def _nis(seen: Vector, step: float) -> float:
+    """The mean squared innovation over its variance, from gathered numbers."""
     gained = seen[NOW:SIZE] - seen[BEFORE:NOW]
     return mean_squared_innovation(gained[:SIX], gained[SIX:])
 

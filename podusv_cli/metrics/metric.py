@@ -51,8 +51,8 @@ def add(seen: Vector, integrals: int, position: int, amount: float) -> None:
 def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
     """The gathered numbers, with half a weight for the last instant of a run that was cut short.
 
-    The engine gives half a weight only to the last instant of the grid. `seen` are the numbers of a
-    run, or of several, a column each.
+    The engine gives half a weight only to the last instant of the grid. `seen` (numbers,) is of a
+    run, or (numbers, runs) of several; `step` in s.
     """
     whole, added = seen.copy(), seen[integrals : 2 * integrals]
     if integrals:

@@ -69,6 +69,7 @@ def other_kernels(
     """Placeholder of the other accumulators' kernel."""
 
 
+# Arguments as those of `spans.all_kernels`.
 def call_both(
     t: float, weight: float, steady: float, s: Vector, row: Vector, k: Any, seen: Vector
 ) -> None:
@@ -145,7 +146,7 @@ class Metrics(Probe):
         return _accumulators(self.known)
 
     def summary(self, seen: Vector, failed: Failed | None = None) -> dict[str, float]:
-        """Metrics by name; NaN where a run ended before one is defined.
+        """Metrics by name from `seen` (numbers,); NaN where a run ended before one is defined.
 
         A metric that raises is left out where `failed` is told; else it raises LawError.
         """
@@ -160,7 +161,7 @@ class Metrics(Probe):
         return numbers
 
     def one(self, name: str, seen: Vector) -> Vector:
-        """The metric of this name from gathered numbers, a column a run; NaN where undefined."""
+        """The metric of this name (runs,) from `seen` (numbers, runs); NaN where undefined."""
         metric, begin = self.known[name], self.ahead
         for part, size in self.parts:
             if part is metric.accumulator:

@@ -209,7 +209,7 @@ class _Program:
         return float(self.step / 6.0 * (ends[:-1] + 4.0 * middle + ends[1:]).sum())
 
     def _bounds(self) -> tuple[Vector, Vector]:
-        """The least and the largest of every unknown; the first state is given."""
+        """The least and the largest of every unknown (unknowns,); the first state is given."""
         low = np.full((self.n + 1, UNKNOWNS), -np.inf)
         low[:, STATES:] = -np.array(self.problem.loop.actuator.limits())
         high = -low

@@ -28,7 +28,10 @@ def schedule(problem: OptimumProblem, motion: Motion) -> str:
 
 
 def _choose_rows(demands: Vector) -> list[int]:
-    """The rows that a schedule has: all, or every so many and those where the demand bends most."""
+    """The rows that a schedule has: all, or every so many and those where the demand bends most.
+
+    `demands` is (times, 2) [N, N m].
+    """
     last, half = len(demands) - 1, MOST_ROWS // 2
     if last < MOST_ROWS:
         return list(range(last + 1))
@@ -57,7 +60,7 @@ def _gains(problem: OptimumProblem, motion: Motion) -> Vector:
 
 
 def _slopes(problem: OptimumProblem, motion: Motion) -> tuple[Vector, Vector]:
-    """The rates' derivatives by state and by demand at each of the motion's times."""
+    """The rates' derivatives by state (times, 6, 6) and demand (times, 6, 2) along the motion."""
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate((STATES, 2, 3))]
     both = ca.jacobian(rate(*arguments), ca.vertcat(*arguments[:2]))

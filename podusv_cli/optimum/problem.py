@@ -32,7 +32,7 @@ class Motion:
         return cls(log["time"], np.column_stack(states), np.column_stack(demands))
 
     def at(self, times: Vector) -> Motion:
-        """The motion at other times, on straight lines between its own."""
+        """The motion at other `times` (n,) [s], on straight lines between its own."""
 
         def between(rows: Vector) -> Vector:
             return np.column_stack([np.interp(times, self.times, column) for column in rows.T])

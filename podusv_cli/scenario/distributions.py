@@ -40,7 +40,7 @@ class Bounded(Component):
         """The values without `within`."""
 
     def at(self, u: Vector) -> Vector:
-        """The values."""
+        """The values (n,) for shares u (n,) in [0, 1), within the bounds."""
         if self.within is None:
             return self.whole(u)
         low, high = self.shares
@@ -110,7 +110,10 @@ class LogNormal(Bounded):
 
 
 def _halving_places(low: float, high: float) -> Vector:
-    """All places that LEVELS halvings can come to, with both ends: 2^LEVELS + 1 in order."""
+    """All places that LEVELS halvings can come to, with both ends, in order.
+
+    Shape (2^LEVELS + 1,).
+    """
     edges = np.array([low, high])
     for _ in range(LEVELS):
         halves = np.empty(2 * len(edges) - 1)
@@ -145,6 +148,7 @@ def _some(name: str, values: tuple[Any, ...]) -> None:
 
 
 def _uniform(bounds: Interval, u: Vector) -> Numbers:
+    """A number between the bounds for each `u` (n,) in [0, 1), all alike likely."""
     low, high = bounds
     return np.clip(low + u * (high - low), low, high)
 
@@ -185,6 +189,7 @@ def _choice(values: tuple[Any, ...], u: Vector) -> Numbers:
 
 
 def _integers(bounds: tuple[int, int], u: Vector) -> Numbers:
+    """A whole number between the bounds, both included, for each `u` (n,) in [0, 1)."""
     low, high = bounds
     return low + _place(high - low + 1, u)
 
@@ -257,7 +262,7 @@ class Distribution(Component):
         return [name for name in WAYS if getattr(self, name) is not None]
 
     def at(self, u: Vector) -> Numbers:
-        """The value for every u."""
+        """The value (n,) for every u (n,) in [0, 1)."""
         (name,) = self.given_keys
         return WAYS[name][1](getattr(self, name), u)
 

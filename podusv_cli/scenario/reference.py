@@ -81,7 +81,10 @@ def reference(scenario: Scenario) -> Reference:
 
 
 def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
-    """Speed, rate of the course and tangential acceleration of the target."""
+    """Speed [m/s], rate of the course [rad/s] and tangential acceleration [m/s2], each (n,).
+
+    `target` is (n, 6).
+    """
     _, _, x_dot, y_dot, x_ddot, y_ddot = target.T
     speed = np.hypot(x_dot, y_dot)
     moving = np.where(speed > STANDING, speed, np.inf)
@@ -90,7 +93,7 @@ def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Vector:
-    """The disturbance on a hull at the target's position and velocity."""
+    """The disturbance (n, 3) on a hull at the target's position and velocity."""
     sea, vessel = scenario.sea, scenario.vessel
     course = np.arctan2(target[:, 3] + 0.0, target[:, 2] + 0.0)  # -0.0 is no half turn
     speed = np.hypot(target[:, 2], target[:, 3])

@@ -167,7 +167,10 @@ def _facts(recording: Recording, texts: Texts) -> dict[str, str]:
 def _scales(
     file: h5py.File, arrays: Mapping[str, Vector], about: Mapping[str, Signal]
 ) -> dict[str, h5py.Dataset]:
-    """A dataset for every axis but time. ValueError if arrays differ in length along an axis."""
+    """The dimension scale of every axis but time. ValueError if lengths along an axis differ.
+
+    `arrays` and `about` are by the name of the signal.
+    """
     lengths: dict[str, int] = {}
     for name, array in arrays.items():
         for axis, size in zip(about[name].dimensions, array.shape, strict=True):

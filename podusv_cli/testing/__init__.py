@@ -247,7 +247,7 @@ def run_with(component: Component, compiled: bool) -> Recording:
 
 
 def evaluate_component(component: Component, seed: int) -> list[Vector]:
-    """What the component's kernel writes at a random state; NaN where it writes nothing."""
+    """What the component's kernel writes at a random state, (numbers,) each; NaN for nothing."""
     random = np.random.default_rng(seed)
     t = float(random.uniform(0.0, 300.0))
     x = random.uniform(-1.0, 1.0, 6) * [20.0, 20.0, 3.0, 1.5, 0.5, 0.8]

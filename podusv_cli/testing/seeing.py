@@ -43,7 +43,7 @@ def intact(vector: Vector) -> bool:
 
 
 def pose_at(t: float) -> Vector:
-    """A vessel that moves in every quantity."""
+    """State (6,) at t [s] of a vessel that moves in every quantity."""
     rates, places = np.linspace(0.3, 0.8, SIX), np.arange(1.0, SIX + 1.0)
     return np.sin(rates * t + places) * [9.0, 9.0, 3.0, 1.0, 0.3, 0.5]
 

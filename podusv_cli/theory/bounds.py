@@ -111,7 +111,10 @@ class _Axis:
         return 1.0 / (4.0 * self.A) + (from_cross if self.cross else 0.0)
 
     def room(self, rate: Vector) -> Vector:
-        """sigma_y, the part of 2 A that remains for the filter's drift with a decay at `rate`."""
+        """sigma_y (n,), the part of 2 A that remains for the filter's drift.
+
+        `rate` (n,) [1/s] is the decay that is wanted.
+        """
         if math.isinf(self.A):
             return np.full_like(rate, math.inf)
         spare = self.k - rate - self.cross**2 / (self.gain - rate * self.mass)

@@ -32,7 +32,10 @@ class IdealWeights:
 
 
 def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vector]:
-    """f_u and f_r: accelerations minus those due to actuator and disturbance, for any vessel."""
+    """f_u [m/s2] and f_r [rad/s2] (rows,): accelerations less those of actuator and disturbance.
+
+    For any vessel.
+    """
     m, s, d = loop.vessel, now.signals, now.rates
     sway, yaw = s["tau_v"] + s["b_v"], s["tau_r"] + s["b_r"]
     loaded = (m.m22 * yaw - m.m32 * sway) / (m.m22 * m.m33 - m.m23 * m.m32)
@@ -110,6 +113,6 @@ def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
 
 
 def rows_to_fit(rows: int, nodes: int) -> Vector:
-    """Indices of the rows that the fit uses."""
+    """Indices (n,) of the rows that the fit uses."""
     most = max(1, min(MOST_ROWS, MOST_NUMBERS // nodes, rows))
     return np.linspace(0, rows - 1, most).astype(int)

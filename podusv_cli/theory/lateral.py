@@ -82,7 +82,7 @@ def velocity_vector_loop(
 
 
 def velocity_vector_polynomial(law: VelocityVector, at: SwayAnswer) -> Vector:
-    """Coefficients of its characteristic polynomial for m23 = m32 = 0 above V_m, s^4 first."""
+    """Coefficients (5,) of its characteristic polynomial for m23 = m32 = 0 above V_m, s^4 first."""
     (p, d), a, b, T = at, law.k_psi, law.k_r, law.T_v
     q = law.k_p * (a + b)
     return np.array(
@@ -97,7 +97,7 @@ def velocity_vector_polynomial(law: VelocityVector, at: SwayAnswer) -> Vector:
 
 
 def momentum_vector_polynomial(at: SwayAnswer, gains: MomentumGains) -> Vector:
-    """Coefficients of the polynomial of `momentum_vector` with these gains, s^4 first.
+    """Coefficients (5,) of the polynomial of `momentum_vector` with these gains, s^4 first.
 
     `at` is the answer of the neutral point's sway z: z' = -p V r - d z.
     """

@@ -98,7 +98,7 @@ def poles(A: Vector) -> Complex:
 
 
 def stable(A: Vector) -> bool:
-    """Whether no pole is to the right of the imaginary axis by more than rounding."""
+    """Whether no pole of A (n, n) is to the right of the imaginary axis by more than rounding."""
     eigenvalues = np.linalg.eigvals(A)
     return bool(eigenvalues.real.max() <= STABLE * abs(eigenvalues).max())
 
@@ -150,7 +150,10 @@ def _crossings(cut: Cut, omega: Vector) -> tuple[Vector, Vector]:
 
 
 def _gains(cut: Cut, omega: Vector, L: Complex) -> list[float]:
-    """Factors of the gain with which a pole lies on the imaginary axis, at 0 as well."""
+    """Factors of the gain with which a pole lies on the imaginary axis, at 0 as well.
+
+    L (n,) is the loop's response at `omega` (n,) [rad/s].
+    """
     at = _roots(lambda w: float(cut.response(np.array([w]))[0, 0, 0].imag), omega, L.imag)
     values = [complex(cut.response(np.array([w]))[0, 0, 0]).real for w in at]
     if abs(np.linalg.eigvals(cut.open_matrix)).min() > SLOWEST:
@@ -159,7 +162,7 @@ def _gains(cut: Cut, omega: Vector, L: Complex) -> list[float]:
 
 
 def _roots(f: Callable[[float], float], omega: Vector, values: Vector) -> list[float]:
-    """Zeros of f between frequencies at which its values change sign."""
+    """Zeros of f [rad/s] between frequencies `omega` (n,) at which `values` (n,) change sign."""
     from scipy.optimize import brentq  # slow to import
 
     changes = np.flatnonzero(np.diff(values > 0.0))
@@ -167,7 +170,7 @@ def _roots(f: Callable[[float], float], omega: Vector, values: Vector) -> list[f
 
 
 def _peak(cut: Cut, omega: Vector, values: Vector, of: Callable[[complex], float]) -> float:
-    """The largest value between the frequencies, too."""
+    """The largest value between the frequencies `omega` (n,) [rad/s], too."""
     from scipy.optimize import minimize_scalar  # slow to import
 
     at = int(np.argmax(values))

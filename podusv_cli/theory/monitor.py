@@ -253,7 +253,10 @@ class _Bounds:
 
 
 def _share_kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
-    """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows."""
+    """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows.
+
+    V and its rate are (rows,).
+    """
     if not (np.isfinite(bound.Delta) and len(V)):
         return np.nan
     keeps = (rate[rows] <= -2.0 * bound.lambda_ * V[rows] + bound.Delta for rows in blocks(len(V)))
@@ -277,6 +280,7 @@ def _fixed_arrays(
 
 
 def _v_dot_bound(log: Recording) -> Vector:
+    """The bound of V' over the rows of a log (rows,), from the window that each row is in."""
     window = np.searchsorted(log["window_start"], log["time"], side="right") - 1
     return np.asarray(-2.0 * log["V_lambda"][window] * log["V"] + log["V_Delta"][window])
 

@@ -112,7 +112,7 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
 
 
 def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
-    """Components of an earth-fixed vector along and across the line of sight."""
+    """Components (rows,) of an earth-fixed vector (x, y) along and across the line of sight."""
     cos_d, sin_d = np.cos(psi_d), np.sin(psi_d)
     return x * cos_d + y * sin_d, y * cos_d - x * sin_d
 
@@ -120,7 +120,7 @@ def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
 def _alpha_u_rate(
     log: Recording, now: Replayed, law: PolarBackstepping, sight: SightLine
 ) -> Vector:
-    """Rate of (21); the paper's X_1 (40) with the true accelerations."""
+    """Rate of (21) (rows,) [m/s2]; the paper's X_1 (40) with the true accelerations."""
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]
     cos_e, sin_e, spin = np.cos(psi_e), np.sin(psi_e), sight.w - log["r"]
     approach = sight.side * (law.k_ze * sight.distance_rate + sight.P_rate)

@@ -129,7 +129,7 @@ def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
 
 
 def _arrive(plan: Plan, compiled: bool) -> Vector:
-    """The loop's state at the end of a run. Raises NotConvergedError where it diverges."""
+    """The loop's state (states,) at the end of a run. Raises NotConvergedError if it diverges."""
     log = run(plan, compiled=compiled)
     if log.status == "interrupted":
         raise KeyboardInterrupt
@@ -190,7 +190,7 @@ class _Frame:
             self._drift[2] = turn
 
     def rows(self, q: Vector, given: Vector | None = None) -> Vector:
-        """For rows of q: rates of q, then the loop's row; `given` as `rates_at` has it."""
+        """For q (n, states): rates of q, then the loop's row; `given` as `rates_at` has it."""
         count = q.shape[1]
         times = np.full((len(q), 1), self.course.time)
         out = self._rates(np.hstack([times, q + self._origin]), given)
@@ -200,7 +200,7 @@ class _Frame:
         return out
 
     def row(self, q: Vector) -> Vector:
-        """The same for one q. Raises ArithmeticError where a rate is not finite."""
+        """The same for one q (states,). Raises ArithmeticError where a rate is not finite."""
         row = np.asarray(self.rows(q[None])[0])
         if not np.isfinite(row).all():
             raise ArithmeticError("a rate is not finite")
@@ -227,7 +227,7 @@ class _Frame:
         return _Left(np.asarray(solver.y), solver.t, min(late), max(late))
 
     def steady(self, left: _Left) -> Vector:
-        """The q near that of the settled vessel which does not change, by Newton's method."""
+        """The q (states,) near the settled vessel's which does not change, by Newton's method."""
         q: Vector = left.q
         for _ in range(ROUNDS):
             rates, slopes = self.row(q)[: len(q)], self._central(q, STEPS[1])[: len(q)]
@@ -259,7 +259,11 @@ class _Frame:
         return self._differences(q, relative)[0]
 
     def _differences(self, q: Vector, relative: float) -> tuple[Vector, Vector]:
-        """Central differences, and by how much those to either side are off them."""
+        """Central differences, and by how much those to either side are off them.
+
+        Both are (numbers that are seen, states); the steps are `relative` to the size of each
+        state.
+        """
         steps = relative * _size(q)
         rows = self.rows(np.vstack([q + np.diag(steps), q - np.diag(steps), q]))[:, self._seen].T
         above, below, here = np.split(rows, [len(q), 2 * len(q)], axis=1)

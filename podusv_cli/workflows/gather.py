@@ -100,7 +100,7 @@ def _check_common(log: Track, duration: float) -> None:
 
 
 def _about_unit(times: Vector, duration: float) -> str:
-    """What to write where the numbers of a clock are no seconds; "" where they seem to be.
+    """What to write where the numbers of a clock, `times` (n,), are no seconds; else "".
 
     They tell by dates, by a span that fits the run in another unit, or by the distance of rows.
     """

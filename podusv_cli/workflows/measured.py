@@ -82,7 +82,10 @@ def track(
 
 
 def _at(at: Vector, times: Vector, values: Vector, *, turns: bool) -> Vector:
-    """A quantity at other times; NaN before its first value and after its last one."""
+    """A quantity at the times `at` (n,); NaN before its first value and after its last one.
+
+    Its `values` (m,) are of `times` (m,) [s]; those of an angle go the shorter way round.
+    """
     known = np.isfinite(values)
     whole = np.unwrap(values[known]) if turns else values[known]
     return np.interp(at, times[known], whole, left=np.nan, right=np.nan)

@@ -216,7 +216,7 @@ class Actuator(Component):
         return tau
 
     def _drive_once(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
-        """Loads and rate of the state."""
+        """Loads (3,) [N, N, N m] and rate of the state (states,) for x (6,) and demand (2,)."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
         call(
             self.drive,

@@ -108,6 +108,7 @@ def _lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) ->
     """Stands for an actuator's `lose`."""
 
 
+# Arguments as those of `Actuator.drive`; `demand` has one more number, when the step began [s].
 def _drive_commanded(
     t: float,
     x: Vector,
@@ -129,6 +130,7 @@ def _drive_commanded(
     _inner(t, x, state, given, k, table, tau, rate, tail(signals, LOGGED))
 
 
+# Arguments as those of `Actuator.drive`; `demand` has one more number, when the step began [s].
 def _failing(
     t: float,
     x: Vector,

@@ -247,9 +247,10 @@ class Pods(Actuator):
         return lag, lag + TURNING * turning
 
     def settled(self, x: Vector, demand: Vector) -> Vector:
-        """Loads where the pods' state is what is commanded; the advance speed hangs on the angle.
+        """Loads (3,) where the pods' state is what is commanded: x (6,), demand (2,).
 
-        A horizon only takes longer to get there, so it is left out.
+        The advance speed hangs on the angle. A horizon only takes longer to get there, so it is
+        left out.
         """
         k, table, count = (
             bundle(self.constants() | {"horizon": 0.0}),

@@ -30,7 +30,7 @@ class Recorded(NamedTuple):
 
 @lru_cache(maxsize=4)  # asked for table and constants of every run
 def rows_of(text: str, replayed: Signals, lagged: Signals, zero: Sequence[str]) -> Vector:
-    """The rows of the text: t, and a command for each of the signals `replayed`.
+    """The rows of the text (rows, 1 + commands): t [s], and each of the signals `replayed`.
 
     Columns are called as these, or as the commands `lagged` that they follow. Those that belong to
     signals called in `zero` may all be left out. Raises ValueError.
@@ -82,6 +82,8 @@ def _obey(
     """Stands for an actuator's `obey`."""
 
 
+# Arguments as those of `Actuator.drive`; the rows begin in `table` where the actuator's own numbers
+# end.
 def _obeying(
     t: float,
     x: Vector,

@@ -94,7 +94,7 @@ class Network(Component):
         return len(self.centers) or math.prod(self.nodes)
 
     def axes(self) -> list[Vector]:
-        """The grid's coordinates along u, v, r."""
+        """The grid's coordinates along u, v [m/s] and r [rad/s], each (nodes on it,)."""
         ranges = zip(self.low, self.high, self.nodes, strict=True)
         return [
             np.linspace(low, high, count) if count > 1 else np.array([(low + high) / 2])
@@ -108,7 +108,7 @@ class Network(Component):
         return np.stack(np.meshgrid(*self.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
 
     def width_array(self) -> Vector:
-        """Gaussian widths along u, v, r."""
+        """Gaussian widths along u, v, r: (3,) [m/s, m/s, rad/s]."""
         if self.widths is not None:
             return np.asarray(self.widths, dtype=float)
         return np.array([self.spread * (axis[1] - axis[0]) for axis in self.axes()])
@@ -145,6 +145,11 @@ class Network(Component):
 
 @lru_cache(maxsize=4)  # the runs of a batch mostly have one network, and a run asks three times
 def _table(network: Network) -> Vector:
+    """The table of `_evaluate`, flat: centres (3, bells), then exponents (3, bells).
+
+    On a grid the first bells are the nodes of the plane (v, r), the others those along u. Read
+    only: runs share it.
+    """
     along, plane = network.factors
     centers, exponents = rows = np.zeros((2, 3, network.bells))
     centers[:, :plane] = network.center_array()[:plane].T
@@ -227,6 +232,7 @@ def activation(network: Network, nu: npt.NDArray[np.float64]) -> Vector:
 
 
 def _node_distance(log: Recording) -> Vector:
+    """How far the velocity is from the nearest node, in widths, over the rows of a log (rows,)."""
     nu = np.stack([log[name] for name in "uvr"], axis=1)
     return nearest(nu, log["rbf_center"], log["rbf_width"])
 

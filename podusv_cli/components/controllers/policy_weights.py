@@ -56,7 +56,10 @@ class Header(BaseModel, extra="allow"):
 
 
 def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
-    """The tensors of a safetensors file, and its remarks, by name. Raises ValueError."""
+    """The arrays of a safetensors file by name, each in its own shape, and its remarks.
+
+    Raises ValueError.
+    """
     begin = LENGTH + int.from_bytes(data[:LENGTH], "little")
     try:
         header = Header.model_validate_json(data[LENGTH:begin] if begin <= len(data) else b"")
@@ -124,7 +127,7 @@ def _period(remarks: Mapping[str, str]) -> float | None:
 
 
 def _normal(arrays: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
-    """Mean and scale of the inputs, taken out of the tensors."""
+    """Mean and scale of the inputs, both (inputs,), taken out of the tensors."""
     mean, scale = arrays.pop("mean", np.zeros(inputs)), arrays.pop("scale", np.ones(inputs))
     for name, vector in (("mean", mean), ("scale", scale)):
         if vector.shape != (inputs,):
@@ -135,7 +138,7 @@ def _normal(arrays: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
 
 
 def _layers(arrays: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]]:
-    """Name, weight and bias of every layer, in the order of their numbers."""
+    """Name, weight (outputs, inputs) and bias (outputs,) of every layer, in order."""
     named = {name: LAYER.fullmatch(name) for name in arrays}
     if strange := [name for name, match in named.items() if not match]:
         raise ValueError(

@@ -37,7 +37,6 @@ TURNS = 2  # position in the memory
 TURNING = Signal("turns", "1", "1 while it turns on the spot, else 0")
 
 
-# x (6) state, target (6), u_d [m/s] the wanted speed.
 @kernel
 def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     """Bearing of where a circle about the vessel meets the path, or of the path, less psi [rad]."""

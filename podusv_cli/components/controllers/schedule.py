@@ -42,9 +42,9 @@ def _read_recorded(text: str, *, held: bool) -> Recorded | None:
 
 @lru_cache(maxsize=4)  # one schedule is read a dozen times in a run
 def _rows(text: str) -> Vector:
-    """The numbers in lines with commas, the heading continuous. Raises ValueError.
+    """The numbers in lines with commas (rows, columns), the heading continuous.
 
-    Recorded commands are for the actuator to read: their demand is 0.
+    Raises ValueError. Recorded commands are for the actuator to read: their demand is 0.
     """
     if _read_recorded(text, held=False):
         rows = named_rows(text, NOUN).rows[:, [0, 0, 0]] * [1.0, 0.0, 0.0]

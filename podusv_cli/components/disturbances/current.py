@@ -67,7 +67,7 @@ class Current(Disturbance):
         return self.speed_std == self.direction_std == 0.0
 
     def _wandering(self, quantity: str, count: int) -> Vector:
-        """A process of variance 1, drawn from its steady distribution at the start."""
+        """A process of variance 1 (count,), drawn from its steady distribution at the start."""
         if self._steady():
             return np.zeros(count)
         stream = (self.seed, "current", quantity)

@@ -19,7 +19,7 @@ LAYOUTS = {4: ("t [s]", "b_u [N]", "b_v [N]", "b_r [N m]")}
 
 @lru_cache(maxsize=4)  # one record is read a dozen times in a run
 def _rows(text: str) -> Vector:
-    """Raises ValueError."""
+    """The rows t [s], b_u [N], b_v [N], b_r [N m] of a text (rows, 4). Raises ValueError."""
     rows = timed_rows(text, "the record", LAYOUTS)
     rows.flags.writeable = False
     return rows

@@ -108,7 +108,7 @@ def harris(frequency: Vector, speed: float, drag: float) -> Vector:
 
 
 def in_bins(density: Density, edges: Vector) -> Vector:
-    """The variance in each bin between neighbouring edges."""
+    """The variance (n - 1,) in each bin between neighbouring edges (n,) [Hz or rad/s]."""
     width = np.diff(edges)
     count = max(SAMPLES, math.ceil(ALL_SAMPLES / len(width)))
     samples = (density(edges[:-1] + (i + 0.5) / count * width) for i in range(count))
@@ -181,7 +181,7 @@ def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
 
 
 def growing_edges(low: float, high: float, count: int) -> Vector:
-    """Edges of `count` bins, each wider than the one before by the same factor."""
+    """Edges (count + 1,) of bins, each wider than the one before by the same factor."""
     ends = logarithm(np.array([low, high]))
     return exponential(np.linspace(ends[0], ends[1], count + 1))
 
@@ -213,7 +213,7 @@ def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
 
 @cache
 def _shares(spreading: int) -> Vector:
-    """The share of cos^(2 spreading) up to each of the angles, by Simpson's rule."""
+    """The share of cos^(2 spreading) up to each of the angles (angles,), by Simpson's rule."""
     fine = math.pi * (np.linspace(0.0, 1.0, 2 * len(SHARES) - 1) - 0.5)
     base = np.maximum([cos_sin(angle)[0] for angle in fine.tolist()], 0.0)
     density = np.ones_like(base)

@@ -35,7 +35,7 @@ class Peak(NamedTuple):
     m: float
 
     def shape(self, ratio: Vector) -> Vector:
-        """Density over the ratio to the peak's frequency, before it is scaled."""
+        """Density (n,) over the ratio to the peak's frequency (n,), before it is scaled."""
         width = np.where(ratio < 1.0, 0.07, 0.09)
         bell = exponential(np.maximum(-0.5 * ((ratio - 1.0) / width) ** 2, SMALLEST))
         fall = exponential(np.maximum(-self.n / self.m * power(ratio, -self.m), SMALLEST))

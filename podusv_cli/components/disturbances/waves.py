@@ -75,7 +75,7 @@ ELEVATION = Signal("zeta", "m", "elevation of the sea where the vessel is", r"\z
 
 
 def _shares(chosen: Share, curve: ReflectionCurve, size: Vector) -> Vector:
-    """The reflected share of each component."""
+    """The reflected share (components,) of each component; `size` (components,) as the curve's."""
     return (
         interpolate_shares(curve, size) if chosen == "curve" else np.full(len(size), float(chosen))
     )

@@ -29,8 +29,8 @@ POSE_ALONE = (True, True, True, False, False, False)  # x, y, psi have to be mea
 def mean_squared_innovation(squares: Vector, counts: Vector) -> float:
     """NIS: the mean squared innovation over its variance; NaN where nothing was measured.
 
-    `squares` are sums of squared innovations over their variances, one for each measured quantity,
-    and `counts` how many are in each sum, as `Estimator.covariance` lays them out.
+    `squares` (quantities,) are sums of squared innovations over their variances, and `counts`
+    (quantities,) how many are in each sum, as `Estimator.covariance` lays them out.
     """
     count = float(counts.sum())
     return float(squares.sum()) / count if count else math.nan

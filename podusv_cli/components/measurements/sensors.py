@@ -67,7 +67,7 @@ class Sensor(Component):
         return np.where(lost, np.nan, each)
 
     def _error(self, stream: tuple[int | str, ...], count: int) -> Vector:
-        """Noise and bias."""
+        """Noise and bias of `count` samples (count,), in the unit of the quantity."""
         error = self.noise * normals((*stream, "noise"), 0, count)
         if self.bias > 0.0:
             lag = self.period / self.bias_time

@@ -152,7 +152,7 @@ class Waypoints(Path):
         return knots[1:][turns], jumps[turns]
 
     def _course(self) -> Vector:
-        """The points that the spline goes through; a loop ends where it begins."""
+        """The points (n, 2) [m] that the spline goes through; a loop ends where it begins."""
         closing = (
             self.points[:1] if self.after == "loop" and self.points[0] != self.points[-1] else ()
         )

@@ -263,7 +263,7 @@ class Plan:
 
     @cached_property
     def first_target(self) -> Vector:
-        """Where the target is at t = 0."""
+        """The target (6,) at t = 0."""
         path = self.loop.path
         if not path.follows:
             return np.asarray(self.recall(path.targets, AT_START)[0])
@@ -276,7 +276,7 @@ class Plan:
     @cached_property
     @np.errstate(all="ignore")  # a start beyond all numbers is for the run to tell
     def first_memory(self) -> Vector:
-        """The law's memory at t = 0."""
+        """The law's memory (slots,) at t = 0."""
         loop = self.loop
         return loop.controller.start(np.array(loop.start), self.first_target, loop.nominal)
 

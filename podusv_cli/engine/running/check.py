@@ -98,7 +98,10 @@ def _check_declared(plan: Plan) -> None:
 
 
 def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
-    """Demand, rates and signals that the law writes at the start of a run, over `before`."""
+    """Demand (2,), rates and signals that the law writes at the start of a run.
+
+    The arrays are full of `before` before that, so that one sees what it leaves unwritten.
+    """
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
     tau, rate, signals = (np.full(n, before) for n in (len(DEMAND), len(memory), len(law.signals)))

@@ -124,13 +124,16 @@ def places(plan: Plan) -> list[tuple[int, list[int]]]:
 
 
 def room(count: int) -> Vector:
-    """Zeros that begin at a whole register."""
+    """Zeros (count,) that begin at a whole register, as vector loads need."""
     more = np.zeros(count + LANES)
     return more[-(more.ctypes.data // NUMBER) % LANES :][:count]
 
 
 def _side_by_side(vectors: Sequence[Vector]) -> Vector:
-    """One vector of several, a lane each; the lanes that are left repeat the first."""
+    """One vector of several (n,), a lane each: (n, LANES), flat.
+
+    The lanes that are left repeat the first, so that they compute with sound numbers.
+    """
     together = room(LANES * max(map(len, vectors)))
     for lane in range(LANES):
         vector = vectors[lane if lane < len(vectors) else 0]

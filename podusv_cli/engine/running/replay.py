@@ -20,7 +20,10 @@ from podusv_cli.engine.step.layout import Layout, Vectors
 
 
 def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
-    """At most so many rows of a log, evenly spread: time, target, vessel's state, law's memory."""
+    """At most `most` rows of a log, evenly spread: time, target, vessel's state, law's memory.
+
+    Shape (rows, 1 + 6 + 6 + slots), as `rk4.evaluate_all` reads them.
+    """
     times = recording["time"]
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
     names = [*STATE, *dict.fromkeys(plan.states["law"])]
@@ -132,6 +135,7 @@ def _rates_runner(plan: Plan, compiled: bool) -> Callable[..., None]:
     def compiled_run(
         count: int, logged: Vector, out: Vector, vectors: Vectors, layout: Layout
     ) -> None:
+        """Evaluate the loop at `count` logged rows, by machine code; writes `out` (flat)."""
         vectors, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
         run(*adapters, count, signatures.pointer(logged), signatures.pointer(out), vectors, sizes)
 

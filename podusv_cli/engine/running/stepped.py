@@ -76,7 +76,10 @@ class SteppedRun:
         return self.reached == instant
 
     def gathered_so_far(self) -> Vector:
-        """What the probe gathers of the run that ends at the next instant, as it is steered now."""
+        """What the probe gathers of the run that ends at the next instant, as it is steered now.
+
+        Shape (probe.size,).
+        """
         if not 0 < self.reached <= self.grid.steps:
             return self.vectors.seen.copy()
         with self._unchanged:
@@ -101,7 +104,7 @@ class SteppedRun:
         return self.vectors.row[first : first + 3].copy()
 
     def target(self) -> Vector:
-        """The target at the next instant, as `TARGET`."""
+        """The target (6,) at the next instant, as `TARGET`."""
         self._aim(self.time)
         return self._target.copy()
 
@@ -223,13 +226,19 @@ class SteppedBatch:
         return np.where(self.alive, self.time, ended * self.grid.step)
 
     def view(self) -> Vector:
-        """What `look` writes at the next instant; a run that has ended repeats another one."""
+        """What `look` writes at the next instant, (numbers, runs).
+
+        A run that has ended repeats another one.
+        """
         self._aim(self.time)
         self._look(self.time)
         return self._view
 
     def gathered_so_far(self) -> Vector:
-        """What the probes gather of runs that end at the next instant, or have ended before."""
+        """What the probes gather of runs that end at the next instant, or have ended before.
+
+        Shape (probe.size, runs).
+        """
         with self._unchanged:
             if self.reached <= self.grid.steps:
                 self._march(self.reached, self.reached + 1, self.reached)

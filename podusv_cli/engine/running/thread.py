@@ -141,7 +141,11 @@ def march(
     under_way: Vector,
     progress: Callable[[int], None] | None = None,
 ) -> Ending:
-    """March up to the instant `last`, excluded. To be called while interrupts are held."""
+    """March up to the instant `last`, excluded. To be called while interrupts are held.
+
+    `under_way` (2 or more,) has the instant that was reached, and the flag that stops the march;
+    `progress` hears the instant.
+    """
     work = Work(advance, under_way)
     try:
         with interrupts_enabled():

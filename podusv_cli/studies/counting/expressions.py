@@ -57,7 +57,7 @@ class OfRuns(Walk):
         return np.where(np.abs(values) > REAL, np.copysign(np.inf, values), values)
 
     def countable(self, name: str, values: Vector, failed: Mask) -> Vector:
-        """A metric with FAILED, of its sign, in place of infinity."""
+        """A metric with FAILED, of its sign, in place of infinity; arrays (cells, draws)."""
         numbers = worst(self.metrics[name], values, failed)
         return np.where(np.isinf(numbers), np.copysign(FAILED, numbers), numbers)
 
@@ -135,7 +135,10 @@ def parse_success(text: str, metrics: Mapping[str, MetricAbout]) -> ast.expr:
 def judge_success(
     tree: ast.expr, values: Mapping[str, Vector], finished: Mask, metrics: Mapping[str, MetricAbout]
 ) -> Mask:
-    """Which runs of a law are a success; one is not where the condition is unknown."""
+    """Which runs (cells, draws) of a law are a success; one is not where that is unknown.
+
+    `values` has each metric of the tree, in the same shape.
+    """
     held = OfOneRun(metrics, values=values, ended=finished).condition(tree).yes
     return np.broadcast_to(held, np.shape(finished))
 

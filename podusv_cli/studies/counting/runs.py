@@ -103,9 +103,9 @@ class StudyRuns(Protocol):
 
 
 def worst(about: MetricAbout, values: Vector, failed: Mask) -> Vector:
-    """A metric with the worst for failed runs and for the time of what never happened.
+    """A metric with the worst for `failed` runs and for the time of what never happened.
 
-    That is +inf, or -inf of a metric of which more is better.
+    That is +inf, or -inf of a metric of which more is better. All arrays (cells, draws).
     """
     never = np.isnan(values) if about.happens else False
     return np.where(failed | never, -np.inf if about.margin else np.inf, values)

@@ -208,6 +208,7 @@ def _at_share(node: ast.expr, q: float, walk: OverLaws) -> Sampler:
     values = walk.side(node)
 
     def sample(label: str, cell: int, used: Mask) -> Quantile:
+        """The quantile in a cell over the draws `used` (draws,), failures as infinity."""
         chosen = values[cell][used]
         return Quantile(label, len(chosen), int(np.isnan(chosen).sum()), chosen, q)
 

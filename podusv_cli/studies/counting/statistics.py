@@ -106,7 +106,7 @@ def quantile(values: Vector, q: float, level: float) -> Interval:
 
 
 def quantiles(values: Vector, shares: Sequence[float], level: float) -> list[Interval]:
-    """Several quantiles, for which the values are sorted once."""
+    """Several quantiles of `values` (n,) with intervals of this level; sorted once for all."""
     n = values.shape[-1]
     unknown = np.isnan(values).any()
     high = np.sort(np.where(np.isnan(values), inf, values), axis=-1)
@@ -136,7 +136,7 @@ def _rank(n: int, q: float, level: float) -> int:
 
 
 def _at(ordered: Vector, rank: int) -> Any:
-    """The value with this rank from 1; infinite for a rank that does not exist."""
+    """The value of this rank, from 1, in `ordered` (n,); infinite for a rank that is not there."""
     n = ordered.shape[-1]
     if 1 <= rank <= n:
         return ordered[..., rank - 1][()]
@@ -172,7 +172,10 @@ class Pairs:
 
 
 def pairs(a: Vector, b: Vector, margin: float) -> Pairs:
-    """The comparison of two laws that met the same draws."""
+    """The comparison of two laws that met the same draws; `a` and `b` (draws,), inf for a failure.
+
+    Values closer than `margin`, in parts, are a tie.
+    """
     wins, losses = below(a, b, margin), below(b, a, margin)
     failed, unknown = np.isposinf(a) & np.isposinf(b), np.isnan(a) | np.isnan(b)
     return Pairs(len(a), *(int(where.sum()) for where in (wins, losses, failed, unknown)))
@@ -225,15 +228,15 @@ def holm(decides: Callable[[int, float], bool], count: int, level: float) -> lis
 
 
 def ranks(values: Vector) -> Vector:
-    """Ranks from 1; equal values, failures (+inf) among them, share the mean of their ranks."""
+    """Ranks (n,) from 1; equal values, failures (+inf) among them, share their mean rank."""
     _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
     return np.asarray((np.cumsum(counts) - (counts - 1) / 2.0)[places])
 
 
 def standard(values: Vector) -> Vector:
-    """Ranks, shifted and scaled so that the sum of products of two is their correlation.
+    """Ranks (n,), shifted and scaled so that the sum of products of two is their correlation.
 
-    NaN where the values do not vary.
+    NaN where the values (n,) do not vary.
     """
     centred = ranks(values) - (len(values) + 1) / 2.0
     length = np.sqrt(centred @ centred)
@@ -241,9 +244,10 @@ def standard(values: Vector) -> Vector:
 
 
 def rank_correlations(quantities: Mapping[str, Vector], metric: Vector) -> dict[str, float]:
-    """Spearman's rank correlation of a metric with every quantity, given as `standard` makes it.
+    """Spearman's rank correlation of a metric (draws,) with every quantity, by name.
 
-    Of the draws where the metric is known; NaN where one of the two does not vary.
+    A quantity (draws,) is given as `standard` makes it. Of the draws where the metric is known; NaN
+    where one of the two does not vary.
     """
     known = ~np.isnan(metric)
     y, whole = standard(metric[known]), bool(known.all())

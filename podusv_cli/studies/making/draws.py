@@ -44,7 +44,7 @@ def seeds(seed: int, quantity: str, first: int, count: int, stream: str = SWEEP)
 
 
 def table(sweep: Sweep, first: int, count: int, stream: str = SWEEP) -> dict[str, npt.NDArray[Any]]:
-    """Draws first, first + 1, ... of every quantity, by its name."""
+    """Draws first, first + 1, ... of every quantity, by its name; each (count,)."""
     shares = _sobol if sweep.design == "sobol" else _random
     drawn_shares = shares(sweep, first, count, stream)
     with np.errstate(over="ignore"):  # the scenario's ranges tell
@@ -67,7 +67,7 @@ def _random(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vect
 
 
 def _sobol(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
-    """Sobol' points, each dimension shifted by the quantity's own digits."""
+    """Sobol' points (count,) by quantity, each dimension shifted by the quantity's own digits."""
     from scipy.stats import qmc  # takes 60 MB
 
     if not sweep.vary:

@@ -180,7 +180,10 @@ def _heatmaps(results: Results) -> Iterator[Sketch]:
 
 
 def _panel(results: Results, law: str, name: str, across: int) -> Vector:
-    """A number of every cell, a row for each combination of all keys but the first."""
+    """A number of every cell, a row for each combination of all keys but the first.
+
+    Shape (cells / across, across), where `across` is how many values the first key has.
+    """
     table = results.summary
     column = "failed" if name == "failed" else "q50"
     rows = table[(table.law == law) & ((name == "failed") | (table.metric == name))]
@@ -378,7 +381,7 @@ def _span_of(distances: Sequence[Vector]) -> tuple[float, float]:
 
 
 def _steps(values: Vector, ends: tuple[float, float]) -> Vector:
-    """Points at which a distribution is drawn: its values, thinned, between the axis's ends."""
+    """Points at which a distribution of `values` (n,) is drawn, thinned, between `ends`."""
     low, high = ends
     inside = np.sort(values[(values > low) & (values < high)])
     chosen = np.linspace(0, len(inside) - 1, min(POINTS, len(inside))).astype(int)
@@ -428,6 +431,7 @@ def _span(axes: Axes, values: Mapping[str, Vector], *shown: float) -> tuple[floa
 
 
 def _without_tails(numbers: Vector) -> list[float]:
+    """The quantiles at TAIL and 1 - TAIL of numbers (n,), where the axis ends; maybe none."""
     ends = [TAIL, 1.0 - TAIL]
     return np.quantile(numbers, ends, method="inverted_cdf").tolist() if len(numbers) else []
 

@@ -181,7 +181,10 @@ def _quantile(call: ast.Call, walk: OfGains, worst: float) -> Any:
 
 
 def numbers_of(call: ast.Call, walk: OfGains, worst: float = math.inf) -> Vector:
-    """What a statistic is of: a number of each run, the worst where it failed or is not known."""
+    """What a statistic is of: a number of each run (draws,).
+
+    `worst` stands where a run failed or its number is not known.
+    """
     values = np.broadcast_to(walk.side(call.args[0]), walk.runs.failed.shape)
     return np.where(walk.runs.failed | np.isnan(values), worst, values)
 

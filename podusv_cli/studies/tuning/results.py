@@ -329,7 +329,7 @@ class SearchResults:
 
 
 def worst_where_unknown(runs: Outcomes, metric: str) -> Vector:
-    """A metric of runs; infinite where a run failed, and where it has none."""
+    """A metric of runs (draws,); infinite where a run failed, and where it has none."""
     numbers = np.where(runs.failed, np.inf, runs.metrics[metric])
     return np.asarray(np.where(np.isnan(numbers), np.inf, numbers))
 

@@ -86,7 +86,7 @@ class LawRatios:
         return float(np.mean([np.mean(self._first(law, needed)) for law in laws]))
 
     def _first(self, law: str, needed: Vector) -> npt.NDArray[np.bool_]:
-        """In which samples a law is ahead of all others, with a lead of `needed` by pair."""
+        """In which samples (SAMPLES,) a law leads all others, by `needed` (pairs,) deviations."""
         sides = [(place, -1 if pair[0] == law else 1) for place, pair in enumerate(self.pairs)]
         own = [(place, side) for place, side in sides if law in self.pairs[place]]
         ahead = [side * self._off[place] > -needed[place] for place, side in own]
@@ -137,7 +137,11 @@ def ratios(runs: Mapping[str, Vector], level: float, seed: int, *, sets: int = 1
 def _sample_reached(
     table: Vector, met: Indices, trained: Indices, random: np.random.Generator
 ) -> Vector:
-    """What a law reaches in each sample of training sets, of its searches, and of the draws."""
+    """What a law reaches in each sample of training sets, of its searches, and of the draws.
+
+    `table` is (searches, draws), `met` and `trained` are indices of draws and of training sets.
+    Shape (SAMPLES,).
+    """
     by_search = np.stack([np.median(runs[met], axis=1) for runs in table], axis=1)
     if len(table) == 1:
         return by_search[:, 0]
