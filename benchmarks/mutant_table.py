@@ -572,8 +572,8 @@ TABLE: dict[str, list[Row]] = {
      "test_without_numba_runs_have_the_same_bytes_and_a_law_of_ones_own_is_told"),
 ],
 "doubt": [
-    ('        "rad": _plus(_radian, math.pi, 0.2),\n',
-     '        "rad": _plus(_radian, math.pi / 2, 0.2),\n',
+    ('        "rad": _by_summand(_radian, math.pi, 0.2),\n',
+     '        "rad": _by_summand(_radian, math.pi / 2, 0.2),\n',
      'test_angles_move_to_either_side_as_the_page_says'),
     ("for _ in range(LOOKS):", "for _ in range(0):",
      "test_a_window_of_a_hundredth_of_the_range_is_found_by_the_number_that_falls"),

@@ -89,7 +89,7 @@ class TriedChoice:
 
     def turns(self, claim: str, base: Judged) -> list[Turn]:
         """Where a claim's verdict turns: for words each that does, for numbers on each side."""
-        turned = [t for t in self.trials if t.judged.turns(claim, base)]
+        turned = [t for t in self.trials if t.judged.contradicts(claim, base)]
         if not self.choice.range:
             return [Turn(self.choice, t.value, self.choice.own, 0.0) for t in turned]
         sides = ([t for t in turned if (t.value > self.choice.own) == up] for up in (True, False))
@@ -174,7 +174,7 @@ class _Side:
 
     def turns_at(self, distance: float, claim: str) -> bool:
         """Whether a verdict is the opposite there."""
-        return self.judge_at(distance).turns(claim, self.base)
+        return self.judge_at(distance).contradicts(claim, self.base)
 
     def tried_between(self) -> list[float]:
         """Try the places that every side has, and give all that were tried."""

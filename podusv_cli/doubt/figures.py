@@ -172,7 +172,7 @@ def turned_spans(
     """
     own = shown.choice.own
     side = [t for t in shown.trials if (t.value > own) == (end > own)]
-    places = sorted((abs(t.value - own), t.judged.turns(claim, base)) for t in side)
+    places = sorted((abs(t.value - own), t.judged.contradicts(claim, base)) for t in side)
     for turned, run in groupby(places, key=lambda place: place[1]):
         if turned:
             at = [distance / abs(end - own) for distance, _ in run]

@@ -26,7 +26,7 @@ class Judged:
         """Whether a claim has the same numbers, bit for bit; two missing ones are the same."""
         return repr(self.numbers.get(claim)) == repr(other.numbers.get(claim))
 
-    def turns(self, claim: str, base: Judged) -> bool:
+    def contradicts(self, claim: str, base: Judged) -> bool:
         """Whether the answer on a claim is the opposite of the base's."""
         answer, first = self.answers.get(claim), base.answers[claim]
         return answer is not None and first is not None and answer is not first

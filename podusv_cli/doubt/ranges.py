@@ -33,10 +33,10 @@ class DoubtRange(NamedTuple):
 Way = Callable[[float, Scenario, Key], DoubtRange | None]  # how a number of this key moves
 
 
-def _times(alone: float, together: float) -> Way:
+def _by_factor(alone: float, together: float) -> Way:
     """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
 
-    def range_times(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
+    def range_of_factor(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         """Factors of the scenario's value, as far as the key takes both ends; None if it cannot."""
         ends = [_inside([own / f, own * f], key) for f in (alone, together)]
         if not own or any(low * high <= 0.0 for low, high in ends):
@@ -45,13 +45,13 @@ def _times(alone: float, together: float) -> Way:
         drawn = [Quantity(times=Distribution(log_uniform=(low, high))) for low, high in ways]
         return DoubtRange(drawn[0], drawn[1], abs(own))
 
-    return range_times
+    return range_of_factor
 
 
-def _plus(scale: Callable[[Scenario], float], alone: float, together: float) -> Way:
+def _by_summand(scale: Callable[[Scenario], float], alone: float, together: float) -> Way:
     """A summand up to a share of a scale, inside the key's bounds."""
 
-    def range_plus(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
+    def range_of_summand(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         """Summands to the scenario's value, in shares of `scale`; None where that is 0."""
         if not (unit := scale(scenario)):
             return None
@@ -61,12 +61,12 @@ def _plus(scale: Callable[[Scenario], float], alone: float, together: float) -> 
         drawn = [Quantity(plus=Distribution(uniform=(low - own, high - own))) for low, high in ends]
         return DoubtRange(drawn[0], drawn[1], unit)
 
-    return range_plus
+    return range_of_summand
 
 
 def _place(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
     """A summand of a coordinate; a factor of a length that has bounds, as a radius."""
-    way = _times(2.0, 1.05) if limits(key.field) else _plus(_length, 5.0, 0.5)
+    way = _by_factor(2.0, 1.05) if limits(key.field) else _by_summand(_length, 5.0, 0.5)
     return way(own, scenario, key)
 
 
@@ -74,7 +74,7 @@ def _load(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
     """A factor; where there is no load along this axis, up to what drifts the hull at the speed."""
     if own or key.name not in DRIFTS:
         return LOAD(own, scenario, key)
-    return _plus(DRIFTS[key.name], 1.0, 1.0)(own, scenario, key)
+    return _by_summand(DRIFTS[key.name], 1.0, 1.0)(own, scenario, key)
 
 
 def _inside(ends: list[float], key: Key) -> tuple[float, float]:
@@ -119,24 +119,29 @@ def _yaw_drift(scenario: Scenario) -> float:
 
 
 DRIFTS = {"b_u": _surge_drift, "b_v": _sway_drift, "b_r": _yaw_drift}
-LOAD = _times(2.0, 1.2)
-LIMIT = _times(10.0, 1.25)
+LOAD = _by_factor(2.0, 1.2)
+LIMIT = _by_factor(10.0, 1.25)
 # How the numbers of a section move, by their unit; "" is for all other units.
 RANGES: dict[str, dict[str, Way]] = {
-    "vessel": {"": _times(1.5, 1.1)},
-    "nominal": {"": _times(1.5, 1.1)},
+    "vessel": {"": _by_factor(1.5, 1.1)},
+    "nominal": {"": _by_factor(1.5, 1.1)},
     "start": {
-        "m": _plus(_length, 5.0, 0.5),
-        "rad": _plus(_radian, math.pi, 0.2),
-        "m/s": _plus(_speed, 1.0, 0.1),
-        "rad/s": _plus(_turning, 1.0, 0.1),
+        "m": _by_summand(_length, 5.0, 0.5),
+        "rad": _by_summand(_radian, math.pi, 0.2),
+        "m/s": _by_summand(_speed, 1.0, 0.1),
+        "rad/s": _by_summand(_turning, 1.0, 0.1),
     },
-    "path": {"m": _place, "rad": _plus(_radian, math.pi, 0.2), "": _times(2.0, 1.05)},
-    "disturbance": {"rad": _plus(_radian, math.pi, math.pi), "N": _load, "N m": _load, "": LOAD},
-    "actuator": {"N": LIMIT, "N m": LIMIT, "": _times(2.0, 1.25)},
-    "measurement": {"": _times(3.0, 1.25)},
-    "estimator": {"": _times(3.0, 1.25)},
-    "controller": {"": _times(3.0, 1.25)},
+    "path": {"m": _place, "rad": _by_summand(_radian, math.pi, 0.2), "": _by_factor(2.0, 1.05)},
+    "disturbance": {
+        "rad": _by_summand(_radian, math.pi, math.pi),
+        "N": _load,
+        "N m": _load,
+        "": LOAD,
+    },
+    "actuator": {"N": LIMIT, "N m": LIMIT, "": _by_factor(2.0, 1.25)},
+    "measurement": {"": _by_factor(3.0, 1.25)},
+    "estimator": {"": _by_factor(3.0, 1.25)},
+    "controller": {"": _by_factor(3.0, 1.25)},
 }
 
 

@@ -108,6 +108,6 @@ def count_turns(
     claim: str, worlds: Sequence[Judged], base: Judged
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Which draws turn a claim's verdict, and in which its answer is known; both (draws,)."""
-    turned = np.array([world.turns(claim, base) for world in worlds], bool)
+    turned = np.array([world.contradicts(claim, base) for world in worlds], bool)
     known = np.array([world.answers.get(claim) is not None for world in worlds], bool)
     return turned, known

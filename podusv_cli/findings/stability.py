@@ -137,7 +137,7 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
     """
     law, about = scenario.controller, axes(scenario, nu)
 
-    def slow_gain(key: str) -> float:
+    def rate_with_halved(key: str) -> float:
         """The rate [1/s] of the loop's fastest mode with half of this gain."""
         halved = law.model_copy(update={key: 0.5 * getattr(law, key)})
         own = [
@@ -148,7 +148,9 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
         return min(own, default=np.inf)
 
     gains = [key for key in type(law).model_fields if isinstance(getattr(law, key), float)]
-    return min(sorted(gains, key=lambda key: key != loop.key), key=slow_gain, default=loop.key)
+    return min(
+        sorted(gains, key=lambda key: key != loop.key), key=rate_with_halved, default=loop.key
+    )
 
 
 def bursts(loop: Loop, bound: AdaptedBound, error: float, step: float) -> bool:

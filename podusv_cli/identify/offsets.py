@@ -101,7 +101,7 @@ class Clocks:
         """Ways that the vessel as it was given predicts much better than the log as it is."""
         with ThreadPoolExecutor(available_workers()) as pool:
             own, mirrored = (
-                [*pool.map(self._value_way, [Way(d, turned) for d in DELAYS])]
+                [*pool.map(self._score_way, [Way(d, turned) for d in DELAYS])]
                 for turned in (False, True)
             )
         none = own[DELAYS.index(0.0)].value
@@ -130,7 +130,7 @@ class Clocks:
         read = _mirror_log(self.part) if way.mirrored else self.part
         return FitProblem(self.scenario, wanted, [log_of(read, actuator, wanted.step, way.delay)])
 
-    def _value_way(self, way: Way) -> Way:
+    def _score_way(self, way: Way) -> Way:
         """With loads that hardly wander, so that the commands have to explain the motion."""
         problem = self._problem(way)
         y = np.array([QUIET * (number.name in WALKS) for number in problem.numbers])

@@ -229,7 +229,7 @@ class _Bounds:
         value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
         observed = self._observe_rows(rows) if self.continuous and len(value) else None
         bound = bounds.ultimate_bound(self.law, self.loop.vessel, observed)
-        kept = _share_kept(bound.corrected, value, rate)
+        kept = _share_below_bound(bound.corrected, value, rate)
         pushes = [_largest(self.traces[name][rows]) for name in ("push", "printed_push")]
         sway = bounds.sway_bound(self.loop.vessel, *pushes)
         largest_v = _largest(self.log["v"][rows])
@@ -252,7 +252,7 @@ class _Bounds:
         return bounds.Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
 
 
-def _share_kept(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
+def _share_below_bound(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
     """Fraction of the rows with V' <= -2 lambda V + Delta; NaN without a bound or rows.
 
     V and its rate are (rows,).

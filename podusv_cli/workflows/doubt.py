@@ -60,7 +60,7 @@ def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None)
     scenario, world = loaded.scenario, comparison(loaded)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with interrupts_deferred(), writer_of(request, target) as writer:
-        report, writer.extras.interrupted = doubt_subject(world, scenario, request, progress)
+        report, writer.extras.interrupted = report_doubt(world, scenario, request, progress)
         outputs.write(writer, report, loaded.text, figures=request.figures)
         return outputs.Doubted(
             writer.finish(), report.answers, writer.status, tuple(writer.extras.missing)
@@ -86,21 +86,21 @@ def comparison(loaded: Loaded) -> Subject:
         )
     named = {label for claim in parsed for label in labels_of(claim.claim)}
 
-    def judge_comparison(scenario: Scenario) -> Singles:
+    def singles_with_claims(scenario: Scenario) -> Singles:
         singles = with_loads(scenario.singles())
         return {label: single for label, single in singles.items() if label in named}
 
     hulls = find(loaded.root, ("doubt", "hulls"))
     others = {
-        node.content: judge_comparison(
+        node.content: singles_with_claims(
             loaded.merge_over(tree_with("vessel.preset", node, loaded.root))
         )
         for node in (hulls.content if hulls else ())
     }
-    return Subject(parsed, judge_comparison(loaded.scenario), others)
+    return Subject(parsed, singles_with_claims(loaded.scenario), others)
 
 
-def doubt_subject(
+def report_doubt(
     subject: Subject, scenario: Scenario, request: Request, progress: Progress | None
 ) -> tuple[DoubtReport, bool]:
     """All that is tried, and what it says of every claim; whether an interrupt ended it."""

@@ -347,7 +347,7 @@ def test_hulls_are_drawn_whole_and_judged_as_algebra_has_it():
     section = {"draws": 60, "vary": {"vessel": {"rows": lines}}, "printed": fixed.split()}
     text = WRITTEN.replace(f"doubt: {{{STAY}, draws: 40}}", f"doubt: {json.dumps(section)}")
     loaded = load_text(text, "adrift.yaml", (), (doubt_faults,))
-    report, _ = doubting.doubt_subject(
+    report, _ = doubting.report_doubt(
         doubting.comparison(loaded), loaded.scenario, Request(workers=1), None
     )
     (choice,) = report.tried.draws.choices

@@ -150,7 +150,7 @@ class Waves(Disturbance):
             )
         if self.spectrum == "torsethaugen":
             self._suits_torsethaugen()
-        kept = self._kept_share()
+        kept = self._share_between_cutoffs()
         if not kept >= LEAST:
             raise ValueError(
                 f"between lowest {self.lowest:g} and highest {self.highest:g} the spectrum has "
@@ -168,7 +168,7 @@ class Waves(Disturbance):
                 f"the torsethaugen spectrum holds up to {HIGHEST:g} m and below {LONGEST:g} s, "
                 f"found {self.height:g} m and {self.period:g} s"
             )
-        kept = self._kept_share()
+        kept = self._share_between_cutoffs()
         if kept < BOTH:
             ratio = self.period / peaks(self.height, self.period)[1].period
             bound = f"lowest {0.6 * ratio:.2g}" if ratio < 1.0 else f"highest {3.0 * ratio:.2g}"
@@ -226,7 +226,7 @@ class Waves(Disturbance):
     def _density(self, rate: Vector) -> Vector:
         return DENSITY[self.spectrum](self, rate)
 
-    def _kept_share(self) -> float:
+    def _share_between_cutoffs(self) -> float:
         """The share of the spectrum's energy that the cut-offs leave."""
         edges = spectra.even_edges(*self._band, BINS)
         return math.fsum(spectra.in_bins(self._density, edges)) / (self.height / 4.0) ** 2

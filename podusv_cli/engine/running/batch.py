@@ -90,8 +90,8 @@ def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
 
     def endings(stopped: bool) -> list[Ending]:
         """How the run ended; cut short if it was `stopped` before its last instant."""
-        if stopped and work.good_instants < last:
-            return [Ending(work.good_instants, "interrupted")]
+        if stopped and work.good_instant_count < last:
+            return [Ending(work.good_instant_count, "interrupted")]
         return [work.ending(last)]
 
     return MarchThread([run], work, endings)
@@ -104,7 +104,7 @@ def march_together(
     grid, last = runs[0].plan.grid, runs[0].plan.grid.steps + 1
     lanes = Lanes.of([run.vectors for run in runs], runs[0].plan.layout)
     work = Work(partial(advance(lanes, grid.step), 0, last), lanes.under_way, bell)
-    return MarchThread(runs, work, lambda stopped: lanes.endings(work.good_instants, last))
+    return MarchThread(runs, work, lambda stopped: lanes.endings(work.good_instant_count, last))
 
 
 def _apart(vectors: Vectors) -> Vectors:

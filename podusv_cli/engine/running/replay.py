@@ -53,13 +53,13 @@ def replayer(
     )
     law = compile.entry("law", loop.controller.law, tuple(constants))
 
-    def read_time() -> float:
+    def time_law_ns() -> float:
         """The time of one evaluation of the law [ns], over all rounds."""
         began = time.thread_time_ns()  # of the processor: what else it does is not the law's
         replay(law, rounds, count, width, *vectors)
         return float((time.thread_time_ns() - began) / (rounds * count))
 
-    return read_time
+    return time_law_ns
 
 
 @dataclass(frozen=True)

@@ -84,7 +84,7 @@ class Work:
             self.wait()
             ended = self.over or self.hangs()
             if progress:
-                progress(self.good_instants)
+                progress(self.good_instant_count)
 
     def stop(self) -> None:
         """Tell the march to stop at the next instant."""
@@ -96,10 +96,10 @@ class Work:
         end = time.monotonic() + LAST_CHANCE
         while self.started and not self.over and time.monotonic() < end:
             self.wait()
-        return self.good_instants
+        return self.good_instant_count
 
     @property
-    def good_instants(self) -> int:
+    def good_instant_count(self) -> int:
         """The number of good instants: all before the one that is under way."""
         return int(self._under_way[0]) if self.result is None else self.result
 
@@ -107,7 +107,9 @@ class Work:
         """How a march up to this instant ended; one that hangs is abandoned."""
         if self.result is None:
             self.stop()  # should the law return one day
-            return Ending(self.good_instants, "crashed" if self.error else "hung", self.fault())
+            return Ending(
+                self.good_instant_count, "crashed" if self.error else "hung", self.fault()
+            )
         return Ending(self.result, "finished" if self.result == last else "diverged")
 
     def end_interrupted(self, last: int) -> Ending:

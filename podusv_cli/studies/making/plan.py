@@ -111,7 +111,7 @@ class StudyPlan:
                 facts[f"{law}[{cell.index}]{KERNELS}"] = kernels(self.run_plan(law, cell.index))
         return facts
 
-    def vary(self, variant: Variant) -> StudyPlan:
+    def with_variant(self, variant: Variant) -> StudyPlan:
         """The variant of this study, which has no grid. Raises ValidationError."""
         own = self.scenario.singles()
         laws = {name: change_law(own[law].controller, dict(new)) for name, law, new in variant.laws}

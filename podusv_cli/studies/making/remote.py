@@ -55,7 +55,7 @@ def _plan(recipe: StudyText) -> StudyPlan:
 
 @lru_cache(PLANS)
 def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> StudyPlan:
-    return _plan(recipe).vary(Variant(*variant))
+    return _plan(recipe).with_variant(Variant(*variant))
 
 
 @lru_cache(PLANS)

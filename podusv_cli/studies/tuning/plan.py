@@ -139,7 +139,7 @@ class TunePlan:
     def variant(self, laws: Mapping[str, Contestant], stream: str, draws: int) -> StudyPlan:
         """The study of laws by their new names, on draws of a stream."""
         renamed = tuple((name, law, tuple(new.items())) for name, (law, new) in laws.items())
-        return self.base.vary(Variant(stream, draws, renamed))
+        return self.base.with_variant(Variant(stream, draws, renamed))
 
     def runs(self, results: list[UnitResult]) -> Outcomes:
         """The runs of some units, in their order; failed is what the study calls no success."""
