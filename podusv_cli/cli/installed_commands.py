@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from importlib.metadata import EntryPoint, distributions
+from importlib.metadata import EntryPoint
 from types import FunctionType
 from typing import Any
 
@@ -12,22 +12,18 @@ import typer
 
 from podusv_cli.cli.exit_codes import with_exit_codes
 from podusv_cli.core.errors import LawError, in_a_line
-from podusv_cli.core.plugins import is_from_installer
+from podusv_cli.core.plugins import installed_points
 
 GROUP = "podusv.commands"
 
 
 @cache
 def installed_commands() -> dict[str, EntryPoint]:
-    """The entry points of all installed packages, by the command's name; the first one counts.
-
-    A package that lies in the folder of a run, study or search offers nothing, as with components.
-    """
+    """The entry points of all installed packages, by the command's name; the first one counts."""
     points: dict[str, EntryPoint] = {}
-    for package in distributions():
-        for point in package.entry_points:
-            if point.group == GROUP and is_from_installer(package):
-                points.setdefault(point.name, point)
+    for _, found in installed_points(GROUP):
+        for point in found:
+            points.setdefault(point.name, point)
     return dict(sorted(points.items()))
 
 

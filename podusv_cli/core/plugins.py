@@ -162,24 +162,32 @@ def _fault(error: BaseException, path: str) -> str:
 def installed_plugins() -> Plugins:
     """What installed packages offer by entry points of the groups `podusv.controllers` and so on.
 
-    Their modules are imported when something is looked for in their room. A package that lies in
-    the folder of a run, study or search offers nothing: nobody installed it.
+    Their modules are imported when something is looked for in their room.
     """
     by_package: dict[str, Plugin] = {}
-    for package in distributions():
+    for package, found in installed_points(*GROUPS):
         points = tuple(  # with the backport of importlib.metadata, which Dask imports, of its class
             (point.group.removeprefix("podusv."), EntryPoint(point.name, point.value, point.group))
-            for point in package.entry_points
-            if point.group in GROUPS
+            for point in found
         )
-        # the first one hides another
-        if points and package.name not in by_package and is_from_installer(package):
+        if package.name not in by_package:  # the first one hides another
             digest = _package_digest(points)
             by_package[package.name] = Plugin(package.name, digest, package.version, offers=points)
     return tuple(by_package[name] for name in sorted(by_package))
 
 
-def is_from_installer(package: Distribution) -> bool:
+def installed_points(*groups: str) -> Iterator[tuple[Distribution, list[EntryPoint]]]:
+    """The installed packages that have entry points of these groups, each with those.
+
+    A package that lies in the folder of a run, study or search is left out: nobody installed it.
+    """
+    for package in distributions():
+        points = [point for point in package.entry_points if point.group in groups]
+        if points and _is_from_installer(package):
+            yield package, points
+
+
+def _is_from_installer(package: Distribution) -> bool:
     """Whether this package lies where installers of this Python put it, or in one's own folder.
 
     Python looks for packages in the current folder too: `python -m` and notebooks do.
