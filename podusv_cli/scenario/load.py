@@ -106,8 +106,8 @@ class Loaded:
         """Key and message for every law of which two signals would have one name."""
         return list(clashes(self.scenario, self.plans))
 
-    def check(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
-        """This. Raises ScenarioError with the faults and with all that the checks find."""
+    def pass_checks(self, faults: list[Fault], checks: Sequence[Check]) -> Loaded:
+        """This, where it has no faults. Raises ScenarioError with them and what the checks find."""
         for key, text in chain(self.contradictions, *map(self._faults_by, checks)):
             steps = route(key) if isinstance(key, str) else key
             mark = follow(self.filled, steps)[-1].mark
@@ -116,14 +116,14 @@ class Loaded:
             raise ScenarioError(_order_faults(faults, self.root.mark.source))
         return self
 
-    def _faults_by(self, check: Check) -> Sequence[tuple[str | Route, str]]:
+    def _faults_by(self, check: Check) -> tuple[tuple[str | Route, str], ...]:
         """What a check finds; one that is asked for again, as of a study's only cell, has told."""
         if check not in self._faults_found:
-            self._faults_found[check] = check(self)
+            self._faults_found[check] = tuple(check(self))
         return self._faults_found[check]
 
     @cached_property
-    def _faults_found(self) -> dict[Check, Sequence[tuple[str | Route, str]]]:
+    def _faults_found(self) -> dict[Check, tuple[tuple[str | Route, str], ...]]:
         return {}
 
     def warn_of_dropped(self, warn: Callable[[str], object]) -> Loaded:
@@ -139,7 +139,7 @@ class Loaded:
         root = merge_kept(root, keys_of(type(self.scenario)), [])
         scenario, filled = _build_scenario(root, self.scenario.plugged, faults)
         changed = replace(self, scenario=scenario, filled=filled, root=root)
-        return changed.check(faults, (CLASHES, *checks)).scenario
+        return changed.pass_checks(faults, (CLASHES, *checks)).scenario
 
 
 # What is wrong with what is loaded: key and message. A key as its steps where names have dots.
@@ -190,7 +190,7 @@ def load_text(
     root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
     scenario, filled = _build_scenario(root, known, faults)
     loaded = Loaded(scenario, filled, text, root, dropped)
-    return loaded.check(faults, (CLASHES, *checks))
+    return loaded.pass_checks(faults, (CLASHES, *checks))
 
 
 def load_stored(
@@ -216,7 +216,7 @@ def load_stored(
     with_contents(root, keys_of(scenario_class(known)), faults, without_files)
     _raise_damage(faults, source)
     scenario, filled = _build_scenario(root, known, faults)
-    return Loaded(scenario, filled, text, root, dropped).check(faults, checks)
+    return Loaded(scenario, filled, text, root, dropped).pass_checks(faults, checks)
 
 
 def _raise_damage(faults: list[Fault], source: str) -> None:

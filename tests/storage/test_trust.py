@@ -300,7 +300,8 @@ def as_if_installed():
         {
             "scenario.yaml": text,
             "evil-1.0.dist-info/METADATA": "Name: evil\nVersion: 1.0\n",
-            "evil-1.0.dist-info/entry_points.txt": "[podusv.controllers]\nevil = evil:Evil\n",
+            "evil-1.0.dist-info/entry_points.txt": "[podusv.controllers]\nevil = evil:Evil\n"
+            "[podusv.commands]\nevil = evil:Evil\n",
         }
     )
     shutil.copy("gift/evil.py", "gift/yaml.py")
@@ -340,15 +341,20 @@ def test_a_notebook_in_somebody_s_folder_takes_nothing_there_for_installed(place
     for name in ("yaml.py", "signal.py"):  # which Python itself would take
         Path("gift", name).unlink()
     code = (
-        f"import sys; sys.path.insert(0, '..')\n{NAMES}import podusv; podusv.load('scenario.yaml')"
+        f"import sys; sys.path.insert(0, '..')\n{NAMES}{COMMANDS}"
+        "import podusv; podusv.load('scenario.yaml')"
     )
     Path("gift/evil-1.0.dist-info/scenario.yaml").write_text(Path("gift/scenario.yaml").read_text())
     said = begun("-c", code, cwd=place)
     assert not Path("MARK").exists()
-    assert said.stdout.strip() == "[]"
+    assert said.stdout.split() == ["[]", "[]"]
     assert "ScenarioError" in said.stderr
 
 
+COMMANDS = (
+    "from podusv_cli.cli.installed_commands import installed_commands\n"
+    "print([*installed_commands()])\n"
+)
 NAMES = (
     "from podusv_cli.core.plugins import installed_plugins\n"
     "print([p.name for p in installed_plugins()])\n"

@@ -1,6 +1,7 @@
 """What a study's runs are of: other kernels can be read, another scenario is refused."""
 
 import json
+import pickle
 import shutil
 from textwrap import dedent
 
@@ -33,6 +34,12 @@ def placed(store, draws=40):
     text = TEXT.replace("draws: 40", f"draws: {draws}")
     (store.folder / stores.SCENARIO).write_text(text)
     return store.folder
+
+
+def test_a_plan_goes_to_another_process_after_its_kernels_were_asked_for():
+    plan = small()
+    identity = plan.identity
+    assert pickle.loads(pickle.dumps(plan)).identity == identity
 
 
 @pytest.fixture

@@ -62,7 +62,7 @@ def _make_cells(
             scenario = (
                 loaded.merge_over(top, checks)
                 if grid
-                else loaded.check([], (CLASHES, *checks)).scenario
+                else loaded.pass_checks([], (CLASHES, *checks)).scenario
             )
             yield Cell(index, values, scenario)
         except ScenarioError as error:

@@ -51,6 +51,10 @@ class StudyPlan:
     cells: tuple[Cell, ...]
     variant: Variant | None = None  # which one of the study it is, if any
 
+    def __reduce__(self) -> tuple[type[StudyPlan], tuple[Any, ...]]:
+        """These values alone: what is made of them has kernels that other processes cannot name."""
+        return StudyPlan, (self.scenario, self.cells, self.variant)
+
     @property
     def sweep(self) -> Sweep:
         """The study's settings. Raises UsageError where the scenario has none."""
