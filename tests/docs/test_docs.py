@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import shlex
 from collections.abc import Callable, Iterator
 from datetime import date
@@ -15,6 +16,7 @@ import pytest
 import yaml
 from command_samples import ROOT, commanded
 
+import podusv
 import podusv_cli
 from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.figures.drawing import FIGURES
@@ -25,9 +27,11 @@ from podusv_cli.scenario.plugins import kinds_of
 
 PAGES = [
     path.relative_to(ROOT).as_posix()
-    for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("results/*.md")])
+    for room in ("", "docs/", "docs/laws/", "results/")
+    for path in sorted(ROOT.glob(f"{room}*.md"))
 ]
 EXAMPLES = [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("examples/*/*.md"))]
+LAW_FIGURES = runpy.run_path(str(ROOT / "examples/law_figures.py"))
 Refused = Callable[[str], str]
 
 
@@ -147,7 +151,7 @@ def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
     ],
 )
 def test_every_kind_has_its_place_on_a_page(section: str, pages: str) -> None:
-    text = "".join(page.read_text() for page in (ROOT / "docs").glob(f"{pages}.md"))
+    text = "".join(page.read_text() for page in (ROOT / "docs").rglob(f"{pages}.md"))
     kinds = kinds_of(scenario_class(()), section)
     missing = [kind for kind in kinds if not re.search(rf"(`|kind: ){kind}\b", text)]
     assert not missing
@@ -168,6 +172,41 @@ def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:
             float
         )
         assert row[1:] == [f"{number:.0f}" for number in found]
+
+
+DEFAULTS = {  # the scenario whose laws have the numbers of a page's section on defaults
+    "velocity_vector": "laws/rivals",
+    "momentum_vector": "laws/rivals",
+    "hand_position": "laws/rivals",
+    "sliding_mode": "laws/rivals",
+    "los_pid": "laws/rivals",
+    "alos": "laws/rivals",
+    "adaptive_neural": "laws/rivals",
+    "pid": "laws/rivals",
+    "cascade": "lefeber_2003/circle",
+    "los_backstepping": "fossen_2003/course",
+    "mss": "laws/autopilots",
+}
+
+
+@pytest.mark.parametrize("law", DEFAULTS)
+def test_the_defaults_on_a_laws_page_are_those_that_a_run_has(law: str) -> None:
+    section = text_of(f"docs/laws/{law}.md").partition("## Defaults\n")[2].partition("\n## ")[0]
+    told = {name: float(number) for name, number in re.findall(r"`(\w+)` ([\d.]*\d)", section)}
+    singles = podusv.load(f"podusv:{DEFAULTS[law]}.yaml").singles().values()
+    (controller, *_) = (one.controller for one in singles if one.controller.kind == law)
+    assert len(told) > 3
+    assert told == {name: getattr(controller, name) for name in told}
+
+
+def test_a_law_page_shows_its_picture_below_sixty_kilobytes() -> None:
+    pages = {path.stem: path.read_text() for path in (ROOT / "docs/laws").glob("*.md")}
+    drawn = {path.stem: path.stat().st_size for path in (ROOT / "docs/images/laws").glob("*.png")}
+    assert set(drawn) == set(LAW_FIGURES["SHOWN"]) == set(pages) - {"gains", "observer"}
+    assert all(f"](../images/laws/{law}.png)" in pages[law] for law in drawn)
+    assert max(drawn.values()) < 60_000
+    for law, (shown, _) in LAW_FIGURES["SHOWN"].items():
+        assert f"`podusv compare podusv:{shown}.yaml`" in pages[law]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -344,9 +344,9 @@ def test_a_few_cases_come_out_again() -> None:
     )
 
 
-# --- results/laws.md compares the laws as the committed study of rivals has them
+# --- docs/laws.md compares the laws as the committed study of rivals has them
 
-COMPARED = (ROOT / "results" / "laws.md").read_text().partition("## How they compare")[2]
+COMPARED = (ROOT / "docs" / "laws.md").read_text().partition("## How they compare")[2]
 LAWS_PAGE = COMPARED.partition("\n## ")[0]
 STUDY = ROOT / "results" / "studies" / "rivals"
 SUMMARY = pd.read_csv(STUDY / "summary.csv").set_index(["law", "metric"])
