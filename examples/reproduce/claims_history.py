@@ -41,7 +41,7 @@ changes whose texts could both be judged, {turns} turn the verdict on today's ru
 
 A claim that was put after its runs existed describes what was seen. It is tested only where a \
 run that was not seen is judged by it: other readings, steps, hulls and draws ([README.md]\
-(README.md#what-the-verdicts-depend-on), [doubt.md](doubt.md), [studies.md](studies.md)).
+(README.md#what-the-verdicts-depend-on), [doubt.md](../docs/doubt.md#what-our-verdicts-depend-on), [studies.md](../docs/studies.md#what-the-committed-studies-found)).
 
 Every text of every claim, with its date: [claims_log.csv](claims_log.csv). Below are those that \
 changed, first those that turn. The verdict is that of the text on today's runs; a dash: it \

@@ -409,25 +409,36 @@ def test_the_table_of_papers_counts_the_verdicts_of_each(paper):
     assert row == (str(len(verdicts)), ", ".join(map(str, counts)))
 
 
+DOUBTS = pd.read_csv(ROOT / "results" / "doubt.csv")
+DEPENDS = r"^\| ([a-z' ]+) \| (\d+) \| (\d+) \| (\d+) \| (\d+) \|$"
+
+
 @pytest.mark.parametrize(
     ("link", "scenario"),
     [("lefeber_2003.md", ""), ("fossen_2003.md", ""), ("#claim-by-claim", "corrected_compare")],
 )
 def test_the_table_of_papers_counts_what_is_robust(link, scenario):
-    """As results/doubt.md has it, of which `make doubt` makes the rows."""
-    letter = {"lefeber_2003.md": "L", "fossen_2003.md": "F"}.get(link, "C")
-    found = re.findall(
-        rf"^\| {letter}\w+ \((\w+)\) \| [^|]+ \| ([^|]+) \|",
-        (ROOT / "results/doubt.md").read_text(),
-        re.M,
-    )
-    studies = {path.stem for path in (ROOT / "configs/studies").iterdir()}
-    found = [(where, word) for where, word in found if where not in studies]
-    words = [word for where, word in found if not scenario or where == scenario]
+    """As results/doubt.csv has it, which `make doubt` makes."""
+    paper = {"#claim-by-claim": "mu_2017"}.get(link, link.removesuffix(".md"))
+    found = DOUBTS[(DOUBTS.paper == paper) & (DOUBTS.word != "cannot tell")]
+    words = found.word[found.scenario == scenario] if scenario else found.word
     (row,) = re.findall(
         rf"^\|[^|]*\({link}\)[^|]*(?:\|[^|]*){{4}}\| (\d+) of (\d+) \|", README, re.M
     )
-    assert row == (str(words.count("robust")), str(len(words)))
+    assert row == (str((words == "robust").sum()), str(len(words)))
+
+
+def test_the_table_of_what_verdicts_depend_on_counts_the_verdicts():
+    page = (ROOT / "docs/doubt.md").read_text()
+    counts = pd.crosstab(DOUBTS.word, DOUBTS.paper)
+    names = re.findall(r"`(\w+)`", re.search(r"^\| word \| (`.*) \|$", page, re.M)[1])
+    told = {row[0]: [int(cell) for cell in row[1:]] for row in re.findall(DEPENDS, page, re.M)}
+    assert {word: list(counts.loc[word, names]) for word in counts.index} == {
+        word: row for word, row in told.items() if any(row)
+    }
+    assert f"Of {len(DOUBTS)} verdicts" in page
+    solid = DOUBTS[DOUBTS.word == "robust"]
+    assert f"{solid.beside.notna().sum()} of the {len(solid)} robust ones are not if" in page
 
 
 @pytest.mark.parametrize("paper", ["lefeber_2003", "fossen_2003"])
