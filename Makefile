@@ -75,14 +75,14 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/runs/pod/
 	@echo "$(words $(PODS)) steps:"
 	@rm -f results/pod.log
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
-	@echo "what was found: results/pod.md; every table and figure: results/runs/pod/*/report.html"
+	@echo "what was found: docs/pod.md; every table and figure: results/runs/pod/*/report.html"
 
 sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/runs/sea/
 	@echo "$(words $(SEAS)) steps, about five minutes on two cores:"
 	@rm -f results/sea.log
 	@for name in $(SEAS); do $(STEP) compare sea $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
-	@echo "what was found: results/sea.md; every table and figure: results/runs/sea/*/report.html"
+	@echo "what was found: docs/sea.md; every table and figure: results/runs/sea/*/report.html"
 
 doubt: $(VENV)/run.done ## what the verdicts on papers and studies depend on, into results/doubt.csv, half an hour on two cores
 	@for name in $(DOUBTED); do \
