@@ -31,6 +31,7 @@ PAGES = [
 ]
 EXAMPLES = [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("examples/*/*.md"))]
 LAW_FIGURES = runpy.run_path(str(ROOT / "examples/law_figures.py"))
+GALLERY = runpy.run_path(str(ROOT / "examples/figure_gallery.py"))
 Refused = Callable[[str], str]
 
 
@@ -136,6 +137,17 @@ def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
     assert list(documented) == list(FIGURES)
     for name, sheet in FIGURES.items():
         assert documented[name] == ", ".join(f"`{signal}`" for signal in sheet.signals)
+
+
+def test_the_gallery_has_every_figure_with_the_command_that_draws_it() -> None:
+    page = text_of("docs/figures.md")
+    assert list(GALLERY["SHOWN"]) == list(FIGURES)
+    for name in FIGURES:
+        assert (ROOT / f"docs/images/figures/{name}.png").stat().st_size < 80_000
+        _, shown, below = page.partition(f"](images/figures/{name}.png)\n\n")
+        _, drawn, *_ = below.split("\n\n", 2)
+        assert shown
+        assert drawn == f"    {GALLERY['command'](name)}"
 
 
 @pytest.mark.parametrize(
