@@ -75,16 +75,16 @@ pod: $(VENV)/run.done ## the laws behind a pod, into results/runs/pod/
 	@echo "$(words $(PODS)) steps:"
 	@rm -f results/pod.log
 	@for name in $(PODS); do $(STEP) compare pod $$name 0 || exit 1; done
-	@echo "what was found: results/pod.md; every table and figure: results/runs/pod/*/report.html"
+	@echo "what was found: docs/pod.md; every table and figure: results/runs/pod/*/report.html"
 
 sea: $(VENV)/run.done ## single runs in a sea and through sensors, into results/runs/sea/
 	@echo "$(words $(SEAS)) steps, about five minutes on two cores:"
 	@rm -f results/sea.log
 	@for name in $(SEAS); do $(STEP) compare sea $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/sea.py > results/.table && mv results/.table results/sea/loads.csv
-	@echo "what was found: results/sea.md; every table and figure: results/runs/sea/*/report.html"
+	@echo "what was found: docs/sea.md; every table and figure: results/runs/sea/*/report.html"
 
-doubt: $(VENV)/run.done ## what the verdicts on papers and studies hang on, into results/doubt.md, half an hour on two cores
+doubt: $(VENV)/run.done ## what the verdicts on papers and studies depend on, into results/doubt.csv, half an hour on two cores
 	@for name in $(DOUBTED); do \
 	    echo "  $$name" && mkdir -p results/.doubt/$${name%/*} && \
 	    $(BIN)/podusv doubt configs/$$name.yaml --out results/.doubt/$$name --force -q || exit 1; \
@@ -94,8 +94,8 @@ doubt: $(VENV)/run.done ## what the verdicts on papers and studies hang on, into
 	    $(BIN)/podusv doubt configs/studies/$$name.yaml --set sweep.draws=200 --out results/.doubt/studies/$$name -q || exit 1; \
 	done
 	@$(BIN)/python examples/reproduce/doubts.py $(addprefix results/.doubt/,$(DOUBTED) $(addprefix studies/,$(JUDGED))) > results/.table && \
-	    mv results/.table results/doubt.md
-	@echo "what was found: results/doubt.md; every turn and figure: results/.doubt/*/*/report.html"
+	    mv results/.table results/doubt.csv
+	@echo "what was found: docs/doubt.md; every turn and figure: results/.doubt/*/*/report.html"
 
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
@@ -103,7 +103,7 @@ bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench
 	    cp results/.bench/figures/profiles.png results/bench/figures
 	@$(BIN)/podusv bench configs/bench_boats --force --out results/.bench_boats && \
 	    cp results/.bench_boats/runs.csv results/bench/boats.csv
-	@echo "what was found: results/bench.md; the page: results/.bench/report.html"
+	@echo "what was found: docs/bench.md; the page: results/.bench/report.html"
 
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
 	@$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs -d build/doctrees . site
@@ -117,7 +117,7 @@ sweep: $(VENV)/run.done ## the committed studies at full size, about half an hou
 	    (cd results/.studies/$$name && cp summary.csv pairs.csv sensitivity.csv claims.json ../../studies/$$name && \
 	        cp figures/*-iae.png ../../studies/$$name/figures) || exit 1; \
 	done
-	@echo "what was found: results/studies.md; every table and figure: results/.studies/*/report.html"
+	@echo "what was found: docs/studies.md; every table and figure: results/.studies/*/report.html"
 
 tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour on two cores
 	@for name in $(SEARCHES); do \
@@ -130,7 +130,7 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 	    $(BIN)/python examples/reproduce/judge.py configs/studies/judge_$$name.yaml results/tuning/hull/gains.csv \
 	        results/tuning/judged/$$name || exit 1; \
 	done
-	@echo "what was found: results/tuning.md; every table and figure: results/.tuning/*/report.html"
+	@echo "what was found: docs/tuning.md; every table and figure: results/.tuning/*/report.html"
 
 quick: $(VENV)/dev.done ## the test files nearest to what has changed since main
 	@$(BIN)/python tests/quick.py --files $(or $(FILES),25) --numprocesses auto --dist loadfile --no-loadscope-reorder

@@ -2,7 +2,7 @@
 
     .venv/bin/python -m benchmarks.default_gains [LAW]...
 
-Two tables of results/laws.md: hulls that no rule was made on, at 10 Hz, on a line and on legs; and
+A table of docs/laws/gains.md: hulls that no rule was made on, at 10 Hz, on a line and on legs; and
 of the legs, whose corners turn by 90 deg, how many runs fail at each speed.
 """
 

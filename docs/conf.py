@@ -25,7 +25,14 @@ project = "podusv"
 author = "podusv contributors"
 version = release = __version__
 root_doc = "docs/index"
-include_patterns = ["*.md", "docs/*", "docs/reference/*", "results/*.md", "examples/*/README.md"]
+include_patterns = [
+    "*.md",
+    "docs/*",
+    "docs/laws/*",
+    "docs/reference/*",
+    "results/*.md",
+    "examples/*/README.md",
+]
 extensions = ["myst_parser", "sphinx.ext.autodoc"]
 myst_heading_anchors = 4  # as GitHub forms them
 myst_enable_extensions = ["dollarmath"]

@@ -35,18 +35,22 @@ JUDGED_IN = {
 HEAD = """\
 # Claims and when they changed
 
-Keep this: a claim that is put as an expression after its runs exist can be bent towards them. \
+A claim that is put as an expression after its runs exist can be bent towards them. \
 {changed} of the {claims} claims that the scenarios state have had another text. Of {known} \
-changes whose texts could both be judged, {turns} turn the verdict on today's runs: {names}.
+changes whose texts could both be judged, {turns} turn the verdict on today's runs.
 
-A claim that was put after its runs existed describes what was seen. It is tested only where a \
-run that was not seen is judged by it: other readings, steps, hulls and draws ([README.md]\
-(README.md#what-the-verdicts-depend-on), [doubt.md](doubt.md), [studies.md](studies.md)).
+A claim that was put after its runs existed describes what was seen. Only a run that was not \
+seen tests it: other [readings and steps](README.md#what-the-verdicts-depend-on), \
+[values](../docs/doubt.md#what-our-verdicts-depend-on), \
+[draws](../docs/studies.md#what-the-committed-studies-found).
 
-Every text of every claim, with its date: [claims_log.csv](claims_log.csv). Below are those that \
-changed, first those that turn. The verdict is that of the text on today's runs; a dash: it \
-needs a study, or the claim was taken out. Made by `examples/reproduce/claims_history.py` from \
-this repository's history. Reasons are written by hand, and a test refuses a change without one.
+Every text of every claim, with date, verdict on today's runs and reason: \
+[claims_log.csv](claims_log.csv). `examples/reproduce/claims_history.py` makes it from this \
+repository's history. Reasons are written by hand, and a test refuses a change without one. \
+These changes turn the verdict:
+
+| claim | since | verdict of the old text | of the new one | reason |
+|---|---|---|---|---|
 """
 
 
@@ -187,40 +191,19 @@ def of_several(texts: Sequence[Text]) -> list[list[Text]]:
 
 
 def page(texts: Sequence[Text]) -> str:
-    """results/claims_log.md: those first whose verdict turned."""
-    changed = sorted(of_several(texts), key=lambda of_claim: not _turns(of_claim))
+    """results/claims_log.md: how many texts changed, and the changes that turn a verdict."""
+    changed = of_several(texts)
     pairs = [pair for of_claim in changed for pair in pairwise(of_claim)]
-    head = HEAD.format(
-        changed=len(changed),
-        claims=len({text.key for text in texts}),
-        turns=sum(map(_turns, changed)),
-        known=sum(bool(a.verdict and b.verdict) for a, b in pairs),
-        names=", ".join(of_claim[0].claim for of_claim in changed if _turns(of_claim)),
-    )
-    return "\n".join((head, *map(_section, changed)))
+    known = [(old, new) for old, new in pairs if old.verdict and new.verdict]
+    turns = [(old, new) for old, new in known if old.verdict != new.verdict]
+    claims = len({text.key for text in texts})
+    head = HEAD.format(changed=len(changed), claims=claims, turns=len(turns), known=len(known))
+    return head + "".join(_row(old, new) for old, new in turns)
 
 
-def _turns(of_claim: Sequence[Text]) -> int:
-    verdicts = [(a.verdict, b.verdict) for a, b in pairwise(of_claim)]
-    return sum(bool(a and b) and a != b for a, b in verdicts)
-
-
-def _section(of_claim: Sequence[Text]) -> str:
-    first = of_claim[0]
-    rows = "\n".join(
-        f"| {t.date} | {_cell(t)} | {t.verdict or '-'} | {t.reason} |" for t in of_claim
-    )
-    head = "| since | text | verdict | reason |\n|---|---|---|---|"
-    return f"## {first.claim} of {first.config}\n\n{head}\n{rows}\n"
-
-
-def _cell(text: Text) -> str:
-    if not text.expect:
-        return "taken out"
-    given = f"; given `{text.given}`" if text.given else ""
-    tolerance = f"; tolerance {text.tolerance}" if text.tolerance else ""
-    testable = "; not testable" if text.testable == "no" else ""
-    return f"`{text.expect}`{given}{tolerance}{testable}"
+def _row(old: Text, new: Text) -> str:
+    claim = f"{new.claim} of {new.config}"
+    return f"| {claim} | {new.date} | {old.verdict} | {new.verdict} | {new.reason} |\n"
 
 
 def main(*words: str) -> None:

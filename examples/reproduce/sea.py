@@ -1,4 +1,4 @@
-"""What results/sea.md tells of loads and wave motions, from the logs that `make sea` leaves."""
+"""What docs/sea.md tells of loads and wave motions, from the logs that `make sea` leaves."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Fill the tables and numbers of results/tuning.md in from results/tuning/; prints the page.
+"""Fill the table and numbers of docs/tuning.md in from results/tuning/; prints the page.
 
-python examples/reproduce/tuning.py > results/.table && mv results/.table results/tuning.md
+python examples/reproduce/tuning.py > results/.table && mv results/.table docs/tuning.md
 """
 
 import math
@@ -15,7 +15,10 @@ import pandas as pd
 
 from podusv_cli.studies.tuning.searches import compare_laws
 
-RESULTS = Path(__file__).parents[2] / "results"
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "results"
+PAGE = ROOT / "docs" / "tuning.md"
+FOUND = "## What the committed searches found\n"  # where the numbers begin
 LEVEL = 0.95  # of intervals that hold together
 SEEDS = 21  # of resampling; a pair near the limit is apart with some of them
 NUMBER = r"([^\s,;.]+(?:\.\d+)?)"
@@ -45,23 +48,12 @@ def error(row: dict[str, Any], before: str, after: str, usual: str) -> list[str]
     return ["{} [{}, {}]".format(*first), "{} ({} to {})".format(*then)]
 
 
-def searched(case: str) -> Iterator[list[Any]]:
-    """The rows of a search."""
-    gains = table(case, "gains").groupby("law").size()
-    for row in table(case).sort_values("repeats_median").to_dict("records"):
-        yield [
-            row["law"],
-            gains[row["law"]],
-            place(row),
-            *error(row, "objective_before", "repeats", "_median"),
-        ]
-
-
-def ratios() -> Iterator[list[str]]:
-    """Error after over before, by law and hull."""
+def rows() -> Iterator[list[str]]:
+    """A law's error before and after the search, and what the gains make of other hulls."""
     others = [table(f"judged/{hull}").set_index("law") for hull in ("fresh", "cybership2", "otter")]
-    for law in table("judged/cybership2").law:
-        yield [law, *(_ratio(other.loc[law]) for other in others)]
+    for row in table("hull").sort_values("repeats_median").to_dict("records"):
+        first = error(row, "objective_before", "repeats", "_median")
+        yield [row["law"], place(row), *first, *(_ratio(one.loc[row["law"]]) for one in others)]
 
 
 def _ratio(row: Any) -> str:
@@ -69,16 +61,6 @@ def _ratio(row: Any) -> str:
         return f"{row.ratio:.2f}, open"
     told = f"{row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
     return f"**{told}**" if row.ratio_high < 1.0 or row.ratio_low > 1.0 else told
-
-
-def judged(hull: str) -> Iterator[list[str]]:
-    """The rows of a hull that judges."""
-    for row in table(f"judged/{hull}").to_dict("records"):
-        times = ("before", "after", "after_low", "after_high")
-        failed = [100 * row[f"failed_{time}"] for time in times]
-        shares = "{:.1f}, {:.1f} ({:.1f} to {:.1f})".format(*failed)
-        held = f"{row['held_after']} of {row['searches']}"
-        yield [row["law"], place(row), shares, *error(row, "before", "after", ""), held]
 
 
 def sentences() -> Iterator[tuple[Any, ...]]:
@@ -93,9 +75,6 @@ def sentences() -> Iterator[tuple[Any, ...]]:
     )
     hulls = ("fresh", "cybership2", "otter")
     fresh, other, otter = (table(f"judged/{hull}").set_index("law") for hull in hulls)
-    yield "On CyberShip II {} of 91 pairs are apart", _apart("cybership2")
-    yield "searched hulls it is {} pairs, three of them", _apart("fresh")
-    yield "on the Otter {}, six of them", _apart("otter")
     better = 100 * (1 - other.ratio[other.ratio_high < 1.0])
     least, most = whole(better.min()), whole(better.max())
     yield "better with found gains, by {} to {} % in the median", least, most
@@ -105,8 +84,6 @@ def sentences() -> Iterator[tuple[Any, ...]]:
         "these hulls, and at most {} % off the others",
         *map(whole, (off.min(), off.max(), rest.max())),
     )
-    lost = whole(100 * other.failed_after_high["adrc"])
-    yield "one set of `adrc` fails in {} % of the draws", lost
     before = 100 * other.failed_before[["adrc", "hand_position", "pid"]]
     yield "too, in {} to {} %", *map(whole, (before.min(), before.max()))
     worst = ("adaptive_crab", "dsc", "pid", "full_backstepping", "adaptive_neural")
@@ -135,10 +112,6 @@ def sentences() -> Iterator[tuple[Any, ...]]:
     )
 
 
-def _apart(hull: str) -> int:
-    return len(_those_apart(table(f"judged/{hull}", "searches")))
-
-
 def _those_apart(pairs: pd.DataFrame) -> pd.DataFrame:
     return pairs[(pairs.ratio_high < 1.0) | (pairs.ratio_low > 1.0)]
 
@@ -158,21 +131,16 @@ def _apart_given_draws(case: str) -> tuple[int, int]:
 
 
 def filled(page: str) -> str:
-    """The page with all tables and numbers anew; where lines break stays."""
-    hulls = judged("cybership2"), judged("otter")
-    made = iter([searched("hull"), searched("network"), ratios(), *hulls])
-
-    def rows(match: re.Match[str]) -> str:
-        lines = (f"| {' | '.join(map(str, row))} |\n" for row in next(made))
-        return "".join([match[1], *lines])
-
-    page = re.sub(r"(?m)(^\|---.*\n)(?:\|.*\n)+", rows, page)
-    for text, *numbers in sentences():
-        words = r"\s+".join(map(re.escape, text.split())).replace(r"\{\}", NUMBER)
-        page, found = re.subn(words, partial(_with, numbers=numbers), page)
-        if not (found or " / " in text):  # not all pairs are named
-            raise SystemExit(f"results/tuning.md has no sentence like: {text}")
-    return page
+    """The page with its table and numbers anew; where lines break stays."""
+    before, title, text = page.partition(FOUND)
+    shown = "".join(f"| {' | '.join(row)} |\n" for row in rows())
+    text = re.sub(r"(?m)(^\|---.*\n)(?:\|.*\n)+", lambda match: match[1] + shown, text, count=1)
+    for sentence, *numbers in sentences():
+        words = r"\s+".join(map(re.escape, sentence.split())).replace(r"\{\}", NUMBER)
+        text, found = re.subn(words, partial(_with, numbers=numbers), text)
+        if not (found or " / " in sentence):  # not all pairs are named
+            raise SystemExit(f"docs/tuning.md has no sentence like: {sentence}")
+    return before + title + text
 
 
 def _with(match: re.Match[str], numbers: list[Any]) -> str:
@@ -184,4 +152,4 @@ def _with(match: re.Match[str], numbers: list[Any]) -> str:
 
 
 if __name__ == "__main__":
-    print(filled((RESULTS / "tuning.md").read_text()), end="")
+    print(filled(PAGE.read_text()), end="")

@@ -2,7 +2,7 @@
 
 From the nominal vessel, the actuator without failure, and the times of the loop. Components size
 their defaults with them (`rules`), relative to the model ship for which the defaults were found:
-CyberShip II's hull `paper_nonlinear` with 8 N and 2.5 N m. docs/laws.md has the formulas.
+CyberShip II's hull `paper_nonlinear` with 8 N and 2.5 N m. docs/laws/gains.md has the formulas.
 """
 
 from __future__ import annotations

@@ -17,9 +17,11 @@ from podusv_cli.workflows.plain_math import plain_blocks
 
 CONTENTS = "index.rst"  # the contents of the site: captions, and the pages below each
 CAPTION = re.compile(r"^   :caption: (.+)$")
-ENTRY = re.compile(r"^   (?:.* <)?/?((?:results/)?\w+)>?$")  # pages that are written, not made
+# Pages that are written; those that are made lie in another folder.
+ENTRY = re.compile(r"^   (?:.* <)?/?((?:results/|laws/)?\w+)>?$")
 HEADING = re.compile(r"^(#{1,4}) (.+)$")
 FENCE = re.compile(r"^ *```")
+CODE = re.compile(r"`(\w+)`")
 CONFIG = re.compile(r"\bconfigs/([\w/]+\.yaml)")
 LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)\s]+)\)")
 # What a match counts; those in the text up to `MOST`.
@@ -70,9 +72,16 @@ def names() -> tuple[str, ...]:
     return tuple(name for pages in contents().values() for name in pages)
 
 
+@cache
+def law_pages() -> dict[str, str]:
+    """The page of each control law: the one in the folder `laws` whose title has its name."""
+    titles = {name: sections(name)[0].heading for name in names() if name.startswith("laws/")}
+    return {law: name for name, title in titles.items() for law in CODE.findall(title)}
+
+
 def page(name: str) -> str:
-    """A page as Markdown; its name may be written as a file's, too (`docs/studies.md`)."""
-    short = _short(name)
+    """A page as Markdown; its name may be that of a file (`docs/studies.md`) or of a law."""
+    short = _full_name(name)
     there = posixpath.dirname(f"{_place(short)}.md")
     return reachable(_file(short).read_text("utf-8"), there)
 
@@ -88,8 +97,8 @@ def reachable(text: str, folder: str) -> str:
 
 
 def is_page(name: str) -> bool:
-    """Whether a word is the name of a page."""
-    return _short(name) in names()
+    """Whether a word is the name of a page, or of a law that has one."""
+    return _full_name(name) in names()
 
 
 def search(text: str) -> list[tuple[Section, str]]:
@@ -163,6 +172,12 @@ def _plain(line: str) -> str:
 def _short(name: str) -> str:
     """A page's name of its file's in a checkout."""
     return name.removeprefix("docs/").removesuffix(".md")
+
+
+def _full_name(name: str) -> str:
+    """The name of a page in the contents; a law's name stands for its page."""
+    short = _short(name)
+    return law_pages().get(short, short)
 
 
 def _place(name: str) -> str:

@@ -10,9 +10,13 @@ import pytest
 from command_samples import ROOT, Command
 
 from podusv_cli.scenario import shipped
+from podusv_cli.scenario.model import scenario_class
+from podusv_cli.scenario.plugins import kinds_of
 from podusv_cli.workflows import docs
 
-SHIPPED = [*(ROOT / "docs").glob("*.md"), *(ROOT / "results").glob("*.md")]
+TRIALS = {"schedule", "stopping", "turning_circle", "zigzag"}  # kinds that follow no target
+LAWS = [kind for kind in kinds_of(scenario_class(()), "controller") if kind not in TRIALS]
+SHIPPED = [page for room in ("docs", "docs/laws", "results") for page in (ROOT / room).glob("*.md")]
 
 
 def test_every_page_of_docs_and_results_is_listed_with_its_title(podusv: Command) -> None:
@@ -38,6 +42,13 @@ def test_a_page_in_a_pipe_is_its_markdown_with_links_that_can_be_followed(
 
 def test_a_page_may_be_named_as_its_file_is(podusv: Command) -> None:
     assert podusv("docs", "docs/studies.md").out == podusv("docs", "studies").out
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_every_law_has_a_page_that_its_name_finds(law: str, podusv: Command) -> None:
+    assert podusv("docs", law).out.startswith("# ")
+    title, *_ = podusv("docs", law).out.splitlines()
+    assert f"`{law}`" in title
 
 
 def test_a_comment_in_code_is_no_heading() -> None:

@@ -116,7 +116,9 @@ def test_the_wheel_has_metadata_types_licence_and_scenarios(
     configs = {path.relative_to(ROOT).as_posix() for path in (ROOT / "configs").rglob("*.yaml")}
     assert {f"podusv_cli/{name}" for name in configs} <= names
     pages = {
-        f"{room}/{path.name}" for room in ("docs", "results") for path in (ROOT / room).glob("*.md")
+        f"{room}/{path.name}"
+        for room in ("docs", "docs/laws", "results")
+        for path in (ROOT / room).glob("*.md")
     }
     assert {f"podusv_cli/{name}" for name in (*pages, "docs/index.rst")} <= names
     shown = {f"podusv_cli/examples/{place}" for name in examples() for place in texts(name)}

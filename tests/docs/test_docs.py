@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 import shlex
 from collections.abc import Callable, Iterator
 from datetime import date
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
 import yaml
 from command_samples import ROOT, commanded
 
+import podusv
 import podusv_cli
 from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.figures.drawing import FIGURES
@@ -25,9 +26,12 @@ from podusv_cli.scenario.plugins import kinds_of
 
 PAGES = [
     path.relative_to(ROOT).as_posix()
-    for path in sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("results/*.md")])
+    for room in ("", "docs/", "docs/laws/", "results/")
+    for path in sorted(ROOT.glob(f"{room}*.md"))
 ]
 EXAMPLES = [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.glob("examples/*/*.md"))]
+LAW_FIGURES = runpy.run_path(str(ROOT / "examples/law_figures.py"))
+GALLERY = runpy.run_path(str(ROOT / "examples/figure_gallery.py"))
 Refused = Callable[[str], str]
 
 
@@ -135,6 +139,17 @@ def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
         assert documented[name] == ", ".join(f"`{signal}`" for signal in sheet.signals)
 
 
+def test_the_gallery_has_every_figure_with_the_command_that_draws_it() -> None:
+    page = text_of("docs/figures.md")
+    assert list(GALLERY["SHOWN"]) == list(FIGURES)
+    for name in FIGURES:
+        assert (ROOT / f"docs/images/figures/{name}.png").stat().st_size < 80_000
+        _, shown, below = page.partition(f"](images/figures/{name}.png)\n\n")
+        _, drawn, *_ = below.split("\n\n", 2)
+        assert shown
+        assert drawn == f"    {GALLERY['command'](name)}"
+
+
 @pytest.mark.parametrize(
     ("section", "pages"),
     [
@@ -147,7 +162,7 @@ def test_every_figure_is_documented_with_the_signals_that_it_needs() -> None:
     ],
 )
 def test_every_kind_has_its_place_on_a_page(section: str, pages: str) -> None:
-    text = "".join(page.read_text() for page in (ROOT / "docs").glob(f"{pages}.md"))
+    text = "".join(page.read_text() for page in (ROOT / "docs").rglob(f"{pages}.md"))
     kinds = kinds_of(scenario_class(()), section)
     missing = [kind for kind in kinds if not re.search(rf"(`|kind: ){kind}\b", text)]
     assert not missing
@@ -160,14 +175,39 @@ def test_the_citation_names_this_version() -> None:
     assert date.fromisoformat(citation["date-released"]).year >= 2026
 
 
-def test_the_numbers_of_the_pods_are_the_committed_ones() -> None:
-    for row in rows("docs/pod.md")[:3]:
-        name = row[0].split("`")[1]
-        table = pd.read_csv(ROOT / f"results/pod/{name}/comparison.csv", index_col=0)
-        found = table.loc["iae", ["adaptive_neural", "dsc", "full_backstepping", "pid"]].astype(
-            float
-        )
-        assert row[1:] == [f"{number:.0f}" for number in found]
+DEFAULTS = {  # the scenario whose laws have the numbers of a page's section on defaults
+    "velocity_vector": "laws/rivals",
+    "momentum_vector": "laws/rivals",
+    "hand_position": "laws/rivals",
+    "sliding_mode": "laws/rivals",
+    "los_pid": "laws/rivals",
+    "alos": "laws/rivals",
+    "adaptive_neural": "laws/rivals",
+    "pid": "laws/rivals",
+    "cascade": "lefeber_2003/circle",
+    "los_backstepping": "fossen_2003/course",
+    "mss": "laws/autopilots",
+}
+
+
+@pytest.mark.parametrize("law", DEFAULTS)
+def test_the_defaults_on_a_laws_page_are_those_that_a_run_has(law: str) -> None:
+    section = text_of(f"docs/laws/{law}.md").partition("## Defaults\n")[2].partition("\n## ")[0]
+    told = {name: float(number) for name, number in re.findall(r"`(\w+)` ([\d.]*\d)", section)}
+    singles = podusv.load(f"podusv:{DEFAULTS[law]}.yaml").singles().values()
+    (controller, *_) = (one.controller for one in singles if one.controller.kind == law)
+    assert len(told) > 3
+    assert told == {name: getattr(controller, name) for name in told}
+
+
+def test_a_law_page_shows_its_picture_below_sixty_kilobytes() -> None:
+    pages = {path.stem: path.read_text() for path in (ROOT / "docs/laws").glob("*.md")}
+    drawn = {path.stem: path.stat().st_size for path in (ROOT / "docs/images/laws").glob("*.png")}
+    assert set(drawn) == set(LAW_FIGURES["SHOWN"]) == set(pages) - {"gains", "observer"}
+    assert all(f"](../images/laws/{law}.png)" in pages[law] for law in drawn)
+    assert max(drawn.values()) < 60_000
+    for law, (shown, _) in LAW_FIGURES["SHOWN"].items():
+        assert f"`podusv compare podusv:{shown}.yaml`" in pages[law]
 
 
 @pytest.mark.parametrize("page", PAGES)

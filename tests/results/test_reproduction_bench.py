@@ -1,4 +1,4 @@
-"""results/bench.md tells the committed runs of the bench."""
+"""docs/bench.md, tuning.md and studies.md tell the committed tables."""
 
 import json
 import re
@@ -18,10 +18,11 @@ from podusv_cli.studies.tuning.check import tune_faults
 from podusv_cli.studies.tuning.plan import TunePlan
 
 RESULTS = Path(__file__).parents[2] / "results"
-PAGE = (RESULTS / "bench.md").read_text()
+PAGE = (RESULTS.parent / "docs" / "bench.md").read_text()
 RUNS = pd.read_csv(RESULTS / "bench" / "runs.csv")
 FAILED = RUNS[RUNS.status != "finished"]
 WORDS = " ".join(PAGE.split())
+OURS = ("momentum_vector", "velocity_vector")
 
 
 def count(law, query):
@@ -29,20 +30,25 @@ def count(law, query):
 
 
 def test_the_leaderboard_is_that_of_the_runs():
-    table = as_markdown(RUNS)
-    assert table == (RESULTS / "bench" / "leaderboard.md").read_text()
-    assert table in PAGE
+    assert as_markdown(RUNS) == (RESULTS / "bench" / "leaderboard.md").read_text()
+    boards = [leaderboard(rows) for rows in by_vessel(RUNS).values()]
+    for law in RUNS.law.unique():
+        cells = [f"{board.mean_rank[law]:.1f}, {board.failed[law]:.0f}" for board in boards]
+        assert f"| {law} | {' | '.join(cells)} | " in PAGE
 
 
-def test_which_law_fails_least_hangs_on_where_failing_begins():
+def test_which_law_fails_least_depends_on_where_failing_begins():
     lengths = RUNS.vessel.map(
         {"cybership2": 1.255, "otter": 2.0, "paper_nonlinear": 1.255, "revolt": 3.0}
     )
     limits = (("e_steady", 0.3), ("e_steady", 0.5), ("e_steady", 1.0), ("z_e_steady", 0.5))
     lost = [(RUNS.status == "diverged") | (RUNS[name] > part * lengths) for name, part in limits]
-    for law, rows in RUNS.groupby("law"):
-        counts = " | ".join(str(found[rows.index].sum()) for found in lost)
-        assert f"| {law} | {counts} |" in PAGE
+    near, half, _, plain = (found.groupby(RUNS.law).sum() for found in lost)
+    assert [near.idxmin(), half.idxmin(), plain.idxmin()] == [*OURS[:1], "pid", *OURS[:1]]
+    said = "PID ({} of 256 cases), at 0.3 lengths `momentum_vector` ({}; PID {}), by the distance "
+    said += "to the target `momentum_vector` ({}; PID {})."
+    ours, pid = (near.momentum_vector, near.pid), (plain.momentum_vector, plain.pid)
+    assert said.format(half.pid, *ours, *pid) in WORDS
 
 
 def test_the_runs_are_those_of_the_shipped_bench():
@@ -67,9 +73,10 @@ def test_the_findings_are_those_of_the_runs():
     assert f"in {min(sampled)} to {max(sampled)} of 32 cases, PID in three" in WORDS
     assert count("pid", "condition == 'sampled'") == 3
     corners = "task in ('lawnmower', 'square')"
-    assert f"fails in {count('full_backstepping', corners)} of 64 cases" in WORDS
+    assert f"full backstepping fails in {count('full_backstepping', corners)} of 64" in WORDS
     resting = [count(law, "task == 'station'") for law in ("velocity_vector", "momentum_vector")]
-    assert "`velocity_vector` in {} of 32 cases, `momentum_vector` in {};".format(*resting) in WORDS
+    said = "`velocity_vector` fails in {} of 32 cases, `momentum_vector` in {};"
+    assert said.format(*resting) in WORDS
     assert count("pid", "task == 'station'") == 3
     assert f"beyond the standoff PID ({len(FAILED[FAILED.law == 'pid'])} of 256 cases)" in WORDS
     assert FAILED.groupby("law").size().idxmin() == "pid"
@@ -77,14 +84,13 @@ def test_the_findings_are_those_of_the_runs():
 
 def test_ranks_by_vessel_and_condition_are_those_of_the_runs():
     ranks = RUNS.pivot_table("rank", "law", "vessel")
-    ours = {"momentum_vector", "velocity_vector"}
     for hull in ("cybership2", "paper_nonlinear"):
-        assert set(ranks[hull].nsmallest(2).index) == ours
+        assert set(ranks[hull].nsmallest(2).index) == {*OURS}
     assert ranks[["otter", "revolt"]].idxmin().tolist() == ["momentum_vector", "super_twisting"]
     beyond = {
         vessel: leaderboard(rows).median_ratio_e.pid for vessel, rows in by_vessel(RUNS).items()
     }
-    said = "PID is at {cybership2:.3g} times the best law in the median on `cybership2`, "
+    said = "at {cybership2:.3g} times the best law in the median on `cybership2`, "
     said += "{otter:.3g} on the Otter, {paper_nonlinear:.3g} on `paper_nonlinear` and "
     said += "{revolt:.3g} on ReVolt."
     assert said.format(**beyond) in WORDS
@@ -124,9 +130,10 @@ def of_optimum():
 def test_the_table_of_the_optimum_is_that_of_runs_and_optima():
     runs = of_optimum()
     assert runs.of.min() > 1.0
+    shown = ["calm", "sea", "hull_other", "sampled"]
     for law, ratios in runs.groupby(["law", "condition"]).of.agg(middle).unstack().iterrows():
-        cells = [f"{r:.2f}" if np.isfinite(r) else "✗" for r in ratios[CONDITIONS]]
-        assert f"| {law} | {' | '.join(cells)} |" in PAGE
+        cells = [f"{r:.2f}" if np.isfinite(r) else "✗" for r in ratios[shown]]
+        assert re.search(rf"^\| {law} \| .* \| {' . '.join(cells)} \|$", PAGE, re.M)
 
 
 def test_how_near_the_best_law_comes_is_what_the_page_says():
@@ -139,10 +146,10 @@ def test_how_near_the_best_law_comes_is_what_the_page_says():
     assert "1 to 2 % above the optimum. At corners it is 24 and 25 %" in WORDS
 
 
-# --- results/tuning.md tells the committed tables of searches
+# --- docs/tuning.md tells the committed tables of searches
 
 ROOT = Path(__file__).parents[2]
-TUNING = (ROOT / "results" / "tuning.md").read_text()
+TUNING = (ROOT / "docs" / "tuning.md").read_text()
 CASES = ("hull", "network")
 
 
@@ -167,12 +174,9 @@ def test_every_law_had_the_runs_that_the_scenario_says(case):
 
 # --- gains judged on other hulls
 
-JUDGED = {
-    "fresh": "the same hulls",
-    "cybership2": "CyberShip II in m s",
-    "otter": "the Otter in m s",
-}
-ELSEWHERE = TUNING.partition("## Judged on another hull\n")[2].partition("\n## ")[0]
+JUDGED = ("fresh", "cybership2", "otter")
+FOUND = TUNING.partition("## What the committed searches found\n")[2]
+ELSEWHERE = FOUND.partition("### Judged on another hull\n")[2]
 
 
 def judged(hull, name="laws"):
@@ -189,7 +193,7 @@ def test_all_sets_of_the_search_were_judged_on_the_draws_of_the_scenario(hull):
     assert set(runs.draws) == {plan.tune.validate}
     assert set(runs.searches) == {searched.tune.repeats * searched.tune.training_sets}
     assert plan.base.sweep.seed != searched.base.sweep.seed
-    assert f"`{'configs/studies/' if hull == 'fresh' else ''}judge_{hull}.yaml`" in ELSEWHERE
+    assert f"`{'configs/studies/' if hull == 'fresh' else ''}judge_{hull}.yaml`" in FOUND
 
 
 def test_the_sentences_about_other_hulls_are_those_of_the_runs():
@@ -223,9 +227,6 @@ def test_the_sentences_about_other_hulls_are_those_of_the_runs():
     assert {law: share for share, laws in told.items() for law in re.findall(r"`(\w+)`", laws)} == {
         law: f"{lost[law]:.0f}" for law in lost.index[lost > 10]
     }
-    assert f"one set of `adrc` fails in {lost['adrc']:.0f} % of the draws" in " ".join(
-        TUNING.split()
-    )
     before = 100 * other.failed_before[["adrc", "hand_position", "pid"]]
     assert f"too, in {before.min():.0f} to {before.max():.0f} %" in words
     laws = ("adaptive_crab", "dsc", "pid", "full_backstepping", "adaptive_neural")
@@ -237,7 +238,6 @@ def test_the_sentences_about_other_hulls_are_those_of_the_runs():
     assert f"{held[0]} of the 280 sets hold all of them there" in words
     assert f"{held[1]} of 280 sets do, on the Otter" in words
     assert f"in proportion to its forces, {held[2]}." in words
-    assert list(other.index[other.held_before]) == ["los_pid"]
 
 
 def apart(pairs):
@@ -297,13 +297,13 @@ def test_sets_that_keep_a_law_faster_than_its_target_fail_on_the_otter():
     )
 
 
-# --- results/studies.md tells the committed tables of studies
+# --- docs/studies.md tells the committed tables of studies
 
 STUDIES = RESULTS.parent / "configs" / "studies"
-STUDIES_PAGE = (RESULTS / "studies.md").read_text()
+STUDIES_PAGE = (ROOT / "docs" / "studies.md").read_text().partition("## What the committed")[2]
 LAWS = {law: law for law in ("adaptive_neural", "dsc", "full_backstepping", "pid")}
 ABLATED = LAWS | {"no adaptation": "no_adaptation", "equal gain": "equal_gain"}
-HULLS, TOLD = STUDIES_PAGE.split("## True hull and told hull")
+HULLS, TOLD = STUDIES_PAGE.split("### True hull and nominal hull")
 
 
 def table(name, study="hull_and_sea"):
@@ -476,12 +476,6 @@ def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
             f"`velocity_vector` / `{rival}` is {ratio}" in section
             or f"`{rival}` {ratio}" in section
         )
-    verdicts = [
-        json.loads((RESULTS / "studies" / name / "claims.json").read_text())
-        for name in ("rivals", "rivals_earth")
-    ]
-    seen = [[claim["verdict"] for claim in verdict["claims"]] for verdict in verdicts]
-    assert seen[0] == seen[1]
 
 
 @pytest.mark.papers

@@ -1,4 +1,4 @@
-"""The committed results of the pods, made anew: the tables, and what results/pod.md says."""
+"""The committed results of the pods, made anew: the tables, and what docs/pod.md says."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ SOON = (
     "single",
 )  # the others take half a minute, and what `make test-papers` sees of them is in the lines
 LAWS = ["adaptive_neural", "dsc", "full_backstepping", "pid"]
-FOUND = (ROOT / "results/pod.md").read_text()
+FOUND = (ROOT / "docs/pod.md").read_text()
 
 
 LINES = re.findall(r"^\| `(\w+)` \| (`.*`) \| (\d+) \| (\d+) \|$", FOUND, re.MULTILINE)
@@ -92,7 +92,7 @@ def test_what_the_findings_hang_on_comes_out(name, keys, adaptive_neural, pid):
 
 
 def test_the_lines_that_say_so_are_there():
-    assert len(LINES) == 13
+    assert len(LINES) == 8
 
 
 @pytest.mark.papers
@@ -106,7 +106,7 @@ def test_the_lines_that_say_so_are_there():
 )
 def test_what_else_costs_at_the_propeller_comes_out(name, keys, told):
     law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["adaptive_neural"]
-    assert told.format(round(rerun(law).metrics["energy_pod"])) in FOUND
+    assert told.format(round(rerun(law).metrics["energy_pod"])) in " ".join(FOUND.split())
 
 
 @pytest.mark.papers

@@ -7,7 +7,8 @@ point as in `hand_position`.
 
 Proved: with known loads, off the limits and behind a pure moment, the hand point comes to its
 target. Not proved: the heading with `reference: origin`, any limit, and pods, where an offset
-stays. Anti-windup: the observer is told the loads that act. docs/laws.md has the derivation.
+stays. Anti-windup: the observer knows the loads that act. Derivation:
+docs/laws/hand_position.md.
 """
 
 from __future__ import annotations

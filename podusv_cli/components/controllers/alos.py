@@ -9,7 +9,7 @@ loads, are podusv's.
 
 Proved, for a heading that is exact and a constant crab angle: the cross-track error tends to 0. Not
 proved: the autopilot together with the guidance, and any limit. Anti-windup: the observer is told
-the loads that act; what is learnt grows slowly far from the line. docs/laws.md has the equations.
+the loads that act; what is learnt grows slowly far from the line. Equations: docs/laws/alos.md.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Source: github.com/ArduPilot/ardupilot, AR_PosControl.cpp (commit 00357a4), AR_A
 (00f02a6), AP_L1_Control.cpp (069b133), AR_WPNav.cpp where it still calls L1, AP_MotorsUGV.cpp
 (0264b67), and its tuning in rover-quicktune.lua (13139c3). L1 guidance: S. Park, J. Deyst and J. P.
 How, "A new nonlinear guidance logic for trajectory tracking", AIAA 2004-4900. Equations and numbers
-are taken from there, no code. docs/laws.md has them, and what is left out.
+are taken from there, no code. docs/laws/ardupilot.md has them, and what is left out.
 
 Proved: period and damping of L1, linearised on a line; no offset in a steady state on a line. Not
 proved: that the vessel comes there. Anti-windup: an integral whose output is limited only shrinks.

@@ -8,7 +8,7 @@ drift angle of the told hull; the source has a recorded motion in its place.
 Proved in the source: with a persistent turn, the told hull, no load and no limit, the errors vanish
 from any start, globally and uniformly, and exponentially from then on. Not proved: anything about
 a target whose turn changes, a load, or limits; on a straight line the pole of the position across
-it is 0. Anti-windup: none, the law has no integral. docs/laws.md has the equations.
+it is 0. Anti-windup: none, the law has no integral. docs/laws/cascade.md has the equations.
 """
 
 from __future__ import annotations

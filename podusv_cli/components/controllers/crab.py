@@ -3,7 +3,7 @@
 A hull in a cross load follows the path only with its bow off the course by the crab angle. A law
 that points at the target can do this if it aims at a point ahead of it: at the distance L of the
 standoff, in the direction of that heading. In the steady state the vessel's origin is then at the
-target, and no longer behind it. docs/laws.md has the derivation.
+target, and no longer behind it. docs/laws/adaptive_neural.md has the derivation.
 """
 
 from __future__ import annotations

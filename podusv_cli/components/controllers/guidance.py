@@ -2,7 +2,7 @@
 
 The path is the straight line through the target along its velocity. Source of the frame and of the
 lookahead: T. I. Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control" (2011). The
-speed that follows the target is podusv's. docs/laws.md has the equations.
+speed that follows the target is podusv's. docs/laws/los_pid.md has the equations.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 With w = v + l r the hand point h = p + l (cos psi, sin psi) moves at R (u, w), and surge force and
 yaw moment push it along and across the bow, each by itself. So its motion can be prescribed. What
-stays behind is the heading: it settles as docs/laws.md says.
+stays behind is the heading: it settles as docs/laws/hand_position.md says.
 """
 
 from __future__ import annotations

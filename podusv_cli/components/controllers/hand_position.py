@@ -8,7 +8,7 @@ of the hand point.
 
 Proved: without loads or with constant ones, off the limits, the hand point comes to its target if
 the loop settles. Not proved: the heading with `reference: origin`, and any limit. Anti-windup:
-back-calculation. docs/laws.md has the derivation.
+back-calculation. docs/laws/hand_position.md has the derivation.
 """
 
 from __future__ import annotations

@@ -7,7 +7,8 @@ those of public programs that cite it. The filter of the heading is podusv's cho
 Proved in the source: with the told hull, no Coriolis term, no load and no limit, the errors of
 heading and velocities vanish exponentially from any start, and the sway velocity that stands in
 for the missing force stays bounded. Not proved: that the vessel comes to the path, and anything
-about a load or a limit. Anti-windup: none, the law has no integral. docs/laws.md has the equations.
+about a load or a limit. Anti-windup: none, the law has no integral. Equations:
+docs/laws/los_backstepping.md.
 """
 
 from __future__ import annotations

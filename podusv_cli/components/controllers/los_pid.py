@@ -6,8 +6,8 @@ lookahead ahead of the nearest point of the path. No part of it knows the drift,
 it stays beside the path.
 
 Proved: the poles of the speed's and the heading's loops of an undamped hull. Not proved: anything
-about guidance and loops together, or limits. Anti-windup: back-calculation. docs/laws.md has the
-equations.
+about guidance and loops together, or limits. Anti-windup: back-calculation. Equations:
+docs/laws/los_pid.md.
 """
 
 from __future__ import annotations

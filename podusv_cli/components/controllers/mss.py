@@ -6,7 +6,7 @@ the guidance. The demo drives with constant thrust; the control of the speed is 
 
 Proved: poles of the observer and, for Nomoto's model with the time constant T, of the heading
 without its integral. Not proved: guidance and autopilot together. Anti-windup: none for the
-heading, as in the source; back-calculation for the speed. docs/laws.md has the equations.
+heading, as in the source; back-calculation for the speed. docs/laws/mss.md has the equations.
 """
 
 from __future__ import annotations

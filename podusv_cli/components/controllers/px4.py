@@ -3,7 +3,7 @@
 Source: github.com/PX4/PX4-Autopilot, PurePursuit.cpp (commit 0c5c181), DifferentialVelControl.cpp
 (12d2f69), DifferentialAttControl.cpp (1a907ef), DifferentialRateControl.cpp (15c4f08),
 RoverControl.cpp (2f13ebc), PID.cpp (2cc8af2), and its parameters' files and tuning pages. Equations
-and numbers are taken from there, no code. docs/laws.md has them, and what is left out.
+and numbers are taken from there, no code. docs/laws/ardupilot.md has them, and what is left out.
 
 Proved: how far beside a line a steady state is. Not proved: that the vessel comes to the path.
 Anti-windup: integrals end at full scale, and begin anew wherever nothing is wanted.

@@ -8,7 +8,8 @@ sliding mode control", Int. J. Control 58 (1993), 1247-1263. On surface vessels:
 K. R. Muske, L. C. McNinch and R. A. Soltan, IEEE Trans. Industrial Electronics 55 (2008; not
 checked against the original). The surface is podusv's: the velocity that the hand point lacks.
 
-Proved, off the limits: the hand point's missing velocity comes into a ball that docs/laws.md gives.
+Proved, off the limits: the velocity that the hand point lacks comes into a ball
+(docs/laws/sliding_mode.md).
 Not proved: super-twisting on two coupled axes, the heading, and pods. Anti-windup: the first order
 has no memory; super-twisting learns the less, the more the actuator falls short.
 """

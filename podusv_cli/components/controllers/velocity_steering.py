@@ -1,7 +1,7 @@
 """What laws share that turn the vector of velocity over ground: yaw first, surge as far as it fits.
 
 The bow turns until the wanted velocity and the predicted sway agree, by the angle chi_e. Surge
-waits for yaw: the vessel turns first. docs/laws.md has the equations.
+waits for yaw: the vessel turns first. docs/laws/velocity_vector.md has the equations.
 """
 
 from __future__ import annotations

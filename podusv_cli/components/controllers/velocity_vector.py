@@ -5,7 +5,8 @@ wanted one. Source: ours, on the guidance of Breivik and Fossen (see `constant_b
 
 Proved: no offset in a steady state off the limits, whatever vessel it was told; the position error
 is bounded if the velocity error is. Not proved: that it comes to the steady state; docs/theory.md
-has eigenvalues, docs/laws.md the derivation. Anti-windup: the observer is told the loads that act.
+has eigenvalues, docs/laws/velocity_vector.md the derivation. Anti-windup: the observer knows the
+loads that act.
 """
 
 from __future__ import annotations

@@ -22,10 +22,10 @@ from podusv_cli.scenario.load import load
 from podusv_cli.scenario.presets import preset_names, preset_text
 
 X_P, U = -0.499, 0.5
-RESULTS = " ".join((Path(__file__).parents[3] / "results/pod.md").read_text().split())
+RESULTS = " ".join((Path(__file__).parents[3] / "docs/pod.md").read_text().split())
 Loads = tuple[float, float, float]
 
-# Constant loads (b_u, b_v, b_r), whether the sway force acts, and what results/pod.md says of it.
+# Constant loads (b_u, b_v, b_r), whether the sway force acts, and what docs/pod.md says of it.
 LINES: list[tuple[Loads, bool, str]] = [
     ((0.5, 0.5, 0.5), True, "the mean of (52) takes 6.5 deg"),
     ((0.5, 0.5, 0.7), True, "b_r = 0.7 N m takes 22 deg"),
@@ -95,7 +95,7 @@ def test_what_35_deg_cannot_hold_is_a_pod_at_its_limit():
 
 
 def test_a_pod_alone_makes_a_third_of_a_newton_metre_with_the_load_from_behind():
-    """results/pod.md: T cos(delta) is drag less b_u; with b_u against, it is the 0.67 N m."""
+    """docs/pod.md: T cos(delta) is drag less b_u; with b_u against, it is the 0.67 N m."""
     drag = (0.72 + 1.32742 * U + 5.86643 * U * U) * U
     behind, against = (-X_P * (drag - b_u) * math.tan(math.radians(35.0)) for b_u in (0.5, -0.5))
     assert f"{behind:.2f} N m, less than the mean b_r" in RESULTS

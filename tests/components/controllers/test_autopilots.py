@@ -496,7 +496,7 @@ def test_where_ten_degrees_a_second_take_more_than_all_there_is_the_circle_is_wi
 
 
 def test_on_a_hull_without_a_stable_course_they_swing_as_the_page_says() -> None:
-    page, found = (Path(__file__).parents[3] / "docs" / "laws.md").read_text(), []
+    page, found = (Path(__file__).parents[3] / "docs" / "laws" / "ardupilot.md").read_text(), []
     for law in ({"kind": "ardupilot"}, {"kind": "ardupilot", "guidance": "l1"}, {"kind": "px4"}):
         out = podusv.simulate(
             {

@@ -39,7 +39,7 @@ def last(out: Recording, seconds: float) -> Any:
 
 
 def wanted_velocity(x: Vector, target: Vector, k_p: float, k_b: float) -> tuple[Vector, Vector]:
-    """V_c over ground as docs/laws.md has it, and the matrix that it multiplies e with."""
+    """V_c over ground of docs/laws/momentum_vector.md, and the matrix that it multiplies e with."""
     e, V_d = target[:2] - x[:2], target[2:4]
     along, across = V_d @ e / np.hypot(*e), (V_d[0] * e[1] - V_d[1] * e[0]) / np.hypot(*e)
     s_max = max(np.sqrt(max(LAW.U**2 - across**2, 0.0)) - along, 0.05)

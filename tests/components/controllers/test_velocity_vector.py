@@ -51,7 +51,7 @@ def within(out: Recording, start: float, end: float = np.inf) -> Any:
 
 @cache
 def reference() -> Any:
-    """V_c and A of docs/laws.md, A by differentiation of V_c with s_max held."""
+    """V_c and A of docs/laws/velocity_vector.md, A by differentiation of V_c with s_max held."""
     t, k_p, s_max = sp.symbols("t k_p s_max")
     at = [sp.Function(name)(t) for name in ("x", "y", "x_d", "y_d")]
     e = sp.Matrix([at[2] - at[0], at[3] - at[1]])
