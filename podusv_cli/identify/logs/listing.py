@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from podusv_cli.core.earth import PLACE
 from podusv_cli.core.escaping import visible
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
-from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.messages import TIME
 from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
 from podusv_cli.identify.logs.reading import (
@@ -160,7 +160,7 @@ def _places(guesses: dict[str, str]) -> dict[str, str]:
 def _no_places(columns: Columns, guesses: dict[str, str]) -> list[tuple[str, str]]:
     """Columns that are called so and have no places on earth in degrees, and why."""
     found = []
-    for signal in (LAT, LON):
+    for signal in PLACE:
         column = _places(guesses).get(signal.name)
         if column is None or _unit(column, columns, guesses):
             continue
