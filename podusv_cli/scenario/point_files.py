@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.core import units
 from podusv_cli.core.earth import Plane, error_at
 from podusv_cli.core.timed_rows import TextLine, columns, lines_of
-from podusv_cli.scenario.routes import Pair, Route, RouteFault, beyond_earth, route_of
+from podusv_cli.scenario.routes import Pair, RouteFault, RouteFile, beyond_earth, route_of
 from podusv_cli.scenario.yaml_text import MAX_NODES, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
@@ -62,7 +62,7 @@ class Placing:
             return Node((), Mark(name))
         return Node(tuple(_point(pair, name) for pair in pairs), Mark(name))
 
-    def _rows_as_places(self, text: str) -> Route | None:
+    def _rows_as_places(self, text: str) -> RouteFile | None:
         """Rows under `lat` and `lon`, or without names about the scenario's origin; else None."""
         header, lines = lines_of(text)
         cells = header.cells if header else []
@@ -83,7 +83,7 @@ class Placing:
             if math.isnan(lat + lon):
                 raise RouteFault(f"has no latitude and longitude in line {line.number}")
             pairs.append((lat, lon))
-        return Route(tuple(pairs))
+        return RouteFile(tuple(pairs))
 
     def _in_metres(
         self, places: Sequence[Pair], name: str, key: str, faults: list[Fault]
@@ -142,8 +142,9 @@ def _about(plane: Plane, lines: Sequence[TextLine]) -> bool:
 def _number(cell: str) -> float:
     """The number in a cell, NaN where there is none."""
     number = resolve(cell)
-    is_one = isinstance(number, (int, float)) and not isinstance(number, bool)
-    return float(number) if is_one else math.nan
+    if isinstance(number, bool) or not isinstance(number, (int, float)):
+        return math.nan
+    return float(number)
 
 
 def _point(pair: Pair, name: str) -> Node:

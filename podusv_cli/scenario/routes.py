@@ -40,7 +40,7 @@ POINTS = re.compile(r"^\s*(?:points|polygon)\s*=\s*(.*)$", re.MULTILINE | re.IGN
 MOOS_PAIR = re.compile(r"\s*([^,:{}\s]+)\s*,\s*([^,:{}\s]+)(?:\s*,[^:]*)?\s*")
 
 
-class Route(NamedTuple):
+class RouteFile(NamedTuple):
     """The waypoints of a file, and what of it is left out, in words.
 
     `pairs` are latitude and longitude [deg] where they are `on_earth`, else north and east [m].
@@ -55,7 +55,7 @@ class RouteFault(ValueError):
     """What is wrong with a route's file, in a sentence."""
 
 
-def route_of(text: str) -> Route | None:
+def route_of(text: str) -> RouteFile | None:
     """The route that a text holds; None for rows of numbers, which are no route's own format.
 
     Raises RouteFault where it is damaged, or has no waypoints.
@@ -70,7 +70,7 @@ def route_of(text: str) -> Route | None:
     return _checked(_moos(begin)) if POINTS.search(begin) else None
 
 
-def _checked(route: Route) -> Route:
+def _checked(route: RouteFile) -> RouteFile:
     """The route without a waypoint that repeats the one before. Raises RouteFault."""
     if not route.pairs:
         raise RouteFault("has no waypoints")
@@ -81,7 +81,7 @@ def _checked(route: Route) -> Route:
     return route._replace(pairs=tuple(kept), left_out=(*route.left_out, *words))
 
 
-def _waypoint_list(text: str) -> Route:
+def _waypoint_list(text: str) -> RouteFile:
     """`QGC WPL 110`: a row an item; the first is the place of home where its frame is 0."""
     items = []
     for number, line in enumerate(text.splitlines()[1:], 2):
@@ -95,7 +95,7 @@ def _waypoint_list(text: str) -> Route:
     return _of_mission(items)
 
 
-def _plan(text: str) -> Route:
+def _plan(text: str) -> RouteFile:
     """QGroundControl's .plan, or GeoJSON."""
     try:
         data = json.loads(text)
@@ -125,7 +125,7 @@ def _simple_items(items: Any) -> Iterator[Mapping[str, Any]]:
             yield item
 
 
-def _of_mission(items: Sequence[tuple[int, int, float, float]]) -> Route:
+def _of_mission(items: Sequence[tuple[int, int, float, float]]) -> RouteFile:
     """The waypoints among mission items: frame, command, latitude and longitude, or x and y."""
     places: list[Pair] = []
     frames: set[bool] = set()
@@ -142,7 +142,7 @@ def _of_mission(items: Sequence[tuple[int, int, float, float]]) -> Route:
             places.append((lat, lon))
     if len(frames) > 1:
         raise RouteFault("has waypoints in degrees and in metres; write them in one frame")
-    return Route(tuple(places), on_earth=frames != {False}, left_out=_counts(others))
+    return RouteFile(tuple(places), on_earth=frames != {False}, left_out=_counts(others))
 
 
 def _counts(others: Mapping[str, int]) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ def _counts(others: Mapping[str, int]) -> tuple[str, ...]:
     return tuple(f"{what}: {count}" for what, count in others.items() if count)
 
 
-def _geojson(data: Mapping[str, Any]) -> Route:
+def _geojson(data: Mapping[str, Any]) -> RouteFile:
     """The first line of GeoJSON, or its points in their order."""
     lines, points, others = [], [], Counter[str]()
     for geometry in _geometries(data):
@@ -165,7 +165,7 @@ def _geojson(data: Mapping[str, Any]) -> Route:
             others[kind] += 1
     chosen, left_out = _line_or_points(lines, points)
     pairs = tuple((_number(_at(p, 1)), _number(_at(p, 0))) for p in _list(chosen))
-    return Route(pairs, left_out=(*left_out, *_counts(others)))
+    return RouteFile(pairs, left_out=(*left_out, *_counts(others)))
 
 
 def _geometries(data: Any) -> Iterator[Mapping[str, Any]]:
@@ -189,7 +189,7 @@ def _line_or_points(
     return lines[0], _counts(others)
 
 
-def _xml(text: str) -> Route:
+def _xml(text: str) -> RouteFile:
     """GPX or KML."""
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise RouteFault("has a document type or entities, which are not read")
@@ -211,22 +211,22 @@ def _inside(element: ElementTree.Element, name: str) -> list[ElementTree.Element
     return [inner for inner in element.iter() if _tag(inner) == name]
 
 
-def _gpx(root: ElementTree.Element) -> Route:
+def _gpx(root: ElementTree.Element) -> RouteFile:
     """The first route; the first track where there is none; else the waypoints in their order."""
     ways = [[*_inside(way, "rtept")] for way in _inside(root, "rte")]
     ways += [[*_inside(way, "trkpt")] for way in _inside(root, "trk")]
     chosen, left_out = _line_or_points(ways, _inside(root, "wpt"))
-    return Route(
+    return RouteFile(
         tuple((_number(p.get("lat")), _number(p.get("lon"))) for p in chosen), left_out=left_out
     )
 
 
-def _kml(root: ElementTree.Element) -> Route:
+def _kml(root: ElementTree.Element) -> RouteFile:
     """The first line, else the points in their order; longitude comes first."""
     lines = [_kml_places(line) for line in _inside(root, "linestring")]
     points = [place for point in _inside(root, "point") for place in _kml_places(point)]
     chosen, left_out = _line_or_points(lines, points)
-    return Route(tuple(chosen), left_out=left_out)
+    return RouteFile(tuple(chosen), left_out=left_out)
 
 
 def _kml_places(geometry: ElementTree.Element) -> list[Pair]:
@@ -235,7 +235,7 @@ def _kml_places(geometry: ElementTree.Element) -> list[Pair]:
     return [(_number(_at(place, 1)), _number(_at(place, 0))) for place in cells]
 
 
-def _moos(text: str) -> Route:
+def _moos(text: str) -> RouteFile:
     """The first `points` of a MOOS-IvP behaviour, whose x is east and y north."""
     first, *others = [match[1] for match in POINTS.finditer(text)]
     body = first.partition("//")[0].partition("pts=")[2] or first.partition("//")[0]
@@ -247,7 +247,7 @@ def _moos(text: str) -> Route:
             continue  # `label, survey`: a setting among the points
         pairs.append((float(match[2]), float(match[1])))
     left_out = _counts({"lists of points after the first": len(others)})
-    return Route(tuple(pairs), on_earth=False, left_out=left_out)
+    return RouteFile(tuple(pairs), on_earth=False, left_out=left_out)
 
 
 def _list(part: Any) -> list[Any]:
@@ -272,7 +272,11 @@ def _number(part: Any) -> float:
     return float(text)
 
 
-FORMATS: Mapping[str, Callable[[str], Route]] = {"QGC WPL": _waypoint_list, "{": _plan, "<": _xml}
+FORMATS: Mapping[str, Callable[[str], RouteFile]] = {
+    "QGC WPL": _waypoint_list,
+    "{": _plan,
+    "<": _xml,
+}
 
 
 def beyond_earth(pairs: Iterable[Pair]) -> str:

@@ -12,12 +12,12 @@ import yaml
 from log_files import read, write_bag, write_dataflash, write_ulog, written
 
 from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.core.earth import LAT, LON
 from podusv_cli.core.signal import Signal
 from podusv_cli.identify.fit.march import DELIVERED, HOLDS, VALUES
 from podusv_cli.identify.fit.records import complete, log_of
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import columns_of
-from podusv_cli.core.earth import LAT, LON
 from podusv_cli.identify.logs.frames import local_plane
 from podusv_cli.identify.logs.listing import listing
 from podusv_cli.identify.logs.reading import LogTable, NamedQuantities, delivered_each, table
