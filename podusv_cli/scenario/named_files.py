@@ -7,9 +7,10 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import Component, ValuesOf
 from podusv_cli.scenario.keys import Key
 from podusv_cli.scenario.point_files import Placing
 from podusv_cli.scenario.shipped import relative_to
@@ -90,9 +91,36 @@ def _read(
     for fields, reader, form in ways:
         for key, taker in fields.items():
             given = _read_in(given, section, key, taker, reader, form, faults)
+    for key, values_of in model.values_of.items():
+        given = _under(given, section, key, values_of, placing.remarks, faults)
     for key, (taker, name) in model.folders_of.items():
         given = _read_in(given, section, key, taker, partial(_in_folder, name), _whole, faults)
     return _over_file(given, section, model, faults)
+
+
+def _under(
+    given: Node,
+    section: str,
+    key: str,
+    values_of: ValuesOf,
+    remarks: list[str],
+    faults: list[Fault],
+) -> Node:
+    """A section over the values that another program's file has, in place of the file's name."""
+    file = given.mapping.get(key)
+    if not file or not isinstance(file.content, str):
+        return given
+    name, dotted = _path(file), f"{section}.{key}"
+    rest = {n: entry for n, entry in given.mapping.items() if n != key}
+    text = read_text(name, file.mark, dotted, faults)
+    try:
+        values, said = values_of(text) if text is not None else ({}, [])
+    except ValueError as error:
+        faults.append(Fault(Mark(name), dotted, f"the file {error}"))
+        values, said = {}, []
+    remarks += (f"{name}: {line}" for line in said)
+    below = {n: Node(content, Mark(name), text=str(content)) for n, content in values.items()}
+    return replace(given, content=below | rest, faulty=given.faulty or not values)
 
 
 def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
@@ -108,7 +136,8 @@ def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
 def without_files(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
     """The section as it is; a fault for every file that it names itself, not with `--set`."""
     preset = ["preset"] if model.presets and given.word("preset").endswith(YAML) else []
-    for key in (*model.rows_of, *model.texts_of, *model.bytes_of, *model.folders_of, *preset):
+    named = (model.rows_of, model.texts_of, model.bytes_of, model.folders_of, model.values_of)
+    for key in (*chain.from_iterable(named), *preset):
         file = given.mapping.get(key)
         if file and file.mark.line and file.content is not None:
             faults.append(Fault(file.mark, f"{section}.{key}", ELSEWHERE))

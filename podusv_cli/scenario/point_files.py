@@ -37,7 +37,7 @@ class Placing:
     def __init__(self, root: Node, remarks: list[str]) -> None:
         """`remarks` takes sentences about what was left out, or taken for granted."""
         self._given = root.mapping.get("origin")
-        self._remarks = remarks
+        self.remarks = remarks
         self._plane = _plane(self._given) if self._given else None
         self._first: Node | None = None
 
@@ -55,7 +55,7 @@ class Placing:
         if route is None:
             return Node(tuple(_rows(text, name, faults)), Mark(name))
         if left_out := ", ".join(route.left_out):
-            self._remarks.append(f"{name}: left out of the route: {left_out}")
+            self.remarks.append(f"{name}: left out of the route: {left_out}")
         pairs = self._in_metres(route.pairs, name, key, faults) if route.on_earth else route.pairs
         if len(pairs) > MAX_POINTS:
             faults.append(Fault(Mark(name), "", f"more than {MAX_POINTS:,} points"))
@@ -71,7 +71,7 @@ class Placing:
             order = names.index("lat"), names.index("lon")
         elif not header and self._plane and _about(self._plane, lines):
             order = (0, 1)
-            self._remarks.append(
+            self.remarks.append(
                 "rows without names lie about the origin's own degrees, and are taken for "
                 "latitude, longitude; name the columns in a first line, lat,lon or x,y"
             )
@@ -98,7 +98,7 @@ class Placing:
         north, east = plane.north_east(*np.transpose(places))
         away = float(np.hypot(north, east).max())
         if not away < FAR:
-            self._remarks.append(
+            self.remarks.append(
                 f"{name}: a waypoint is {away / 1000.0:.4g} km from the origin ({plane.lat:g}, "
                 f"{plane.lon:g} deg), where the plane is off by about {error_at(away):.2g} m; is "
                 "that origin right?"
@@ -110,7 +110,7 @@ class Placing:
         mark = Mark(name)
         self._first = Node({"lat": Node(lat, mark), "lon": Node(lon, mark)}, mark)
         self._plane = Plane(lat, lon)
-        self._remarks.append(
+        self.remarks.append(
             f"{name}: x = y = 0 is its first waypoint; to lay logs beside the run write "
             f"origin: {{lat: {lat:.9g}, lon: {lon:.9g}}}"
         )
