@@ -63,8 +63,8 @@ class Component(BaseModel):
     field that takes a text of it and that text's name, `values_of` those that may name a file of
     another program, with the function that makes values of its text, and remarks. One that
     `stands_alone` takes no value of another kind whose place it takes. `noun` is what messages call
-    it. `rules` has the fields that may be null, and in a scenario are by default, with the rule that
-    gives the number; the field's own default is the model ship's.
+    it. `rules` has the fields that may be null, and in a scenario are by default, with the rule
+    that gives the number; the field's own default is the model ship's.
     """
 
     presets: ClassVar[Presets | None] = None
