@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -22,8 +22,8 @@ from podusv_cli.core.units import spell_unit, units_allowed_for
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import from_frame, local_plane
-from podusv_cli.identify.logs.messages import TIME
 from podusv_cli.identify.logs.ranges import PLACES, may_be_minutes, on_earth, without_none
+from podusv_cli.identify.logs.topics import TIME
 
 Marks = npt.NDArray[np.bool_]
 Whole = npt.NDArray[np.int64]
@@ -301,7 +301,7 @@ def _factor(signal: Signal, unit: str, name: str) -> float:
     return known[spell_unit(unit)] if unit else 1.0
 
 
-def clock_of(column: str, columns: Columns) -> str | None:
+def clock_of(column: str, columns: Collection[str]) -> str | None:
     """The column that has the times of a message's field: "topic.time" of "topic.field.x"."""
     parts = column.split(".")
     clocks = (".".join([*parts[:n], TIME]) for n in range(len(parts) - 1, 0, -1))
