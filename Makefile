@@ -19,7 +19,7 @@ $(PYTHON) -m venv --clear $(1) && \
 $(1)/bin/pip install --quiet --disable-pip-version-check --editable . $(2) $(TESTED_WITH) && \
 OPENBLAS_NUM_THREADS=1 $(1)/bin/pytest --numprocesses auto --dist loadfile -m "not slow and not benchmark and not browser"
 endef
-TESTED_WITH := pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 import-linter fmpy optuna casadi gymnasium safetensors rosbags pyulog pymavlink
+TESTED_WITH := pytest pytest-xdist hypothesis sympy xarray h5netcdf netCDF4 import-linter fmpy optuna casadi gymnasium safetensors rosbags pyulog pymavlink pynmea2
 PODS := kept dropped ideal no_anti_windup single
 ABLATIONS := ablation ablation_figures ablation_standoff ablation_gains ablation_gains_figures \
     ablation_gains_standoff ablation_pid

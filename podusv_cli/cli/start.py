@@ -53,6 +53,14 @@ def start(
     preset: Annotated[
         str, typer.Option(metavar="NAME", help="A vessel of podusv in place of dimensions.")
     ] = "",
+    route: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE",
+            help="Waypoints: .plan, .waypoints, GPX, KML, GeoJSON, MOOS points, CSV of lat,lon.",
+            show_default="four, at right angles",
+        ),
+    ] = "",
     out: Annotated[
         Path | None, typer.Option(help="File to write.", show_default="NAME.yaml in this folder")
     ] = None,
@@ -71,7 +79,7 @@ def start(
     if preset:
         if any((*given.values(), hulls, hull_beam, speed, turn)):
             raise UsageError("--preset has hull and thrusters; leave the dimensions out")
-        written = workflow.start_from(preset, file)
+        written = workflow.start_from(preset, file, route)
     else:
         lacking = [f"--{option}" for option, text in given.items() if not text]
         if lacking and not sys.stdin.isatty():
@@ -80,7 +88,7 @@ def start(
         if lacking and hulls is None:
             hulls = typer.prompt("Hulls: 1, or 2 of a catamaran", default=1, type=int)
         boat = workflow.Boat(**asked, hulls=hulls or 1, hull_beam=hull_beam, speed=speed, turn=turn)
-        written = workflow.start(boat, file)
+        written = workflow.start(boat, file, route)
     echo(f"wrote {written}")
     echo(f"next: podusv compare {written}")
     if not preset:

@@ -30,6 +30,7 @@ TARGET = ("x_d", "y_d")
 NO_LAW = "measured"
 ABOUT_LOG = "measured-log"  # code of what is doubtful about it
 FEWEST = 10  # common instants, below which a distance says nothing
+APART = 10.0  # extents, beyond which a log is of another place
 SCALED = 20.0  # times the mean speed of a run, that only another unit explains
 Marks = npt.NDArray[np.bool_]
 
@@ -141,7 +142,30 @@ class Track:
             log_instants.name: float(count),
         }
 
-    def beside_speeds(self, label: str, run: Recording) -> list[Finding]:
+    def beside_run(self, label: str, run: Recording) -> list[Finding]:
+        """Remarks where it is much faster or slower than a run, or far away from it."""
+        return [*self._beside_speeds(label, run), *self._beside_place(label, run)]
+
+    def _beside_place(self, label: str, run: Recording) -> list[Finding]:
+        """A remark where both extend little beside the distance between them."""
+        if self.aligned or not len(run["time"]):
+            return []
+        own, other = (
+            np.column_stack([signals[name] for name in PLANE])
+            for signals in (self.signals, run.signals)
+        )
+        own = own[np.isfinite(own).all(axis=1)]
+        apart = float(np.hypot(*(np.median(own, axis=0) - np.median(other, axis=0))))
+        extent = max(float(np.ptp(points, axis=0).max()) for points in (own, other))
+        if apart < APART * extent:
+            return []
+        text = (
+            f"it lies {apart / 1000.0:.3g} km from {label}, and neither extends over more than "
+            f"{extent:.3g} m; check `origin` of the scenario, or whether the log is of that place"
+        )
+        return [self.remark(text)]
+
+    def _beside_speeds(self, label: str, run: Recording) -> list[Finding]:
         """A remark where it is much faster or slower than a run, as in other units."""
         own, other = _path(self.times, self.signals), _path(run["time"], run.signals)
         if not own or not other or 1.0 / SCALED < own / other < SCALED:

@@ -49,6 +49,10 @@ class Rule(NamedTuple):
     exact: bool = False  # another key's number, not rounded to DIGITS
 
 
+# From the text of another program's file to values by field, and remarks; raises ValueError.
+ValuesOf = Callable[[str], tuple[dict[str, Any], list[str]]]
+
+
 class Component(BaseModel):
     """A part of a scenario. Fields carry unit, range, default and meaning (see `value`).
 
@@ -56,10 +60,11 @@ class Component(BaseModel):
     CSV file of pairs, each with the field that takes the file's rows, `texts_of` those that may
     name a file whose text another field takes, `bytes_of` those that may name a file whose bytes
     another field takes, as base64, `folders_of` those that may name a finished folder, with the
-    field that takes a text of it and that text's name. One that `stands_alone` takes no value of
-    another kind whose place it takes. `noun` is what messages call it. `rules` has the fields that
-    may be null, and in a scenario are by default, with the rule that gives the number; the field's
-    own default is the model ship's.
+    field that takes a text of it and that text's name, `values_of` those that may name a file of
+    another program, with the function that makes values of its text, and remarks. One that
+    `stands_alone` takes no value of another kind whose place it takes. `noun` is what messages call
+    it. `rules` has the fields that may be null, and in a scenario are by default, with the rule
+    that gives the number; the field's own default is the model ship's.
     """
 
     presets: ClassVar[Presets | None] = None
@@ -67,6 +72,7 @@ class Component(BaseModel):
     texts_of: ClassVar[dict[str, str]] = {}
     bytes_of: ClassVar[dict[str, str]] = {}
     folders_of: ClassVar[dict[str, tuple[str, str]]] = {}
+    values_of: ClassVar[dict[str, ValuesOf]] = {}
     rules: ClassVar[dict[str, Rule]] = {}
     stands_alone: ClassVar[bool] = False
     noun: ClassVar[str] = "component"

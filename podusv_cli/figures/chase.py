@@ -16,7 +16,8 @@ from podusv_cli.pages.page import environment
 
 FRAMES = 1000  # of a run, at most
 WHERE = ("x", "y", "psi")  # without these a run cannot be shown
-DIGITS = {"time": 4, "psi": 4}
+ON_EARTH = ("lat", "lon")  # of runs whose scenario has an origin
+DIGITS = {"time": 4, "psi": 4, "lat": 6, "lon": 6}
 AWAY = ("z_e", "e_ct")  # the distance that is drawn: to the target, else from the active leg
 MILLIMETRES = 3  # digits of all others
 FAR = 1e9  # m; diverged runs end beyond any map
@@ -58,7 +59,7 @@ def _track(run: Shown, frames: int) -> dict[str, Any]:
     """
     count = len(run.recording["time"])
     rows = np.linspace(0, count - 1, min(count, frames)).round().astype(int)
-    names = ("time", *WHERE, *(("x_d", "y_d") if run.has("z_e") else ()))
+    names = ("time", *WHERE, *ON_EARTH, *(("x_d", "y_d") if run.has("z_e") else ()))
     away = next(filter(run.has, AWAY), None)
     legs = np.array(run.about.waypoints if run.about.follows else ())
     stopped = f"{run.recording.status} at t = {run.end:g} s"

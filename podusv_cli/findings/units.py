@@ -23,6 +23,7 @@ CLOSE = 0.5  # lengths, over which a whole way extends
 FAR = 300.0  # lengths between start and target
 NORTH, EAST = 90.0, 180.0  # deg, the largest latitude and longitude
 DEGREE = 111e3  # m, of latitude
+GRID = 2e4  # m, from which on a way that far is one in coordinates of a map
 
 
 class UnitGuess(NamedTuple):
@@ -137,7 +138,8 @@ def _points(case: Case) -> Sentences:
     degrees = north <= NORTH and east <= EAST and extent * DEGREE > length
     meant = (
         f"are they latitude and longitude in degrees? {extent:.3g} deg of latitude are "
-        f"{extent * DEGREE:.3g} m: write metres north and east of a point nearby"
+        f"{extent * DEGREE:.3g} m: write metres north and east of a point nearby, or a file whose "
+        "first line is lat,lon (podusv docs origin)"
         if degrees
         else "are they in km? write metres"
     )
@@ -159,7 +161,15 @@ def _start(case: Case) -> Sentences:
     if away > FAR * length:
         axis = int(abs(east) > abs(north))
         number = (start.x, start.y)[axis]
-        near = away / 1000.0 < FAR * length
+        if path.follows and away > GRID:
+            yield At(
+                "path.points",
+                f"the nearest waypoint is {away / 1000.0:.3g} km from the start; are the points "
+                "coordinates of a grid, as UTM's? write metres north and east of a place nearby, "
+                "or a start beside them",
+            )
+            return
+        near = number and away / 1000.0 < FAR * length
         meant = (
             f"was {number:g} given in mm? then write {number / 1000.0:g}" if near else "check it"
         )

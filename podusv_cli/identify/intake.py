@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.core.earth import PLACE
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.records import FEWEST, POSE, FilterLog, complete, log_of
 from podusv_cli.identify.logs.checks import check_log
 from podusv_cli.identify.logs.commands import with_actuator_state
-from podusv_cli.identify.logs.frames import LAT, LON
 from podusv_cli.identify.logs.reading import CLOCK, LogTable, NamedQuantities, tables
 from podusv_cli.identify.offsets import Clocks
 from podusv_cli.scenario.identify import LogFile
@@ -31,8 +31,13 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
     wanted, actuator = scenario.identify, scenario.actuator
     assert wanted is not None
     signals = (*STATE, *actuator.replayed, *actuator.lagged)
-    _all_taken(wanted.columns, {signal.name for signal in (*signals, CLOCK, LAT, LON)})
-    boots = tables(path, signals, NamedQuantities(wanted.columns, wanted.frame), name=given.name)
+    _all_taken(wanted.columns, {signal.name for signal in (*signals, CLOCK, *PLACE)})
+    boots = tables(
+        path,
+        signals,
+        NamedQuantities(wanted.columns, wanted.frame, scenario.plane),
+        name=given.name,
+    )
     found = []
     for boot in boots if given.span is None else _within(boots, given.span):
         at_rows = with_actuator_state(boot, actuator)

@@ -89,7 +89,7 @@ def load_scenario(
     result = _load_source(source, assignments(changes), checks, plugins.of_files(trust))
     if silent:
         return result
-    return result.warn_of_dropped(
+    return result.warn_of_remarks(
         lambda lost: warnings.warn(lost.removeprefix("warning: "), stacklevel=4)
     )
 

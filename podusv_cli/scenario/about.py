@@ -9,10 +9,12 @@ from typing import Any
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.about import BESIDE_RUNS, RunAbout
 from podusv_cli.core.component import Component
+from podusv_cli.core.earth import Plane
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.metrics.table import METRICS
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.scenario.sections import Origin
 from podusv_cli.scenario.settings import changed_settings, parts, settings
 
 
@@ -41,12 +43,18 @@ def identify_of(about: RunAbout | None) -> Identify | None:
     return Identify(columns=about.log_columns, frame=about.log_frame)
 
 
+def plane_of(about: RunAbout) -> Plane | None:
+    """Where on earth a run's x = y = 0 is; None where its scenario does not say."""
+    origin = about.values.get("origin")
+    return Origin.model_validate(origin).plane if origin else None
+
+
 def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
     """What readers need of one run's scenario; `identify` gives the frame of measured logs."""
     law, approach = scenario.controller, scenario.controller.approach()
     return RunAbout(
         **_of_parts(scenario),
-        values=scenario.model_dump(mode="json", exclude={*BESIDE_RUNS}),
+        values=_values(scenario),
         metrics={n: m.about for n, m in scenario.known_metrics().items() if n not in METRICS},
         path_end=scenario.passed_by(1.0),
         path_steady=scenario.passed_by(1.0 - scenario.metrics.steady_fraction),
@@ -68,6 +76,12 @@ def _told_by(scenario: Scenario, identify: Identify) -> RunAbout:
         log_columns=identify.columns,
         log_frame=identify.frame,
     )
+
+
+def _values(scenario: Scenario) -> dict[str, Any]:
+    """The scenario as JSON has it, without the sections that it does not have."""
+    values = scenario.model_dump(mode="json", exclude={*BESIDE_RUNS})
+    return {key: content for key, content in values.items() if content is not None}
 
 
 def _of_parts(scenario: Scenario) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
 
+from podusv_cli.core.earth import PLACE
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.quantities import bytes_in_words, time_in_words
 from podusv_cli.engine.loop.plan import Plan
@@ -78,7 +79,8 @@ def estimate(scenario: Scenario, plan: Plan) -> Size:
     grid, about = plan.grid, plan.about
     monitored = len(monitor.signals(plan)) if scenario.log.monitor else 0
     logged = sum(name in about for name in plan.names)
-    content = grid.rows * (logged + monitored) * NUMBER
+    derived = monitored + (len(PLACE) if scenario.origin else 0)
+    content = grid.rows * (logged + derived) * NUMBER
     cosines = sum(part.cosines() for part in scenario.disturbances().values())
     step = STEP + MEMORY * len(plan.states["law"]) + COSINE * cosines
     pace = 1.0 if scenario.simulation.compiled else PLAIN

@@ -22,7 +22,7 @@ from podusv_cli.scenario.kinds import merge_kept
 from podusv_cli.scenario.layers import compose_layers, self_contained
 from podusv_cli.scenario.messages import check
 from podusv_cli.scenario.model import Scenario, scenario_class
-from podusv_cli.scenario.named_files import with_contents, without_files
+from podusv_cli.scenario.named_files import fill_sections, with_contents, without_files
 from podusv_cli.scenario.presets import complete, stands_in
 from podusv_cli.scenario.resolved import plain_data, yaml_text
 from podusv_cli.scenario.yaml_text import MAX_NODES, read_text
@@ -54,15 +54,16 @@ class Loaded:
     """A scenario, the plan of each of its runs, and the origins of its values.
 
     `text` is the scenario file as given. `root` is the tree of which the scenario is made, `filled`
-    is this with presets, files and what stands for other values. `dropped` are sentences about
-    values that were given to a section before it was given another kind, which does not take them.
+    is this with presets, files and what stands for other values. `remarks` are sentences about
+    values that were given to a section before it was given another kind, which does not take them,
+    and about what of a route is left out or taken for granted.
     """
 
     scenario: Scenario
     filled: Node
     text: str
     root: Node
-    dropped: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @cached_property
     def origins(self) -> dict[str, str]:
@@ -126,10 +127,10 @@ class Loaded:
     def _faults_found(self) -> dict[Check, tuple[tuple[str | Route, str], ...]]:
         return {}
 
-    def warn_of_dropped(self, warn: Callable[[str], object]) -> Loaded:
-        """This, after a warning of all that was dropped."""
-        for lost in self.dropped:
-            warn(f"warning: {lost}")
+    def warn_of_remarks(self, warn: Callable[[str], object]) -> Loaded:
+        """This, after a warning of each of its remarks."""
+        for remark in self.remarks:
+            warn(f"warning: {remark}")
         return self
 
     def merge_over(self, top: Node, checks: Sequence[Check] = ()) -> Scenario:
@@ -137,7 +138,7 @@ class Loaded:
         faults: list[Fault] = []
         root = merge(self.root, without_misfits(self.root, top, faults))
         root = merge_kept(root, keys_of(type(self.scenario)), [])
-        scenario, filled = _build_scenario(root, self.scenario.plugged, faults)
+        scenario, filled = _build_scenario(root, self.scenario.plugged, faults, [])
         changed = replace(self, scenario=scenario, filled=filled, root=root)
         return changed.pass_checks(faults, (CLASHES, *checks)).scenario
 
@@ -187,9 +188,9 @@ def load_text(
     root = compose_layers(text, source, overrides, faults, placed=placed)
     if root is None:
         raise ScenarioError(_order_faults(faults, source))
-    root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
-    scenario, filled = _build_scenario(root, known, faults)
-    loaded = Loaded(scenario, filled, text, root, dropped)
+    root, known, remarks = _resolve_plugins(root, plugged, files, source, faults)
+    scenario, filled = _build_scenario(root, known, faults, remarks)
+    loaded = Loaded(scenario, filled, text, root, tuple(remarks))
     return loaded.pass_checks(faults, (CLASHES, *checks))
 
 
@@ -212,11 +213,11 @@ def load_stored(
     _raise_damage(faults, source)
     if root is None or faults:
         raise ScenarioError(_order_faults(faults, source))
-    root, known, dropped = _resolve_plugins(root, plugged, files, source, faults)
-    with_contents(root, keys_of(scenario_class(known)), faults, without_files)
+    root, known, remarks = _resolve_plugins(root, plugged, files, source, faults)
+    fill_sections(root, keys_of(scenario_class(known)), faults, without_files)
     _raise_damage(faults, source)
-    scenario, filled = _build_scenario(root, known, faults)
-    return Loaded(scenario, filled, text, root, dropped).pass_checks(faults, checks)
+    scenario, filled = _build_scenario(root, known, faults, remarks)
+    return Loaded(scenario, filled, text, root, tuple(remarks)).pass_checks(faults, checks)
 
 
 def _raise_damage(faults: list[Fault], source: str) -> None:
@@ -229,7 +230,7 @@ def _raise_damage(faults: list[Fault], source: str) -> None:
 
 def _resolve_plugins(
     root: Node, plugged: Plugged, files: Sequence[str | Plugin], source: str, faults: list[Fault]
-) -> tuple[Node, Plugins, tuple[str, ...]]:
+) -> tuple[Node, Plugins, list[str]]:
     """The tree with its plug-ins and with what sections keep of other kinds; what is dropped.
 
     Without one of the plug-ins, nothing else can be said of the tree.
@@ -238,13 +239,15 @@ def _resolve_plugins(
     root, known = plugged(plugins.with_given(root, files), faults)
     if len(faults) > before:
         raise ScenarioError(_order_faults(faults, source))
-    return merge_kept(root, keys_of(scenario_class(known)), dropped), known, tuple(dropped)
+    return merge_kept(root, keys_of(scenario_class(known)), dropped), known, dropped
 
 
-def _build_scenario(root: Node, known: Plugins, faults: list[Fault]) -> tuple[Scenario, Node]:
-    """The scenario of a tree, and the tree with what is filled in."""
+def _build_scenario(
+    root: Node, known: Plugins, faults: list[Fault], remarks: list[str]
+) -> tuple[Scenario, Node]:
+    """The scenario of a tree, and the tree with what is filled in; `remarks` as `complete`."""
     top, source = keys_of(scenario_class(known)), root.mark.source
-    root = complete(root, top, faults)
+    root = complete(root, top, faults, remarks)
     scenario = check(root, top, faults)
     if scenario is None:
         raise ScenarioError(_order_faults(faults, source))
@@ -288,5 +291,5 @@ def tree_yaml(loaded: Loaded) -> str:
     It has what that extends and what was set, and nothing that is filled in: `nominal` follows the
     vessel, and the laws follow `controller`, as before.
     """
-    root = with_contents(loaded.root, keys_of(type(loaded.scenario)), [])
+    root = with_contents(loaded.root, keys_of(type(loaded.scenario)), [], [])
     return yaml_text({"name": loaded.scenario.name} | plain(root))

@@ -22,9 +22,10 @@ from podusv_cli.components.paths.base import Path
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.about import BESIDE_RUNS, Claim, at_target
 from podusv_cli.core.component import Component, value
+from podusv_cli.core.earth import PLACE, Plane
 from podusv_cli.core.plugins import Plugins, from_file, installed_plugins
 from podusv_cli.core.registry import any_of
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.closed_loop import ClosedLoop, passed_by
 from podusv_cli.engine.loop.plan import Plan
@@ -39,6 +40,7 @@ from podusv_cli.scenario.sections import (
     Control,
     Log,
     MetricSettings,
+    Origin,
     Required,
     Simulation,
     Start,
@@ -97,6 +99,9 @@ class Scenario(Component):
         ..., "", "the vessel that the controller is told about; the same by default"
     )
     start: Start = value(Start(), "", "state at t = 0")
+    origin: Origin | None = value(
+        None, "", "where x = y = 0 is on earth, for routes and logs; see podusv docs origin"
+    )
     path: AnyPath = value(..., "", "how the target moves")
     disturbance: Summands[AnyDisturbance] = value(..., "", DISTURBANCE)
     actuator: AnyActuator = value(..., "", "from the law's demand to the load on the hull")
@@ -260,6 +265,11 @@ class Scenario(Component):
         parts = self.disturbance
         return Total(parts=parts) if isinstance(parts, tuple) else parts
 
+    @property
+    def plane(self) -> Plane | None:
+        """The plane of x and y on earth; None where nobody says where they are."""
+        return self.origin.plane if self.origin else None
+
     def time_grid(self) -> TimeGrid:
         """The instants of a scenario that `conflicts` finds no fault with."""
         step = self.simulation.step
@@ -340,7 +350,10 @@ class Scenario(Component):
 
     def about(self, plan: Plan) -> dict[str, Signal]:
         """Every signal in the log of this run by name. Raises LawError where two have one name."""
-        return monitor.about(plan) if self.log.monitor else plan.about
+        own = monitor.about(plan) if self.log.monitor else plan.about
+        if not self.origin:
+            return own
+        return by_name(((lambda: "the loop", own.values()), (lambda: "the key `origin`", PLACE)))
 
 
 def scenario_class(plugins: Plugins) -> type[Scenario]:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import base64
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
-from podusv_cli.core.component import Component
-from podusv_cli.core.timed_rows import TextLine, columns, lines_of
+from podusv_cli.core.component import Component, ValuesOf
 from podusv_cli.scenario.keys import Key
+from podusv_cli.scenario.point_files import Placing
 from podusv_cli.scenario.shipped import relative_to
-from podusv_cli.scenario.yaml_text import MAX_NODES, read, read_bytes, read_text, resolve, text_node
+from podusv_cli.scenario.yaml_text import read, read_bytes, read_text, text_node
 from podusv_cli.scenario.yaml_tree import (
     Fault,
     Mark,
@@ -25,10 +26,6 @@ from podusv_cli.scenario.yaml_tree import (
     without_misfits,
 )
 
-MAX_POINTS = MAX_NODES // 4  # a point is three values, and the resolved scenario has to be readable
-MOST_FAULTS = 10  # in one file of points
-COLUMNS = ("x [m]", "y [m]")
-
 ELSEWHERE = "refers to another file; the scenario that podusv keeps in a folder never does"
 
 YAML = (".yaml", ".yml")  # what the names of files end with that are presets
@@ -39,19 +36,23 @@ Read = Callable[[str, Mark, str, list[Fault]], Any]  # a file, named at a mark u
 Form = Callable[[Any, str, str, list[Fault]], Node]  # of what is read, the file's name, the key
 
 
-def with_contents(root: Node, top: Key, faults: list[Fault], fill: Fill | None = None) -> Node:
-    """The tree with what files hold in place of the files' names, or as `fill` has it.
+def with_contents(root: Node, top: Key, faults: list[Fault], remarks: list[str]) -> Node:
+    """The tree with what files hold in place of the files' names.
 
-    `top` are the scenario's keys.
+    `top` are the scenario's keys. `remarks` takes sentences about what of a file is left out.
     """
+    placing = Placing(root, remarks)
+    return placing.with_origin(fill_sections(root, top, faults, partial(_read, placing)))
+
+
+def fill_sections(root: Node, top: Key, faults: list[Fault], fill: Fill) -> Node:
+    """The tree with every section that is a component as `fill` has it."""
     default = root.mapping.get("controller")
     usual = {"controllers": default.word("kind")} if default else {}
     for name, entry in root.mapping.items():
         if key := top.keys.get(name):
             kind = usual.get(name, "")
-            root = root.with_entry(
-                name, _fill_section(entry, key, (name,), fill or _read, faults, kind)
-            )
+            root = root.with_entry(name, _fill_section(entry, key, (name,), fill, faults, kind))
     return root
 
 
@@ -78,19 +79,48 @@ def _fill_section(
     return fill(node, dotted_key(at), section.section, faults) if section.section else node
 
 
-def _read(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
+def _read(
+    placing: Placing, given: Node, section: str, model: type[Component], faults: list[Fault]
+) -> Node:
     """A section of class `model` with what its files hold in place of their names."""
     ways: list[tuple[dict[str, str], Read, Form]] = [
-        (model.rows_of, read_text, _points),
+        (model.rows_of, read_text, placing.points),
         (model.texts_of, read_text, _whole),
         (model.bytes_of, read_bytes, _bytes),
     ]
     for fields, reader, form in ways:
         for key, taker in fields.items():
             given = _read_in(given, section, key, taker, reader, form, faults)
+    for key, values_of in model.values_of.items():
+        given = _under(given, section, key, values_of, placing.remarks, faults)
     for key, (taker, name) in model.folders_of.items():
         given = _read_in(given, section, key, taker, partial(_in_folder, name), _whole, faults)
     return _over_file(given, section, model, faults)
+
+
+def _under(
+    given: Node,
+    section: str,
+    key: str,
+    values_of: ValuesOf,
+    remarks: list[str],
+    faults: list[Fault],
+) -> Node:
+    """A section over the values that another program's file has, in place of the file's name."""
+    file = given.mapping.get(key)
+    if not file or not isinstance(file.content, str):
+        return given
+    name, dotted = _path(file), f"{section}.{key}"
+    rest = {n: entry for n, entry in given.mapping.items() if n != key}
+    text = read_text(name, file.mark, dotted, faults)
+    try:
+        values, said = values_of(text) if text is not None else ({}, [])
+    except ValueError as error:
+        faults.append(Fault(Mark(name), dotted, f"the file {error}"))
+        values, said = {}, []
+    remarks += (f"{name}: {line}" for line in said)
+    below = {n: Node(content, Mark(name), text=str(content)) for n, content in values.items()}
+    return replace(given, content=below | rest, faulty=given.faulty or not values)
 
 
 def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
@@ -106,7 +136,8 @@ def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
 def without_files(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
     """The section as it is; a fault for every file that it names itself, not with `--set`."""
     preset = ["preset"] if model.presets and given.word("preset").endswith(YAML) else []
-    for key in (*model.rows_of, *model.texts_of, *model.bytes_of, *model.folders_of, *preset):
+    named = (model.rows_of, model.texts_of, model.bytes_of, model.folders_of, model.values_of)
+    for key in (*chain.from_iterable(named), *preset):
         file = given.mapping.get(key)
         if file and file.mark.line and file.content is not None:
             faults.append(Fault(file.mark, f"{section}.{key}", ELSEWHERE))
@@ -177,42 +208,3 @@ def _whole(text: str, name: str, key: str, faults: list[Fault]) -> Node:
 
 def _bytes(data: bytes, name: str, key: str, faults: list[Fault]) -> Node:
     return Node(base64.b64encode(data).decode("ascii"), Mark(name))
-
-
-def _points(text: str, name: str, key: str, faults: list[Fault]) -> Node:
-    return Node(tuple(_rows(text, name, faults)), Mark(name))
-
-
-def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
-    """A node for every line: x and y, in the order of the header where there is one."""
-    header, filled = lines_of(text)
-    try:
-        order = columns(header, COLUMNS, "the file") if header else [0, 1]
-    except ValueError as error:
-        faults.append(Fault(Mark(name, header.number if header else 1, 1), "", str(error)))
-        return
-    if len(filled) > MAX_POINTS:
-        faults.append(Fault(Mark(name), "", f"more than {MAX_POINTS:,} points"))
-        return
-    most = len(faults) + MOST_FAULTS
-    for line in filled:
-        row = _row(line, Mark(name, line.number, 1), faults)
-        if len(faults) > most:
-            return
-        cells = row.content
-        yield replace(row, content=tuple(cells[i] for i in order if i < len(cells)))
-
-
-def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
-    """A line of a file of points as a list of two numbers; faults for what is no such pair."""
-    numbers = [resolve(cell) for cell in line.cells]
-    wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
-    # The line is not shown: the file may be one that the user may not read.
-    if len(numbers) != 2:
-        text = f"must be two numbers x,y [m], found {len(numbers)} between commas"
-        faults.append(Fault(mark, "", text))
-    elif any(wrong):
-        place = ("first", "second")[wrong.index(True)]
-        faults.append(Fault(mark, "", f"must be two numbers x,y [m]; the {place} is no number"))
-    pairs = zip(numbers, line.cells, strict=True)
-    return Node(tuple(Node(number, mark, text=cell) for number, cell in pairs), mark)

@@ -100,13 +100,13 @@ def with_presets(top: Key = SCENARIO) -> dict[str, tuple[type[Component], Preset
     }
 
 
-def complete(root: Node, top: Key, faults: list[Fault]) -> Node:
+def complete(root: Node, top: Key, faults: list[Fault], remarks: list[str]) -> Node:
     """The tree in podusv's units, with presets, files, `name`, `nominal`, `controllers` filled in.
 
-    `top` are the scenario's keys.
+    `top` are the scenario's keys. `remarks` takes sentences about what of a file is left out.
     """
     plugins = top.scenario.plugged
-    root = in_si(with_contents(_name(_without_null(root), faults), top, faults), top)
+    root = in_si(with_contents(_name(_without_null(root), faults), top, faults, remarks), top)
     root = _nominal(_vessel(root, plugins, faults), plugins, faults)
     return _controllers(_sections(root, top, faults), top)
 

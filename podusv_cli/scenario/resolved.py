@@ -8,7 +8,6 @@ from typing import Any
 
 import yaml
 
-from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.yaml_text import resolve
 
@@ -16,9 +15,8 @@ HEADING = "# A complete scenario, every value written out; it runs again to the 
 
 
 def plain_data(scenario: Scenario) -> dict[str, Any]:
-    """The scenario as plain data; studies only where there are some, since runs have none."""
-    data = scenario.model_dump()
-    return {k: v for k, v in data.items() if k not in BESIDE_RUNS or v is not None}
+    """The scenario as plain data, without the sections that it does not have."""
+    return {key: content for key, content in scenario.model_dump().items() if content is not None}
 
 
 def resolved_yaml(scenario: Scenario) -> str:

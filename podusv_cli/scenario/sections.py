@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from podusv_cli.core.component import Component, value
+from podusv_cli.core.earth import MOST, Plane
 from podusv_cli.metrics.windows import Radii, Windows
 
 LONGEST_NAME = 80  # letters
@@ -36,6 +37,18 @@ class Start(Component):
     u: float = value(0.0, "m/s", "surge velocity")
     v: float = value(0.0, "m/s", "sway velocity")
     r: float = value(0.0, "rad/s", "yaw rate")
+
+
+class Origin(Component):
+    """Where x = y = 0 is on earth, for routes and logs in latitude and longitude."""
+
+    lat: float = value(..., "deg", "latitude, north", ge=-MOST["lat"], le=MOST["lat"])
+    lon: float = value(..., "deg", "longitude, east", ge=-MOST["lon"], le=MOST["lon"])
+
+    @property
+    def plane(self) -> Plane:
+        """The plane of x and y."""
+        return Plane(self.lat, self.lon)
 
 
 class Simulation(Component):

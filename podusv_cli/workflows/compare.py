@@ -307,7 +307,7 @@ def _place_measured(members: Sequence[Member], runs: Sequence[PastRun]) -> list[
     for member in members:
         if member.track and logs:
             label, first = next(iter(logs.items()))
-            remarks = member.track.beside_speeds(label, first)
+            remarks = member.track.beside_run(label, first)
             track = member.track.place_beside(label, first)
             remarks = [*track.remarks, *remarks]
             about = track.about(member.about, max(done))

@@ -35,7 +35,7 @@ from podusv_cli.scenario.yaml_tree import find, tree_with
 from podusv_cli.storage.run_folder import default_folder
 from podusv_cli.workflows.claimed_margins import with_margins
 from podusv_cli.workflows.doubt_study import doubt_study
-from podusv_cli.workflows.execute import examine, monitor_case, summary, warm_up
+from podusv_cli.workflows.execute import add_derived, examine, summary, warm_up
 from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import RESULTS, open_scenario, writer_of
 
@@ -168,7 +168,7 @@ def _change_scenario(subject: Subject, label: str, world: World) -> Scenario:
 def _simulate_in_memory(label: str, case: Case, parsed: Sequence[ParsedClaim]) -> PastRun:
     """A run in memory, with what a comparison adds to it that these claims name."""
     recording = to_end(case.plan, compiled=case.scenario.simulation.compiled)
-    whole, _ = monitor_case(case, recording)
+    whole, _ = add_derived(case, recording)
     numbers = summary(case, recording, Extras())
     if len(recording["time"]) and any(law_operations.name in c.claim.expect for c in parsed):
         numbers |= operations(case.plan, recording)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from podusv_cli import __version__
+from podusv_cli.core import earth
 from podusv_cli.core.about import MetricAbout, RunAbout
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.finding import Finding
@@ -151,8 +152,8 @@ def execute(
             metrics |= extras.attempt("the law's cost", lambda: _cost(case, recording)) or {}
         with watch.part("theory"):
             whole, theory = extras.make_or_record(
-                "theory.json with the stability monitor's signals",
-                lambda: monitor_case(case, recording, allocate),
+                "theory.json with the signals that follow from others",
+                lambda: add_derived(case, recording, allocate),
             ) or (recording, {})
         with watch.part("write"):
             whole = _write_log(writer, case, whole, again=long)
@@ -272,10 +273,13 @@ def _cost(case: Case, recording: Recording) -> dict[str, float]:
     return timed | operations(case.plan, recording)
 
 
-def monitor_case(
+def add_derived(
     case: Case, recording: Recording, allocate: Allocate = np.empty
 ) -> tuple[Recording, dict[str, Any]]:
-    """The recording with what the stability monitor adds, and its findings; none without V."""
+    """The recording with places on earth and what the stability monitor adds, and its findings.
+
+    No places without an origin; nothing of the monitor without V.
+    """
     plan, scenario = case.plan, case.scenario
     monitored_run = scenario.log.monitor and monitor.monitor_recording(
         plan,
@@ -284,9 +288,11 @@ def monitor_case(
         compiled=scenario.simulation.compiled,
         allocate=allocate,
     )
+    whole = monitored_run.recording if monitored_run else recording
+    placed = earth.add_places(whole, scenario.plane, allocate) if scenario.plane else whole
     if not monitored_run:
-        return recording, {}
-    return monitored_run.recording, theory_report(plan.loop, plan.grid, monitored_run)
+        return placed, {}
+    return placed, theory_report(plan.loop, plan.grid, monitored_run)
 
 
 def _write_log(

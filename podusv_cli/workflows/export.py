@@ -42,7 +42,7 @@ def export(config: Path, request: Request, products: Products = Products()) -> P
     platforms, linked = _platforms(products), _linkable_platforms(products) if products.fmu else {}
     too_large = limits(allow_large=False)
     checks, plugged = (unknown_codes, too_large), of_files(request.trust)
-    loaded = load(config, request.overrides, checks, request.plugins, plugged).warn_of_dropped(
+    loaded = load(config, request.overrides, checks, request.plugins, plugged).warn_of_remarks(
         request.say
     )
     scenario = single(loaded, request.controller)

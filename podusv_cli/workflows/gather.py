@@ -13,10 +13,11 @@ import numpy as np
 from podusv_cli.comparison.claims import ParsedClaim
 from podusv_cli.comparison.measured import FEWEST, PLACE, START, Track
 from podusv_cli.comparison.parsing import parse_claims
+from podusv_cli.core.earth import Plane
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.findings.finding import unknown_codes
-from podusv_cli.scenario.about import identify_of
+from podusv_cli.scenario.about import identify_of, plane_of
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import Loaded
@@ -78,12 +79,25 @@ def gather_logs(logs: Sequence[Path], groups: Sequence[Members], align: str = ""
     members = [member for group in groups for member in group.members]
     speeds = [member.case.scenario.facts.U if member.case else math.inf for member in members]
     sections = [group.identify for group in groups if group.identify]
-    log = track(logs[0], sections, max(speeds), aligned=align).start_clock_at(BEGIN)
+    plane = _common_plane(members)
+    log = track(logs[0], sections, max(speeds), plane=plane, aligned=align).start_clock_at(BEGIN)
     beside = members[0].about
     _check_common(log, max(member.about.duration for member in members))
     name, text = logs[0].stem, repr(log.signals["x"].tolist())
     own = Member(name, log.about(beside), text, track=log, noticed=log.remarks)
     return [Members(name, [own])]
+
+
+def _common_plane(members: Sequence[Member]) -> Plane | None:
+    """Where the runs are on earth, None where nobody says. Raises UsageError where they differ."""
+    planes = {plane: member.label for member in members if (plane := plane_of(member.about))}
+    if len(planes) > 1:
+        places = "; ".join(f"{label}: {p.lat:g}, {p.lon:g} deg" for p, label in planes.items())
+        raise UsageError(
+            f"the runs have origins that differ ({places}), so a log lies beside one of them only; "
+            "give all the same `origin`"
+        )
+    return next(iter(planes), None)
 
 
 def _check_common(log: Track, duration: float) -> None:

@@ -6,7 +6,7 @@ from podusv_cli.core.past_run import PastRun
 from podusv_cli.findings.finding import find_before_run, postflight
 from podusv_cli.process.extras import Extras
 from podusv_cli.scenario.case import Case
-from podusv_cli.workflows.execute import Stopwatch, monitor_case, simulate_case, summary
+from podusv_cli.workflows.execute import Stopwatch, add_derived, simulate_case, summary
 
 
 def run_in_memory(case: Case) -> PastRun:
@@ -16,7 +16,7 @@ def run_in_memory(case: Case) -> PastRun:
     """
     extras = Extras()
     recording = simulate_case(case, Stopwatch())
-    whole, _ = monitor_case(case, recording)
+    whole, _ = add_derived(case, recording)
     findings = [*find_before_run(case), *postflight(case.scenario, whole)]
     numbers = summary(case, recording, extras)
     return PastRun(

@@ -38,7 +38,7 @@ from podusv_cli.scenario.plugins import kinds_of, of_files
 from podusv_cli.scenario.resolved import yaml_text
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Route, dotted_key, plain, route
 from podusv_cli.workflows.compare import compare
-from podusv_cli.workflows.execute import monitor_case, summary, warm_up
+from podusv_cli.workflows.execute import add_derived, summary, warm_up
 from podusv_cli.workflows.live_verdicts import (
     claims_about,
     limits_in_words,
@@ -202,7 +202,7 @@ class Live:
         for label, recording in self._recordings(cases, rest).items():
             case = cases[label]
             if rest:
-                recording, _ = monitor_case(case, recording)
+                recording, _ = add_derived(case, recording)
                 for found in (*find_before_run(case), *postflight(case.scenario, recording)):
                     findings.setdefault(str(found), []).append(label)
             numbers[label] = summary(case, recording, Extras())

@@ -46,7 +46,7 @@ def loaded_for(
         loaded = kept_scenario(config, *given, plugins.of_folder(request.trust))
     else:
         loaded = load(config, *given, plugins.of_files(request.trust))
-    loaded.warn_of_dropped(lambda lost: request.warn(lost.removeprefix("warning: ")))
+    loaded.warn_of_remarks(lambda lost: request.warn(lost.removeprefix("warning: ")))
     if getattr(loaded.scenario, key) is None:
         named = config if isinstance(config, Path) else loaded.scenario.name
         raise UsageError(f"{named} has no key `{key}`, {advice}")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from podusv_cli.comparison.measured import PLANE, Track
+from podusv_cli.core.earth import Plane
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
@@ -20,8 +21,9 @@ PSI = STATE[2]
 SELDOM = 0.05  # of the positions, that may lack a heading
 NO_COMMON_PLACE = (
     "the log and the runs have no common place: its x and y count from its first fix, those of the "
-    "runs from where `start` is; `--align place` moves the log to where the first run is at the "
-    "first common instant, `--align start` its clock as well"
+    "runs from where `start` is; write `origin: {lat: ..., lon: ...}` of x = y = 0 into the "
+    "scenario, or move the log: `--align place` to where the first run is at the first common "
+    "instant, `--align start` its clock as well"
 )
 NO_HEADING = (
     "no column is called psi: positions alone are compared, headings have no number, and no hull "
@@ -40,21 +42,27 @@ def is_log(path: Path) -> bool:
 
 
 def track(
-    path: Path, identify: Sequence[Identify], top_speed: float = math.inf, *, aligned: str = ""
+    path: Path,
+    identify: Sequence[Identify],
+    top_speed: float = math.inf,
+    *,
+    plane: Plane | None = None,
+    aligned: str = "",
 ) -> Track:
     """The measured track of a log; the first of these sections says what its columns are called.
 
+    `plane` is that of the runs beside it, in which latitudes and longitudes are placed.
+
     A row stands where a position is new; all else is straight between its own values, and NaN
-    before the first and after the last of them. `top_speed`
-    [m/s] is that of the fastest boat beside it; `aligned` as in `Track`. Raises UsageError where
-    the log has no positions, or has mistakes that its motion shows.
+    before the first and after the last of them. `top_speed` [m/s] is that of the fastest boat
+    beside it; `aligned` as in `Track`. Raises UsageError where the log has no positions, or has
+    mistakes that its motion shows.
     """
     from podusv_cli.identify.logs.checks import check_log
     from podusv_cli.identify.logs.reading import NamedQuantities, delivered_each, table
 
-    named = (
-        NamedQuantities(identify[0].columns, identify[0].frame) if identify else NamedQuantities()
-    )
+    given = identify[0] if identify else Identify()
+    named = NamedQuantities(given.columns, given.frame, plane)
     log = table(path, STATE, named)
     if lacking := [name for name in PLANE if name not in log.columns]:
         raise UsageError(

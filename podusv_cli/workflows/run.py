@@ -36,7 +36,7 @@ def run(config: Path, request: Request, progress: Progress | None = None) -> Fin
 def open_scenario(config: Path, request: Request, checks: Sequence[Check]) -> Loaded:
     """The scenario of a file; warns of values that it loses. Raises ScenarioError."""
     loaded = load(config, request.overrides, checks, request.plugins, of_files(request.trust))
-    return loaded.warn_of_dropped(request.warn)
+    return loaded.warn_of_remarks(request.warn)
 
 
 def writer_of(request: Request, target: Path, needed: float = 0.0) -> RunWriter:

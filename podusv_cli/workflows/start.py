@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,13 +11,16 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+import numpy as np
+
 from podusv_cli.components.actuators.pod import Pods
+from podusv_cli.components.paths.base import Point
 from podusv_cli.components.vessels.estimated import SCATTER, Hull, estimate_vessel
 from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core import units
 from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
-from podusv_cli.core.phrases import unknown_word
+from podusv_cli.core.phrases import as_yaml, unknown_word
 from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.findings.finding import finding_kinds, unknown_codes
 from podusv_cli.scenario.limits import limits
@@ -81,22 +85,38 @@ class Thrusters:
         return [0.0] if self.count == 1 else [sides[i % 2] for i in range(self.count)]
 
 
-def start(boat: Boat, out: Path) -> Path:
+@dataclass(frozen=True)
+class StartingLegs:
+    """Legs of a scenario: what they are, lines for its text, and waypoints [m]."""
+
+    about: str
+    lines: tuple[str, ...]
+    points: tuple[Point, ...]
+
+    @property
+    def length(self) -> float:
+        """Of all legs [m]."""
+        return float(np.hypot(*np.diff(self.points, axis=0).T).sum())
+
+
+def start(boat: Boat, out: Path, route: str = "") -> Path:
     """Write the scenario of a boat and the schema for editors beside it.
 
-    Raises UsageError for what is no length, mass, speed or set of thrusters, StorageError where
+    `route` is a file of waypoints, "" for four of podusv's. Raises UsageError for what is no
+    length, mass, speed or set of thrusters, and for a route that cannot be read; StorageError where
     the file exists.
     """
     hull, thrusters = _hull(boat)
-    return _write_new(out, _of_dimensions(hull, thrusters, known=bool(boat.speed)))
+    way = _way(route, out)
+    return _write_new(out, _of_dimensions(hull, thrusters, way, known=bool(boat.speed)))
 
 
-def start_from(preset: str, out: Path) -> Path:
+def start_from(preset: str, out: Path, route: str = "") -> Path:
     """The same for a vessel of podusv whose thrusters are known, too."""
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
         raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
-    return _write_new(out, _of_preset(preset))
+    return _write_new(out, _of_preset(preset, _way(route, out)))
 
 
 def _write_new(out: Path, text: str) -> Path:
@@ -205,34 +225,61 @@ def _thrusters(boat: Boat) -> Thrusters:
     return made
 
 
-def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
+def _way(route: str, out: Path) -> StartingLegs | None:
+    """The legs of a route beside the scenario `out`; None without one. Raises UsageError."""
+    if not route:
+        return None
+    storage.make_folder(out.parent)  # the route is read from there
+    file = os.path.relpath(route, out.parent)
+    path = as_yaml(file) if file.isprintable() else repr(file)
+    text = f"name: boat\nvessel: {{preset: otter}}\nactuator: {{kind: ideal}}\n{BESIDE}".replace(
+        "kind: line", f"kind: legs, file: {path}"
+    )
+    try:
+        scenario = load_text(text, str(out)).scenario
+    except ScenarioError as error:
+        raise UsageError(f"--route {route}: {str(error).splitlines()[0]}") from error
+    points = scenario.path.waypoints()
+    lines = [f"  file: {path}"]
+    if scenario.origin:
+        lines.append(f"origin: {{lat: {scenario.origin.lat:.9g}, lon: {scenario.origin.lon:.9g}}}")
+    (x, y), (ahead, right) = points[0], np.subtract(points[1], points[0])
+    psi = math.degrees(math.atan2(right, ahead))
+    lines.append(f"start: {{x: {x:.10g}, y: {y:.10g}, psi: {psi:.4g} deg}}")
+    about = f"{len(points)} waypoints of {os.path.basename(file)}"
+    return StartingLegs(about, tuple(lines), points)
+
+
+def _of_dimensions(
+    hull: Hull, thrusters: Thrusters, way: StartingLegs | None, *, known: bool
+) -> str:
     """The scenario's text for a boat of these dimensions; `known` says if its speed was given."""
     numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
-    return _fill_template(title, boat, "\n".join(_study(numbers)))
+    return _fill_template(title, boat, "\n".join(_study(numbers)), way)
 
 
-def _of_preset(preset: str) -> str:
+def _of_preset(preset: str, way: StartingLegs | None) -> str:
     """The scenario's text for a vessel of podusv with its thrusters."""
     boat = (
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
     )
-    return _fill_template(f"{preset} of podusv with its thrusters.", boat, "")
+    return _fill_template(f"{preset} of podusv with its thrusters.", boat, "", way)
 
 
-def _fill_template(title: str, boat: str, study: str) -> str:
+def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None) -> str:
     """The scenario's text: `boat` and `study` are YAML; a task that suits the boat is worked out.
 
-    Speed, legs and duration follow from the hull, so that it can keep up.
+    Speed and duration follow from the hull, so that it can keep up; legs, too, without a `way`.
     """
     scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
     holds = vessel.envelope.speed if vessel.envelope else math.inf
     speed = float(f"{min(hull.cruise, holds, RADIUS * facts.r_top * hull.length):.2g}")
-    long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
+    way = way or _way_of(hull)
     words = {
         "title": title,
         "schema": SCHEMA,
@@ -240,13 +287,25 @@ def _fill_template(title: str, boat: str, study: str) -> str:
         "mass": f"{hull.mass:g}",
         "boat": boat,
         "speed": f"{speed:g}",
-        "long": f"{long:g}",
-        "wide": f"{wide:g}",
-        "duration": f"{10.0 * math.ceil(0.1 * TIME * (2.0 * long + wide) / speed):g}",
+        "about_way": way.about,
+        "way": "\n".join(way.lines),
+        "duration": f"{10.0 * math.ceil(0.1 * TIME * way.length / speed):g}",
         "study": study,
     }
     template = files("podusv_cli.workflows").joinpath("starting_files", "boat.yaml.txt")
     return Template(template.read_text("utf-8")).substitute(words).rstrip() + "\n"
+
+
+def _way_of(hull: Hull) -> StartingLegs:
+    """Legs for a boat without a route: a few lengths north, east, and south again."""
+    long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
+    points = ((0.0, 0.0), (long, 0.0), (long, wide), (0.0, wide))
+    written = ", ".join(f"[{x:g}, {y:g}]" for x, y in points)
+    return StartingLegs(
+        "m, north and east: put your waypoints here, or a file (podusv docs origin)",
+        (f"  points: [{written}]",),
+        points,
+    )
 
 
 WHY = {

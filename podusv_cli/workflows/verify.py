@@ -46,7 +46,7 @@ def verify(
         raise UsageError(f"{config} is a run folder; verify its resolved.yaml")
     checks = (unknown_codes, limits(insist=""))
     scenario = (
-        load(config, overrides, checks, plugins, of_files(trust)).warn_of_dropped(warn).scenario
+        load(config, overrides, checks, plugins, of_files(trust)).warn_of_remarks(warn).scenario
     )
     if out:
         files.check_places([out])

@@ -279,6 +279,29 @@ def test_a_log_on_earth_has_no_common_place_with_a_run(sailed_on_earth):
     assert numbers(done, "run")[0] == pytest.approx(off, rel=1e-3)
 
 
+def test_with_an_origin_a_log_on_earth_lies_where_it_was(sailed_on_earth):
+    """Of its run, by the tables of a degree's length; the run's own lat and lon say the same."""
+    lat = 59.0 - sailed_on_earth["x"][8] / 111_393.5
+    lon = 10.0 - sailed_on_earth["y"][8] / 57_477.0
+    write("placed.yaml", f"extends: task.yaml\nname: placed\norigin: {{lat: {lat}, lon: {lon}}}\n")
+    p.run(
+        "placed.yaml",
+        {"controllers": None, "controller": {"kind": "momentum_vector"}},
+        out="placed",
+    )
+    done = compared("placed", "LOG.csv")
+    assert warnings_of(done) == []
+    assert numbers(done, "placed")[1] < 1e-3
+    own = p.open_run("placed")
+    assert own["lat"][8] == pytest.approx(59.0, abs=1e-8)
+    assert own["lon"][8] == pytest.approx(10.0, abs=1e-8)
+    write("far.yaml", f"extends: placed.yaml\nname: far\norigin: {{lat: {lat + 0.1}}}\n")
+    (line,) = warnings_of(compared("far.yaml", "LOG.csv"))
+    assert "it lies 11.1 km from" in line
+    with pytest.raises(PodusvError, match="origins that differ"):
+        compared("placed", "far.yaml", "LOG.csv")
+
+
 def test_a_log_on_earth_is_moved_to_the_run_when_asked(podusv: Command, sailed_on_earth):
     done = compared("run", "LOG.csv", align="place")
     (line,) = warnings_of(done)

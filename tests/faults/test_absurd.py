@@ -193,7 +193,7 @@ log: {{every: {shape["every"]}, monitor: {shape["monitor"]}}}
     scenario = loaded(text).scenario
     case = Case.of(scenario)
     recording = execute.simulate_case(case, execute.Stopwatch())
-    recording, _ = execute.monitor_case(case, recording)
+    recording, _ = execute.add_derived(case, recording)
     expected = estimate(scenario, case.plan)
     assert expected.steps == 10
     assert expected.rows == len(recording["time"])

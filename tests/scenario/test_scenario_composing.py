@@ -60,7 +60,7 @@ def test_another_kind_keeps_what_it_takes_and_tells_what_it_does_not():
     write("same.yaml", "extends: base.yaml\ncontroller: {kind: dsc, T_r: 0.7}\n")
     other = load("other.yaml")
     assert other.scenario.controller.k_ze == 0.4
-    assert other.dropped == (
+    assert other.remarks == (
         "other.yaml:2:20: controller: kind pid in place of dsc, which loses T_u: 0.5",
     )
     same = load("same.yaml").scenario.controller
@@ -132,11 +132,11 @@ def test_a_law_that_is_written_out_says_which_numbers_another_kind_keeps_of_it()
     write("free.yaml", re.sub("controller: .*", free, STEERED))
     new, wholly = "controller.kind=momentum_vector", load("free.yaml").scenario
     own = load("free.yaml", [new])
-    assert own.dropped == ()
+    assert own.remarks == ()
     write("written.yaml", resolved_yaml(wholly))
     kept = load("written.yaml", [new])
     assert kept.scenario.controller.T_v == wholly.controller.T_v != own.scenario.controller.T_v
-    (told,) = (one for one in kept.dropped if "keeps" in one)
+    (told,) = (one for one in kept.remarks if "keeps" in one)
     assert f"keeps omega_u: 9.0, omega_v: {wholly.controller.omega_v}, " in told
     assert f" T_v: {wholly.controller.T_v}, which may have been defaults of velocity_v" in told
     assert told.endswith("; null takes those of momentum_vector")
@@ -151,7 +151,7 @@ def test_a_path_of_another_kind_keeps_course_and_speed():
         loaded = load("path.yaml", changes)
         assert (loaded.scenario.path.course, loaded.scenario.path.speed) == (0.3, 1.3)
         assert (
-            "path: kind line in place of sinusoid, which loses amplitude: 4.0" in loaded.dropped[0]
+            "path: kind line in place of sinusoid, which loses amplitude: 4.0" in loaded.remarks[0]
         )
 
 
@@ -163,7 +163,7 @@ def test_a_key_of_the_same_name_and_another_unit_or_type_is_another_key():
     law = loaded.scenario.controller
     assert (law.k_u, law.k_r) == (plain.k_u, plain.k_r)
     assert 9.0 != law.k_u != 4.0 != law.k_r
-    assert "which loses k_u: 9.0, k_r: 4.0" in loaded.dropped[0]
+    assert "which loses k_u: 9.0, k_r: 4.0" in loaded.remarks[0]
 
 
 def test_a_disturbance_keeps_nothing_of_another_kind():
@@ -171,7 +171,7 @@ def test_a_disturbance_keeps_nothing_of_another_kind():
     write("sea.yaml", STEERED.replace("kind: none", "kind: current, speed: 0.2, direction: 1.0"))
     loaded = load("sea.yaml", ["disturbance={kind: wind, speed: 5.0}"])
     assert loaded.scenario.disturbance.direction == 0.0
-    assert loaded.dropped == ()
+    assert loaded.remarks == ()
 
 
 COMMANDS = ("run", "compare", "validate", "verify", "margins", "export")

@@ -13,7 +13,7 @@ from podusv_cli.components.vessels.vessel import VESSELS, Vessel
 from podusv_cli.core.errors import ScenarioError, StorageError
 from podusv_cli.scenario import presets
 from podusv_cli.scenario.load import load, load_stored, load_text, tree_yaml
-from podusv_cli.scenario.named_files import MAX_POINTS
+from podusv_cli.scenario.point_files import MAX_POINTS
 from podusv_cli.scenario.presets import preset_file, preset_names
 from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.scenario.yaml_tree import plain
@@ -258,7 +258,7 @@ def test_the_header_of_a_route_says_which_column_is_which():
         ("0,0\n1e999,1\n", ["route.csv:2:1: path.points[1][0]: must be a number [m], found 1e999"]),
         ("O,5\n1,1\n2,2\n", ["route.csv:1:1: must be two numbers x,y [m]; the first is no number"]),
         (
-            "lat,lon\n0,0\n1,1\n",
+            "a,b\n0,0\n1,1\n",
             [
                 "route.csv:1:1: line 1 of the file names columns that are not x [m], y [m] (in any "
                 "order, units may be left out): column 1 is none of these"

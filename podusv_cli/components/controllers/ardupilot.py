@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Literal
 
 from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.parameter_files import of_ardupilot
 from podusv_cli.components.controllers.rover import (
     SHARED,
     STEERING_I,
@@ -27,7 +28,7 @@ from podusv_cli.components.controllers.rover import (
     kept_within,
     path_course,
 )
-from podusv_cli.core.component import Rule, value
+from podusv_cli.core.component import Rule, ValuesOf, value
 from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import direction, wrap
@@ -91,6 +92,10 @@ class ArduPilot(Rover):
     """Position controller or L1 guidance, PI control of yaw rate and speed with feed forwards."""
 
     kind: Literal["ardupilot"] = "ardupilot"
+    values_of: ClassVar[dict[str, ValuesOf]] = {"file": of_ardupilot}
+    file: str | None = value(
+        None, "", "parameter file of the autopilot, beside the scenario; read into the other keys"
+    )
     rules: ClassVar[dict[str, Rule]] = Rover.rules | {
         "speed_FF": by.THROTTLE,
         "speed_P": by.THROTTLE,

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, Literal
 
 from podusv_cli.components import rules as by
 from podusv_cli.components.controllers.base import Slots, each
+from podusv_cli.components.controllers.parameter_files import of_px4
 from podusv_cli.components.controllers.rover import (
     SHARED,
     STEERING_I,
@@ -27,7 +28,7 @@ from podusv_cli.components.controllers.rover import (
     kept_within,
     path_course,
 )
-from podusv_cli.core.component import Rule, Ruled, value
+from podusv_cli.core.component import Rule, Ruled, ValuesOf, value
 from podusv_cli.core.elementary import arctangent, cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
@@ -58,6 +59,10 @@ class Px4(Rover):
     """Pure pursuit, P control of heading, PI control of yaw rate and speed with feed forwards."""
 
     kind: Literal["px4"] = "px4"
+    values_of: ClassVar[dict[str, ValuesOf]] = {"file": of_px4}
+    file: str | None = value(
+        None, "", "parameter file of the autopilot, beside the scenario; read into the other keys"
+    )
     no_gains: ClassVar[tuple[str, ...]] = (
         *Rover.no_gains,
         "lookahead_min",

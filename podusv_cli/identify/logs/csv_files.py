@@ -125,11 +125,6 @@ def _names(path: Path, head: FileLine) -> list[str]:
     where = f"{path}: line {head.number}, its first,"
     if not any(names):
         raise LogFault(f"{where} names no columns; is it UTF-16 without a mark? Save it as UTF-8")
-    if names[0].startswith(("$", "!")):
-        raise LogFault(
-            f"{where} is an NMEA 0183 sentence; convert the log to CSV with the columns time [s], "
-            "lat [deg], lon [deg], psi [deg]"
-        )
     if sum(map(_is_number, names)) > len(names) / 2:
         raise LogFault(f"{where} has numbers and no names; write a line such as time,x,y,psi above")
     ((name, count),) = Counter(filter(None, names)).most_common(1)

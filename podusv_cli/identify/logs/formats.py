@@ -11,10 +11,19 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.csv_files import read_csv
-from podusv_cli.identify.logs.messages import read_dataflash, read_ros, read_ulog
+from podusv_cli.identify.logs.mat_files import read_mat
+from podusv_cli.identify.logs.messages import (
+    read_dataflash,
+    read_nmea,
+    read_ros,
+    read_telemetry,
+    read_ulog,
+)
+from podusv_cli.identify.logs.nmea import is_nmea
 from podusv_cli.storage.log_reader import read_log
 
 STATE_NAMES = {signal.name for signal in STATE}
+BEGINNING = 4096  # bytes, in which the first line shows
 MEASURED = "_m"  # ends the name of what a sensor of podusv measured
 
 
@@ -54,8 +63,18 @@ def _own(path: Path) -> Contents:
     return Contents(rest | {name: columns[f"{name}{MEASURED}"] for name in measured})
 
 
+def _text(path: Path) -> Contents:
+    """A file of lines: NMEA sentences, or a table."""
+    with path.open("rb") as file:
+        begin = file.read(BEGINNING)
+    return read_nmea(path) if is_nmea(begin.decode("ascii", "replace")) else read_csv(path)
+
+
 READERS: dict[str, Callable[[Path], Contents]] = {
-    ".csv": read_csv,
+    ".csv": _text,
+    ".txt": _text,
+    ".nmea": _text,
+    ".log": _text,
     ".h5": _own,
     ".db3": read_ros,
     ".mcap": read_ros,
@@ -63,4 +82,6 @@ READERS: dict[str, Callable[[Path], Contents]] = {
     "": read_ros,
     ".ulg": read_ulog,
     ".bin": read_dataflash,
+    ".tlog": read_telemetry,
+    ".mat": read_mat,
 }

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from podusv_cli.core.earth import PLACE
 from podusv_cli.core.escaping import visible
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
-from podusv_cli.identify.logs.frames import LAT, LON
-from podusv_cli.identify.logs.messages import TIME
 from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
 from podusv_cli.identify.logs.reading import (
     UNITS,
@@ -26,6 +25,7 @@ from podusv_cli.identify.logs.reading import (
     mark_new_values,
     split_unit,
 )
+from podusv_cli.identify.logs.topics import TIME
 
 SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
@@ -43,13 +43,22 @@ NAMES = {
     "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
     "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
     ".*propeller.*|.*motor.*|.*esc.*speed.*",
-    "delta_#": r"delta_?\d|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
+    "delta_#": r"delta_?\d|rsa_starboard|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
     "tau_u": r"tau_u|surge_?force|force\.x",
     "tau_v": r"tau_v|sway_?force|force\.y",
     "tau_r": r"tau_r|yaw_?moment|torque\.z",
 }
+# Columns that are none of these, whatever their last word: clocks of messages, what is wanted,
+# where a plane touches the earth, how uncertain a value is, which engine it is.
+NEVER = re.compile(
+    r"\.time$|setpoint|(^|[._ ])(ref|reset|manual|input|target|desired)_|covariance|variance"
+    r"|(^|[._ ])(std|eph|epv|evh|evv)|engine_no"
+)
+PARTS = "n_part_cmd_#"  # speeds that are asked for in parts of full speed
+FULL = 1.001  # largest of these
 # Of each of these a log needs one, the first where nothing is known.
-NEEDED = ((TIME,), ("x", "lat"), ("y", "lon"), ("psi",), ("n_1", "delta_1", "tau_u"))
+DRIVEN = ("n_1", "n_part_cmd_1", "delta_1", "tau_u")
+NEEDED = ((TIME,), ("x", "lat"), ("y", "lon"), ("psi",), DRIVEN)
 FORMS = ("^({})$", "([./ ]|_(?=...))({})$")  # the whole name, or its last part
 # Of quantities the unit that the end of a name means, and that which a range means that begins so.
 ENDINGS = {
@@ -119,6 +128,9 @@ class Listing:
                 unit = f" [{own.unit}]" if own.unit else ""
                 lines.append(f"  {own.quantity}: {_in_quotes(split_unit(own.name)[0] + unit)}")
         known = {own.quantity for own in self.columns}
+        clocks = {own.name for own in self.columns}
+        if all(clock_of(own.name, clocks) for own in self.columns if own.quantity):
+            known |= {TIME}  # every message has its own
         lacking = [names[0] for names in NEEDED if not known & {*names}]
         lines += [f"  # {name}: ?   (not guessed; see podusv docs identify)" for name in lacking]
         left = [visible(own.name) for own in self.columns if not own.quantity]
@@ -160,7 +172,7 @@ def _places(guesses: dict[str, str]) -> dict[str, str]:
 def _no_places(columns: Columns, guesses: dict[str, str]) -> list[tuple[str, str]]:
     """Columns that are called so and have no places on earth in degrees, and why."""
     found = []
-    for signal in (LAT, LON):
+    for signal in PLACE:
         column = _places(guesses).get(signal.name)
         if column is None or _unit(column, columns, guesses):
             continue
@@ -205,10 +217,27 @@ def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
         for form in [form.format(name) for form in FORMS for name in likely]:
             for column in columns:
                 free = column not in taken and (numbered or quantity not in taken)
-                own = quantity != TIME or _may_be_clock(column, columns)
-                if free and own and re.search(form, _plain(column)):
+                may_be = _may_be_clock if quantity == TIME else _may_be
+                if free and may_be(column, columns) and re.search(form, _plain(column)):
                     taken |= {column, quantity}
-                    yield column, quantity
+                    parts = quantity == "n_#" and _in_parts(column, columns)
+                    yield column, PARTS if parts else quantity
+
+
+def _may_be(column: str, columns: Columns) -> bool:
+    """Whether a column can be a quantity; velocities beside positions are those of the earth."""
+    plain = _plain(column)
+    if NEVER.search(column.lower()) or NEVER.search(plain):
+        return False
+    beside = plain.removesuffix("vx").removesuffix("vy")
+    return beside == plain or not {f"{beside}x", f"{beside}y"} <= {*map(_plain, columns)}
+
+
+def _in_parts(column: str, columns: Columns) -> bool:
+    """Whether a propeller's numbers are percents, or lie between full astern and full ahead."""
+    values = columns[column]
+    most = float(np.nanmax(np.abs(values), initial=0.0))
+    return split_unit(column)[1] == "%" or ("rp" not in _plain(column) and 0.0 < most <= FULL)
 
 
 def _pattern(quantity: str) -> str:

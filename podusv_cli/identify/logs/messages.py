@@ -1,4 +1,4 @@
-"""Logs of messages that come by topic: ROS bags, PX4's ULog, ArduPilot's DataFlash.
+"""Logs of messages that come by topic: ROS bags, PX4's ULog, ArduPilot's logs, NMEA.
 
 A column has its own times: "topic.field" those in "topic.time" [s]. The libraries that read these
 formats meet damage wherever they iterate; whatever they raise there becomes a sentence.
@@ -11,8 +11,7 @@ import importlib
 import math
 import os
 import sys
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import wraps
@@ -26,11 +25,13 @@ import numpy as np
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
-from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
+from podusv_cli.identify.logs.contents import Contents, LogFault
+from podusv_cli.identify.logs.nmea import contents_of_sentences
+from podusv_cli.identify.logs.topics import TIME, TopicMessages
 
-TIME = "time"
 LONGEST = 16  # numbers of an array in a message; longer ones are pictures and clouds
 OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simulation's clock set it
+CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3, "T": 1e-3}  # of DataFlash, new and old, to s
 Reader = Callable[[Path], Contents]
 
 
@@ -90,7 +91,7 @@ def read_ros(path: Path) -> Contents:
     """
     reader, typesys = _library("rosbags.highlevel", path), _library("rosbags.typesys", path)
     store = typesys.get_typestore(typesys.Stores.LATEST)
-    topics = _Messages()
+    topics = TopicMessages()
     with reader.AnyReader([path], default_typestore=store) as bag:
         for connection, arrival, raw in bag.messages():
             message = bag.deserialize(raw, connection.msgtype)
@@ -148,40 +149,42 @@ def read_dataflash(path: Path) -> Contents:
     """Every message of an ArduPilot log: "MESSAGE.Field", a second sensor's "MESSAGE_1.Field"."""
     library = _library("pymavlink.DFReader", path)
     log = library.DFReader_binary(str(path), zero_time_base=True)
-    messages, first = _Messages(), math.nan
+    messages, first = TopicMessages(), math.nan
     while (message := log.recv_msg()) is not None:
         content = message.to_dict()
-        clock = content.pop("TimeUS", None)
+        clock = next((content.pop(name) * s for name, s in CLOCKS.items() if name in content), None)
         if clock is None:
             continue
         first = clock if math.isnan(first) else first
         which = content.get(message.fmt.instance_field, 0)
         name = message.get_type() + (f"_{which}" if which else "")
         numbers = {f".{n}": float(x) for n, x in content.items() if isinstance(x, Real)}
-        messages.add(name, (clock - first) * 1e-6, numbers)
+        messages.add(name, clock - first, numbers)
     return Contents(messages.columns())
 
 
-class _Messages:
-    """Messages by topic, as they come in."""
+@_fence_reader
+def read_telemetry(path: Path) -> Contents:
+    """Every MAVLink message of a ground station's log (.tlog): "MESSAGE.field", by its arrival."""
+    library = _library("pymavlink.mavutil", path)
+    log = library.mavlink_connection(str(path))
+    messages, first = TopicMessages(), math.nan
+    while (message := log.recv_match()) is not None:
+        kind, arrival = message.get_type(), float(getattr(message, "_timestamp", math.nan))
+        if kind == "BAD_DATA" or not math.isfinite(arrival):
+            continue
+        first = arrival if math.isnan(first) else first
+        content = message.to_dict().items()
+        numbers = {f".{n}": float(x) for n, x in content if isinstance(x, Real)}
+        messages.add(kind, arrival - first, numbers)
+    return Contents(messages.columns())
 
-    def __init__(self) -> None:
-        self.times: dict[str, list[float]] = defaultdict(list)
-        self.contents: dict[str, list[Mapping[str, float]]] = defaultdict(list)
 
-    def add(self, topic: str, time: float, numbers: Mapping[str, float]) -> None:
-        self.times[topic].append(time)
-        self.contents[topic].append(numbers)
-
-    def columns(self) -> Columns:
-        """A column for each field of each topic; NaN where a message lacks it."""
-        columns: dict[str, Vector] = {}
-        for topic, contents in self.contents.items():
-            columns[f"{topic}.{TIME}"] = np.array(self.times[topic])
-            for field in dict.fromkeys(name for numbers in contents for name in numbers):
-                values = [numbers.get(field, math.nan) for numbers in contents]
-                columns[topic + field] = np.array(values)
-        return columns
+@_fence_reader
+def read_nmea(path: Path) -> Contents:
+    """NMEA 0183 sentences, a line each: see `nmea`."""
+    parse = _library("pynmea2", path).parse
+    return contents_of_sentences(path.read_text("ascii", "replace"), parse)
 
 
 def _library(name: str, path: Path) -> Any:

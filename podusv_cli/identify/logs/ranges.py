@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from podusv_cli.core.earth import LAT, LON, MOST
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import Signal
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.logs.frames import LAT, LON
 
 Marks = npt.NDArray[np.bool_]
-PLACES = {LAT.name: ("latitude", 90.0), LON.name: ("longitude", 180.0)}  # and most [deg]
+PLACES = {LAT.name: ("latitude", MOST[LAT.name]), LON.name: ("longitude", MOST[LON.name])}
 SELDOM = 0.05  # of the values, that may be out of range
 MINUTES = 100.0  # a degree, where degrees and minutes are written as one number
 IN_MINUTES = (

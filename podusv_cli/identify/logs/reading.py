@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,14 +15,15 @@ import numpy as np
 import numpy.typing as npt
 
 from podusv_cli.core import units
+from podusv_cli.core.earth import PLACE, Plane
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.core.units import spell_unit, units_allowed_for
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
 from podusv_cli.identify.logs.formats import contents_of
-from podusv_cli.identify.logs.frames import LAT, LON, from_frame, local_plane
-from podusv_cli.identify.logs.messages import TIME
+from podusv_cli.identify.logs.frames import from_frame, local_plane
 from podusv_cli.identify.logs.ranges import PLACES, may_be_minutes, on_earth, without_none
+from podusv_cli.identify.logs.topics import TIME
 
 Marks = npt.NDArray[np.bool_]
 Whole = npt.NDArray[np.int64]
@@ -31,7 +32,7 @@ SELDOM = 0.05  # of a sensor's values, that may come at another time than the ot
 SLACK = 1e-5  # of a step, to which times of a date are true
 LISTED = 30  # columns that a message names
 BOOT = 20  # rows at least, between two steps back of a clock and in each, which then began anew
-SENSED = {signal.name for signal in (*STATE, LAT, LON)}
+SENSED = {signal.name for signal in (*STATE, *PLACE)}
 OPTIONAL = {signal.name for signal in STATE[3:]}  # that may be in a log without any number
 # What logs have beside the units that people write: propellers in rad/s, angles as integers.
 OF_LOGS = {
@@ -95,10 +96,14 @@ class LogTable:
 
 
 class NamedQuantities(NamedTuple):
-    """What a log calls quantities, and the frame that it has them in."""
+    """What a log calls quantities, the frame that it has them in, and where x = y = 0 is on earth.
+
+    Without a plane x and y of latitudes and longitudes count from the first fix.
+    """
 
     columns: Mapping[str, str] = {}
     frame: Literal["ned", "enu"] = "ned"
+    plane: Plane | None = None
 
 
 class _Series(NamedTuple):
@@ -150,19 +155,19 @@ def tables(
         found = [replace(part, name=f"{name}, boot {i}") for i, part in enumerate(found, 1)]
     lines = tuple(f"{name}: {word}." for word in (*contents.warnings, *words))
     found[0] = replace(found[0], warnings=(*lines, *found[0].warnings))
-    return [_in_frame(part, named.frame) for part in found]
+    return [_in_frame(part, named) for part in found]
 
 
-def _in_frame(whole: LogTable, frame: str) -> LogTable:
+def _in_frame(whole: LogTable, named: NamedQuantities) -> LogTable:
     """The table north, east, to starboard; of latitude and longitude, which are so in any frame."""
-    flat, notes = local_plane(from_frame(whole.columns, frame))
-    from_fix = "x" in flat and "x" not in whole.columns
-    minutes = from_fix and all(may_be_minutes(whole.columns[place]) for place in PLACES)
+    flat, notes = local_plane(from_frame(whole.columns, named.frame), named.plane)
+    on_earth_alone = "x" in flat and "x" not in whole.columns
+    minutes = on_earth_alone and all(may_be_minutes(whole.columns[place]) for place in PLACES)
     return replace(
         whole,
         columns=flat,
         notes=tuple(f"{whole.name}: {note}." for note in notes),
-        from_fix=from_fix,
+        from_fix=on_earth_alone and named.plane is None,
         maybe_minutes=minutes,
     )
 
@@ -175,7 +180,7 @@ def _series(
     clock = _find_column(columns, CLOCK, named, name)
     series: dict[str, _Series] = {}
     used: dict[str, str] = {}
-    for signal in (*wanted, LAT, LON):
+    for signal in (*wanted, *PLACE):
         found = _find_column(columns, signal, named, name)
         if not found or (signal.name in PLACES and {"x", "y"} & series.keys()):
             continue
@@ -296,7 +301,7 @@ def _factor(signal: Signal, unit: str, name: str) -> float:
     return known[spell_unit(unit)] if unit else 1.0
 
 
-def clock_of(column: str, columns: Columns) -> str | None:
+def clock_of(column: str, columns: Collection[str]) -> str | None:
     """The column that has the times of a message's field: "topic.time" of "topic.field.x"."""
     parts = column.split(".")
     clocks = (".".join([*parts[:n], TIME]) for n in range(len(parts) - 1, 0, -1))

@@ -96,7 +96,9 @@ const chaseOn = (stage) => {
     });
     const x = across(now);
     set(cursor, "d", `M${x} ${TOP}V${tall - BASE}`);
-    output.textContent = `t = ${now.toFixed(end < 20 ? 2 : 1)} s`;
+    const first = runs[0], i = row(first, now), degrees = (name) => first[name][i].toFixed(5);
+    const place = first.lat && first.lat[i] !== null ? `, ${first.label} at ${degrees("lat")}, ${degrees("lon")} deg` : "";
+    output.textContent = `t = ${now.toFixed(end < 20 ? 2 : 1)} s${place}`;
     slider.value = now;
   };
 

@@ -25,7 +25,16 @@ from podusv_cli.studies.making.check import sweep_faults
 from podusv_cli.studies.making.draws import SWEEP
 
 # Sections of a scenario that change no number of a study.
-COSMETIC = ("name", "description", "log", "silence", "claims", "controllers", *BESIDE_RUNS)
+COSMETIC = (
+    "name",
+    "description",
+    "origin",
+    "log",
+    "silence",
+    "claims",
+    "controllers",
+    *BESIDE_RUNS,
+)
 MOST_NAMED = 4  # keys that a message about another study names
 LawInCell = tuple[str, int]  # a law, and the number of a cell
 KERNELS = " kernels"  # ends the key of the digest of a law's compiled source

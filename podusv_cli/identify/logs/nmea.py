@@ -1,0 +1,142 @@
+"""Logs of NMEA 0183 sentences, as receivers, compasses and engines send them.
+
+A column is "SENTENCE.field", without the talker: RMC.lat, HDT.heading, RPM_1.speed. Places come as
+degrees. The time of a sentence without a clock lies between those of the sentences with one beside
+it, by lines. Field names are those of pynmea2.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import operator
+import re
+from collections.abc import Iterator, Mapping
+from datetime import UTC, date, datetime, time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.units import NUMBER
+from podusv_cli.identify.logs.contents import Contents, LogFault
+from podusv_cli.identify.logs.topics import TopicMessages
+
+SENTENCE = re.compile(r"[$!]([A-Z]{2}[A-Z]{3}|P[A-Z]{3,4})(,[^*]*)(?:\*([0-9A-Fa-f]{2}))?")
+LEADING = re.compile(r"^([-+]?)0+(?=\d)")  # zeros, as in 091.5
+SELDOM = 0.05  # of the sentences, whose checksum may be wrong
+NUMBERED = ("engine_no",)  # fields that count engines and shafts
+DAY = 86400.0  # s
+UNITS = {  # of fields whose unit the standard gives
+    "spd_over_grnd": "kn",
+    "spd_over_grnd_kts": "kn",
+    "true_course": "deg",
+    "true_track": "deg",
+    "heading": "deg",
+    "true_heading": "deg",
+    "rsa_starboard": "deg",
+    "rsa_port": "deg",
+    "lat": "deg",
+    "lon": "deg",
+    "rpm": "rpm",
+    "rate_of_turn": "deg/s",
+}
+PER_MINUTE = {"rate_of_turn": 1.0 / 60.0}  # deg/min, to deg/s
+SPEED_OF_RPM = {"speed": "rpm"}  # what RPM calls its field
+
+
+class Sentence(NamedTuple):
+    """A sentence of a log: its type, numbers by field, and its time of day [s] where it has one."""
+
+    kind: str
+    numbers: Mapping[str, float]
+    clock: float
+    day: date | None
+
+
+def is_nmea(text: str) -> bool:
+    """Whether the first line of a text that is not empty is a sentence."""
+    first = next((line for line in text.lstrip("\ufeff").splitlines() if line.strip()), "")
+    return SENTENCE.search(first) is not None
+
+
+def contents_of_sentences(text: str, parse: Any) -> Contents:
+    """The columns of a log; `parse` is pynmea2's. Raises LogFault where no sentence has a clock."""
+    matches = [match for line in text.splitlines() if (match := SENTENCE.search(line))]
+    wrong = [bool(m[3]) and _checksum(m[1] + m[2]) != int(m[3], 16) for m in matches]
+    rows = [i for i, bad in enumerate(wrong) if not bad]
+    warnings = []
+    if sum(wrong) > SELDOM * len(wrong):
+        rows = list(range(len(matches)))
+        warnings = [f"{sum(wrong)} of {len(wrong)} sentences have a wrong checksum; all are read"]
+    elif any(wrong):
+        warnings = [f"{sum(wrong)} sentences with a wrong checksum are left out"]
+    sentences = [_sentence(parse, matches[i]) for i in rows]
+    kept = [(i, s) for i, s in zip(rows, sentences, strict=True) if s]
+    times = _times(kept)
+    topics = TopicMessages()
+    for at, (_, sentence) in zip(times, kept, strict=True):
+        if sentence.numbers and math.isfinite(at):
+            topics.add(sentence.kind, at, sentence.numbers)
+    return Contents(topics.columns(), warnings=tuple(warnings))
+
+
+def _checksum(body: str) -> int:
+    """The exclusive or of all letters between $ and *."""
+    return functools.reduce(operator.xor, body.encode("ascii", "replace"), 0)
+
+
+def _sentence(parse: Any, match: re.Match[str]) -> Sentence | None:
+    """A sentence, None for one that pynmea2 does not know or cannot read."""
+    try:
+        message = parse(f"${match[1]}{match[2]}")
+        fields = {field[1]: getattr(message, field[1]) for field in message.fields}
+    except Exception:  # a type that it does not know, or a field that is none
+        return None
+    kind = str(getattr(message, "sentence_type", type(message).__name__))
+    if any(fields.get(name) == "V" for name in ("status", "rmc_status")):
+        return None  # the receiver says that it is not valid
+    clock, day = fields.get("timestamp"), fields.get("datestamp")
+    number = next((str(fields[name]) for name in NUMBERED if fields.get(name)), "")
+    return Sentence(
+        f"{kind}_{number}" if number else kind,
+        dict(_numbers(kind, fields, message)),
+        _seconds(clock) if isinstance(clock, time) else math.nan,
+        day if isinstance(day, date) else None,
+    )
+
+
+def _numbers(kind: str, fields: Mapping[str, Any], message: Any) -> Iterator[tuple[str, float]]:
+    """The numbers of a sentence by field, with the unit that the standard gives."""
+    for name, content in fields.items():
+        if name in ("lat", "lon"):
+            degrees = getattr(message, {"lat": "latitude", "lon": "longitude"}[name])
+            if content:
+                yield f".{name} [deg]", float(degrees)
+            continue
+        text = LEADING.sub(r"\1", str(content).strip())
+        if not NUMBER.fullmatch(text):
+            continue
+        own = SPEED_OF_RPM.get(name, name) if kind == "RPM" else name
+        unit = f" [{UNITS[own]}]" if own in UNITS else ""
+        yield f".{own}{unit}", float(text) * PER_MINUTE.get(own, 1.0)
+
+
+def _seconds(clock: time) -> float:
+    return 3600.0 * clock.hour + 60.0 * clock.minute + clock.second + 1e-6 * clock.microsecond
+
+
+def _times(kept: list[tuple[int, Sentence]]) -> Vector:
+    """When each sentence came [s], since 1970 where one has a date. Raises LogFault without any."""
+    clocks = np.array([sentence.clock for _, sentence in kept], float)
+    timed = np.flatnonzero(np.isfinite(clocks))
+    if not len(timed):
+        raise LogFault("has no sentence with a clock (RMC, GGA, GLL, ZDA), so nobody knows when")
+    # Over midnight a clock steps back by a day; by less it is one that was set.
+    clocks[timed] += DAY * np.cumsum(np.diff(clocks[timed], prepend=clocks[timed[0]]) < -0.5 * DAY)
+    first = next((s.day for _, s in kept if s.day), None)
+    if first:
+        clocks += datetime(first.year, first.month, first.day, tzinfo=UTC).timestamp()
+    lines = np.array([line for line, _ in kept], float)
+    new = timed[np.flatnonzero(np.diff(clocks[timed], prepend=-np.inf) > 0.0)]
+    return np.asarray(np.interp(lines, lines[new], clocks[new], left=np.nan, right=np.nan))

@@ -1,0 +1,199 @@
+"""NMEA 0183, telemetry logs, MATLAB's files, old DataFlash, and what is proposed for PX4's logs."""
+
+import random
+import struct
+
+import numpy as np
+import pytest
+from log_files import write_dataflash
+from scipy.io import savemat
+
+from podusv_cli.identify.logs.contents import LogFault
+from podusv_cli.identify.logs.formats import columns_of, contents_of
+from podusv_cli.identify.logs.listing import listing
+
+
+def sentence(body):
+    """With its checksum, the exclusive or of the letters."""
+    check = 0
+    for letter in body:
+        check ^= ord(letter)
+    return f"${body}*{check:02X}"
+
+
+def sentences(count=60, begins=86_390.0):
+    """Positions at 5 Hz, headings at 10 Hz, an engine at 2 Hz; over midnight of 10 January 2024."""
+    lines = []
+    for i in range(count):
+        at = begins + 0.1 * i
+        day, of_day = 10 + int(at >= 86_400.0), at % 86_400.0
+        clock = f"{int(of_day // 3600):02d}{int(of_day % 3600 // 60):02d}{of_day % 60:05.2f}"
+        if i % 2 == 0:
+            place = f"{4812.0 + 1e-4 * i:09.4f},N,{1130.0 + 2e-4 * i:010.4f},W"
+            lines.append(f"GPRMC,{clock},A,{place},1.500,090.0,{day:02d}0124,3.4,W,D")
+        lines.append(f"GNHDT,{(355.0 + 0.5 * i) % 360.0:05.1f},T")
+        if i % 5 == 0:
+            lines += [f"IIRPM,S,1,{600 + i}.0,,A", f"IIRSA,{-0.1 * i:.1f},A,,V", "TIROT,-6.0,A"]
+    return [sentence(line) for line in lines]
+
+
+def nmea(tmp_path, lines, name="log.nmea"):
+    path = tmp_path / name
+    path.write_bytes("\r\n".join(lines).encode())
+    return path
+
+
+@pytest.mark.parametrize("name", ["log.nmea", "log.txt", "log.csv", "log.log"])
+def test_sentences_become_columns_with_units_and_times(tmp_path, name):
+    columns = columns_of(nmea(tmp_path, sentences(160), name))
+    begin = 1_704_931_190.0  # 2024-01-10T23:59:50Z
+    assert columns["RMC.time"] == pytest.approx(begin + 0.2 * np.arange(80), abs=1e-3)
+    assert columns["RMC.lat [deg]"][70] == pytest.approx(48.0 + (12.0 + 1e-4 * 140) / 60.0)
+    assert columns["RMC.lon [deg]"][70] == pytest.approx(-11.0 - (30.0 + 2e-4 * 140) / 60.0)
+    assert columns["HDT.heading [deg]"][:12].tolist() == [
+        (355.0 + 0.5 * i) % 360 for i in range(12)
+    ]
+    # A heading comes right behind the position of its time, or between two of them.
+    assert np.abs(columns["HDT.time"][:150] - begin - 0.1 * np.arange(150)).max() < 0.1
+    assert columns["RPM_1.rpm [rpm]"][:2].tolist() == [600.0, 605.0]
+    assert columns["ROT.rate_of_turn [deg/s]"][0] == pytest.approx(-0.1)
+
+
+def test_what_a_log_of_sentences_may_be_is_proposed(tmp_path):
+    lines = listing(nmea(tmp_path, sentences())).mapping()
+    assert lines[1:7] == [
+        '  lat: "RMC.lat [deg]"',
+        '  lon: "RMC.lon [deg]"',
+        '  psi: "HDT.heading [deg]"',
+        '  n_1: "RPM_1.rpm [rpm]"',
+        '  delta_1: "RSA.rsa_starboard [deg]"',
+        '  r: "ROT.rate_of_turn [deg/s]"',
+    ]
+    assert not any("?" in line for line in lines)
+
+
+def test_sentences_that_are_damaged_are_left_out_and_counted(tmp_path):
+    lines = sentences(200)
+    lines[10] = lines[10].replace("A", "B", 1)
+    read = contents_of(nmea(tmp_path, lines))
+    assert read.warnings == ("1 sentences with a wrong checksum are left out",)
+    wrong = [line[:-2] + "00" for line in sentences()]
+    read = contents_of(nmea(tmp_path, wrong))
+    assert read.warnings[0].endswith("sentences have a wrong checksum; all are read")
+    assert len(read.columns["RMC.lat [deg]"]) == 30
+    void = [line.replace(",A,48", ",V,48").split("*")[0] for line in sentences(20)]
+    with pytest.raises(LogFault, match="no sentence with a clock"):
+        contents_of(nmea(tmp_path, void))
+
+
+def test_damaged_sentences_end_in_a_sentence(tmp_path):
+    rng, text = random.Random(5), "\r\n".join(sentences(30))
+    for _ in range(300):
+        a, b = sorted(rng.randrange(len(text)) for _ in range(2))
+        damaged = text[:a] + rng.choice(["", "\0", ",,", "$", "é"]) + text[min(b, a + 30) :]
+        path = tmp_path / "log.nmea"
+        path.write_text(damaged, encoding="utf-8")
+        try:
+            columns = columns_of(path)
+        except LogFault:
+            continue
+        assert all(np.isfinite(v).all() for name, v in columns.items() if name.endswith("time"))
+
+
+def test_matlab_s_vectors_structures_and_matrices_are_columns(tmp_path):
+    t = np.arange(50) * 0.1
+    content = {
+        "t": t.reshape(-1, 1),
+        "pos": np.column_stack([t, 2.0 * t]),
+        "boat": {"psi": 0.1 * t, "n": np.vstack([t, -t])},
+        "mass": 55.0,
+        "note": "a trial",
+        "short": np.arange(7.0),
+    }
+    savemat(tmp_path / "log.mat", content)
+    read = contents_of(tmp_path / "log.mat")
+    assert set(read.columns) == {"t", "pos_1", "pos_2", "boat.psi", "boat.n_1", "boat.n_2"}
+    assert read.columns["boat.n_2"].tolist() == (-t).tolist()
+    assert read.warnings == ("short are left out: they do not have 50 rows as most columns",)
+
+
+def test_files_of_matlab_that_cannot_be_read_say_what_to_write(tmp_path):
+    (tmp_path / "new.mat").write_bytes(
+        b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(512)
+    )
+    with pytest.raises(LogFault, match="save it as -v7"):
+        contents_of(tmp_path / "new.mat")
+    (tmp_path / "bad.mat").write_bytes(b"abc")
+    with pytest.raises(LogFault, match=r"no \.mat file, or damaged"):
+        contents_of(tmp_path / "bad.mat")
+    savemat(tmp_path / "none.mat", {"mass": 55.0})
+    with pytest.raises(LogFault, match="holds no vectors"):
+        contents_of(tmp_path / "none.mat")
+
+
+def test_dataflash_of_before_microseconds_has_milliseconds(tmp_path):
+    whole = write_dataflash(tmp_path / "log.bin").read_bytes()
+    micro = columns_of(tmp_path / "log.bin")["ATT.time"]
+    (tmp_path / "log.bin").write_bytes(whole.replace(b"TimeUS", b"TimeMS"))
+    assert columns_of(tmp_path / "log.bin")["ATT.time"] == pytest.approx(1000.0 * micro)
+
+
+def test_a_telemetry_log_has_its_messages_by_arrival(tmp_path):
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    pack = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    out = b""
+    for i in range(20):
+        messages = (
+            mavlink.MAVLink_global_position_int_message(
+                100 * i, 590_000_000 + i, 100_000_000, 0, 0, 0, 0, 0, 100 * i
+            ),
+            mavlink.MAVLink_servo_output_raw_message(1000 * i, 0, *[1500 + i] * 8),
+        )
+        for message in messages:
+            out += struct.pack(">Q", 1_700_000_000_000_000 + 100_000 * i) + message.pack(pack)
+    (tmp_path / "log.tlog").write_bytes(out)
+    columns = columns_of(tmp_path / "log.tlog")
+    assert columns["GLOBAL_POSITION_INT.time"] == pytest.approx(0.1 * np.arange(20), abs=1e-6)
+    assert columns["GLOBAL_POSITION_INT.lat"][3] == 590_000_003
+    assert columns["SERVO_OUTPUT_RAW.servo1_raw"][4] == 1504.0
+
+
+def px4_log(path):
+    """Position, attitude, rates, motors and sticks of a boat, as PX4 logs them."""
+
+    def message(kind, body):
+        return struct.pack("<HB", len(body), ord(kind)) + body
+
+    topics = {
+        "manual_control_setpoint": ("float x;float y;float r;", "fff", lambda _: (0.0, 0.5, 0.1)),
+        "vehicle_angular_velocity": ("float[3] xyz;", "fff", lambda t: (0.0, 0.0, 0.1 * t)),
+        "vehicle_local_position": (
+            "double ref_lat;double ref_lon;float x;float y;float vx;float vy;float heading;",
+            "ddfffff",
+            lambda t: (48.2, 11.5, t, 2.0 * t, 1.0, 2.0, 0.05 * t),
+        ),
+        "actuator_motors": ("float[2] control;", "ff", lambda t: (0.5, -0.1 * t)),
+    }
+    out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
+    out += [message("F", f"{n}:uint64_t timestamp;{f}".encode()) for n, (f, _, _) in topics.items()]
+    out += [message("A", struct.pack("<BH", 0, i) + n.encode()) for i, n in enumerate(topics)]
+    for k in range(50):
+        for i, (_, codes, values) in enumerate(topics.values()):
+            body = struct.pack(f"<HQ{codes}", i, 100_000 * k, *values(0.1 * k))
+            out.append(message("D", body))
+    path.write_bytes(b"".join(out))
+    return path
+
+
+def test_of_a_px4_log_the_boat_s_own_motion_is_proposed(tmp_path):
+    lines = listing(px4_log(tmp_path / "usv.ulg")).mapping()
+    proposed = {line.split(":")[0].strip(): line.split('"')[1] for line in lines if '"' in line}
+    assert proposed == {
+        "x": "vehicle_local_position.x",
+        "y": "vehicle_local_position.y",
+        "psi": "vehicle_local_position.heading",
+        "r": "vehicle_angular_velocity.xyz[2]",
+        "n_part_cmd_1": "actuator_motors.control[0]",
+        "n_part_cmd_2": "actuator_motors.control[1]",
+    }
