@@ -31,6 +31,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Identification
+from podusv_cli.identify.doubts import early_words, thrust_words, worse_words
 from podusv_cli.identify.fit.estimate import OPEN, SILENT, HullEstimate, directions
 from podusv_cli.identify.fit.march import (
     APART,
@@ -46,7 +47,7 @@ from podusv_cli.identify.fit.problem import FitProblem, hull_numbers
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.logs.reading import LogTable, mark_new_values
 from podusv_cli.identify.outputs import rows_of_draws
-from podusv_cli.identify.phrases import early_words, summary, thrust_words, worse_words
+from podusv_cli.identify.phrases import summary
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.identify import answer_logs

@@ -208,6 +208,10 @@ class FitProblem:
         added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}
         return own.changed(new | added)
 
+    def position_noise(self, y: Vector) -> float:
+        """Standard deviation of a measured position, on each axis, at a point [m]."""
+        return self.values(y).get("sigma_p", self.filter.sigma_p)
+
     def thrust(self, y: Vector) -> float:
         """What part of the loads that the actuator's numbers give acts on the hull at a point."""
         return self._hull_values(y).get(THRUST, 1.0)
