@@ -100,7 +100,7 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
     rows = log.record.rows.copy()
     rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
     cut = log.of(rows)
-    points = [y, np.zeros(len(y))]
+    points = [y, problem.before(y)]
     currents = [_current(problem, cut.until(first), point) for point in points]
     track = problem.follow(cut, points, currents).track[first:]
     measured = np.where(

@@ -16,7 +16,8 @@ from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Force, Identification
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
-from podusv_cli.identify.fit.march import CURRENT, DELAY, THRUST
+from podusv_cli.identify.fit.march import COMPASS, CURRENT, DELAY, THRUST
+from podusv_cli.identify.fit.wander import DEVIATION, LASTING
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
@@ -39,6 +40,9 @@ OTHERS = {
     "m33": "kg m2",
     THRUST: "1",
     DELAY: "s",
+    DEVIATION: "m",
+    LASTING: "s",
+    COMPASS: "rad",
     **dict.fromkeys(CURRENT, "m/s"),
     "first u": "m/s",
     "first v": "m/s",

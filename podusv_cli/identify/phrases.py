@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from podusv_cli.identify.answer import AXES, Identification
+from podusv_cli.identify.answer import AXES, Identification, Parameter
 from podusv_cli.identify.fit.estimate import OPEN
+from podusv_cli.identify.fit.march import COMPASS
+from podusv_cli.identify.fit.wander import DEVIATION, LASTING
 from podusv_cli.identify.judge import SHOWN, WHO
+from podusv_cli.scenario.identify import WANDER
 
 # The manoeuvre that determines the numbers of an axis.
 MANOEUVRES = {
@@ -26,6 +31,7 @@ def summary(answer: Identification) -> list[str]:
     seconds = sum(log.duration for log in logs)
     given = f"{len(logs)} {'logs' if len(logs) > 1 else 'log'} of {seconds:.0f} s in all"
     notes = [note for log, _, _ in answer.judged for note in log.notes]
+    notes = [*_sensors(answer), *notes]
     if not answer.estimate.settled:
         unsettled = (
             f"{given}: the search did not settle, so the logs count as determining nothing. The "
@@ -38,6 +44,33 @@ def summary(answer: Identification) -> list[str]:
         f"determined, each to less than {OPEN:g} of what was known before."
     )
     return [*_judge_in_words(answer), *_forces(answer), determined, *notes]
+
+
+def _sensors(answer: Identification) -> list[str]:
+    """Which lasting errors of sensors were looked for, and what came out."""
+    found, problem = {p.name: p for p in answer.parameters}, answer.problem
+    lines, compass = [], found.get(COMPASS)
+    if LASTING in found:
+        size, lasts = found.get(DEVIATION), found[LASTING]
+        given = f"{problem.wander:.2g} m as given" if size is None else _with_ends(size, "m")
+        lines.append(
+            f"Positions have an error that wanders, looked for beside the hull: {given} on each "
+            f"axis, forgotten in {_with_ends(lasts, 's')}. noise: {{wander: 0}} looks for none."
+        )
+    elif WANDER not in problem.wanted.noise:
+        lines.append(
+            "Third differences of the positions show no error that wanders, so none was looked "
+            "for; noise: {wander: 1.0} looks for one of about 1 m."
+        )
+    if compass:
+        degrees = _with_ends(compass, "deg", math.degrees(1.0))
+        lines.append(f"The compass shows {degrees} more than the heading.")
+    return lines
+
+
+def _with_ends(p: Parameter, unit: str, factor: float = 1.0) -> str:
+    """A number with its interval, times a factor that makes its unit this one."""
+    return f"{factor * p.value:.2g} {unit} ({factor * p.low:.2g} to {factor * p.high:.2g})"
 
 
 def _judge_in_words(answer: Identification) -> list[str]:
