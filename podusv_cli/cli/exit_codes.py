@@ -26,8 +26,9 @@ MEANINGS = {
     1: "a bug in podusv",
     2: "wrong usage or scenario",
     3: "some of several runs failed (`compare`, `sweep`) or figures (`plot`), a number is not "
-    "converged (`verify`, `optimum`) or there is no steady motion (`margins`), or runs differ "
-    "(`rerun`, `diff`, kept logs of `sweep`)",
+    "converged (`verify`, `optimum`) or there is no steady motion (`margins`), a hull is no "
+    "improvement on the vessel that was given (`identify`), or runs differ (`rerun`, "
+    "`diff`, kept logs of `sweep`)",
     4: "the simulation diverged; what was computed is kept",
     5: "input or output failed",
     129: "the terminal was closed",

@@ -39,6 +39,14 @@ def _report_columns(found: Listing) -> None:
         echo(line)
 
 
+REFUSED = 3
+Force = Annotated[
+    bool,
+    typer.Option(
+        "--force",
+        help="Replace finished results, and write a hull that predicts worse than `vessel`.",
+    ),
+]
 Columns = Annotated[
     Path | None,
     typer.Option(
@@ -54,7 +62,7 @@ def identify(
     columns: Columns = None,
     assign: options.Assignments = None,
     out: options.Out = None,
-    force: options.Force = False,
+    force: Force = False,
     figures: options.Figures = True,
     as_json: options.AsJson = False,
     quiet: options.Quiet = False,
@@ -64,7 +72,8 @@ def identify(
     """Find the numbers of a hull, and how far off they may be, from logs of the boat.
 
     The section `identify` of the scenario names the logs and their columns; `vessel` is what is
-    known before. What the logs do not determine is named.
+    known before. What the logs do not determine is named. Exit code 3 when the hull predicts a log
+    worse than `vessel`: it is kept aside, and no scenario takes it.
     """
     if columns:
         return _show_columns(columns, as_json)
@@ -95,9 +104,12 @@ def identify(
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.identify(Path(config), request, bars)
     show(done, lambda: _report(done), as_json=as_json, quiet=quiet)
+    if done.refusal:
+        echo(done.refusal, err=True)
     if done.status == "interrupted":
         echo("interrupted; the numbers are the best so far", err=True)
         raise typer.Exit(INTERRUPTED)
+    raise typer.Exit(REFUSED if done.refusal else 0)
 
 
 def _report(done: Identified) -> None:
@@ -111,5 +123,5 @@ def _report(done: Identified) -> None:
     echo_table(list(SCORES), [*score_rows(judged or answer.scores)])
     for line in (*summary(answer), *open_words(answer)):
         echo(line)
-    echo(f"hull: {done.folder / 'identified.yaml'}")
+    echo(f"hull: {done.hull}")
     echo(f"report: {done.folder / 'report.html'}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from podusv_cli.core.signal import STATE
 from podusv_cli.identify.fit.estimate import Directions, HullEstimate
 from podusv_cli.identify.fit.problem import FitProblem, channels
 from podusv_cli.identify.fit.records import FilterLog
-from podusv_cli.identify.judge import FreeRun, Score
+from podusv_cli.identify.judge import FreeRun, Score, decisive, predicted_worse
 
 SIDE = 1.959964  # standard deviations to either end of an interval that holds 95 %
 SLOWEST = 0.05  # of the largest speed along the logs: slower is no motion to speak of
@@ -120,6 +121,17 @@ class Identification:
     directions: Directions
     judged: Sequence[tuple[FilterLog, str, Sequence[FreeRun]]]
     scores: Sequence[Score]
+
+    @property
+    def determined_count(self) -> int:
+        """How many directions the logs determine; none where the search did not settle."""
+        return self.directions.determined_count if self.estimate.settled else 0
+
+    @cached_property
+    def refused_by(self) -> list[tuple[Score, Score]]:
+        """Where the prior predicts better, so that the hull is none to use: own score, prior's."""
+        both_axes = math.sqrt(2.0) * self.problem.position_noise(self.estimate.y)
+        return predicted_worse(decisive(self.scores), both_axes)
 
     @cached_property
     def vessel(self) -> Vessel:

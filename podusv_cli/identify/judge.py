@@ -22,6 +22,8 @@ MOST = 20
 HORIZONS = (5.0, 30.0, np.inf)  # s after a start; infinite: to the end of the log, from the first
 NEAR = 0.1  # of a horizon: how far from it a measured value may be
 FARTHEST = HORIZONS[-2] * (1.0 + NEAR)  # s after a start: what no score looks beyond
+SHOWN = 30.0  # s after a start: the horizon that counts
+WORSE = 1.2  # times the prior's error: what is no accident of one log
 WHO = ("identified", "prior", "constant velocity")
 
 
@@ -98,7 +100,7 @@ def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> Fre
     rows = log.record.rows.copy()
     rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
     cut = log.of(rows)
-    points = [y, np.zeros(len(y))]
+    points = [y, problem.before(y)]
     currents = [_current(problem, cut.until(first), point) for point in points]
     track = problem.follow(cut, points, currents).track[first:]
     measured = np.where(
@@ -157,3 +159,32 @@ def scores(log: FilterLog, role: str, runs: Sequence[FreeRun]) -> Iterator[Score
                 own = errors[:, i]
                 position, heading = _rms(own[:, 0]), _rms(own[np.isfinite(own[:, 1]), 1])
                 yield Score(log.name, role, horizon, who, len(own), position, heading)
+
+
+def predicted_worse(scores: Sequence[Score], noise: float = 0.0) -> list[tuple[Score, Score]]:
+    """Scores of the hull from the logs that are worse than the prior's, each beside that one.
+
+    An error that the positions' own `noise` [m] explains is not worse than another.
+    """
+    own, prior = ([s for s in scores if s.who == who] for who in WHO[:2])
+    return [
+        (s, before)
+        for s, before in zip(own, prior, strict=True)
+        if s.position > WORSE * max(before.position, noise)
+    ]
+
+
+def decisive(scores: Sequence[Score]) -> list[Score]:
+    """Those that decide whether a hull is an improvement: of each log at one horizon.
+
+    That is SHOWN, or the longest of a log that has no such run. Logs that were not fitted decide;
+    the others do where all were fitted.
+    """
+    judged = [s for s in scores if s.role == "judge"] or list(scores)
+    chosen: list[Score] = []
+    for log in dict.fromkeys(s.log for s in judged):
+        own = [s for s in judged if s.log == log]
+        horizons = {s.horizon for s in own}
+        at = SHOWN if SHOWN in horizons else max(horizons)
+        chosen += [s for s in own if s.horizon == at]
+    return chosen

@@ -11,11 +11,13 @@ from typing import Any
 
 from podusv_cli.components.estimators.ekf import ExtendedKalmanFilter
 from podusv_cli.core.component import unit_of
+from podusv_cli.core.escaping import visible
 from podusv_cli.core.phrases import value_text
 from podusv_cli.core.recording import Status
 from podusv_cli.identify.answer import AXES, Force, Identification
 from podusv_cli.identify.fit.estimate import OPEN, SILENT
-from podusv_cli.identify.fit.march import CURRENT, DELAY, THRUST
+from podusv_cli.identify.fit.march import COMPASS, CURRENT, DELAY, THRUST
+from podusv_cli.identify.fit.wander import DEVIATION, LASTING
 from podusv_cli.identify.judge import WHO, Score
 from podusv_cli.identify.phrases import open_words, summary
 from podusv_cli.pages.page import Picture, environment, flat
@@ -25,11 +27,11 @@ from podusv_cli.scenario.sweep import POSTERIOR
 from podusv_cli.storage import csv_files
 from podusv_cli.storage.run_folder import RunWriter
 
-IDENTIFIED = "identified.yaml"
-HEADING = (
-    "# A hull that podusv identify found from logs; posterior.csv has what these leave open.\n"
-)
+# Names of the hull and of its draws; under the second ones no scenario takes them by itself.
+WRITTEN, REFUSED = ("identified.yaml", POSTERIOR), ("refused.yaml", f"refused_{POSTERIOR}")
+HEADING = "# A hull that podusv identify found from logs; {} has what these leave open.\n"
 DIGITS = "%.9g"
+UNSETTLED = "not settled"  # in place of whether the logs determine it
 AXIS = {axis.name: axis for axis in AXES}
 # Units of numbers that neither vessel nor filter has as a key.
 OTHERS = {
@@ -38,6 +40,9 @@ OTHERS = {
     "m33": "kg m2",
     THRUST: "1",
     DELAY: "s",
+    DEVIATION: "m",
+    LASTING: "s",
+    COMPASS: "rad",
     **dict.fromkeys(CURRENT, "m/s"),
     "first u": "m/s",
     "first v": "m/s",
@@ -54,8 +59,14 @@ class Identified:
     folder: Path
     answer: Identification
     status: Status
+    refusal: str = ""  # why the hull was not written as one to use
     warnings: tuple[str, ...] = ()
     missing: tuple[Failure, ...] = ()
+
+    @property
+    def hull(self) -> Path:
+        """The file that has the hull."""
+        return self.folder / (REFUSED if self.refusal else WRITTEN)[0]
 
     def as_json(self) -> dict[str, Any]:
         """What `--json` prints."""
@@ -64,7 +75,8 @@ class Identified:
             "status": self.status,
             "folder": str(self.folder),
             "settled": self.answer.estimate.settled,
-            "known": self.answer.directions.determined_count,
+            "refused": self.refusal,
+            "known": self.answer.determined_count,
             "of": len(self.answer.problem.hull),
             "parameters": [asdict(p) for p in self.answer.parameters],
             "forces": [asdict(f) for f in self.answer.forces],
@@ -76,11 +88,23 @@ class Identified:
 
 
 def write(
-    writer: RunWriter, answer: Identification, text: str, *, warnings: Sequence[str], figures: bool
+    writer: RunWriter,
+    answer: Identification,
+    text: str,
+    *,
+    refusal: str,
+    warnings: Sequence[str],
+    figures: bool,
 ) -> None:
-    """All files of the folder but the manifest; `text` is the scenario's file."""
+    """All files of the folder but the manifest; `text` is the scenario's file.
+
+    A hull with a `refusal` is written under names that no scenario takes by itself.
+    """
+    hull, draws = REFUSED if refusal else WRITTEN
+    said = [refusal] if refusal else []
+    heading = "".join(f"# {visible(line)}\n" for line in said) + HEADING.format(draws)
     writer.add("scenario.yaml", text.encode())
-    writer.add(IDENTIFIED, (HEADING + yaml_text(vessel_keys(answer))).encode())
+    writer.add(hull, (heading + yaml_text(vessel_keys(answer))).encode())
     for name, rows in {
         "parameters.csv": [
             {"name": p.name, "unit": unit(answer, p.name), **asdict(p)} for p in answer.parameters
@@ -88,14 +112,14 @@ def write(
         "forces.csv": [force_record(f) for f in answer.forces],
         "fits.csv": [asdict(w) for w in answer.whiteness],
         "judged.csv": [score_record(s) for s in answer.scores],
-        POSTERIOR: rows_of_draws(answer),
+        draws: rows_of_draws(answer),
     }.items():
         writer.add(name, csv_files.records(rows, DIGITS).encode())
     pictures = _pictures(answer, writer.extras) if figures else []
     for picture in pictures:
         writer.add(f"figures/{picture.name}.png", picture.file)
     origin = writer.add_origin(answer.problem.scenario.plugged)
-    writer.add("report.html", page(answer, pictures, origin, warnings).encode())
+    writer.add("report.html", page(answer, pictures, origin, [*said, *warnings]).encode())
 
 
 def vessel_keys(answer: Identification) -> dict[str, Any]:
@@ -167,7 +191,7 @@ def parameter_rows(answer: Identification) -> Iterator[list[str]]:
             f"{p.value:.4g}",
             f"{p.low:.4g} to {p.high:.4g}",
             f"{p.width:.2g}",
-            determined,
+            determined if answer.estimate.settled else UNSETTLED,
         ]
 
 
@@ -181,7 +205,7 @@ def force_rows(answer: Identification) -> Iterator[list[str]]:
             f"{f.value:.4g} {axis.unit}",
             f"{f.low:.4g} to {f.high:.4g}",
             f"{f.width:.2g}",
-            "yes" if f.width <= OPEN else "no",
+            UNSETTLED if not answer.estimate.settled else "yes" if f.width <= OPEN else "no",
         ]
 
 
@@ -229,7 +253,7 @@ def page(
             scores=(SCORES, [*score_rows(answer.scores)]),
             whiteness=answer.whiteness,
             widths=[f"{width:.2g}" for width in answer.directions.widths],
-            known=answer.directions.determined_count,
+            known=answer.determined_count,
             least=OPEN,
             little=SILENT,
             pictures=list(enumerate(pictures, 1)),

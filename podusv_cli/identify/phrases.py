@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from podusv_cli.identify.answer import AXES, Identification
+from podusv_cli.identify.answer import AXES, Identification, Parameter
 from podusv_cli.identify.fit.estimate import OPEN
-from podusv_cli.identify.fit.march import DELAY, THRUST
-from podusv_cli.identify.judge import WHO
+from podusv_cli.identify.fit.march import COMPASS
+from podusv_cli.identify.fit.wander import DEVIATION, LASTING
+from podusv_cli.identify.judge import SHOWN, WHO
+from podusv_cli.scenario.identify import WANDER
 
 # The manoeuvre that determines the numbers of an axis.
 MANOEUVRES = {
@@ -16,9 +20,6 @@ MANOEUVRES = {
     "N": "turning circles and zig-zags would",
     "m": "zig-zags, starts and stops would",
 }
-SHOWN = 30.0  # s after the start of a free run
-WORSE = 1.2  # times the prior's error: what is no accident of one log
-FAR = 3.0  # prior standard deviations, beyond which a number contradicts what was known
 FINEST = 1.0  # %, since what an interval leaves out is hardly ever less
 MOST = 4  # directions that are named
 SHARE = 0.3  # of a direction, from which on a number is named
@@ -27,19 +28,49 @@ SHARE = 0.3  # of a direction, from which on a number is named
 def summary(answer: Identification) -> list[str]:
     """What came out, a sentence each, what matters most first."""
     hull, logs = answer.problem.hull, answer.problem.logs
-    lines = [*_judge_in_words(answer), *_forces(answer)]
     seconds = sum(log.duration for log in logs)
-    lines.append(
-        f"{len(logs)} {'logs' if len(logs) > 1 else 'log'} of {seconds:.0f} s in all: "
-        f"{answer.directions.determined_count} of {len(hull)} directions of the hull's numbers are "
+    given = f"{len(logs)} {'logs' if len(logs) > 1 else 'log'} of {seconds:.0f} s in all"
+    notes = [note for log, _, _ in answer.judged for note in log.notes]
+    notes = [*_sensors(answer), *notes]
+    if not answer.estimate.settled:
+        unsettled = (
+            f"{given}: the search did not settle, so the logs count as determining nothing. The "
+            "numbers are only the best of several searches: give the vessel numbers nearer to the "
+            "boat's, or look for fewer (identify.free)."
+        )
+        return [unsettled, *_judge_in_words(answer), *notes]
+    determined = (
+        f"{given}: {answer.determined_count} of {len(hull)} directions of the hull's numbers are "
         f"determined, each to less than {OPEN:g} of what was known before."
     )
-    if not answer.estimate.settled:
+    return [*_judge_in_words(answer), *_forces(answer), determined, *notes]
+
+
+def _sensors(answer: Identification) -> list[str]:
+    """Which lasting errors of sensors were looked for, and what came out."""
+    found, problem = {p.name: p for p in answer.parameters}, answer.problem
+    lines, compass = [], found.get(COMPASS)
+    if LASTING in found:
+        size, lasts = found.get(DEVIATION), found[LASTING]
+        given = f"{problem.wander:.2g} m as given" if size is None else _with_ends(size, "m")
         lines.append(
-            "The search did not settle, so the numbers are only the best of several tries: give "
-            "the vessel numbers nearer to the boat's, or look for fewer (identify.free)."
+            f"Positions have an error that wanders, looked for beside the hull: {given} on each "
+            f"axis, forgotten in {_with_ends(lasts, 's')}. noise: {{wander: 0}} looks for none."
         )
-    return [*lines, *(note for log, _, _ in answer.judged for note in log.notes)]
+    elif WANDER not in problem.wanted.noise:
+        lines.append(
+            "Third differences of the positions show no error that wanders, so none was looked "
+            "for; noise: {wander: 1.0} looks for one of about 1 m."
+        )
+    if compass:
+        degrees = _with_ends(compass, "deg", math.degrees(1.0))
+        lines.append(f"The compass shows {degrees} more than the heading.")
+    return lines
+
+
+def _with_ends(p: Parameter, unit: str, factor: float = 1.0) -> str:
+    """A number with its interval, times a factor that makes its unit this one."""
+    return f"{factor * p.value:.2g} {unit} ({factor * p.low:.2g} to {factor * p.high:.2g})"
 
 
 def _judge_in_words(answer: Identification) -> list[str]:
@@ -96,63 +127,3 @@ def open_words(answer: Identification) -> list[str]:
         lines[MOST:] = [f"and {len(lines) - MOST} more"]
     inertia = any(p.name[0] == "m" and p.width > OPEN for p in answer.parameters)
     return [*lines, *([f"inertia: {MANOEUVRES['m']}"] if inertia else [])]
-
-
-def worse_words(answer: Identification) -> list[str]:
-    """A sentence for each log that was not fitted and that the prior predicts better."""
-    by = {(s.log, s.horizon, s.who): s for s in answer.scores if s.role == "judge"}
-    names = dict.fromkeys(
-        log
-        for (log, horizon, who), s in by.items()
-        if who == WHO[0] and s.position > WORSE * by[log, horizon, WHO[1]].position
-    )
-    return [
-        f"{name}: the vessel as it was given predicts this log better than the one from the logs; "
-        "do not take that one before you know why (the logs determine too little, or disagree)"
-        for name in names
-    ]
-
-
-def thrust_words(answer: Identification) -> list[str]:
-    """A sentence where thrust was looked for, since a hull has no place for it."""
-    return [
-        f"thrust is {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) times what the actuator's numbers "
-        "give. The hull holds with that thrust alone: multiply the actuator's thrust (of pods "
-        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} wherever this hull is used, or a draw of "
-        "posterior.csv: draws of another thrust are scaled so that they move as under their own."
-        for p in answer.parameters
-        if p.name == THRUST
-    ]
-
-
-def early_words(answer: Identification) -> list[str]:
-    """A sentence where commands act before the log says that they were given, for certain.
-
-    A command that is held from row to row, and in truth goes on changing, is half a row late there.
-    """
-    return [
-        f"delay is {p.value:.2g} s ({p.low:.2g} to {p.high:.2g}): the boat moves before its "
-        "commands. Half the distance of rows comes from commands that change between the rows of a "
-        "log, and the fit takes that out; more is a clock that is off. Log commands more often, or "
-        "log what the actuator did: with rows of five lags inertia came out 3 % off, outside its "
-        "interval, and with rows of two lags within 0.6 %."
-        for p in answer.parameters
-        if p.name == DELAY and p.high < 0.0
-    ]
-
-
-def far_words(answer: Identification) -> list[str]:
-    """A sentence where numbers end far from what was known before: the vessel is another one."""
-    far = [
-        f"{p.name} {p.value:.4g} (before {p.prior:.4g})"
-        for p, y in zip(answer.parameters, answer.estimate.y, strict=True)
-        if abs(y) > FAR and p.name in {number.name for number in answer.problem.hull}
-    ]
-    if not far:
-        return []
-    return [
-        f"{len(far)} numbers are more than {FAR:g} standard deviations from what was known before: "
-        f"{', '.join(far)}. Is the vessel's preset of another size, or the thrust in another unit? "
-        "With a prior so far off the intervals are too narrow; give the vessel numbers nearer to "
-        "these."
-    ]

@@ -299,6 +299,9 @@ def identify(
 ) -> IdentifiedHull:
     """The hull of a boat from the logs that a scenario names, as `podusv identify` finds it.
 
+    A hull that predicts a log worse than the vessel that was given says why in its `refusal`, and
+    no scenario takes it from the folder; `force` writes it all the same.
+
     Raises UsageError without logs and for logs that cannot be used, ScenarioError, StorageError.
 
     >>> import podusv
@@ -306,7 +309,7 @@ def identify(
     >>> hull.forces[["force", "at", "value", "low", "high"]]  # doctest: +SKIP
     """
     done = identifying.identify_of(load_scenario(source, changes), request(out, force, figures))
-    return IdentifiedHull(done.folder, done.answer)
+    return IdentifiedHull(done)
 
 
 def _single(given: Loaded) -> Scenario:

@@ -10,20 +10,34 @@ from typing import Any
 import pandas as pd
 
 from podusv_cli.identify.answer import Identification
-from podusv_cli.identify.outputs import rows_of_draws, vessel_keys
+from podusv_cli.identify.outputs import Identified, rows_of_draws, vessel_keys
 
 
 @dataclass(frozen=True, repr=False)
 class IdentifiedHull:
     """A hull that logs gave, what is known of its errors, and the folder with all of it."""
 
-    folder: Path
-    _answer: Identification
+    _done: Identified
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the result."""
+        return self._done.folder
+
+    @property
+    def _answer(self) -> Identification:
+        return self._done.answer
 
     def __repr__(self) -> str:
-        """How many directions of the hull's numbers the logs determine."""
-        known, whole = self._answer.directions.determined_count, len(self._answer.problem.hull)
-        return f"<podusv hull: {known} of {whole} directions determined, {self.folder}>"
+        """How many directions of the hull's numbers the logs determine, and if it is refused."""
+        known, whole = self._answer.determined_count, len(self._answer.problem.hull)
+        refused = ", refused" if self.refusal else ""
+        return f"<podusv hull: {known} of {whole} directions determined{refused}, {self.folder}>"
+
+    @property
+    def refusal(self) -> str:
+        """Why the hull is written as refused.yaml; "" where nothing speaks against it."""
+        return self._done.refusal
 
     @property
     def vessel(self) -> dict[str, Any]:

@@ -13,6 +13,9 @@ from podusv_cli.core.component import Component, Positive, value
 
 DAMPING = {"surge": "X_", "sway": "Y_", "yaw": "N_"}
 SENSORS = ("sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")  # of the ekf
+WANDER, COMPASS = "wander", "compass"  # m, rad: errors that last; 0 where there is none
+LASTING = (WANDER, COMPASS)
+COMPASS_OFF = 0.1  # rad, by which a compass may be off
 GROUPS = ("inertia", *(f"damping.{axis}" for axis in DAMPING))
 
 
@@ -82,11 +85,13 @@ class Identify(Component):
         0.5, "", "relative standard deviation of the vessel's own numbers, before the logs are read"
     )
     priors: dict[str, Positive] = value({}, "", "the same of single numbers, in place of `prior`")
-    noise: dict[str, Positive] = value(
+    noise: dict[str, float] = value(
         {},
         "m or rad or m/s or rad/s",
         "standard deviations of sensors that are known, by the "
-        f"names of the ekf: {', '.join(SENSORS)}; all others follow from the logs",
+        f"names of the ekf: {', '.join(SENSORS)}; all others follow from the logs. Beside them "
+        f"{WANDER}, of a position's error that wanders, by default as the logs say, 0: none; "
+        f"{COMPASS}, by how much a compass may be off, by default {COMPASS_OFF:g}, 0: not at all",
     )
     current: float | None = value(
         None,
@@ -118,8 +123,12 @@ class Identify(Component):
     @field_validator("noise")
     @classmethod
     def _of_sensors(cls, noise: dict[str, float]) -> dict[str, float]:
-        """Raises ValueError for a name in `noise` that is no sensor's."""
-        for name in noise:
-            if name not in SENSORS:
-                raise ValueError(f"{name} is no sensor's deviation (allowed: {', '.join(SENSORS)})")
+        """Raises ValueError for a name in `noise` that is no sensor\'s, and for what is no size."""
+        for name, deviation in noise.items():
+            if name not in (*SENSORS, *LASTING):
+                allowed = ", ".join((*SENSORS, *LASTING))
+                raise ValueError(f"{name} is no sensor's deviation (allowed: {allowed})")
+            if not deviation >= 0.0 or (deviation == 0.0 and name not in LASTING):
+                least = "at least 0" if name in LASTING else "above 0"
+                raise ValueError(f"{name} is {deviation:g}; it has to be {least}")
         return noise

@@ -127,8 +127,11 @@ def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]
     """The text of a file in a folder that podusv finished."""
     manifest = os.path.join(folder, "manifest.json")
     if not os.path.isfile(manifest) or not os.path.isfile(os.path.join(folder, name)):
-        lacks = f"has no {name}" if os.path.isfile(manifest) else "is not there, or not finished"
-        faults.append(Fault(mark, key, f"the folder {folder} {lacks}; podusv identify makes it"))
+        there = os.path.isfile(manifest)
+        lacks = f"has no {name}" if there else "is not there, or not finished"
+        forced = ", of a hull that it refuses with --force alone" if there else ""
+        made = f"the folder {folder} {lacks}; podusv identify makes it{forced}"
+        faults.append(Fault(mark, key, made))
         return None
     return read_text(os.path.join(folder, name), mark, key, faults)
 

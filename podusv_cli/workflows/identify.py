@@ -10,13 +10,13 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.findings.finding import unknown_codes
 from podusv_cli.identify import outputs
 from podusv_cli.identify.answer import Identification
+from podusv_cli.identify.doubts import list_doubts, refusal
 from podusv_cli.identify.fit import estimate
 from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import FilterLog
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.identify.judge import FreeRun, free_runs, scores
 from podusv_cli.identify.logs.contents import LogFault
-from podusv_cli.identify.phrases import early_words, far_words, thrust_words, worse_words
 from podusv_cli.process.interrupts import interrupts_deferred, interrupts_enabled
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import Loaded
@@ -58,19 +58,16 @@ def identify_of(
     with interrupts_deferred(), writer_of(request, target) as writer:
         with interrupts_enabled():
             answer = answer_logs(scenario, scenario.identify, logs, progress)
-        warnings = (
-            *(line for log, _ in logs for line in log.warnings),
-            *thrust_words(answer),
-            *early_words(answer),
-            *far_words(answer),
-            *worse_words(answer),
-        )
+        warnings = (*(line for log, _ in logs for line in log.warnings), *list_doubts(answer))
+        refused = "" if request.force else refusal(answer)
         for line in warnings:
             request.warn(line)
         writer.extras.interrupted = answer.estimate.interrupted
-        outputs.write(writer, answer, loaded.text, warnings=warnings, figures=request.figures)
+        outputs.write(
+            writer, answer, loaded.text, refusal=refused, warnings=warnings, figures=request.figures
+        )
         return outputs.Identified(
-            writer.finish(), answer, writer.status, warnings, tuple(writer.extras.missing)
+            writer.finish(), answer, writer.status, refused, warnings, tuple(writer.extras.missing)
         )
 
 

@@ -31,6 +31,7 @@ from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, bundle
 from podusv_cli.identify import judge
 from podusv_cli.identify.answer import Identification
+from podusv_cli.identify.doubts import early_words, thrust_words, worse_words
 from podusv_cli.identify.fit.estimate import OPEN, SILENT, HullEstimate, directions
 from podusv_cli.identify.fit.march import (
     APART,
@@ -44,9 +45,10 @@ from podusv_cli.identify.fit.march import (
 )
 from podusv_cli.identify.fit.problem import FitProblem, hull_numbers
 from podusv_cli.identify.fit.records import log_of
+from podusv_cli.identify.fit.wander import SIZE
 from podusv_cli.identify.logs.reading import LogTable, mark_new_values
 from podusv_cli.identify.outputs import rows_of_draws
-from podusv_cli.identify.phrases import early_words, summary, thrust_words, worse_words
+from podusv_cli.identify.phrases import summary
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.identify import answer_logs
@@ -78,6 +80,7 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
         **dict.fromkeys(("Y_rv", "Y_vr", "N_rv", "N_vr"), 0.0),  # whose slopes are means
         "current_x": current[0],
         "current_y": current[1],
+        **{"s_g": 0.0, "T_g": 30.0, "wandering": 0.0, "compass": 0.0},
     }
     rows[:, COMMANDS:] = rng.normal(0.0, 1.0, (12, 9))
     size, moving = 9, np.array([0.9, 0.4, 0.5])
@@ -85,7 +88,7 @@ def test_the_filter_along_a_log_is_that_of_plain_python():
     x[3:6] = moving
     rows[:, VALUES + 3 : VALUES + 6] = moving + rng.normal(0.0, 0.05, (12, 3))
     P = np.diag(rng.uniform(1e-4, 4e-4, size))
-    start = np.concatenate([x, P[np.triu_indices(size)], np.zeros(12)])
+    start = np.concatenate([x, P[np.triu_indices(size)], np.zeros(SIZE - 54)])
     count = int(rows[:, DELIVERED : DELIVERED + 6].sum())
     fine = np.repeat(rows, 40, axis=0)  # so that RK4's own error is small
     fine[:, HOLDS] /= 40.0
@@ -326,14 +329,16 @@ def test_hulls_are_drawn_from_wide_priors_too():
 
 def test_a_force_that_is_zero_has_no_interval_and_no_log_for_judging_is_said():
     answer = untold(0.5, draws=10)
-    answer.__dict__["motion"] = np.zeros((4, 3))  # of a boat that lay still
+    answer.__dict__.update(
+        {"motion": np.zeros((4, 3)), "parameters": []}
+    )  # of a boat that lay still
     assert answer.forces == []
     lines = " ".join(summary(answer))
     assert "X(u)" not in lines
     assert "No log was kept for judging" in lines
     kept = (*LOGS, LogFile(file="b.csv", role="judge"))
     judged = replace(answer, problem=replace(answer.problem, wanted=Identify(logs=kept)))
-    judged.__dict__["motion"] = np.zeros((4, 3))
+    judged.__dict__.update({"motion": np.zeros((4, 3)), "parameters": []})
     assert summary(judged)[0].startswith("No log for judging holds a free run of 30 s")
 
 

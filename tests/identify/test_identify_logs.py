@@ -13,6 +13,7 @@ from log_files import read, written
 
 from podusv_cli.components.actuators.ideal import Ideal
 from podusv_cli.core.errors import UsageError
+from podusv_cli.identify.doubts import far_words
 from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.fit.records import log_of
 from podusv_cli.identify.intake import logs_of, pieces
@@ -21,7 +22,6 @@ from podusv_cli.identify.logs.commands import hold_values, with_actuator_state
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import LogTable
 from podusv_cli.identify.offsets import Clocks
-from podusv_cli.identify.phrases import far_words
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.load import load
 from podusv_cli.workflows.identify import answer_logs

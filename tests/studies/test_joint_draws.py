@@ -194,4 +194,4 @@ def test_what_is_wrong_with_the_folder_is_one_sentence():
     of_study = told(claims, "doubt.vary={vessel: {identified: found}}")
     assert "doubt.vary.vessel: a study draws rows itself: write this under sweep.vary" in of_study
     Path("found/posterior.csv").unlink()
-    assert told().endswith("the folder found has no posterior.csv; podusv identify makes it")
+    assert "the folder found has no posterior.csv; podusv identify makes it, of a hull" in told()

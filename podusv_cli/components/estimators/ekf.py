@@ -159,6 +159,23 @@ def wanderings(k: Any, q: Vector) -> None:
     q[8] = k.q_b_psi * k.q_b_psi
 
 
+@kernel
+def predict(tau: Vector, state: Vector, k: Any, f: Vector, rate: Vector) -> None:
+    """Rates of estimate, load and covariance; f becomes F."""
+    cosine, sine = cos_sin(state[2])
+    b, q = scratch(3), scratch(9)
+    b[0] = cosine * state[6] + sine * state[7]
+    b[1] = cosine * state[7] - sine * state[6]
+    b[2] = state[8]
+    plant(state, tau, b, k, rate)
+    rate[6] = rate[7] = rate[8] = 0.0
+    for i in range(N + PACKED, N + PACKED + 2 * MOVING):
+        rate[i] = 0.0
+    slopes(state, state[OF_V], state[OF_R], b, cosine, sine, k, f)
+    wanderings(k, q)
+    spread(f, tail(state, N), q, tail(rate, N))
+
+
 class ExtendedKalmanFilter(Estimator):
     """The estimate with the least mean square error, as far as the model is right.
 
@@ -234,18 +251,8 @@ class ExtendedKalmanFilter(Estimator):
     @kernel
     def follow(tau: Vector, state: Vector, k: Any, rate: Vector) -> None:
         """The nominal vessel, and how far the estimate may be off it."""
-        cosine, sine = cos_sin(state[2])
-        b, f, q = scratch(3), scratch(54), scratch(9)
-        b[0] = cosine * state[6] + sine * state[7]
-        b[1] = cosine * state[7] - sine * state[6]
-        b[2] = state[8]
-        plant(state, tau, b, k, rate)
-        rate[6] = rate[7] = rate[8] = 0.0
-        for i in range(N + PACKED, N + PACKED + 2 * MOVING):
-            rate[i] = 0.0
-        slopes(state, state[OF_V], state[OF_R], b, cosine, sine, k, f)
-        wanderings(k, q)
-        spread(f, tail(state, N), q, tail(rate, N))
+        f = scratch(54)
+        predict(tau, state, k, f, rate)
 
     def start(self, x: Vector, nominal: Vessel) -> Vector:
         """The truth; of the load nothing is known but how large it may be."""

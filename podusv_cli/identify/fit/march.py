@@ -14,7 +14,6 @@ import numpy as np
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.estimators.ekf import (
     MOVING,
-    PACKED,
     ExtendedKalmanFilter,
     N,
     derivative,
@@ -29,8 +28,9 @@ from podusv_cli.engine.machine.signatures import LANE_PROTOTYPES, LANE_VECTOR, P
 from podusv_cli.engine.machine.signatures import VECTOR as PLAIN
 from podusv_cli.engine.running.lanes import room
 from podusv_cli.engine.step.layout import Function, shift_state
+from podusv_cli.identify.fit import wander
+from podusv_cli.identify.fit.wander import ASKED, DEVIATION, LASTING, SIZE, take_in_wandering
 
-SIZE = N + PACKED + 2 * MOVING  # numbers of the filter's state
 STAGES = 4 * SIZE
 MOST_COMMANDS = 32  # of a row
 # A row of a record: how long it holds [s], what is delivered, its values, then of each command its
@@ -41,7 +41,9 @@ SIGMAS = ("sigma_p", "sigma_p", "sigma_psi", "sigma_u", "sigma_v", "sigma_r")
 CURRENT = ("current_x", "current_y")  # m/s: how fast the water flows north and east
 DELAY = "delay"  # s: how much later than the log says its commands act
 THRUST = "thrust"  # what part of the loads that the actuator's numbers give acts on the hull
-NAMES = (*COEFFICIENTS, *ExtendedKalmanFilter().constants(), THRUST, DELAY, *CURRENT)
+COMPASS = "compass"  # rad: by how much more than the heading it shows
+SENSED = (DEVIATION, LASTING, ASKED, COMPASS)
+NAMES = (*COEFFICIENTS, *ExtendedKalmanFilter().constants(), THRUST, DELAY, *CURRENT, *SENSED)
 named = unpacker(NAMES)
 
 
@@ -57,7 +59,8 @@ class Followed(NamedTuple):
 
     `innovations` and `variances` have a row a delivered value, `track` one a row of the record, or
     one alone where no track was asked for: the nine numbers that are estimated, before what the row
-    delivers is taken in. Its velocities are those through the water.
+    delivers is taken in. Its velocities are those through the water, its place is where a receiver
+    sees the boat.
     """
 
     innovations: Vector
@@ -88,7 +91,9 @@ def seen_from_water(i: int, value: float, since: float, psi: float, k: Any, h: V
 
 
 @kernel
-def correct_filter(line: Vector, since: float, state: Vector, k: Any, out: Vector) -> int:
+def correct_filter(
+    size: int, line: Vector, since: float, state: Vector, k: Any, out: Vector
+) -> int:
     """Take in what a row delivers; write innovation and variance of each value, and count them."""
     sigma, h = scratch(MOVING), scratch(MOVING)
     sigma[0], sigma[1], sigma[2] = k.sigma_p, k.sigma_p, k.sigma_psi
@@ -100,9 +105,13 @@ def correct_filter(line: Vector, since: float, state: Vector, k: Any, out: Vecto
             value = seen_from_water(i, line[VALUES + i], since, state[2], k, h)
             innovation = value - (state[i] - late)
             if i == 2:
-                innovation = wrap(innovation)
-            out[at] = innovation
-            out[at + 1] = take_in(i, h, out[at], sigma[i], state)
+                innovation = wrap(innovation - k.compass)
+            if size == wander.PLAIN:
+                out[at] = innovation
+                out[at + 1] = take_in(i, h, out[at], sigma[i], state)
+            else:
+                out[at] = innovation - (state[wander.PLAIN + i] if i < 2 else 0.0)
+                out[at + 1] = take_in_wandering(i, h, out[at], sigma[i], state)
             at += 2
     return at
 
@@ -114,6 +123,7 @@ def filter_rows(
     count: int,
     width: int,
     apart: int,
+    size: int,
     record: Vector,
     actuator: Vector,
     table: Vector,
@@ -124,7 +134,8 @@ def filter_rows(
 ) -> None:
     """The filter along the rows of a record: classical RK4 between them, with commands held.
 
-    Rows of the track are so far `apart`; with 0 the last one alone is left.
+    Rows of the track are so far `apart`; with 0 the last one alone is left. `size` are the numbers
+    of the state that are used: with the error of positions all of them.
     """
     k = named(p)
     tau, y, stages, commands = scratch(3), scratch(SIZE), scratch(STAGES), scratch(MOST_COMMANDS)
@@ -134,31 +145,34 @@ def filter_rows(
         line = tail(record, row * width)
         for i in range(N):
             track[apart * row + i] = state[i]
-        at += correct_filter(line, since, state, k, tail(out, at))
+        if size > wander.PLAIN:  # where a receiver sees the boat
+            track[apart * row] += state[wander.PLAIN]
+            track[apart * row + 1] += state[wander.PLAIN + 1]
+        at += correct_filter(size, line, since, state, k, tail(out, at))
         for i in range(inputs):  # the parabola through the three
             shifts = tail(line, COMMANDS + 3 * i)
             commands[i] = shifts[1] + 0.5 * late * (shifts[2] - shifts[0])
             commands[i] += 0.5 * late * late * (shifts[2] - 2.0 * shifts[1] + shifts[0])
         h = line[HOLDS]
         since += h
-        shift_state(SIZE, state, 0.0, state, y)
+        shift_state(size, state, 0.0, state, y)
         for stage in range(4):
             rate = tail(stages, stage * SIZE)
             loads(0.0, y, y, commands, actuator, table, tau, rate, rate)
             for i in range(3):
                 tau[i] *= k.thrust
             follow(0.0, y, tau, y, p, table, rate)
-            shift_state(SIZE, state, h if stage == 2 else 0.5 * h, rate, y)
-        for i in range(SIZE):
+            shift_state(size, state, h if stage == 2 else 0.5 * h, rate, y)
+        for i in range(size):
             between = stages[SIZE + i] + stages[2 * SIZE + i]
             state[i] += h / 6.0 * (stages[i] + 2.0 * between + stages[3 * SIZE + i])
 
 
-FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 3, *[PLAIN] * 7)
+FILTERED = (PROTOTYPES["actuator"], PROTOTYPES["follow"], *[WHOLE] * 4, *[PLAIN] * 7)
 FILTERED_LANES = (
     LANE_PROTOTYPES["actuator"],
     LANE_PROTOTYPES["follow"],
-    *[WHOLE] * 3,
+    *[WHOLE] * 4,
     PLAIN,
     *[LANE_VECTOR] * 6,
 )
@@ -174,7 +188,7 @@ def pieces(actuator: Actuator) -> list[Any]:
     names = tuple(actuator.constants())
     return [
         compile.lane_adapter("actuator", actuator.replay, names, frozenset(names)),
-        compile.lane_adapter("follow", ExtendedKalmanFilter.follow, NAMES, frozenset()),
+        compile.lane_adapter("follow", wander.follow, NAMES, frozenset({ASKED})),
         compile.Piece(filter_rows, CFUNCTYPE(None, *FILTERED_LANES), "", compile.LANES_BY),
     ]
 
@@ -207,6 +221,7 @@ def side_by_side(actuator: Actuator) -> Follow:
             count,
             width,
             apart,
+            SIZE if constants[0][NAMES.index(ASKED)] else wander.PLAIN,
             signatures.pointer(record.rows),
             *[signatures.pointer(v, LANE_VECTOR) for v in (a, table, p, state, out, track)],
         )

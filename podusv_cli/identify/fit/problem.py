@@ -11,19 +11,19 @@ from typing import TypeVar
 
 import numpy as np
 
-from podusv_cli.components.estimators.ekf import MOVING, ExtendedKalmanFilter, N
+from podusv_cli.components.estimators.ekf import MOVING, PACKED, ExtendedKalmanFilter, N
 from podusv_cli.components.facts import Facts
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.identify.fit.estimate import HullSearch
 from podusv_cli.identify.fit.march import (
+    COMPASS,
     CURRENT,
     DELAY,
     DELIVERED,
     NAMES,
     SIGMAS,
     THRUST,
-    VALUES,
     Follow,
     Followed,
     side_by_side,
@@ -37,9 +37,11 @@ from podusv_cli.identify.fit.numbers import (
     values_at,
 )
 from podusv_cli.identify.fit.records import FilterLog
+from podusv_cli.identify.fit.sensing import USUAL, Wandering, position_wandering, sensor_noise
+from podusv_cli.identify.fit.wander import ASKED, DEVIATION, LASTING, OWN, PLAIN, SIZE
 from podusv_cli.identify.logs.reading import Whole
 from podusv_cli.process.workers import available_workers
-from podusv_cli.scenario.identify import Identify
+from podusv_cli.scenario.identify import COMPASS_OFF, WANDER, Identify
 from podusv_cli.scenario.model import Scenario
 
 Entry = TypeVar("Entry")
@@ -55,25 +57,9 @@ AT_START = (0.2, 0.1, 0.05)  # m/s, m/s, rad/s: the same of the velocities at th
 # differs from one hull to the next, for all of the log; so they are looked for.
 FIRST = ("first u", "first v", "first load_x", "first load_y", "first load_psi")
 TURNED = 0.05  # rad, of the heading at the start
-FINEST = 1e-4  # of what a sensor measured, its least error
+FORGETS = 1.0  # of the logarithm of the time in which a position's error forgets
 FLOWING = 0.1  # of the speed at full thrust: a current that nothing is known of
 BLOCK = 30.0  # s of a log, whose innovations count together
-
-
-def sensor_noise(log: FilterLog) -> Vector:
-    """Standard deviations of the sensors' errors, by third differences; 0 where none is measured.
-
-    White noise has third differences of sqrt(20) times its own deviation, a smooth motion small
-    ones.
-    """
-    rows, found = log.record.rows, np.zeros(MOVING)
-    for i in range(MOVING):
-        values = rows[rows[:, DELIVERED + i] != 0.0, VALUES + i]
-        if len(values) > 10:
-            smooth = np.unwrap(values) if i == 2 else values
-            noise = np.median(np.abs(np.diff(smooth, 3))) / 0.6745 / math.sqrt(20.0)
-            found[i] = max(noise, FINEST * np.std(smooth))
-    return found
 
 
 @dataclass(frozen=True)
@@ -114,6 +100,25 @@ class FitProblem:
         return sigmas
 
     @cached_property
+    def wandering(self) -> Wandering:
+        """What third differences say of an error of positions that wanders."""
+        return position_wandering(self.logs)
+
+    @property
+    def wander(self) -> float:
+        """Deviation of the error of positions that wanders, given or guessed [m]; 0: none."""
+        guessed = self.wandering.deviation if self.wandering.is_sure else 0.0
+        return self.wanted.noise.get(WANDER, guessed)
+
+    @cached_property
+    def _position(self) -> list[FreeNumber]:
+        """Numbers of an error of positions that wanders, if there is one."""
+        if not self.wander:
+            return []
+        own = [] if WANDER in self.wanted.noise else [FreeNumber(DEVIATION, self.wander, UNSURE)]
+        return [*own, FreeNumber(LASTING, USUAL, FORGETS)]
+
+    @cached_property
     def hull(self) -> list[FreeNumber]:
         """The hull's numbers that are looked for."""
         return hull_numbers(self.scenario.vessel, self.wanted)
@@ -124,13 +129,17 @@ class FitProblem:
         guessed = [name for name in self._sensor_deviations if name not in self.wanted.noise]
         noises = [FreeNumber(n, getattr(self.filter, n), UNSURE, least=LEAST) for n in guessed]
         noises += [FreeNumber(n, getattr(self.filter, n), UNSURE) for n in WALKS]
+        noises += self._position
         own = {**dict.fromkeys(CURRENT if self.current else (), self.current), **self._first}
         each = [
             FreeNumber(f"{name}, {log.name}", 0.0, sd, ratio=False)
             for log in self.logs
             for name, sd in own.items()
         ]
-        return [*self.hull, *noises, FreeNumber(DELAY, 0.0, self.wanted.step, ratio=False), *each]
+        off = self.wanted.noise.get(COMPASS, COMPASS_OFF)
+        common = {DELAY: self.wanted.step} | ({COMPASS: off} if off else {})
+        shared = [FreeNumber(name, 0.0, sd, ratio=False) for name, sd in common.items()]
+        return [*self.hull, *noises, *shared, *each]
 
     @cached_property
     def current(self) -> float:
@@ -153,7 +162,8 @@ class FitProblem:
     @cached_property
     def _fixed_constants(self) -> Vector:
         """The filter's constants before anything is looked for, in the order of `NAMES`."""
-        still = {THRUST: 1.0, DELAY: 0.0, **dict.fromkeys(CURRENT, 0.0)}
+        still = {THRUST: 1.0, **dict.fromkeys((DELAY, COMPASS, *CURRENT), 0.0)}
+        still |= {ASKED: float(self.wander > 0.0), DEVIATION: self.wander, LASTING: USUAL}
         known = self.scenario.vessel.constants() | self.filter.constants() | still
         return np.array([known[name] for name in NAMES])
 
@@ -208,6 +218,19 @@ class FitProblem:
         added = {ADDED[n]: beside[n] - new.pop(n) for n in ADDED if n in new}
         return own.changed(new | added)
 
+    def before(self, y: Vector) -> Vector:
+        """The point of the hull before the logs, whose sensors are as they are at a point.
+
+        A compass that is off says nothing against a hull.
+        """
+        sensed = (*SIGMAS, DEVIATION, LASTING, COMPASS)
+        return np.array([e * (n.name in sensed) for n, e in zip(self.numbers, y, strict=True)])
+
+    def position_noise(self, y: Vector) -> float:
+        """Standard deviation of a measured position, on each axis, at a point [m]."""
+        k = dict(zip(NAMES, self.constants(self.at(y), (0.0, 0.0)), strict=True))
+        return math.hypot(k["sigma_p"], k[DEVIATION])
+
     def thrust(self, y: Vector) -> float:
         """What part of the loads that the actuator's numbers give acts on the hull at a point."""
         return self._hull_values(y).get(THRUST, 1.0)
@@ -229,24 +252,29 @@ class FitProblem:
         return side_by_side(self.scenario.actuator)
 
     def start(
-        self, log: FilterLog, current: Sequence[float], values: Vector | None = None
+        self, log: FilterLog, current: Sequence[float], values: Vector, *, first_known: bool = True
     ) -> Vector:
         """The filter's state at the beginning of a log, in the water's frame.
 
-        With `values` from `at` velocity and loads there are known; without, unsure.
+        Velocity and loads there are known by `values` from `at`, or unsure.
         """
-        state, (c, s) = log.state.copy(), (math.cos(log.state[2]), math.sin(log.state[2]))
+        state = log.state.copy()
+        state[2] -= values[self._places[COMPASS]] if COMPASS in self._places else 0.0
+        c, s = math.cos(state[2]), math.sin(state[2])
         state[3] -= c * current[0] + s * current[1]
         state[4] -= c * current[1] - s * current[0]
-        pose = max(self.filter.sigma_p, 1e-9) * 3.0
+        wander = values[self._places[DEVIATION]] if DEVIATION in self._places else self.wander
+        pose = math.hypot(max(self.filter.sigma_p, 1e-9) * 3.0, wander)
         speeds = np.array(AT_START) * [self.facts.s, self.facts.s, self.facts.s / self.facts.lam]
         loads, first = [*self._first.values()][2:], np.zeros(len(FIRST))
-        if values is not None:
+        if first_known:
             first = values[[self._places[f"{name}, {log.name}"] for name in FIRST]]
             speeds[:2], loads = 0.0, [0.0] * 3
         state[3:5] += first[:2]
         unsure = np.diag(np.square([pose, pose, TURNED, *speeds, *loads]))
-        return np.concatenate([state, first[2:], unsure[np.triu_indices(N)], np.zeros(2 * MOVING)])
+        beside = np.zeros(SIZE - N - PACKED)
+        beside[[PLAIN - N - PACKED + OWN, -1]] = wander * wander  # of the error, north and east
+        return np.concatenate([state, first[2:], unsure[np.triu_indices(N)], beside])
 
     def follow(
         self, log: FilterLog, points: Sequence[Vector], currents: Sequence[Sequence[float]] = ()
@@ -254,8 +282,10 @@ class FitProblem:
         """The filter along a log, for every point, in the current of the point or another."""
         values = [self.at(y) for y in points]
         flows = currents or [self._currents(log, each) for each in values]
-        known = [None] * len(points) if currents else values
-        starts = [self.start(log, flow, each) for flow, each in zip(flows, known, strict=True)]
+        starts = [
+            self.start(log, flow, each, first_known=not currents)
+            for flow, each in zip(flows, values, strict=True)
+        ]
         runs = self._runs(log, [*map(self.constants, values, flows)], starts, tracked=True)
         whole = Followed(*(np.concatenate(arrays, axis=-1) for arrays in zip(*runs, strict=True)))
         since = log.times - log.times[0]
