@@ -30,7 +30,7 @@ TARGET = ("x_d", "y_d")
 NO_LAW = "measured"
 ABOUT_LOG = "measured-log"  # code of what is doubtful about it
 FEWEST = 10  # common instants, below which a distance says nothing
-APART = 10.0  # extents, beyond which a log is of another place
+APART, LEAST_APART = 10.0, 200.0  # extents, and m, beyond which a log is of another place
 SCALED = 20.0  # times the mean speed of a run, that only another unit explains
 Marks = npt.NDArray[np.bool_]
 
@@ -157,7 +157,7 @@ class Track:
         own = own[np.isfinite(own).all(axis=1)]
         apart = float(np.hypot(*(np.median(own, axis=0) - np.median(other, axis=0))))
         extent = max(float(np.ptp(points, axis=0).max()) for points in (own, other))
-        if apart < APART * extent:
+        if apart < max(APART * extent, LEAST_APART):
             return []
         text = (
             f"it lies {apart / 1000.0:.3g} km from {label}, and neither extends over more than "
