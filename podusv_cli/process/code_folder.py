@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.system import belongs_to_user
 from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 
 KEPT = 2  # folders of this many other states of what translates kernels stay on disk
@@ -31,6 +32,8 @@ MARKED = b"Signature: 8a477f597d28d172789f06886806bc55\n# Compiled code of podus
 @cache
 def code_folder(name: str) -> Path | None:
     """The folder `name` in $PODUSV_CACHE, else in podusv under $XDG_CACHE_HOME or ~/.cache.
+
+    On Windows under %LOCALAPPDATA% in place of the last.
 
     None where neither will do. A line on stderr says why a place was passed over, and what is used.
     """
@@ -76,7 +79,8 @@ def _roots() -> Iterator[Path]:
     """The folders in which code may be kept, the user's own choice first."""
     if given := os.environ.get("PODUSV_CACHE"):
         yield Path(given).absolute()
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    local = os.environ.get("LOCALAPPDATA") if os.name == "nt" else None
+    home = os.environ.get("XDG_CACHE_HOME") or local or os.path.expanduser("~/.cache")
     if os.path.isabs(home):  # without a home it is `~`, which is no place to make a folder
         yield Path(home, "podusv")
 
@@ -101,8 +105,11 @@ def _check(folder: Path) -> None:
     with suppress(FileNotFoundError):
         status = folder.stat()
         _demand(stat.S_ISDIR(status.st_mode), f"{folder} is not a folder")
-        _demand(status.st_uid == os.getuid(), f"another user owns {folder}")
-        _demand(not status.st_mode & OTHERS, f"others can write to {folder}: chmod go-w {folder}")
+        _demand(belongs_to_user(status), f"another user owns {folder}")
+        _demand(
+            os.name == "nt" or not status.st_mode & OTHERS,
+            f"others can write to {folder}: chmod go-w {folder}",
+        )
 
 
 def _is_marked(folder: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Ctrl-C (SIGINT), SIGTERM and SIGHUP as KeyboardInterrupt, deferred while results are written."""
+"""Ctrl-C and other signals to end as KeyboardInterrupt, deferred while results are written."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from types import FrameType
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # the last: the terminal is lost
+from podusv_cli.core.system import SIGNALS
+
 # s; signals within this time of the first one count as the same interrupt: a terminal signals a
 # command and its workers, the command signals its workers again, and people press twice.
 SAME_INTERRUPT = 3.0

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from podusv_cli.core.system import is_running
+
 _PART = re.compile(
     r"\.((?P<name>.+)\.)?podusv-(?P<machine>[0-9a-f]{8})-(?P<process>[0-9]+)-[0-9a-f]{8}\.part",
     re.DOTALL,  # a name may hold any letter, a new line too
@@ -34,7 +36,7 @@ def find_abandoned(folder: Path) -> Iterator[tuple[Path, str]]:
     with suppress(OSError):
         for entry in list(os.scandir(folder)):
             match = _PART.fullmatch(entry.name)
-            if match and match["machine"] == _machine() and not _alive(int(match["process"])):
+            if match and match["machine"] == _machine() and not is_running(int(match["process"])):
                 yield Path(entry.path), match["name"] or ""
 
 
@@ -52,14 +54,3 @@ def _machine() -> str:
     with suppress(OSError):
         names.append(str(os.stat("/proc/self/ns/pid").st_ino))
     return hashlib.sha256("\n".join(names).encode()).hexdigest()[:8]
-
-
-def _alive(process: int) -> bool:
-    """Whether a process of this number runs, whoever's it is."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # somebody else's, or no process number at all
-        return True
-    return True

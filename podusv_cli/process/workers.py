@@ -7,7 +7,6 @@ process that is killed while it sends its result stops all others.
 from __future__ import annotations
 
 import multiprocessing
-import os
 import time
 import traceback
 from collections import Counter
@@ -21,6 +20,7 @@ from pickle import PicklingError, UnpicklingError
 from typing import Any
 
 from podusv_cli.core.errors import PodusvError, StorageError
+from podusv_cli.core.system import usable_cores
 from podusv_cli.process.interrupts import (
     Interrupts,
     interrupts_caught,
@@ -60,10 +60,7 @@ def available_workers() -> int:
     """
     if multiprocessing.current_process().daemon:
         return 1
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        return os.cpu_count() or 1
+    return usable_cores()
 
 
 def run_all(

@@ -23,6 +23,7 @@ from typing import Any
 import yaml
 
 from podusv_cli.core.phrases import describe_found, quote
+from podusv_cli.core.system import open_flags
 from podusv_cli.core.units import NUMBER
 from podusv_cli.scenario.shipped import PREFIX, file_of, names
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node, Route, dotted_key
@@ -121,7 +122,7 @@ def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | Non
 
 def _nonblocking_opener(path: str, flags: int) -> int:
     """Open a file without waiting for the writer of a pipe."""
-    return os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC)
+    return os.open(path, flags | open_flags("O_NONBLOCK", "O_CLOEXEC"))
 
 
 def _place(source: str, before: str) -> Mark:

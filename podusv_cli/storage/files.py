@@ -20,6 +20,7 @@ import numpy as np
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.system import open_flags
 from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 
 LARGEST_TEXT = 16 * 2**20  # bytes
@@ -27,7 +28,7 @@ LARGEST_FILE = 4 * 2**30  # bytes
 # In a folder while it is written.
 LOCKS = (".podusv-runs.lock", ".podusv-tables.lock", ".podusv-provenance.lock")
 ELSEWHERE = "; read it with h5py or xarray, or log less often (log.every)"
-_CREATE = os.O_CREAT | os.O_EXCL | os.O_CLOEXEC | os.O_WRONLY
+_CREATE = open_flags("O_CREAT", "O_EXCL", "O_CLOEXEC", "O_WRONLY")
 CAUSES = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is used up",
@@ -144,11 +145,14 @@ def disk_array(folder: Path, size: int) -> Vector:
     """An array of `size` numbers in a nameless file of the folder, for logs larger than memory.
 
     Its disk space is reserved at once, so that a full disk is a StorageError here and not a signal
-    (SIGBUS) when a number is stored; ZFS reserves nothing.
+    (SIGBUS) when a number is stored; ZFS, macOS and Windows reserve nothing.
     """
     failure = f"cannot keep the log in {folder} ({8 * size} bytes)"
     with storage_errors(failure), tempfile.TemporaryFile(dir=folder) as file:
-        os.posix_fallocate(file.fileno(), 0, 8 * size)
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, 8 * size)
+        else:
+            file.truncate(8 * size)
         return np.memmap(file, np.float64, "r+", shape=size).view(np.ndarray)
 
 
@@ -186,7 +190,9 @@ def make_folder(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Sync the names in `folder` to the disk. Raises StorageError."""
+    """Sync the names in `folder` to the disk, where the system can. Raises StorageError."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return  # Windows opens no folders
     with storage_errors(f"cannot write {folder} to the disk"):
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
@@ -214,7 +220,7 @@ def _create(path: Path, content: bytes) -> None:
 def open_regular(path: Path) -> Iterator[BufferedReader]:
     """A regular file, open for reading; raises StorageError for a link, pipe or device."""
     # Without O_NONBLOCK, opening a named pipe would wait for its writer.
-    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    flags = open_flags("O_RDONLY", "O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC")
     with storage_errors(f"cannot read {path}"):
         descriptor = os.open(path, flags)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):

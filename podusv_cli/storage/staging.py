@@ -97,7 +97,8 @@ class Staging:
 
 def exchange(one: Path, other: Path) -> None:
     """Exchange two paths by one system call. OSError, with ENOSYS where there is no such call."""
-    rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
+    own = ctypes.CDLL(None, use_errno=True) if os.name == "posix" else None
+    rename = getattr(own, "renameat2", None)
     if rename is None:
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
     here, swapping = -100, 2  # AT_FDCWD, RENAME_EXCHANGE

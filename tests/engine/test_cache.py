@@ -27,7 +27,7 @@ from podusv_cli.engine.loop.closed_loop import nothing
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import compile, object_cache
 from podusv_cli.engine.step.grid import TimeGrid
-from podusv_cli.process import code_folder
+from podusv_cli.process import code_folder, workers
 
 FORCE = 0.0
 
@@ -277,7 +277,7 @@ def _prepare_two() -> None:
 
 
 def test_a_worker_of_a_pool_which_may_start_no_process_compiles_by_itself(cache, monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0, 1}, raising=False)
+    monkeypatch.setattr(workers, "usable_cores", lambda: 2)
     monkeypatch.setattr(compile, "SHARE", 1)
     with multiprocessing.get_context("fork").Pool(1) as pool:
         pool.apply(_prepare_two)

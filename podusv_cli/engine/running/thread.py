@@ -123,8 +123,8 @@ class Work:
         return in_a_line(self.error)
 
     def _run(self) -> None:
-        # Looked up by the thread itself, since the system crashes if the thread has ended.
         """Call the function in its thread; its result or error stays with the work."""
+        # Looked up by the thread itself, since the system crashes if the thread has ended.
         look_up = getattr(time, "pthread_getcpuclockid", None)
         self._clock = (
             partial(time.clock_gettime, look_up(get_ident())) if look_up else time.process_time

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
+from podusv_cli.core.system import physical_memory
 from podusv_cli.storage.run_folder import check_free_space
 from podusv_cli.studies.making import runs_writer
 from podusv_cli.studies.making.plan import StudyPlan
@@ -27,7 +27,7 @@ def check_fits(plan: StudyPlan, folder: Path, parts: int = 1) -> None:
     )
     table = runs_writer.bytes_of(shape, len(plan.metrics), len(plan.sweep.vary))
     check_free_space(folder, table / parts, fewer)
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    memory = physical_memory()
     if (held := HELD_BYTES * runs) > memory:
         raise StorageError(
             f"cannot make {folder}: its tables take {bytes_in_words(held)} of memory or more, and "
