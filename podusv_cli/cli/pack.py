@@ -71,5 +71,6 @@ def show(contents: PackedContents) -> None:
 
 
 def _few(names: tuple[str, ...]) -> str:
+    """The first `SHOWN` names, and how many more there are."""
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more

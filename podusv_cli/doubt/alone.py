@@ -142,6 +142,7 @@ def explore_choice(
 
 
 def _acts(judged: Judged, claim: str, base: Judged) -> bool:
+    """Whether a world changes any number of the claim."""
     return not judged.failed and not judged.same(claim, base)
 
 

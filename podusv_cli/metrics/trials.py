@@ -118,6 +118,7 @@ def _sizes(manoeuvre: str, size: int) -> Any:
     """How many numbers are gathered: none in other trials."""
 
     def size_of(layout: Measured) -> int:
+        """The size in a run of this manoeuvre, else 0."""
         trial = layout.loop.controller.trial()
         return size if trial is not None and trial.manoeuvre == manoeuvre else 0
 
@@ -125,6 +126,7 @@ def _sizes(manoeuvre: str, size: int) -> Any:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """When the trial begins [s] and reverses [rad]; {} for no trial."""
     trial = layout.loop.controller.trial()
     return {"trial_execute": trial.execute, "trial_switch": trial.switch} if trial else {}
 

@@ -127,6 +127,7 @@ def _solve_stage(program: _Program, start: str, guess: Motion) -> Stage:
 
 
 def _tell(tell: Tell | None, stage: int, count: int, iterations: int) -> None:
+    """Tell the fraction that is done: stages, and a guess at the iterations of this one."""
     if tell:  # nobody knows how many iterations there will be
         tell("solving", (stage + iterations / (iterations + 50.0)) / count)
 

@@ -195,6 +195,7 @@ def _integers(bounds: tuple[int, int], u: Vector) -> Numbers:
 
 
 def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
+    """Which of `count` values each share u (n,) in [0, 1) falls on."""
     return np.minimum((u * count).astype(np.int64), count - 1)
 
 

@@ -208,6 +208,7 @@ class SteppedBatch:
         self.alive = self._marching()
 
     def _marching(self) -> npt.NDArray[np.bool_]:
+        """Which of the runs (runs,) have not ended."""
         return np.equal(self._lanes.under_way[REACHED : REACHED + len(self.places)], MARCHING)
 
     @property

@@ -69,6 +69,7 @@ class Interval(NamedTuple):
         return " %" if form.endswith("%") else ""
 
     def _texts(self, form: str, infinite: str) -> list[str]:
+        """Estimate, low and high as text; a form that ends in % is in percent."""
         factor, form = (100.0, form[:-1]) if form.endswith("%") else (1.0, form)
         return [digits(factor * number, form or ".5g", infinite) for number in self]
 

@@ -100,6 +100,7 @@ class Store:
         identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:
+        """Raises StorageError where a study of this identity cannot go on in this folder."""
         if different := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 
