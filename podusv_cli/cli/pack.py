@@ -49,7 +49,7 @@ def pack(
 
 
 def in_words(size: float) -> str:
-    """Such as `3.2 MB`."""
+    """A size [bytes] such as `3.2 MB`."""
     from podusv_cli.core.quantities import bytes_in_words
 
     return bytes_in_words(size)

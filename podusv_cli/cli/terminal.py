@@ -140,7 +140,10 @@ def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
 
 
 def fold_line(text: str, width: int) -> str:
-    """A line wrapped at spaces, the rest of it indented by two; paths are not broken."""
+    """A line wrapped at spaces to `width` letters, the rest of it indented by two.
+
+    Paths are not broken.
+    """
     return textwrap.fill(
         text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
     )

@@ -134,7 +134,7 @@ def _constants(layout: Measured) -> dict[str, float]:
 def _number(
     of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
 ) -> Metric:
-    """A gathered number, first in tables; NaN where the trial did not get so far."""
+    """The number gathered at this position, first in tables; NaN where a trial got not so far."""
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
         name,

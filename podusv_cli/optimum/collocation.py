@@ -235,7 +235,7 @@ def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 def _segment(problem: OptimumProblem, h: float) -> Any:
-    """A CasADi function of one segment: its gaps, its share of the integral, its middle place."""
+    """A CasADi function of a segment of `h` [s]: its gaps, share of the integral, middle place."""
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     before, after = ca.SX.sym("before", UNKNOWNS), ca.SX.sym("after", UNKNOWNS)
     loads = [ca.SX.sym(f"b{i}", 3) for i in range(3)]

@@ -161,7 +161,7 @@ def cosines(variance: Vector, edges: Vector, seed: int, stream: str, amplitudes:
 
 
 def even_edges(low: float, high: float, count: int) -> Vector:
-    """Edges of `count` bins of one width."""
+    """Edges (count + 1,) of `count` bins of one width, from `low` to `high` [Hz or rad/s]."""
     return np.linspace(low, high, count + 1)
 
 
@@ -181,7 +181,7 @@ def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
 
 
 def growing_edges(low: float, high: float, count: int) -> Vector:
-    """Edges (count + 1,) of bins, each wider than the one before by the same factor."""
+    """Edges (count + 1,) from `low` to `high`, each bin wider than the last by the same factor."""
     ends = logarithm(np.array([low, high]))
     return exponential(np.linspace(ends[0], ends[1], count + 1))
 

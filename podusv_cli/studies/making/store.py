@@ -192,7 +192,7 @@ class Store:
             yield self.runs()
 
     def covered_draws(self) -> dict[tuple[str, int], Mask]:
-        """By law and cell, which of the wanted draws are there."""
+        """By law and cell, which of the wanted draws (draws,) are there."""
         there = {
             (law, cell): np.zeros(self.about.draws, bool)
             for law in self.about.laws
@@ -209,7 +209,11 @@ class Store:
 
 
 def encode_unit(result: UnitResult, seal: str) -> bytes:
-    """A unit as the content of a file."""
+    """A unit as the content of a file; `seal` is the digest of the study's identity.
+
+    A line of JSON, then the metrics and end times as little-endian floats, then the states as
+    bytes.
+    """
     facts = {
         "identity": seal,
         "unit": astuple(result.unit),
