@@ -43,7 +43,7 @@ def _constants(layout: Measured) -> dict[str, float]:
 
 
 def _rms(seen: Vector, step: float) -> float:
-    """Root of the mean squared cross-track error [m]; NaN before any time is over."""
+    """Root of the mean squared cross-track error [m]; NaN over no time."""
     return math.sqrt(seen[SQUARE] / seen[TIME]) if seen[TIME] else math.nan
 
 
