@@ -118,7 +118,6 @@ class Identify(Component):
     @field_validator("noise")
     @classmethod
     def _of_sensors(cls, noise: dict[str, float]) -> dict[str, float]:
-        """Raises ValueError for a name in `noise` that is no sensor's."""
         for name in noise:
             if name not in SENSORS:
                 raise ValueError(f"{name} is no sensor's deviation (allowed: {', '.join(SENSORS)})")

@@ -182,7 +182,6 @@ def _bytes(data: bytes, name: str, key: str, faults: list[Fault]) -> Node:
 
 
 def _points(text: str, name: str, key: str, faults: list[Fault]) -> Node:
-    """The lines of a file as a list of points."""
     return Node(tuple(_rows(text, name, faults)), Mark(name))
 
 
@@ -207,7 +206,6 @@ def _rows(text: str, name: str, faults: list[Fault]) -> Iterator[Node]:
 
 
 def _row(line: TextLine, mark: Mark, faults: list[Fault]) -> Node:
-    """A line of a file of points as a list of two numbers; faults for what is no such pair."""
     numbers = [resolve(cell) for cell in line.cells]
     wrong = [isinstance(n, (str, bool)) or n is None for n in numbers]
     # The line is not shown: the file may be one that the user may not read.

@@ -206,7 +206,6 @@ def _thrusters(boat: Boat) -> Thrusters:
 
 
 def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
-    """The scenario's text for a boat of these dimensions; `known` says if its speed was given."""
     numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
@@ -214,7 +213,6 @@ def _of_dimensions(hull: Hull, thrusters: Thrusters, *, known: bool) -> str:
 
 
 def _of_preset(preset: str) -> str:
-    """The scenario's text for a vessel of podusv with its thrusters."""
     boat = (
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
@@ -223,10 +221,6 @@ def _of_preset(preset: str) -> str:
 
 
 def _fill_template(title: str, boat: str, study: str) -> str:
-    """The scenario's text: `boat` and `study` are YAML; a task that suits the boat is worked out.
-
-    Speed, legs and duration follow from the hull, so that it can keep up.
-    """
     scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
