@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from podusv_cli.core.finding import Finding
     from podusv_cli.process.extras import Failure
 
-WIDEST = 100
+WIDEST = 100  # letters; longer lines of prose are hard to read
 SPACE = "  "  # between the columns of a table
 
 

@@ -19,9 +19,9 @@ BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that tu
 SHOWING = (0.5, 1.0)  # of the range, where a number that changes none shows that it does not act
 LOOKS = 12  # steps of golden section: to a 300th of the way between two places
 STEEPER = 3.0  # times as steep as between the places may a number fall to its edge
-GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
+GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))  # of an interval: the part that a golden section cuts off
 SHARP = 1.02  # ratio of distances to which a turn is known
-BY_SEED = 0.1
+BY_SEED = 0.1  # in scales; the distance of another seed, which is no number that moves
 EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
 
 

@@ -35,7 +35,7 @@ WARM = {
     "ipopt.warm_start_bound_push": 1e-6,
     "ipopt.warm_start_mult_bound_push": 1e-6,
 }
-STATES, UNKNOWNS = 6, 8
+STATES, UNKNOWNS = 6, 8  # at each time: (x, y, psi, u, v, r), and with the two demands
 Tell = Callable[[str, float], None]
 
 

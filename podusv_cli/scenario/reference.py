@@ -21,7 +21,7 @@ from podusv_cli.components.vessels.plant import lacking, surge_force, sway_force
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 
-SAMPLES = 60
+SAMPLES = 60  # times of a run, evenly spread
 FASTEST = 100.0  # m/s; larger sway is not searched for
 STANDING = 1e-6  # m/s; a slower target has no course
 

@@ -33,7 +33,7 @@ from podusv_cli.engine.step.layout import (
 )
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
 
-LARGEST = 1e300
+LARGEST = 1e300  # sums and differences of such numbers are still finite
 
 
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
