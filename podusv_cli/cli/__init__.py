@@ -69,7 +69,7 @@ podusv simulates and compares controllers for pod-propelled surface vessels. Fir
   podusv compare podusv:pod/kept.yaml      simulate and compare four laws: table and report
   podusv sweep --help                      judge laws by thousands of drawn hulls, seas, starts
   podusv docs                              the pages of podusv; podusv --help: all commands"""
-OBJECTS_BETWEEN_COLLECTIONS = 500_000
+OBJECTS_BETWEEN_COLLECTIONS = 500_000  # more than all imports make; see `main`
 
 
 class Commands(typer.core.TyperGroup):

@@ -102,6 +102,7 @@ def _show_log(log: LogDifference) -> None:
 
 
 def _number(number: float | None, form: str = ".6g") -> str:
+    """A number as text, `-` for one that a run has not."""
     return "-" if number is None else f"{number:{form}}"
 
 

@@ -49,7 +49,7 @@ def pack(
 
 
 def in_words(size: float) -> str:
-    """Such as `3.2 MB`."""
+    """A size [bytes] such as `3.2 MB`."""
     from podusv_cli.core.quantities import bytes_in_words
 
     return bytes_in_words(size)
@@ -71,5 +71,6 @@ def show(contents: PackedContents) -> None:
 
 
 def _few(names: tuple[str, ...]) -> str:
+    """The first `SHOWN` names, and how many more there are."""
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(names[:SHOWN]) + more

@@ -93,7 +93,7 @@ def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], N
 
 
 def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
-    """A function to call with the fraction done, which prints a line where that takes longer."""
+    """A function to call with the fraction done; prints a line where that takes over `seconds`."""
     begins: list[float] = []
 
     def tell(fraction: float) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from podusv_cli.core.finding import Finding
     from podusv_cli.process.extras import Failure
 
-WIDEST = 100
+WIDEST = 100  # letters; longer lines of prose are hard to read
 SPACE = "  "  # between the columns of a table
 
 
@@ -140,7 +140,10 @@ def _parts(widths: list[int], room: int) -> Iterator[list[int]]:
 
 
 def fold_line(text: str, width: int) -> str:
-    """A line wrapped at spaces, the rest of it indented by two; paths are not broken."""
+    """A line wrapped at spaces to `width` letters, the rest of it indented by two.
+
+    Paths are not broken.
+    """
     return textwrap.fill(
         text, width, subsequent_indent="  ", break_on_hyphens=False, break_long_words=False
     )

@@ -27,6 +27,7 @@ def differing(one: Vector, other: Vector) -> Truths:
 
 
 def _bits(array: Vector) -> npt.NDArray[np.int64]:
+    """The numbers as integers with their bits, in the array's shape."""
     return np.ascontiguousarray(array, dtype=np.float64).view(np.int64)
 
 
@@ -227,6 +228,7 @@ def _first(unequal: list[_Pair]) -> Deviation | None:
 
 def _place_of_largest(pair: _Pair) -> Place:
     # Zeros of different sign differ at a distance of 0.
+    """The indices at which two arrays differ most."""
     distance = distances(pair.one, pair.other, period=pair.period)
     return _place_of_maximum(np.where(differing(pair.one, pair.other), distance, -1.0))
 

@@ -105,6 +105,7 @@ def difference(one: RunFolder, other: RunFolder) -> RunDifference:
 
 
 def _number(run: RunFolder, name: str) -> float | None:
+    """A metric of a run; None where it has none, or where it is not finite."""
     number = run.metrics.get(name)
     return number if number is None or math.isfinite(number) else None
 
@@ -139,4 +140,5 @@ def version_changes(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[st
 
 
 def _facts(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Dotted keys of provenance.json that can explain another result: no times, no paths."""
     return {key: v for key, v in flat(provenance) if key not in OF_EACH_RUN and v is not None}

@@ -246,7 +246,7 @@ def _over(number: float, delay: float) -> float:
 def _rises_to(
     force: Callable[[float], float], wanted: float, highest: float, halvings: int = HALVINGS
 ) -> float:
-    """Where a rising force comes to a wanted one, at most `highest`; by bisection."""
+    """Where a rising force comes to a wanted one, at most `highest`; by so many halvings."""
     low, high = 0.0, highest
     for _ in range(halvings):
         middle = 0.5 * (low + high)

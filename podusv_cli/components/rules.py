@@ -24,6 +24,7 @@ def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
     """The rule for a pole of an observer, which a slow measurement limits."""
 
     def of(facts: Facts, default: float) -> float:
+        """The pole [1/s or rad/s] that suits a boat; `default` is that of the model ship."""
         most = OBSERVED / facts.period if facts.period else math.inf
         return min(default * factor(facts), most)
 

@@ -118,6 +118,7 @@ class Component(BaseModel):
         return checked._with({}, self.model_fields_set | new.keys()) if self.rules else checked
 
     def _with(self, new: Mapping[str, Any], given: set[str]) -> Self:
+        """A copy with new fields, not checked again; `given` are those that the user wrote."""
         made: Any = type(self).model_construct(given, **(dict(self) | dict(new)))
         return cast("Self", made)
 

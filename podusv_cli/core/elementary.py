@@ -17,7 +17,7 @@ from podusv_cli.core.kernel import kernel
 ROUND = 1.5 * 2.0**52  # added and taken away again it leaves the nearest whole number
 SMALLEST = -708.0  # below, e^x is no normal number any more
 LARGEST_ANGLE = 1e15  # rad, turns; beyond, neighbouring numbers are too far apart to be directions
-LOG2_E = 1.0 / math.log(2.0)
+LOG2_E = 1.0 / math.log(2.0)  # e^x = 2^(x LOG2_E)
 # Long constants in parts, all but the last so short that a whole number times it is exact.
 LN2 = (float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33"))
 QUARTER = (

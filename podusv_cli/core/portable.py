@@ -69,6 +69,7 @@ def exponential(x: Vector) -> Vector:
 
 
 def _ratio(x: Vector, part: tuple[tuple[float, ...], tuple[float, ...]]) -> Vector:
+    """A rational function of x (n,): the coefficients of numerator and denominator."""
     return _polynomial(x, part[0]) / _polynomial(x, part[1])
 
 

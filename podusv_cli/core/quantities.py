@@ -13,12 +13,12 @@ TIMES = {"s": 1.0, "min": 60.0, "h": 3600.0, "days": 86400.0, "years": 31557600.
 
 
 def bytes_in_words(count: float) -> str:
-    """Such as `3.2 GB`."""
+    """A number of bytes such as `3.2 GB`."""
     return _in_words(count, BYTES)
 
 
 def time_in_words(seconds: float) -> str:
-    """Such as `1.4 min`."""
+    """A time [s] such as `1.4 min`."""
     return _in_words(seconds, TIMES)
 
 

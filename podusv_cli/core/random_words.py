@@ -24,7 +24,7 @@ BITS = 52  # of a word: more, and u + 1/2 would round to 1
 
 
 def words(stream: tuple[int | str, ...], first: int, count: int) -> Words:
-    """The random words number first, first + 1, ... of the stream with these names."""
+    """The `count` random words from number `first` on of the stream with these names, (count,)."""
     key = int.from_bytes(sha256(json.dumps(stream).encode()).digest()[:16], "little")
     generator = np.random.Philox(key=key).advance(first)
     return np.asarray(generator.random_raw(BLOCK * count)[::BLOCK])
@@ -36,7 +36,7 @@ def in_unit_interval(drawn: Words) -> Vector:
 
 
 def uniforms(stream: tuple[int | str, ...], first: int, count: int) -> Vector:
-    """Numbers first, first + 1, ... of a stream, uniform in (0, 1) without the ends."""
+    """Numbers (count,) from `first` on of a stream, uniform in (0, 1) without the ends."""
     return in_unit_interval(words(stream, first, count))
 
 
@@ -54,5 +54,5 @@ def gauss_markov(stream: tuple[int | str, ...], count: int, lag: float) -> Vecto
 
 
 def normals(stream: tuple[int | str, ...], first: int, count: int) -> Vector:
-    """Numbers first, first + 1, ... of a stream, standard normal; the same on every machine."""
+    """Numbers (count,) from `first` on of a stream, standard normal; the same on every machine."""
     return standard_normal(uniforms(stream, first, count))

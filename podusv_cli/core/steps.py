@@ -22,6 +22,6 @@ def misfit(time: float, step: float) -> str:
 
 
 def nearest_hint(time: float, step: float) -> str:
-    """A hint with the nearest time that fits; the smaller one in the middle of two."""
+    """A hint with the nearest time [s] that fits the step [s]; the smaller one of two as near."""
     count = time / step
     return f"; try {max(1, math.ceil(count - 0.5)) * step:.10g}" if count < 1e12 else ""

@@ -19,9 +19,9 @@ BETWEEN = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # of the range, for verdicts that tu
 SHOWING = (0.5, 1.0)  # of the range, where a number that changes none shows that it does not act
 LOOKS = 12  # steps of golden section: to a 300th of the way between two places
 STEEPER = 3.0  # times as steep as between the places may a number fall to its edge
-GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))
+GOLDEN = 0.5 * (3.0 - math.sqrt(5.0))  # of an interval: the part that a golden section cuts off
 SHARP = 1.02  # ratio of distances to which a turn is known
-BY_SEED = 0.1
+BY_SEED = 0.1  # in scales; the distance of another seed, which is no number that moves
 EDGES = (1e-12, 1.0 - 1e-12)  # shares of a distribution that are its ends
 
 
@@ -142,6 +142,7 @@ def explore_choice(
 
 
 def _acts(judged: Judged, claim: str, base: Judged) -> bool:
+    """Whether a world changes any number of the claim."""
     return not judged.failed and not judged.same(claim, base)
 
 
@@ -166,14 +167,14 @@ class _Side:
         }  # a value and what is said
 
     def judge_at(self, distance: float) -> Judged:
-        """What the claims say there."""
+        """What the claims say where the choice is so far from the scenario's own value."""
         if distance not in self.trials:
             value = self.choice.own + math.copysign(distance, self.end - self.choice.own)
             self.trials[distance] = value, self.judge(world_with(self.choice, value))
         return self.trials[distance][1]
 
     def turns_at(self, distance: float, claim: str) -> bool:
-        """Whether a verdict is the opposite there."""
+        """Whether a verdict is the opposite where the choice is so far from its own value."""
         return self.judge_at(distance).contradicts(claim, self.base)
 
     def tried_between(self) -> list[float]:

@@ -34,7 +34,10 @@ Way = Callable[[float, Scenario, Key], DoubtRange | None]  # how a number of thi
 
 
 def _by_factor(alone: float, together: float) -> Way:
-    """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none."""
+    """A factor up to `alone` or its inverse, inside the key's bounds; of 0 there is none.
+
+    `together` is the factor where all choices are drawn.
+    """
 
     def range_of_factor(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         """Factors of the scenario's value, as far as the key takes both ends; None if it cannot."""
@@ -49,7 +52,10 @@ def _by_factor(alone: float, together: float) -> Way:
 
 
 def _by_summand(scale: Callable[[Scenario], float], alone: float, together: float) -> Way:
-    """A summand up to a share of a scale, inside the key's bounds."""
+    """A summand up to a share of a scale, inside the key's bounds.
+
+    `alone` is the share where only this choice moves, `together` where all are drawn.
+    """
 
     def range_of_summand(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
         """Summands to the scenario's value, in shares of `scale`; None where that is 0."""
@@ -65,7 +71,7 @@ def _by_summand(scale: Callable[[Scenario], float], alone: float, together: floa
 
 
 def _place(own: float, scenario: Scenario, key: Key) -> DoubtRange | None:
-    """A summand of a coordinate; a factor of a length that has bounds, as a radius."""
+    """A summand of a coordinate [m]; a factor of a length that has bounds, as a radius."""
     way = _by_factor(2.0, 1.05) if limits(key.field) else _by_summand(_length, 5.0, 0.5)
     return way(own, scenario, key)
 
@@ -146,7 +152,7 @@ RANGES: dict[str, dict[str, Way]] = {
 
 
 def _whole(own: float) -> tuple[float, ...]:
-    """None and all of the Coriolis terms."""
+    """Shares of the Coriolis terms to try, none and all, but for the scenario's `own`."""
     return tuple(share for share in (0.0, 1.0) if share != own)
 
 

@@ -15,7 +15,7 @@ from podusv_cli.doubt.choices import Choice
 from podusv_cli.doubt.judged import Judged, World, together
 
 STREAM = "doubt"
-PERMUTATIONS = 400
+PERMUTATIONS = 400  # 20 of them lie beyond a band of LEVEL
 LEVEL = 0.95  # of the band that chance stays within
 
 

@@ -92,7 +92,7 @@ def _widen(axes: Axes, size: float) -> None:
 
 
 def _way(y: Vector) -> float:
-    """How far a signal goes up and down, as far as a page can show it."""
+    """How far a signal y (n,) goes up and down in all, as far as a page can show it."""
     _, few = thin_curve(np.arange(len(y), dtype=float), y)
     return float(np.sum(np.abs(np.diff(few, axis=0))))
 

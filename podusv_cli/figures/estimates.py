@@ -106,7 +106,7 @@ def _draw(axes: Axes, run: Shown, name: str, *, fitted: bool, error: bool) -> No
 
 
 def _fresh(measured: Vector) -> NDArray[np.intp]:
-    """The rows in which a value differs from the last one; else that is held and not delivered."""
+    """The rows in which a value (n,) differs from the last one; else it is held, not delivered."""
     return np.flatnonzero(np.diff(measured)) + 1
 
 

@@ -59,8 +59,10 @@ def _draw(axes: Axes, run: Shown, names: tuple[str, str], pod: int, *, fitted: b
 
 
 def _has(run: Shown, name: str, pod: int) -> bool:
+    """Whether the run's log has this signal of this pod; "" is no signal."""
     return bool(name) and run.has(name) and pod < run.recording[name].shape[1]
 
 
 def _curve(run: Shown, name: str, pod: int) -> tuple[Vector, Vector]:
+    """Times (n,) [s] and a signal (n,) of one pod."""
     return run.recording["time"], run.recording[name][:, pod]

@@ -23,7 +23,7 @@ from podusv_cli.findings.stability import (
 from podusv_cli.scenario.case import Case
 from podusv_cli.theory.loop_margins import loop_margins
 
-UNSTABLE = 1.0 + 1e-6
+UNSTABLE = 1.0 + 1e-6  # growth a step; a loop without damping has 1 but for rounding
 # by the cause that a law gives: what is too fast, which loop that is, and what should be smaller
 LOOPS: dict[Cause, tuple[str, str, str]] = {
     "adaptation": ("adaptation", "the linearised loop of error and adaptation", "adaptation gains"),

@@ -48,4 +48,5 @@ def _summary(law: PolarBackstepping, scenario: Scenario) -> str:
 
 
 def _short(condition: GainCondition) -> str:
+    """A condition that fails, with value and limit."""
     return f"{condition.name} = {condition.value:g} fails: it must exceed {condition.limit:.3g}"

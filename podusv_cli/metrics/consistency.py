@@ -87,10 +87,12 @@ def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vecto
 
 
 def _size(layout: Measured) -> int:
+    """How many numbers are gathered: none where the estimator has no covariance."""
     return SIZE if layout.plan.estimate and layout.loop.estimator.covariance[1] else 0
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """Where in the states the estimate is, and where in it its covariance, of how many numbers."""
     at, order = layout.loop.estimator.covariance
     return {"estimate": float(layout.plan.estimate), "covariance": float(at), "order": float(order)}
 

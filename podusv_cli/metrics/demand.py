@@ -31,7 +31,7 @@ def watch(steady: float, row: Vector, k: Any, seen: Vector) -> None:
 
 
 def _variation(position: int) -> Result:
-    """A total variation; NaN with fewer than two instants in the steady window."""
+    """The total variation gathered at this position; NaN with fewer than two steady instants."""
     return lambda seen, step: float(seen[position]) if seen[SETTLED] > 1.0 else math.nan
 
 

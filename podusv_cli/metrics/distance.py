@@ -64,10 +64,12 @@ def watch_settled(
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """The standoff [m] and the settling radius [m]."""
     return standoff_of(layout) | {"settling_radius": layout.settling_radius}
 
 
 def _rmse(seen: Vector, step: float) -> float:
+    """Root of the mean square over the time; NaN before any time is over."""
     return math.sqrt(seen[SQUARE] / seen[TIME]) if seen[TIME] else math.nan
 
 
@@ -76,6 +78,7 @@ def _settling_time(seen: Vector, step: float) -> float:
 
 
 def _rms(position: int) -> Result:
+    """The result that is the root of the mean of a gathered integral."""
     mean = ratio(position, TIME)
     return lambda seen, step: math.sqrt(mean(seen, step))
 

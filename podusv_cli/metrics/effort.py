@@ -25,6 +25,7 @@ def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """The columns of the loads, and of the mark of saturation, -1 without one."""
     return {"tau": float(layout.plan.tau), "saturated": float(layout.column("saturated"))}
 
 

@@ -44,11 +44,13 @@ def _size(layout: Measured) -> int:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """Where the estimate is in the states, and that before a delivery in the row."""
     plan = layout.plan
     return {"estimate": float(plan.estimate), "before": float(plan.columns)}
 
 
 def _rms(position: int) -> Result:
+    """The result that is the root of the mean of a gathered integral; NaN over no time."""
     return lambda seen, step: math.sqrt(seen[position] / seen[TIME]) if seen[TIME] else math.nan
 
 

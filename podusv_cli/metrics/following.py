@@ -37,11 +37,13 @@ def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vecto
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """Where the place on the path is in the states, and how many legs there are."""
     legs = float(len(layout.loop.path.waypoints()) - 1)
     return {"place": float(layout.plan.place), "legs": legs}
 
 
 def _rms(seen: Vector, step: float) -> float:
+    """Root of the mean squared cross-track error [m]; NaN over no time."""
     return math.sqrt(seen[SQUARE] / seen[TIME]) if seen[TIME] else math.nan
 
 

@@ -132,5 +132,5 @@ def gathered(position: int) -> Result:
 
 
 def ratio(position: int, whole: int) -> Result:
-    """One gathered number over another; NaN over 0."""
+    """The number gathered at `position` over that at `whole`; NaN over 0."""
     return lambda seen, step: float(seen[position] / seen[whole]) if seen[whole] else math.nan

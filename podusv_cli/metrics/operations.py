@@ -79,14 +79,17 @@ def _plain(number: Any) -> Any:
 
 
 def _forward(operation: Callable[..., Any]) -> Callable[..., Counted]:
+    """An operator of Python that counts one operation: self, then the other."""
     return lambda self, other: self.tally.apply(operation, self, other)
 
 
 def _backward(operation: Callable[..., Any]) -> Callable[..., Counted]:
+    """The same with the other operand first, as `2.0 * x` calls it."""
     return lambda self, other: self.tally.apply(operation, other, self)
 
 
 def _comparison(operation: Callable[..., Any]) -> Callable[..., bool]:
+    """An operator that compares, and counts nothing."""
     return lambda self, other: bool(operation(self.number, _plain(other)))
 
 
@@ -95,6 +98,7 @@ def _conversion(kind: Callable[[Any], Any]) -> Callable[..., Any]:
 
 
 def _sign(operation: Callable[..., Any]) -> Callable[..., Counted]:
+    """A change of sign, which counts nothing."""
     return lambda self: Counted(operation(self.number), self.tally)
 
 

@@ -41,6 +41,7 @@ def _size(layout: Measured) -> int:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """The number of pods, and the columns of limits and power, -1 where there is none."""
     limits, power = layout.column(LIMITED[0].name), layout.column("power")
     return {"pods": float(_count(layout)), "limits": float(limits), "power": float(power)}
 

@@ -118,6 +118,7 @@ def _sizes(manoeuvre: str, size: int) -> Any:
     """How many numbers are gathered: none in other trials."""
 
     def size_of(layout: Measured) -> int:
+        """The size in a run of this manoeuvre, else 0."""
         trial = layout.loop.controller.trial()
         return size if trial is not None and trial.manoeuvre == manoeuvre else 0
 
@@ -125,6 +126,7 @@ def _sizes(manoeuvre: str, size: int) -> Any:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """When the trial begins [s] and reverses [rad]; {} for no trial."""
     trial = layout.loop.controller.trial()
     return {"trial_execute": trial.execute, "trial_switch": trial.switch} if trial else {}
 
@@ -132,7 +134,7 @@ def _constants(layout: Measured) -> dict[str, float]:
 def _number(
     of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
 ) -> Metric:
-    """A gathered number, first in tables; NaN where the trial did not get so far."""
+    """The number gathered at this position, first in tables; NaN where a trial got not so far."""
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
         name,

@@ -117,6 +117,7 @@ def _rms(own: Vector) -> float:
 
 
 def _at(position: int) -> Callable[[Vector], float]:
+    """What a window's numbers have at a position; NaN for a window that no instant was in."""
     return lambda own: float(own[position]) if own[LENGTH] else math.nan
 
 

@@ -35,7 +35,7 @@ WARM = {
     "ipopt.warm_start_bound_push": 1e-6,
     "ipopt.warm_start_mult_bound_push": 1e-6,
 }
-STATES, UNKNOWNS = 6, 8
+STATES, UNKNOWNS = 6, 8  # at each time: (x, y, psi, u, v, r), and with the two demands
 Tell = Callable[[str, float], None]
 
 
@@ -127,6 +127,7 @@ def _solve_stage(program: _Program, start: str, guess: Motion) -> Stage:
 
 
 def _tell(tell: Tell | None, stage: int, count: int, iterations: int) -> None:
+    """Tell the fraction that is done: stages, and a guess at the iterations of this one."""
     if tell:  # nobody knows how many iterations there will be
         tell("solving", (stage + iterations / (iterations + 50.0)) / count)
 
@@ -234,7 +235,7 @@ def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 def _segment(problem: OptimumProblem, h: float) -> Any:
-    """A CasADi function of one segment: its gaps, its share of the integral, its middle place."""
+    """A CasADi function of a segment of `h` [s]: its gaps, share of the integral, middle place."""
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
     before, after = ca.SX.sym("before", UNKNOWNS), ca.SX.sym("after", UNKNOWNS)
     loads = [ca.SX.sym(f"b{i}", 3) for i in range(3)]

@@ -35,6 +35,7 @@ class Motion:
         """The motion at other `times` (n,) [s], on straight lines between its own."""
 
         def between(rows: Vector) -> Vector:
+            """Rows (times, numbers) at the new times (n,): (n, numbers)."""
             return np.column_stack([np.interp(times, self.times, column) for column in rows.T])
 
         return Motion(times, between(self.states), between(self.demands))

@@ -170,7 +170,10 @@ def _control(
 
 
 def _span(key: Key, now: float, usual: float, length: float) -> dict[str, Any]:
-    """The slider's ends: the key's own where it has both, else around the number."""
+    """The slider's ends: the key's own where it has both, else around the number `now`.
+
+    `usual` is the default; `length` [m] that of the hull, for keys in m, else 0.
+    """
     bounds = limits(key.field)
     low = bounds.get("gt", bounds.get("ge"))
     high = bounds.get("lt", bounds.get("le"))

@@ -37,7 +37,7 @@ class Bounded(Component):
 
     @abstractmethod
     def whole(self, u: Vector) -> Vector:
-        """The values without `within`."""
+        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
 
     def at(self, u: Vector) -> Vector:
         """The values (n,) for shares u (n,) in [0, 1), within the bounds."""
@@ -92,7 +92,7 @@ class Normal(Bounded):
     sigma: float = value(..., OF_SECTION, "its standard deviation", gt=0)
 
     def whole(self, u: Vector) -> Vector:
-        """The values without `within`."""
+        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
         return self.mean + self.sigma * standard_normal(u)
 
 
@@ -105,7 +105,7 @@ class LogNormal(Bounded):
     )
 
     def whole(self, u: Vector) -> Vector:
-        """The values without `within`."""
+        """The values (n,) for shares u (n,) in [0, 1), without `within`."""
         return self.median * exponential(self.sigma * standard_normal(u))
 
 
@@ -195,6 +195,7 @@ def _integers(bounds: tuple[int, int], u: Vector) -> Numbers:
 
 
 def _place(count: int, u: Vector) -> npt.NDArray[np.int64]:
+    """Which of `count` values each share u (n,) in [0, 1) falls on."""
     return np.minimum((u * count).astype(np.int64), count - 1)
 
 

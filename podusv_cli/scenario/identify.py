@@ -123,7 +123,7 @@ class Identify(Component):
     @field_validator("noise")
     @classmethod
     def _of_sensors(cls, noise: dict[str, float]) -> dict[str, float]:
-        """Raises ValueError for a name in `noise` that is no sensor\'s, and for what is no size."""
+        """Raises ValueError for a name in `noise` that is no sensor's, and for what is no size."""
         for name, deviation in noise.items():
             if name not in (*SENSORS, *LASTING):
                 allowed = ", ".join((*SENSORS, *LASTING))

@@ -117,6 +117,7 @@ class Key:
 
     @property
     def _bounds(self) -> list[tuple[str, str, float]]:
+        """For each bound of the key its sign, its words and the number."""
         given = limits(self.field)
         return [(*BOUNDS[name], given[name]) for name in BOUNDS if name in given]
 

@@ -61,6 +61,7 @@ def _settings(source: str, overrides: Sequence[str], faults: list[Fault]) -> Nod
 
 
 def _over(base: Node, top: Node, faults: list[Fault]) -> Node:
+    """`top` over `base`; what does not fit there is a fault, and left out."""
     return merge(base, without_misfits(base, top, faults))
 
 

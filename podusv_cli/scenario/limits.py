@@ -151,4 +151,5 @@ def _too_large(loaded: Loaded, allow_large: bool, read_back: bool, insist: str) 
 
 
 def _log_less(every: int, size: Size, most: int) -> str:
+    """How to get below `most` bytes: the interval of logged steps that suffices."""
     return f"log less often (every: {every * -(-size.content // most)})"

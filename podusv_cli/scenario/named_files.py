@@ -205,9 +205,11 @@ def _path(file: Node) -> str:
 
 
 def _whole(text: str, name: str, key: str, faults: list[Fault]) -> Node:
+    """The text of a file as it is, for a key that takes a text."""
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n")
     return text_node(lines, Mark(name), key, faults, text=lines)
 
 
 def _bytes(data: bytes, name: str, key: str, faults: list[Fault]) -> Node:
+    """The bytes of a file in base64, for a key that takes a network."""
     return Node(base64.b64encode(data).decode("ascii"), Mark(name))

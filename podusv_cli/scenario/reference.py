@@ -21,7 +21,7 @@ from podusv_cli.components.vessels.plant import lacking, surge_force, sway_force
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.scenario.model import Scenario
 
-SAMPLES = 60
+SAMPLES = 60  # times of a run, evenly spread
 FASTEST = 100.0  # m/s; larger sway is not searched for
 STANDING = 1e-6  # m/s; a slower target has no course
 
@@ -57,7 +57,7 @@ class Reference:
 
 
 def median(values: Vector) -> float:
-    """The median; numpy's own imports numpy.ma, which would cost 9 ms of every run."""
+    """The median of values (n,); numpy's own imports numpy.ma, 9 ms of every run."""
     return float(statistics.median(values.tolist()))
 
 
@@ -104,7 +104,10 @@ def _loads(scenario: Scenario, time: Vector, target: Vector, turn: Vector) -> Ve
 def _balance(
     scenario: Scenario, b_v: float, b_r: float
 ) -> Callable[[float, float], tuple[float, float]]:
-    """A function from speed U and turn rate r to steady surge and sway; NaN where none exist."""
+    """A function from speed U and turn rate r to steady surge and sway; NaN where none exist.
+
+    `b_v` [N] and `b_r` [N m] are the mean loads.
+    """
     k, share = bundle(scenario.vessel.constants()), sway_share(scenario)
 
     @cache  # a line and a circle have one speed and one turn rate each

@@ -33,6 +33,7 @@ def of_distribution(distribution: Distribution) -> str:
 
 
 def _cut(bounds: tuple[float, float] | None) -> str:
+    """The words for bounds that cut a distribution off; "" without them."""
     return f", only from {bounds[0]:g} to {bounds[1]:g}" if bounds else ""
 
 

@@ -255,7 +255,7 @@ def _names_places(base: Node, top: Node) -> bool:
 
 
 def _is_place(key: str, count: int) -> bool:
-    """Whether a key is a place in a list of so many entries."""
+    """Whether a key is a place in a list of `count` entries."""
     return key.isdecimal() and len(key) <= LONGEST_PLACE and int(key) < count
 
 

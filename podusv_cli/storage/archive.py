@@ -20,7 +20,7 @@ from podusv_cli.storage import files
 
 NOTHING: Mapping[str, bytes] = {}
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # the time of every file: the first that the format has
-PLAIN = stat.S_IFREG | 0o644
+PLAIN = stat.S_IFREG | 0o644  # a file that its owner writes and all read, on any machine
 MOST_FILES = 100_000
 # Logs become 1 to 3 times as large; the format reaches 1032, and any ratio where files share bytes.
 LARGEST_RATIO = 100

@@ -137,6 +137,7 @@ def remove(folder: Path, what: str, proof: str, unfinished: Collection[str]) -> 
 
 
 def _entry(path: Path) -> FileEntry:
+    """Digest and size of a file. Raises StorageError."""
     digest, size = fingerprint(path)
     return FileEntry(sha256=digest, bytes=size)
 

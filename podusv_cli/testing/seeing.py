@@ -19,7 +19,7 @@ from podusv_cli.scenario.yaml_tree import plain
 
 SIX = len(STATE)
 BEYOND = -1.234567890123e-290  # behind every vector; nobody writes just this
-MARGIN = 8
+MARGIN = 8  # numbers, a whole register
 STEP, STEPS = 0.01, 1000
 PATIENCE = 5.0  # s, in which an estimate has to come to what is measured
 NEAR = 0.4  # of the way there; also rad, m/s and rad/s

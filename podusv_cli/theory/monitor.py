@@ -249,6 +249,7 @@ class _Bounds:
         )
 
     def _both(self, rows: slice, u: str, r: str) -> bounds.Pair:
+        """The largest sizes of a surge trace and a yaw trace in these rows."""
         return bounds.Pair(_largest(self.traces[u][rows]), _largest(self.traces[r][rows]))
 
 

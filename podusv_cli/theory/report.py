@@ -28,6 +28,7 @@ def as_json(loop: ClosedLoop, grid: TimeGrid, monitored: Monitored) -> dict[str,
 
 
 def _condition(condition: GainCondition) -> dict[str, Any]:
+    """A condition on a gain as theory.json has it."""
     forms = {"holds": condition.holds, "holds_printed": condition.holds_printed}
     return asdict(condition) | forms
 
@@ -61,6 +62,7 @@ def _withheld(monitored: Monitored, axis: str) -> float:
 
 
 def _assumption(assumption: str, holds: bool, found: float | None = None) -> dict[str, Any]:
+    """An assumption as theory.json has it; `found` is the number that decides it."""
     number = {} if found is None else {"found": found}
     return {"assumption": assumption, "holds": holds} | number
 

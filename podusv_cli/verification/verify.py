@@ -13,7 +13,7 @@ from podusv_cli.verification.ranking import Ranking, ranking
 from podusv_cli.verification.richardson import StepEstimate, estimate, estimate_position
 from podusv_cli.verification.step_halving import Level, Progress, run_level
 
-LEVELS = 3
+LEVELS = 3  # steps h, h/2, h/4: the least that tell order and error
 POSITION = "end_position"  # verified like a metric
 
 

@@ -202,6 +202,7 @@ def _keep_apart(items: Sequence[Path], target: Path) -> None:
 
 
 def _writer(target: Path, members: Sequence[Member], request: Request) -> RunWriter:
+    """The writer of the comparison's folder. Raises StorageError where the disk has no room."""
     space = disk_needed(sizes(members), request.workers or available_workers())
     return writer_of(request, target, space)
 

@@ -62,4 +62,5 @@ def _runs(path: Path) -> list[RunFolder]:
 
 
 def _pair(one: RunFolder, other: RunFolder) -> tuple[Path, Path, RunDifference]:
+    """Two run folders, and what differs between them."""
     return one.path, other.path, difference(one, other)

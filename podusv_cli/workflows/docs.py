@@ -186,5 +186,6 @@ def _place(name: str) -> str:
 
 
 def _file(name: str) -> Path:
+    """The Markdown file of a page, of a checkout or of an installed podusv."""
     room, _, rest = _place(name).partition("/")
     return shipped.folder(room) / f"{rest}.md"

@@ -159,6 +159,7 @@ def _folder(member: Member) -> Path:
 
 
 def _short(member: Member) -> str:
+    """A run's label: its scenario's name, where its folder is called by a time."""
     name = _folder(member).resolve().name
     return member.about.name if STAMP.fullmatch(name) else name
 
@@ -241,5 +242,6 @@ def _put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
 
 
 def _differs(path: Path, content: bytes) -> bool:
+    """Whether a file is there with another content. Raises StorageError."""
     with files.storage_errors(f"cannot read {path}"):
         return path.is_file() and path.read_bytes() != content

@@ -120,10 +120,10 @@ def rows(page: str) -> list[list[str]]:
 
 def test_every_metric_is_documented_with_its_unit_and_definition() -> None:
     documented = rows("docs/metrics.md")
-    assert len(documented) == len(METRICS)
     assert {tuple(row[:2]) for row in documented} == {
         (f"`{m.name}`", m.unit) for m in METRICS.values()
     }
+    assert len(documented) == len(METRICS)
     assert all(row[2] for row in documented)
     margins = {row[0][1:-1]: row[2] for row in documented if len(row) == 3}
     assert len(margins) > 10
@@ -165,7 +165,7 @@ def test_every_kind_has_its_place_on_a_page(section: str, pages: str) -> None:
     text = "".join(page.read_text() for page in (ROOT / "docs").rglob(f"{pages}.md"))
     kinds = kinds_of(scenario_class(()), section)
     missing = [kind for kind in kinds if not re.search(rf"(`|kind: ){kind}\b", text)]
-    assert not missing
+    assert not missing, f"no {section} of these kinds on docs/{pages}.md: {missing}"
 
 
 def test_the_citation_names_this_version() -> None:

@@ -18,7 +18,7 @@ import math
 
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 
-MOST_PODS = 4
+MOST_PODS = 4  # all 2^4 choices of ahead and astern are tried
 AXES = 3  # surge, sway, yaw
 # A pod's row in `sectors`: directions of the two edges, least and most along them, most astern.
 LOW_COS, LOW_SIN, HIGH_COS, HIGH_SIN, MOST_ASTERN, MOST_AHEAD, FIXED, SECTOR = range(8)

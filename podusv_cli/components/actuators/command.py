@@ -28,7 +28,7 @@ BEGAN = len(DEMAND)  # behind the demand there is when the present step began [s
 DRIVEN = BEGAN + 1  # numbers of both
 LOGGED = len(GIVEN)
 WHOLE = 1.5 * 2.0**52  # a number below 2^51 that is added to it, and taken off, is rounded
-LARGEST = 2.0**51
+LARGEST = 2.0**51  # a count beyond it has no fraction worth rounding
 
 
 class Command(Component):

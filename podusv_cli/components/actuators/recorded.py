@@ -53,12 +53,18 @@ def _column(signal: Signal) -> str:
 
 
 def table_of(rows: Vector) -> Vector:
-    """What `obeying` reads behind the actuator's own table: the times, then the commands."""
+    """What `obeying` reads behind the actuator's own table: the times [s], then the commands.
+
+    `rows` are (rows, 1 + commands), as `rows_of` gives them.
+    """
     return np.concatenate([rows[:, 0], rows[:, 1:].ravel()])
 
 
 def constants_of(rows: Vector, first: int, *, held: bool) -> dict[str, float]:
-    """What `obeying` reads beside the actuator's own constants; `first` is where its table ends."""
+    """What `obeying` reads beside the actuator's own constants; `first` is where its table ends.
+
+    `rows` are (rows, 1 + commands); `held` says whether commands are held between rows.
+    """
     count, width = len(rows), rows.shape[1] - 1
     return {
         "recorded_first": float(first),

@@ -62,7 +62,10 @@ def pace_constants(m33: float, N_m: float, Q0: float, S0: float) -> dict[str, fl
 
 
 def pace(m33: float, N_m: float, Q0: float) -> float:
-    """How fast the law may be, f; below 1 where it would ask for more than N_m at `ANGLE`."""
+    """How fast the law may be, f; below 1 where it would ask for more than N_m at `ANGLE`.
+
+    `m33` [kg m2] is the inertia in yaw, `Q0` [1/s2] the gain that f = 1 stands for.
+    """
     return min(1.0, math.sqrt(N_m / (ANGLE * m33 * Q0)))
 
 

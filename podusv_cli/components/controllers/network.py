@@ -17,7 +17,7 @@ from podusv_cli.core.kernel import Vector, kernel, padded_rounds, tail, whole_la
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 
-MOST_NODES = 10_000
+MOST_NODES = 10_000  # each has two weights, which are states of the loop
 CENTER = Signal(
     "rbf_center",
     "1",

@@ -52,7 +52,7 @@ def layer(facts: Facts) -> float:
 
 
 def root(facts: Facts) -> float:
-    """eta/phi sqrt(phi), over that of the model ship."""
+    """eta/phi sqrt(phi), over that of the model ship [1]: how stiff the sliding mode is."""
     return authority(facts) * math.sqrt(PHI0 / layer(facts))
 
 

@@ -29,7 +29,7 @@ GROUP = 2 * LANES
 SAMPLES = 16  # of a spectrum in every bin, at least
 ALL_SAMPLES = 800  # in all bins, at least: few are wide, and a peak is narrow
 FINE = 4096  # steps in which a spectrum is added up
-NORSOK_N = 0.468
+NORSOK_N = 0.468  # the exponent n of the NORSOK gust spectrum
 HARRIS_LENGTH = 1800.0  # m
 SHARES = np.linspace(0.0, 1.0, 513)  # of the way from -pi/2 to pi/2
 Period = Literal["peak", "mean", "zero_crossing"]
@@ -161,7 +161,7 @@ def cosines(variance: Vector, edges: Vector, seed: int, stream: str, amplitudes:
 
 
 def even_edges(low: float, high: float, count: int) -> Vector:
-    """Edges of `count` bins of one width."""
+    """Edges (count + 1,) of `count` bins of one width, from `low` to `high` [Hz or rad/s]."""
     return np.linspace(low, high, count + 1)
 
 
@@ -181,7 +181,7 @@ def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
 
 
 def growing_edges(low: float, high: float, count: int) -> Vector:
-    """Edges (count + 1,) of bins, each wider than the one before by the same factor."""
+    """Edges (count + 1,) from `low` to `high`, each bin wider than the last by the same factor."""
     ends = logarithm(np.array([low, high]))
     return exponential(np.linspace(ends[0], ends[1], count + 1))
 

@@ -9,7 +9,7 @@ from podusv_cli.components.disturbances.spectra import GROUP, clear_sums
 from podusv_cli.core.elementary import cos_sin, cos_sin_of_turns
 from podusv_cli.core.kernel import LANES, Vector, kernel, scratch, widest
 
-TURN = 2.0 * math.pi
+TURN = 2.0 * math.pi  # rad; phases are in turns, which are cheap to bring into one
 # Room for partial sums: of two envelopes, of them and the motion, of four envelopes, of these as
 # well.
 PAIRS, LONG_ROOM, FACES, SHORT_ROOM = 4 * LANES, 9 * LANES, 8 * LANES, 15 * LANES

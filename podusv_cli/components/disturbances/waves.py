@@ -213,7 +213,10 @@ class Waves(Disturbance):
         return min(FEWEST << doublings, MOST)
 
     def resolving(self, duration: float) -> int:
-        """0.9 components for every period of the peak, with the default cut-offs."""
+        """How many components resolve a run of `duration` [s]: 0.9 for each period of the peak.
+
+        With the default cut-offs; 0 where the number of components does not matter.
+        """
         if self.amplitudes == "deterministic" or self.components == 1:
             return 0
         return spectra.resolving(self._variance(), self._edges() / TURN, duration)

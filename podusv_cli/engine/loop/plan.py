@@ -319,6 +319,7 @@ class Plan:
 
 
 def _kinds(loop: ClosedLoop) -> str:
+    """The classes of a loop's parts, for messages."""
     parts = (loop.path, loop.disturbance, loop.actuator, loop.controller)
     return ", ".join(type(part).__name__ for part in parts)
 

@@ -92,6 +92,7 @@ class Piece(NamedTuple):
 
 @cache  # it reads all byte code of a piece
 def _kept_as(piece: Piece) -> str:
+    """The name of a piece's file: its label, and the digest of all that goes into it."""
     name = piece.label or piece.function.__qualname__
     return re.sub(r"\W", "_", f"{name}_{object_cache.fingerprint(piece.function)}")
 
@@ -115,6 +116,7 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
     done = [0.0] * len(shares)
 
     def advance(share: int, size: float) -> None:
+        """Note how much of its share (in bytes of byte code) a process has compiled."""
         done[share] = size
         if tell:
             tell(sum(done) / whole)

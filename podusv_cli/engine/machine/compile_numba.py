@@ -35,6 +35,7 @@ def tail_of(typing: Any, vector: Any, start: Any) -> Any:
     """`kernel.tail`."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """The pointer moved on by so many numbers."""
         return builder.gep(arguments[0], [arguments[1]])
 
     return vector(vector, types.int64), code
@@ -140,6 +141,7 @@ def signature(prototype: Any, type_of: Any) -> Any:
     """A prototype in numba's types; `type_of` gives that of what is no function."""
 
     def numba_type(kind: Any) -> Any:
+        """numba's type for a type of ctypes; a function inside has a signature of its own."""
         if kind and issubclass(kind, ctypes._CFuncPtr):
             # numba wants a function from a Python object to its address, but never calls it here.
             return types.ExternalFunctionPointer(signature(kind, type_of), ctypes.addressof)

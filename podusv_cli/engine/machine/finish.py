@@ -67,6 +67,7 @@ def bare(made: Any, symbol: str) -> bytes:
 
 
 def _hide(made: Any, symbol: str) -> None:
+    """Make everything but `symbol` internal, so that the optimiser may inline and drop it."""
     for part in (*made.functions, *made.global_variables):
         if not part.is_declaration and part.name != symbol:
             part.linkage = "internal"

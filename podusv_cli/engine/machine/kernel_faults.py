@@ -109,6 +109,7 @@ def _vectors(node: ast.FunctionDef) -> set[str]:
 
 
 def _is_vector(node: ast.expr, vectors: Collection[str]) -> bool:
+    """Whether an expression is a vector: one of these names, `tail(...)` or `scratch(...)`."""
     match node:
         case ast.Name(id=name):
             return name in vectors
@@ -146,6 +147,7 @@ def _body(node: ast.FunctionDef) -> Iterator[ast.AST]:
 
 
 def _without_code(part: ast.AST, known: Mapping[str, Any]) -> str:
+    """Why a part of a kernel cannot become machine code; "" where it can."""
     match part:
         case ast.Call(func=ast.Name(id=name)):
             called = known.get(name)

@@ -57,17 +57,26 @@ class Reads:
         yield from ((line, text) for (line, _), text in self._found.items())
 
     def _block(self, nodes: list[ast.stmt], known: Names | None) -> Names | None:
+        """Names that are set behind these statements, if `known` are before them.
+
+        EVERYTHING where control does not come out behind them.
+        """
         for node in nodes:
             if known is not EVERYTHING:
                 known = self._statement(node, known)
         return known
 
     def _statement(self, node: ast.stmt, known: Names) -> Names | None:
+        """The same of one statement, by the method for its type."""
         follow = getattr(self, f"_after_{type(node).__name__}", self._after_other)
         after: Names | None = follow(node, known)
         return after
 
     def _after_other(self, node: ast.stmt, known: Names) -> Names | None:
+        """Of a statement without branches: what it stores is set.
+
+        `return`, `break` and the like end the way: EVERYTHING.
+        """
         if not isinstance(node, UNREAD):
             self._read(node, known)
         if isinstance(node, ast.Break):
@@ -77,18 +86,21 @@ class Reads:
         return EVERYTHING if isinstance(node, ENDS) else known | _names_stored(node)
 
     def _after_AnnAssign(self, node: ast.AnnAssign, known: Names) -> Names:
+        """Of `x: float = ...`; without a value it sets nothing."""
         if node.value is None:
             return known
         self._read(node.value, known)
         return known | _names_stored(node)
 
     def _after_AugAssign(self, node: ast.AugAssign, known: Names) -> Names:
+        """Of `x += ...`, which reads x as well."""
         if isinstance(node.target, ast.Name):
             self._note(node.target, known)
         self._read(node, known)
         return known
 
     def _after_If(self, node: ast.If, known: Names) -> Names | None:
+        """What both branches set; of a constant condition only the branch that runs."""
         self._read(node.test, known)
         known |= _names_stored(node.test)
         if isinstance(node.test, ast.Constant):
@@ -96,6 +108,7 @@ class Reads:
         return _both([self._block(node.body, known), self._block(node.orelse, known)])
 
     def _after_While(self, node: ast.While, known: Names) -> Names | None:
+        """What is set however the loop is left: at its condition, or by a `break`."""
         self._read(node.test, known)
         known |= _names_stored(node.test)
         loop, _ = self._round(node.body, known)
@@ -104,6 +117,7 @@ class Reads:
         return _both([ended, *loop.left])
 
     def _after_For(self, node: ast.For, known: Names) -> Names | None:
+        """What is set however the loop is left; its body counts only if it surely has a round."""
         self._read(node.iter, known)
         loop, last = self._round(node.body, known | _names_stored(node.target))
         over = _both([last, *loop.again]) if self._has_rounds(node.iter) else known
@@ -111,6 +125,7 @@ class Reads:
         return _both([ended, *loop.left])
 
     def _round(self, body: list[ast.stmt], known: Names) -> tuple[_Loop, Names | None]:
+        """The ways out of a loop's body, and the names that are set at its end."""
         self._loops.append(_Loop())
         last = self._block(body, known)
         return self._loops.pop(), last
@@ -129,6 +144,7 @@ class Reads:
         return False
 
     def _read(self, node: ast.AST, known: Names) -> None:
+        """Note every name that is read in a part of a statement and has maybe no value."""
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
             self._note(node, known)
         if isinstance(node, ast.NamedExpr):  # it has a value for what stands behind it
@@ -138,6 +154,7 @@ class Reads:
                 self._read(part, known)
 
     def _note(self, name: ast.Name, known: Names) -> None:
+        """A fault at this name, where it is a local one that is not among those `known`."""
         if name.id in self._own and name.id not in known:
             self._found[name.lineno, name.id] = (
                 f"{name.id} may have no value here, since it is set in a branch or a loop that "

@@ -73,6 +73,7 @@ def keeps() -> bool:
 
 
 def _path(name: str) -> Path | None:
+    """The file of this name in the folder of code; None without a folder."""
     folder = code_folder.code_folder(translators())
     return folder / f"{name}.code" if folder else None
 
@@ -88,6 +89,7 @@ def target() -> Any:
 
 
 def _load_code(prototype: Any, code: Code) -> Any:
+    """Object code as a function that ctypes calls with this prototype."""
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code.content))
     engine.finalize_object()
@@ -97,6 +99,7 @@ def _load_code(prototype: Any, code: Code) -> Any:
 
 
 def _read(path: Path) -> Code | None:
+    """The code in a file; None where there is none, or a damaged one."""
     with suppress(OSError):
         digest, _, rest = path.read_bytes().partition(b"\n")
         if _seal(path, rest) == digest:
@@ -106,6 +109,7 @@ def _read(path: Path) -> Code | None:
 
 
 def _write(path: Path, code: Code) -> None:
+    """Keep code in its file, behind the digest that seals it."""
     rest = code.symbol.encode() + b"\n" + code.content
     code_folder.write(path, _seal(path, rest) + b"\n" + rest)
 
@@ -126,6 +130,7 @@ def fingerprint(function: Any) -> str:
 
 @cache
 def _circumstances() -> tuple[str, ...]:
+    """What beside the kernel decides its machine code: settings, versions, processor."""
     settings = sorted(f"{k}={v}" for k, v in os.environ.items() if k.startswith("NUMBA_"))
     versions = [sys.version, version("llvmlite"), numba_version()]
     cpu = [llvm.get_process_triple(), llvm.get_host_cpu_name()]

@@ -65,7 +65,7 @@ class BatchRun:
 
     @classmethod
     def of(cls, position: int, plan: Plan) -> BatchRun:
-        """At its start."""
+        """The run in this place of a batch, at its start."""
         return cls(position, plan, plan.vectors())
 
 
@@ -153,7 +153,7 @@ class Batch:
             self.cause[i] = why(run.plan, vectors, ending)
 
     def refuse(self, position: int, status: str, cause: str) -> None:
-        """Enter that a run cannot begin."""
+        """Enter that the run in this place of the batch cannot begin."""
         self.status[position], self.cause[position] = status, visible(" ".join(cause.split()))
 
 
@@ -234,7 +234,7 @@ class _Runs:
         return False
 
     def _begin(self, position: int) -> None:
-        """Make a run, and have it march alone, or wait for others to march beside it."""
+        """Make the run in this place, and have it march alone, or wait for others beside it."""
         run = self._try_to_make(position)
         if run:
             self._together(self._lanes.sort_in(run.vectors, run))
@@ -264,7 +264,7 @@ class _Runs:
                 wait()
 
     def _try_to_make(self, position: int) -> BatchRun | None:
-        """The run, or None and an entry of why there is none."""
+        """The run in this place, or None and an entry of why there is none."""
         run = self._contain(position, lambda: BatchRun.of(position, self._check_plan(position)))
         if run and not self._settled:
             self._settle(run.plan)
@@ -279,7 +279,7 @@ class _Runs:
         self._settled = True
 
     def _check_plan(self, position: int) -> Plan:
-        """The plan of a run."""
+        """The plan of the run in this place. Raises InvalidLoop where its loop cannot be."""
         try:
             loop = self._loops[position]
             return (self._plan or Plan.with_probe(loop, self._grid, self._probe)).like(loop)

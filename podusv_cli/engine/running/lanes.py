@@ -75,6 +75,7 @@ def marcher(
         )
 
         def over(first: int, last: int, steps: int = lanes.layout.steps) -> int:
+            """March from instant `first` up to `last`; the instant that was reached."""
             sizes[STEPS] = steps
             return int(march(*adapters, first, last, h, *given))
 

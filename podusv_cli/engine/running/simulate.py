@@ -145,6 +145,7 @@ def marcher(
         pointers, sizes = signatures.pointers(vectors), signatures.whole_numbers(layout)
 
         def march(first: int, last: int, steps: int = layout.steps) -> int:
+            """March from instant `first` up to `last`; the instant that was reached."""
             sizes[STEPS] = steps
             return int(routine(*adapters, first, last, h, pointers, sizes))
 

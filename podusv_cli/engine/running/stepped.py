@@ -174,7 +174,7 @@ class SteppedBatch:
         look: Any,
         size: int,
     ) -> None:
-        """Nothing is marched yet; the plan is that of runs like these."""
+        """For `size` runs; nothing is marched yet, and the plan is that of runs like these."""
         layout, grid = plan.layout, plan.grid
         self.places = [run.position for run in runs]
         self.grid, self.reached, self.alive = grid, 0, np.ones(len(runs), bool)
@@ -208,6 +208,7 @@ class SteppedBatch:
         self.alive = self._marching()
 
     def _marching(self) -> npt.NDArray[np.bool_]:
+        """Which of the runs (runs,) have not ended."""
         return np.equal(self._lanes.under_way[REACHED : REACHED + len(self.places)], MARCHING)
 
     @property

@@ -118,7 +118,7 @@ class Vectors(NamedTuple):
 
 DISTANCE = 6  # where the row has z_e (18), behind the target
 BEFORE = 6  # numbers behind the logged row: the estimate before what an instant delivers
-HELD_X, HELD_TARGET, HELD_DEMAND = 1, 7, 13
+HELD_X, HELD_TARGET, HELD_DEMAND = 1, 7, 13  # in `held`, behind the time of the sample
 HELD_SIGNALS = HELD_DEMAND + len(DEMAND)
 STOP = 1  # in `under_way`
 

@@ -33,7 +33,7 @@ from podusv_cli.engine.step.layout import (
 )
 from podusv_cli.engine.step.sampled import perceive, sample_and_hold
 
-LARGEST = 1e300
+LARGEST = 1e300  # sums and differences of such numbers are still finite
 
 
 # Vector to named coefficients of the vessel; the plant is the one part that never varies.
@@ -246,7 +246,10 @@ def advance(p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any
 
 
 def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: Layout) -> int:
-    """`advance` as plain Python, whose `math` raises where machine code gives no number."""
+    """`advance` as plain Python, whose `math` raises where machine code gives no number.
+
+    March from instant `first` to `last`, step `h` [s]; returns the instant that was reached.
+    """
     for k in range(first, last):
         try:
             if c.under_way[STOP] != 0.0 or not instant(k, first, h, p, c, n):

@@ -186,6 +186,7 @@ class _Evaluation(Logic):
         return [sample(label, i, used[i]) for i, label in enumerate(self.runs.cells)]
 
     def _used_draws(self, law: str) -> Mask:
+        """Which draws (cells, draws) of a law count: all that are made, or without broken ones."""
         done = self.runs.done(law)
         return done if self.whole else done & ~self.runs.broken(law)
 

@@ -151,6 +151,7 @@ class RunsTable:
         return [*shortfalls(self._success, runs)]
 
     def _read(self, law: str) -> dict[str, Vector]:
+        """The metrics of a law that its condition of success reads, each (cells, draws)."""
         return {name: self.metric(law, name) for name in self.success_metrics}
 
     @cached_property

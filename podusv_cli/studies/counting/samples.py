@@ -40,16 +40,22 @@ class Sample(ABC):
 
     @abstractmethod
     def interval(self, level: float) -> Interval:
-        """The statistic with its interval."""
+        """The statistic with its interval; `level` is the confidence, as 0.95."""
 
     @abstractmethod
     def draws_needed(
         self, sign: ast.cmpop, bound: float, margin: float, level: float
     ) -> int | None:
-        """Draws that would decide a comparison if they continue like these; None: none would."""
+        """Draws that would decide a comparison if they continue like these; None: none would.
+
+        `bound` is the other side, `margin` how far beyond it counts, `level` the confidence.
+        """
 
     def holds(self, sign: ast.cmpop, bound: float, margin: float, level: float) -> bool | None:
-        """Whether the comparison holds all over the interval, or nowhere in it; else None."""
+        """Whether the comparison holds all over the interval, or nowhere in it; else None.
+
+        `bound`, `margin` and `level` as in `draws_needed`.
+        """
         span, margin = self.interval(level), margin if self.has_margin else 0.0
         ends = [bool(SIGNS[type(sign)](end, bound, margin)) for end in (span.low, span.high)]
         return ends[0] if self.n and ends[0] == ends[1] else None
@@ -63,7 +69,7 @@ class Share(Sample):
     has_margin = False
 
     def interval(self, level: float) -> Interval:
-        """Clopper and Pearson's."""
+        """Clopper and Pearson's interval at this level."""
         if not self.n:
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.yes, self.n, level, self.unknown)
@@ -88,7 +94,7 @@ class Discordant(Sample):
     has_margin = False
 
     def interval(self, level: float) -> Interval:
-        """Clopper and Pearson's."""
+        """Clopper and Pearson's interval at this level."""
         if not self.differ + self.unknown:
             return Interval(math.nan, 0.0, 1.0)
         return statistics.share(self.first, self.differ + self.unknown, level, self.unknown)
@@ -112,7 +118,7 @@ class Quantile(Sample):
     has_margin = True
 
     def interval(self, level: float) -> Interval:
-        """Between two of the values."""
+        """The interval at this level, between two of the values: valid for any distribution."""
         if not self.n:
             return Interval(math.nan, -math.inf, math.inf)
         return statistics.quantile(self.values, self.q, level)

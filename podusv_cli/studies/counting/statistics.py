@@ -69,6 +69,7 @@ class Interval(NamedTuple):
         return " %" if form.endswith("%") else ""
 
     def _texts(self, form: str, infinite: str) -> list[str]:
+        """Estimate, low and high as text; a form that ends in % is in percent."""
         factor, form = (100.0, form[:-1]) if form.endswith("%") else (1.0, form)
         return [digits(factor * number, form or ".5g", infinite) for number in self]
 
@@ -128,7 +129,10 @@ def _middle(n: int, q: float) -> int:
 
 @cache
 def _rank(n: int, q: float, level: float) -> int:
-    """The rank of the lower end: the largest r so that r - 1 values or fewer lie below seldom."""
+    """The rank of the lower end: the largest r so that r - 1 values or fewer lie below seldom.
+
+    Of `n` draws, for the quantile at share `q`; seldom is half of 1 - `level`.
+    """
     from scipy.special import bdtr  # slow to import
 
     tail = (1.0 - level) / 2.0
@@ -163,11 +167,11 @@ class Pairs:
         return self.n - self.wins - self.losses - self.unknown
 
     def win_rate(self, level: float) -> Interval:
-        """The share of draws in which the first law wins; a tie is no win."""
+        """The share of draws in which the first law wins, at this level; a tie is no win."""
         return share(self.wins, self.n, level, self.unknown)
 
     def loss_rate(self, level: float) -> Interval:
-        """The share of draws in which the second law wins."""
+        """The share of draws in which the second law wins, at this level."""
         return share(self.losses, self.n, level, self.unknown)
 
 
@@ -258,7 +262,10 @@ def rank_correlations(quantities: Mapping[str, Vector], metric: Vector) -> dict[
 
 
 def by_chance(n: int, level: float) -> float:
-    """The rank correlation that unrelated quantities stay within, on either side, in n draws."""
+    """The rank correlation that unrelated quantities stay within, on either side, in `n` draws.
+
+    At this `level`, as 0.95.
+    """
     from scipy.special import ndtri  # slow to import
 
     return min(float(ndtri((1.0 + level) / 2.0)) / np.sqrt(n - 1.0), 1.0) if n > 1 else 1.0

@@ -165,4 +165,5 @@ class StudyVerdict(Verdict):
 
 
 def _plain(value: object) -> object:
+    """A number that JSON can hold; None for NaN and infinity."""
     return value if not isinstance(value, float) or math.isfinite(value) else None

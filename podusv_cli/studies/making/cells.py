@@ -70,6 +70,7 @@ def _make_cells(
 
 
 def _label(values: tuple[tuple[str, Any], ...]) -> str:
+    """A cell in words: its keys and values."""
     return ", ".join(f"{key} = {as_yaml(value)}" for key, value in values)
 
 

@@ -63,6 +63,7 @@ def draws(sweep: Sweep, first: int, count: int, stream: str = SWEEP) -> Iterator
 
 
 def _random(sweep: Sweep, first: int, count: int, stream: str) -> dict[str, Vector]:
+    """Independent shares (count,) in [0, 1) by quantity."""
     return {name: uniforms(sweep.seed, name, first, count, stream) for name in sweep.vary}
 
 

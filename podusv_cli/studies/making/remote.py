@@ -55,6 +55,7 @@ def _plan(recipe: StudyText) -> StudyPlan:
 
 @lru_cache(PLANS)
 def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> StudyPlan:
+    """The plan of a variant of a study, made once in this worker."""
     return _plan(recipe).with_variant(Variant(*variant))
 
 

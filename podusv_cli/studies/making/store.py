@@ -100,6 +100,7 @@ class Store:
         identity: Mapping[str, Any],
         remedy: str = "name another folder with --out, or begin anew with --force",
     ) -> None:
+        """Raises StorageError where a study of this identity cannot go on in this folder."""
         if different := disagreements(identity, self.about.identity):
             raise UsageError(f"{folder} holds another study: {different}; {remedy}")
 
@@ -191,7 +192,7 @@ class Store:
             yield self.runs()
 
     def covered_draws(self) -> dict[tuple[str, int], Mask]:
-        """By law and cell, which of the wanted draws are there."""
+        """By law and cell, which of the wanted draws (draws,) are there."""
         there = {
             (law, cell): np.zeros(self.about.draws, bool)
             for law in self.about.laws
@@ -208,7 +209,11 @@ class Store:
 
 
 def encode_unit(result: UnitResult, seal: str) -> bytes:
-    """A unit as the content of a file."""
+    """A unit as the content of a file; `seal` is the digest of the study's identity.
+
+    A line of JSON, then the metrics and end times as little-endian floats, then the states as
+    bytes.
+    """
     facts = {
         "identity": seal,
         "unit": astuple(result.unit),

@@ -68,6 +68,7 @@ def _points(plan: TunePlan, law: str) -> Iterator[Gains]:
 
 
 def _matters(run: Any, own: UnitResult, point: Gains, gain: Gain) -> bool:
+    """Whether another value of the gain changes the run `own` at this point."""
     others = (run({**point, gain.key: end}) for end in gain.ends)
     return any(other is None or _differ(own, other) for other in others)
 

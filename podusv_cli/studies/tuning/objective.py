@@ -176,6 +176,7 @@ def _is_negative(node: ast.expr) -> bool:
 
 
 def _quantile(call: ast.Call, walk: OfGains, worst: float) -> Any:
+    """The value of `quantile(...)` or `median(...)` over the draws."""
     share = share_of(call)
     return statistics.quantile(numbers_of(call, walk, worst), share, 0.5).estimate
 

@@ -346,6 +346,7 @@ def _ends(gain: Gain) -> dict[str, float]:
 
 
 def _range(values: Sequence[float]) -> dict[str, float]:
+    """Mean, least and largest of an importance over searches."""
     return {"importance": float(np.mean(values)), "low": min(values), "high": max(values)}
 
 

@@ -22,7 +22,7 @@ import pandas as pd
 
 from podusv_cli.core.kernel import Vector
 
-SAMPLES = 2000
+SAMPLES = 2000  # of the bootstrap: 50 lie beyond either end of a 95 % interval
 COLUMNS = ["a", "b", "ratio", "ratio_low", "ratio_high"]
 Indices = npt.NDArray[np.int64]
 

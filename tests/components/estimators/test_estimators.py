@@ -42,7 +42,11 @@ def test_its_constants_hide_none_of_the_vessel_s_and_its_signals_are_explained(k
 @pytest.mark.parametrize("kind", ESTIMATING)
 def test_a_heading_measured_some_turns_away_is_the_same_heading(kind):
     # The start, 3.0 rad, is near half a turn, and the vessel turns on past it.
-    out, other = (sailed(kind(), Taken(every=5, turns=turns), 30.0) for turns in (0.0, -1.0))
+    velocities = any(kind().needs()[3:])
+    out, other = (
+        sailed(kind(), Taken(every=5, turns=turns, velocities=velocities), 30.0)
+        for turns in (0.0, -1.0)
+    )
     assert np.ptp(out["psi"]) > np.pi
     np.testing.assert_allclose(errors(other), errors(out), atol=1e-9)
 
@@ -125,7 +129,7 @@ def test_halving_the_step_takes_away_all_but_a_sixteenth_of_the_error(kind):
     ends = [
         sailed(
             kind(),
-            Taken(every=every),
+            Taken(every=every, velocities=any(kind().needs()[3:])),
             4.0,
             0.2 / every,
             vessel=PAPER,

@@ -141,6 +141,7 @@ class Instructions(Values):
         return self.let(f"select {MASK} {self.mask(one.block)}, {over} {value}, {over} {other}")
 
     def _select(self, instruction: Instruction) -> None:
+        """A choice in each lane, or one for all where the condition is the same in all of them."""
         (condition, *_), differs = instruction.operands, self.differs(instruction.name)
         chosen = self.operands_with_types(
             instruction.typed_operands[:1], differs and self.differs(condition)
@@ -151,11 +152,13 @@ class Instructions(Values):
         )
 
     def _alloca(self, instruction: Instruction) -> None:
+        """Room on the stack for LANES times as much; a size that is computed is NotForLanes."""
         if instruction.operands != ["1"]:
             raise NotForLanes(f"memory of a size that is computed: {instruction.words}")
         self.places.append(f"{instruction.name} = alloca {room(in_memory(instruction))}, align 64")
 
     def _getelementptr(self, instruction: Instruction) -> None:
+        """A place in memory; in that of all lanes, LANES numbers stand for one."""
         kind = instruction.words.split(", ptr ")[0].split(" ", 1)[1]
         kind = re.sub(r"^(inbounds|nuw|nusw| )+", "", kind)
         if self.masks.points_at(instruction.name) == LANES_MEMORY:
@@ -194,6 +197,7 @@ class Instructions(Values):
         return [self.let(f"getelementptr {kind}, ptr {p}, i64 {i}") for i, p in enumerate(begins)]
 
     def _load(self, instruction: Instruction) -> None:
+        """A whole register from memory of all lanes; one number a lane where places differ."""
         pointer = instruction.operands[0]
         if "volatile" in instruction.words or "atomic" in instruction.words:
             raise NotForLanes(instruction.words)
@@ -212,6 +216,10 @@ class Instructions(Values):
         self.set(instruction, f"load {self.kind(instruction)}, ptr {where}{aligned}")
 
     def _store(self, instruction: Instruction) -> None:
+        """Into memory of all lanes, only where the mask is set.
+
+        A number into plain memory has to be the same in all lanes, or it is NotForLanes.
+        """
         (number, pointer), kind = instruction.operands, instruction.kinds[0]
         if self.masks.points_at(pointer) == PLAIN_MEMORY:
             if (
@@ -234,6 +242,7 @@ class Instructions(Values):
         self.put(f"store {lanes(kind)} {new}, {where}")
 
     def _call(self, instruction: Instruction) -> None:
+        """A call: a mark of podusv, a compiled part, or a function of the mathematical library."""
         called = instruction.operands[-1]
         name = called.strip('@"')
         if name.startswith(SPOKEN_TO_COMPILER):

@@ -54,6 +54,7 @@ class Masks:
         return self.memory.get(pointer, "") if pointer.startswith("%") else PLAIN_MEMORY
 
     def _follow_pointers(self) -> None:
+        """Which memory each pointer points at, found by going on until nothing new is known."""
         pointers = [value for value in self.values.values() if value.kind == "ptr"]
         while True:
             new = {p.name: self._kind(p) for p in pointers if p.name not in self.memory}
@@ -63,6 +64,7 @@ class Masks:
             self.memory |= new
 
     def _kind(self, instruction: Instruction) -> str:
+        """The memory that the pointer of this instruction points at; "" while it is not known."""
         if instruction.opcode == "alloca":
             return LANES_MEMORY
         if instruction.opcode == "load" and self.points_at(instruction.operands[0]) != LANES_MEMORY:
@@ -132,6 +134,7 @@ class Masks:
         self._find_masks_in(None)
 
     def _find_masks_in(self, loop: BlockLoop | None) -> None:
+        """The mask of each node in a loop, None for the whole function, and in the loops inside."""
         level = self.order.levels[loop]
         before: dict[Node, Any] = {}
         held = set().union(*self.waiting[loop].values())
@@ -145,6 +148,11 @@ class Masks:
                 self.of[node] = before[node]
 
     def _mask(self, level: NodeLevel, node: Node, block: int, before: Any, held: set[Node]) -> Any:
+        """The mask of a node: a block or an edge whose lanes are those that come here.
+
+        `before` has the masks of nodes that were met, `held` those at which lanes wait. A mask is
+        reused where the same lanes come, as each one costs an instruction.
+        """
         if node not in level.parent:
             if level.loop is None:
                 return EVERY
@@ -158,6 +166,7 @@ class Masks:
         return block
 
     def _find_joins(self) -> None:
+        """The blocks at which lanes meet that came on several ways, and what differs there."""
         for block, row in enumerate(self.function.blocks):
             edges = {self.edge(begin, block) for begin in self.forward(block)}
             if len(edges) > 1 or None in edges:
@@ -176,6 +185,7 @@ class Masks:
         )
 
     def _find_ragged(self) -> None:
+        """The loops that some lanes leave earlier than others."""
         for loop in self.order.loops[::-1]:  # the inner ones first
             ways = [(b, s) for b in loop.blocks for s in self.function.successors[b]]
             leaving = [(begin, end) for begin, end in ways if end not in loop.blocks]

@@ -85,10 +85,12 @@ def _mark(name: str, result: Any = None) -> Any:
     """A call that numba's code has for a primitive of `core.kernel`, and that widening replaces."""
 
     def type_mark(given: Any) -> Any:
+        """Type and code of a call that stands for something until the IR is widened."""
         kinds = [types.unliteral(kind) for kind in given]
         back = result or kinds[0]
 
         def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            """A call of `podusv.NAME`, without effects, so that the optimiser may move it."""
             kind = ir.FunctionType(context.get_value_type(back), [a.type for a in arguments])
             called = cgutils.get_or_insert_function(builder.module, kind, f"podusv.{name}")
             called.attributes.add("readnone")
@@ -106,13 +108,13 @@ TRUE, NUMBERS = _mark("lane_true", types.boolean), _mark("lane_numbers")
 
 
 @intrinsic
-def _no_padding(typing: Any, whole: Any, count: Any) -> Any:
+def _count_unpadded(typing: Any, whole: Any, count: Any) -> Any:
     """`kernel.padded_rounds`: a register holds several lanes, and no rounds."""
     return types.int64(types.int64, types.int64), lambda c, b, s, arguments: arguments[1]
 
 
 PRIMITIVES = compile_numba.PRIMITIVES | {
-    kernel.padded_rounds: _no_padding,
+    kernel.padded_rounds: _count_unpadded,
     kernel.shared: intrinsic(lambda typing, number: SHARED([number])),
     kernel.lanes_any: intrinsic(lambda typing, mask: ANY([mask])),
     kernel.lane_true: intrinsic(lambda typing, mask, lane: TRUE([mask, lane])),

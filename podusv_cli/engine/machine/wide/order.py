@@ -91,6 +91,7 @@ class Order:
         self.levels = {loop: self._level(loop) for loop in [None, *self.loops]}
 
     def _loops(self) -> list[BlockLoop]:
+        """All loops, the outer ones first; a loop with several ways in is NotForLanes."""
         order = depth_first(0, self.successors)
         above = dominators(order, self.leads)
         place = {block: i for i, block in enumerate(order)}
@@ -147,6 +148,11 @@ class Order:
         return targets
 
     def _level(self, loop: BlockLoop | None) -> NodeLevel:
+        """The nodes of a loop, None for the whole function, in the order in which they are written.
+
+        A loop inside counts as one node. `parent` dominates a node, `later` has the nodes to which
+        all ways from it lead.
+        """
         level = NodeLevel(loop, self._targets(loop))
         order = depth_first(loop.header if loop else 0, level.successors)
         leads, below = defaultdict(list), defaultdict(list)

@@ -112,6 +112,7 @@ def _shorten_names(function: Any) -> dict[str, str]:
 
 
 def _read(instruction: Any, block: int, line: str, kinds: dict[str, str]) -> Instruction:
+    """An instruction of llvmlite as plain words; `line` is its text, `kinds` the types by name."""
     operands = [_operand(operand, kinds) for operand in instruction.operands]
     name = instruction.name
     opcode = instruction.opcode

@@ -80,6 +80,7 @@ class Blocks(Instructions):
         )
 
     def _level(self, loop: BlockLoop | None) -> None:
+        """Write the nodes of a loop, None for the whole function."""
         level = self.masks.order.levels[loop]
         for node in level.nodes:
             if isinstance(node, BlockLoop):
@@ -115,6 +116,7 @@ class Blocks(Instructions):
         return f"at.loop.{node.header}" if isinstance(node, BlockLoop) else f"at.{node}"
 
     def _block(self, level: NodeLevel, block: int) -> None:
+        """Write a block; it is jumped over where no lane comes to it, unless it is cheap."""
         row, waiting = self.function.blocks[block], self._waiting(level, block)
         self.label(f"at.{block}")
         begins = block not in level.parent
