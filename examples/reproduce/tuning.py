@@ -86,12 +86,6 @@ def sentences() -> Iterator[tuple[Any, ...]]:
     )
     before = 100 * other.failed_before[["adrc", "hand_position", "pid"]]
     yield "too, in {} to {} %", *map(whole, (before.min(), before.max()))
-    worst = ("adaptive_crab", "dsc", "pid", "full_backstepping", "adaptive_neural")
-    yield (
-        "in {}, {}, {}, {} and {} % of the draws, the median set of `full_backstepping` in {} %",
-        *(whole(100 * otter.failed_after_high[law]) for law in worst),
-        whole(100 * otter.failed_after["full_backstepping"]),
-    )
     yield "{} of the 280 sets hold all of them there", other.held_after.sum()
     yield (
         "{} of 280 sets do, on the Otter, with limits in proportion to its forces, {}.",

@@ -22,35 +22,19 @@ from podusv_cli.cli.exit_codes import (
 )
 from podusv_cli.cli.installed_commands import installed_commands, load_command
 
-# NAME is the function NAME of cli/NAME.py
-COMMANDS = (
-    "init",
-    "start",
-    "run",
-    "compare",
-    "rerun",
-    "diff",
-    "plot",
-    "validate",
-    "verify",
-    "margins",
-    "optimum",
-    "explain",
-    "list",
-    "schema",
-    "new",
-    "bench",
-    "tune",
-    "doubt",
-    "identify",
-    "docs",
-    "demo",
-    "runs",
-    "export",
-    "pack",
-    "unpack",
-    "live",
-)
+# What `--help` lists below each heading. NAME is the function NAME of cli/NAME.py.
+GROUPS = {
+    "First steps": ("demo", "init", "live", "docs", "explain", "list"),
+    "One run": ("run", "validate", "plot", "verify", "margins", "optimum", "rerun", "diff", "runs"),
+    "Many runs": ("compare", "sweep", "tune", "bench"),
+    "Papers and laws of your own": ("doubt", "new", "schema"),
+    "Boats": ("start", "identify"),
+    "Export": ("export", "pack", "unpack"),
+}
+SEVERAL = "sweep"  # a command with commands of its own
+COMMANDS = tuple(name for names in GROUPS.values() for name in names if name != SEVERAL)
+OTHERS = "Of installed packages"
+LONGEST = 160  # characters of a command's first sentence in the list
 
 # What others call it, and the command that does it.
 MEANT = {
@@ -80,6 +64,21 @@ class Commands(typer.core.TyperGroup):
         own = super().list_commands(ctx)
         return [*own, *(name for name in installed_commands() if name not in own)]
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands below their headings, those of installed packages last."""
+        named = {name for names in GROUPS.values() for name in names}
+        others = tuple(name for name in self.list_commands(ctx) if name not in named)
+        for heading, names in (*GROUPS.items(), (OTHERS, others)):
+            found = {name: self.get_command(ctx, name) for name in names}
+            rows = [
+                (name, command.get_short_help_str(LONGEST))
+                for name, command in found.items()
+                if command
+            ]
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows, col_max=10)
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of this name; one that podusv has is never that of a package."""
         own = super().get_command(ctx, cmd_name)
@@ -106,7 +105,7 @@ for _name in NAMED or COMMANDS:
 if not NAMED:
     from podusv_cli.cli.sweep import sweep
 
-    app.add_typer(sweep, name="sweep")
+    app.add_typer(sweep, name=SEVERAL)
 
 
 def _show_version(wanted: bool) -> None:

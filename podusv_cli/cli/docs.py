@@ -49,7 +49,7 @@ def _list(wanted: str) -> None:
 
     hits = search(wanted)
     for section, line in hits[:SHOWN]:
-        echo_entry(f"podusv docs {section.page}", line, facts=section.heading)
+        echo_entry(f"podusv docs {section.page}", line, facts=section.title)
     if len(hits) > SHOWN:
         echo(f"and {len(hits) - SHOWN} more places")
 

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from podusv_cli.core.plugins import Plugins as Known
     from podusv_cli.scenario.explain import ExplainRow
 
+BEGIN = (
+    "to begin with: podusv explain vessel, path, disturbance, actuator or controller; "
+    "then controller.pid, and controller.K_Pu"
+)
 EQUATION = re.compile(r"\(\d+\)")
 
 
@@ -58,6 +62,8 @@ def explain(
             if not _echo_figure(key, plugins):
                 raise
             return
+        if key is None:
+            echo(BEGIN)
         for row in explained:
             _echo(row)
         if any(EQUATION.search(row.meaning) for row in explained):

@@ -27,8 +27,9 @@ class ListPart(NamedTuple):
     then: str = ""  # what one does with them
 
 
+LAWS = "controller"  # the section that most people look for comes first
 THEN = {
-    "controller": "podusv compare, sweep and bench hold laws beside each other, podusv tune finds "
+    LAWS: "podusv compare, sweep and bench hold laws beside each other, podusv tune finds "
     "their gains, and podusv export takes one of them to a boat's computer"
 }  # by section
 
@@ -62,6 +63,8 @@ def list(
     if not chosen:
         known = dict.fromkeys(word for group in every for word in group.words)
         raise UsageError(unknown_word(f"part {part!r}", part, known))
+    if not part:
+        echo("to begin with: podusv list laws; also paths, vessels, metrics, findings, ...")
     for group in chosen:
         echo(f"{group.heading}:")
         for name, text, facts in group.entries:
@@ -77,7 +80,9 @@ def parts(plugins: Known) -> Iterator[ListPart]:
     from podusv_cli.scenario.model import BASES
     from podusv_cli.scenario.presets import preset_about, preset_names, preset_text, with_presets
 
-    for section, summaries in kinds(plugins).items():
+    by_section = kinds(plugins)
+    for section in dict.fromkeys((LAWS, *by_section)):
+        summaries = by_section[section]
         words = (f"{section}s", f"{BASES[section].noun}s")
         entries = ((kind, text, "") for kind, text in summaries.items())
         yield ListPart(words, section, entries, THEN.get(section, ""))

@@ -21,6 +21,8 @@ CAPTION = re.compile(r"^   :caption: (.+)$")
 ENTRY = re.compile(r"^   (?:.* <)?/?((?:results/|laws/)?\w+)>?$")
 HEADING = re.compile(r"^(#{1,4}) (.+)$")
 FENCE = re.compile(r"^ *```")
+MARKS = re.compile(r"`|\*\*|(?<!\w)\*(?=\w)|(?<=[\w.:])\*(?!\w)")
+BAR = "\v"  # stands for a bar that ends no cell
 CODE = re.compile(r"`(\w+)`")
 CONFIG = re.compile(r"\bconfigs/([\w/]+\.yaml)")
 LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)\s]+)\)")
@@ -37,6 +39,11 @@ class Section:
     heading: str
     text: str
 
+    @property
+    def title(self) -> str:
+        """The heading as plain text."""
+        return _plain(self.heading)
+
     def score(self, words: Sequence[re.Pattern[str]]) -> int:
         """How well the section answers; 0 where a word is missing."""
         if not all(word.search(f"{self.heading}\n{self.text}") for word in words):
@@ -49,9 +56,9 @@ class Section:
 
     def line(self, words: Sequence[re.Pattern[str]]) -> str:
         """The first line of its text that has one of the words, else the first one."""
-        lines = [line.strip(" |>*-") for line in self.text.splitlines() if line.strip()]
+        lines = [_plain(line) for line in self.text.splitlines() if line.strip()]
         matching = (line for line in lines if any(word.search(line) for word in words))
-        return _plain(next(matching, lines[0] if lines else ""))
+        return next(matching, lines[0] if lines else "")
 
 
 @cache
@@ -63,7 +70,7 @@ def contents() -> dict[str, dict[str, str]]:
         if begun := CAPTION.match(line):
             caption = begun[1]
         elif (entry := ENTRY.match(line)) and _file(entry[1]).is_file():
-            captions.setdefault(caption, {})[entry[1]] = sections(entry[1])[0].heading
+            captions.setdefault(caption, {})[entry[1]] = sections(entry[1])[0].title
     return captions
 
 
@@ -165,8 +172,9 @@ def _reachable(link: re.Match[str], folder: str) -> str:
 
 
 def _plain(line: str) -> str:
-    """Text without the marks of links."""
-    return LINK.sub(lambda link: link[2], line)
+    """Text without Markdown's marks: of links, code, emphasis, and of `|` within tables."""
+    words = MARKS.sub("", LINK.sub(lambda link: link[2], line)).replace(r"\|", BAR)
+    return words.strip(" |>-").replace(BAR, "|")
 
 
 def _short(name: str) -> str:

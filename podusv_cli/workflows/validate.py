@@ -22,6 +22,18 @@ from podusv_cli.workflows.execute import examine, warm_up
 from podusv_cli.workflows.request import Request
 from podusv_cli.workflows.run import open_scenario
 
+# Sections in the order in which their values are shown; all others follow, and then the hulls.
+SHOWN_FIRST = (
+    "name",
+    "description",
+    "controller",
+    "controllers",
+    "actuator",
+    "path",
+    "disturbance",
+)
+HULLS = ("vessel", "nominal")  # a hundred numbers
+
 
 @dataclass(frozen=True)
 class Valid:
@@ -50,8 +62,28 @@ class Valid:
         yield from conditions(scenario)
         if scenario.keys_by_rule():
             yield f"defaults {BY_RULE}: {scenario.facts.in_words()}"
-        for key, content in values(scenario).items():
-            yield f"{key}: {as_yaml(content)}  # {self.loaded.origins[key]}"
+        yield from self._value_lines()
+
+    def _value_lines(self) -> Iterator[str]:
+        """Every value and its origin; law, task and limits first, hulls last.
+
+        A nominal vessel that is the true one is one line.
+        """
+        origins = self.loaded.origins
+        shown = {
+            key: f"{as_yaml(content)}  # {origins[key]}"
+            for key, content in values(self.loaded.scenario).items()
+        }
+        own, nominal = (
+            {key.removeprefix(room): line for key, line in shown.items() if key.startswith(room)}
+            for room in ("vessel.", "nominal.")
+        )
+        same = own == nominal
+        for key in sorted(shown, key=_place_of):
+            if not (same and key.startswith("nominal.")):
+                yield f"{key}: {shown[key]}"
+        if same:
+            yield "nominal: as vessel  # every value, and its origin"
 
 
 def validate(config: Path, request: Request) -> Valid:
@@ -68,6 +100,14 @@ def validate(config: Path, request: Request) -> Valid:
     for case in loaded.cases.values():
         warm_up(case)
     return Valid(loaded, findings, study)
+
+
+def _place_of(key: str) -> int:
+    """Where a value stands in the list, by its section."""
+    section = key.partition(".")[0].partition("[")[0]
+    if section in HULLS:
+        return len(SHOWN_FIRST) + 1
+    return SHOWN_FIRST.index(section) if section in SHOWN_FIRST else len(SHOWN_FIRST)
 
 
 def _tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:

@@ -51,6 +51,14 @@ def test_every_law_has_a_page_that_its_name_finds(law: str, podusv: Command) -> 
     assert f"`{law}`" in title
 
 
+def test_lists_of_pages_and_places_have_no_marks_of_markdown(podusv: Command) -> None:
+    assert "`" not in podusv("docs").out
+    for words in ("phase margin", "delay", "thrust lever", "anti-windup", "interval"):
+        said = podusv("docs", *words.split()).out
+        assert not re.search(r"`|\*\*|\\\||\]\(", said), words
+    assert docs._plain(r"a [*b*](c.md) | `d` | **e** | \|f\| |") == "a b | d | e | |f|"
+
+
 def test_a_comment_in_code_is_no_heading() -> None:
     text = "# Page\n```\n# a comment\n```\n## Heading\n"
     assert [part.heading for part in docs._sections("page", text)] == ["Page", "Heading"]

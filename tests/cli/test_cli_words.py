@@ -91,6 +91,13 @@ def test_verbose_shows_every_value_and_where_it_comes_from(podusv):
     assert "vessel.m: 23.8  # vessel file paper.yaml" in lines
     head = next(i for i, line in enumerate(lines) if line.startswith("underactuated: "))
     assert all("  # " in line for line in lines[head + 1 :])
+    sections = [re.split(r"[.:]", line)[0] for line in lines[head + 1 :]]
+    first = [*dict.fromkeys(sections)]
+    assert first[:3] == ["name", "description", "controller"]
+    assert first[-2:] == ["vessel", "nominal"]
+    assert sections.count("nominal") == 1  # it is the vessel
+    other = podusv("validate", "a.yaml", "-v", "--set", "nominal.m=30").out
+    assert other.count("\nnominal.m: 30") == 1
 
 
 # --- explain, list, schema
@@ -108,6 +115,9 @@ def test_explain_shows_everything_about_a_key(podusv):
 
 def test_explain_shows_the_sections_without_a_key(podusv):
     out = podusv("explain").out
+    first, *_ = out.splitlines()
+    named = re.findall(r"\b(vessel|path|disturbance|actuator|controller)\b(?!\.)", first)
+    assert named == ["vessel", "path", "disturbance", "actuator", "controller"]
     assert [line for line in out.splitlines() if line in Scenario.model_fields] == [
         "vessel",
         "nominal",
@@ -170,7 +180,7 @@ def test_a_part_of_the_list_stands_in_the_whole_list(podusv, part, headings):
 def test_an_unknown_part_of_the_list_is_told_with_all_parts(podusv):
     said = podusv("list", "vesels")
     assert (said.code, said.out) == (2, "")
-    assert "unknown part 'vesels'; did you mean 'vessels'? (allowed: paths, " in said.err
+    assert "unknown part 'vesels'; did you mean 'vessels'? (allowed: controllers, " in said.err
 
 
 def test_a_preset_is_explained_with_its_source_and_what_it_holds_for(podusv):
@@ -193,6 +203,24 @@ def test_every_command_and_option_has_help(name, podusv):
     said = podusv(name, "--help")
     assert said.code == 0
     assert " ".join(command.help.split()) in " ".join(said.out.split())
+
+
+def test_help_lists_every_command_below_a_heading(podusv):
+    said = podusv("--help").out
+    below = {}
+    for line in said.splitlines():
+        if heading := re.fullmatch(r"([A-Z][a-z ]+):", line):
+            below[heading[1]] = []
+        elif command := re.match(r"  (\w+)  +\S", line):
+            below[[*below][-1]].append(command[1])
+    assert {heading: tuple(below[heading]) for heading in cli.GROUPS} == cli.GROUPS
+    assert {*cli.COMMANDS, "sweep"} == {name for names in cli.GROUPS.values() for name in names}
+
+
+def test_list_begins_with_the_laws(podusv):
+    hint, first, *_ = podusv("list").out.splitlines()
+    assert hint.startswith("to begin with: podusv list laws")
+    assert first == "controller:"
 
 
 def test_a_command_is_a_function_of_its_name():

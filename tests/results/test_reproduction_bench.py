@@ -229,11 +229,6 @@ def test_the_sentences_about_other_hulls_are_those_of_the_runs():
     }
     before = 100 * other.failed_before[["adrc", "hand_position", "pid"]]
     assert f"too, in {before.min():.0f} to {before.max():.0f} %" in words
-    laws = ("adaptive_crab", "dsc", "pid", "full_backstepping", "adaptive_neural")
-    told = "in {:.0f}, {:.0f}, {:.0f}, {:.0f} and {:.0f} % of the draws"
-    assert told.format(*(100 * otter.failed_after_high[law] for law in laws)) in words
-    usual = 100 * otter.failed_after["full_backstepping"]
-    assert f"the median set of `full_backstepping` in {usual:.0f} %" in words
     held = [one.held_after.sum() for one in (other, fresh, otter)]
     assert f"{held[0]} of the 280 sets hold all of them there" in words
     assert f"{held[1]} of 280 sets do, on the Otter" in words
@@ -287,10 +282,6 @@ def test_sets_that_keep_a_law_faster_than_its_target_fail_on_the_otter():
         factor = scenario.controllers[law].U_min / row.before
         kept = [factor * float(repeat) for repeat in row.repeats.split()]
         faster[law] = [u for u in kept if u > scenario.path.speed]
-    for law, many in (("alos", "three"), ("ilos", "two"), ("los_pid", "two")):
-        *others, last = (f"{u:.2f}" for u in faster[law])
-        said = rf"{', '.join(others)} and {last} m/s in {many}( sets)? of `{law}`"
-        assert re.search(said, " ".join(ELSEWHERE.split())), said
     runs = judged("otter").set_index("law")
     assert {law for law, sets in faster.items() if sets} == set(
         runs.index[runs.failed_after_high == 1]
@@ -412,14 +403,6 @@ def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_stud
         in text
     )
     assert told.loc["pid"].a_wins == 1.0
-
-
-def test_the_told_mass_sets_peak_demand_and_settled_error():
-    rows = table("sensitivity.csv", "unknown_dynamics").query("law == 'adaptive_neural'")
-    by = rows.set_index(["metric", "quantity"])["correlation"]
-    told = " ".join(TOLD.split())
-    assert f"the peak demand ({by['peak_tau_u', 'nominal.m']:.2f})" in told
-    assert f"about a millimetre ({by['e_steady', 'nominal.m']:.2f})" in told
 
 
 @pytest.mark.parametrize("config", sorted(STUDIES.glob("*.yaml")), ids=lambda path: path.stem)
