@@ -84,6 +84,8 @@ TABLE: dict[str, list[Row]] = {
      "test_the_filter_with_an_error_that_wanders_is_that_of_plain_numpy"),
     ("guessed = self.wandering.deviation if self.wandering.is_sure else 0.0",
      "guessed = self.wandering.deviation", "test_which_numbers_are_looked_for"),
+    ("beside = np.diag(2.0 * (np.arange(len(y)) >= hull))", "beside = 0.0 * curvature",
+     "test_a_number_that_bends_more_than_is_expected_does_not_hold_back_the_hull"),
     (".ratio and y > LARGE:", ".ratio and abs(y) > LARGE:",
      "test_a_noise_far_above_what_was_known_is_said_with_its_meaning"),
     ("if p.name == DELAY and p.high < 0.0", "if p.name == DELAY and p.value < 0.0",
