@@ -24,16 +24,40 @@ CEP = math.sqrt(2.0 * math.log(2.0))  # radius that holds half of all positions,
 
 @dataclass(frozen=True)
 class Propeller:
-    """A fixed propeller: where it is [m], thrust over squared speed [N s2] ahead and astern.
+    """A propeller: where it is [m], thrust over squared speed [N s2] ahead and astern.
 
-    `lag` is the time constant of its speed [s].
+    `top` is its largest speed ahead [1/s]; its speed follows what is asked for with the time
+    constant `lag` [s]. It turns with its axis where `angle_lag` [s] is not 0, at most at
+    `angle_rate` [rad/s]; or a rudder does in its stream, whose normal force is `lift` n^2 times its
+    angle, up to the angle `stall` [rad].
     """
 
     x: float
     y: float
     ahead: float
     astern: float
+    top: float
     lag: float = 0.1
+    angle_lag: float = 0.0
+    angle_rate: float = math.inf
+    lift: float = 0.0
+    stall: float = 0.0
+
+    def push(self, n: float, angle: float) -> tuple[float, float, float]:
+        """Surge force, sway force and yaw moment at a speed [1/s] and an angle [rad]."""
+        T = (self.ahead if n >= 0.0 else self.astern) * abs(n) * n
+        along, across = T * math.cos(angle), T * math.sin(angle)
+        if self.lift:
+            normal = self.lift * max(n, 0.0) ** 2 * min(max(angle, -self.stall), self.stall)
+            along, across = T - normal * math.sin(angle), normal * math.cos(angle)
+        return along, across, self.x * across - self.y * along
+
+    def rates(self, n: float, angle: float, asked: Sequence[float]) -> tuple[float, float]:
+        """How fast speed and angle change."""
+        if not self.angle_lag:
+            return (asked[0] - n) / self.lag, 0.0
+        turn = (asked[1] - angle) / self.angle_lag
+        return (asked[0] - n) / self.lag, min(max(turn, -self.angle_rate), self.angle_rate)
 
 
 @dataclass(frozen=True)
@@ -97,39 +121,53 @@ class Sea:
 
 @dataclass(frozen=True)
 class Motion:
-    """States over ground (x, y, psi, u, v, r) and propeller speeds [1/s] at times STEP apart."""
+    """States over ground (x, y, psi, u, v, r) at times STEP apart.
+
+    `thrusters` and `asked` have speeds [1/s] of all propellers, then their angles [rad]; `loads`
+    are their surge force, sway force and yaw moment together.
+    """
 
     times: Array
     states: Array
-    speeds: Array
+    thrusters: Array
     asked: Array
+    loads: Array
 
 
 def sail(
     boat: PlainBoat, asked: Callable[[float], Sequence[float]], duration: float, sea: Sea
 ) -> Motion:
-    """The motion from rest in the water under propeller speeds that are asked for [1/s]."""
+    """The motion from rest in the water; of each propeller a speed, then an angle is asked for.
+
+    Speeds alone [1/s] ask for angles of 0.
+    """
     wx, wy = sea.current
-    count, propellers = round(duration / STEP), boat.propellers
+    count, size = round(duration / STEP), len(boat.propellers)
+    propellers = list(enumerate(boat.propellers))
+
+    def push(s: Sequence[float]) -> list[float]:
+        each = [p.push(s[6 + i], s[6 + size + i]) for i, p in propellers]
+        return [sum(axis) for axis in zip(*each, strict=True)]
+
+    def wanted_at(t: float) -> list[float]:
+        wanted = [float(w) for w in asked(t)]
+        return wanted + [0.0] * (2 * size - len(wanted))
 
     def rate(t: float, s: Sequence[float], wanted: Sequence[float]) -> list[float]:
         psi, u, v, r = s[2:6]
         c, n = math.cos(psi), math.sin(psi)
         bx, by, turn = sea.load(t)
-        push, lags = 0.0, []
-        for p, speed, w in zip(propellers, s[6:], wanted, strict=True):
-            T = (p.ahead if speed >= 0.0 else p.astern) * abs(speed) * speed
-            push += T
-            turn -= p.y * T
-            lags.append((w - speed) / p.lag)
-        nu = boat.acceleration(u, v, r, push + c * bx + n * by, c * by - n * bx, turn)
-        return [c * u - n * v + wx, n * u + c * v + wy, r, *nu, *lags]
+        X, Y, N = push(s)
+        lags = [p.rates(s[6 + i], s[6 + size + i], wanted[i::size]) for i, p in propellers]
+        speeds, angles = zip(*lags, strict=True)
+        nu = boat.acceleration(u, v, r, X + c * bx + n * by, Y + c * by - n * bx, N + turn)
+        return [c * u - n * v + wx, n * u + c * v + wy, r, *nu, *speeds, *angles]
 
     def shifted(s: Sequence[float], h: float, by: Sequence[float]) -> list[float]:
         return [x + h * d for x, d in zip(s, by, strict=True)]
 
-    s = [0.0] * (6 + len(propellers))
-    rows, wants, h = [s], [list(map(float, asked(0.0)))], STEP
+    s = [0.0] * (6 + 2 * size)
+    rows, wants, h = [s], [wanted_at(0.0)], STEP
     for k in range(count):
         t, wanted = k * h, wants[-1]
         a = rate(t, s, wanted)
@@ -141,13 +179,14 @@ def sail(
             for x, p, q, r, o in zip(s, a, b, d, e, strict=True)
         ]
         rows.append(s)
-        wants.append(list(map(float, asked((k + 1) * h))))
+        wants.append(wanted_at((k + 1) * h))
     states: Array = np.array(rows, dtype=np.float64)
     c, n = np.cos(states[:, 2]), np.sin(states[:, 2])
     states[:, 3] += c * wx + n * wy
     states[:, 4] += c * wy - n * wx
     times: Array = h * np.arange(count + 1, dtype=np.float64)
-    return Motion(times, states[:, :6], states[:, 6:], np.array(wants))
+    loads = np.array([push(row) for row in rows])
+    return Motion(times, states[:, :6], states[:, 6:], np.array(wants), loads)
 
 
 def steps_of(
@@ -220,13 +259,30 @@ def log_columns(motion: Motion, sensors: Sensors, rng: np.random.Generator) -> d
     heading = states[:, 2] + sensors.compass_off + sensors.compass * rng.standard_normal(count)
     columns["psi"] = np.mod(heading + math.pi, 2.0 * math.pi) - math.pi
     columns["r"] = states[:, 5] + sensors.gyro * rng.standard_normal(count)
-    for name, values in (("n", motion.speeds), ("n_cmd", motion.asked)):
-        columns |= {f"{name}_{i}": v for i, v in enumerate(values[at].T, 1)}
-    return columns
+    for end, values in (("", motion.thrusters), ("_cmd", motion.asked)):
+        both = np.split(values[at].T, 2)
+        for name, each in zip(("n", "delta"), both, strict=True):
+            columns |= {f"{name}{end}_{i}": v for i, v in enumerate(each, 1)}
+    names = ("tau_u", "tau_v", "tau_r")
+    return columns | dict(zip(names, motion.loads[at].T, strict=True))
+
+
+def columns_of(columns: Mapping[str, Array], logged: str) -> dict[str, Array]:
+    """The log of somebody who has commands, shaft speeds or forces: `logged`."""
+    begins = {
+        "commands": ("n_cmd", "delta_cmd"),
+        "shaft speeds": ("n_", "delta_"),
+        "forces": ("tau",),
+    }
+    asked = logged == "commands"
+    acted = {
+        n: c for n, c in columns.items() if n.startswith(begins[logged]) and ("cmd" in n) == asked
+    }
+    return {n: columns[n] for n in ("time", "x", "y", "psi", "r")} | acted
 
 
 # An Otter's propellers; the hull of somebody's boat of 2 m, and the one that its owner guesses.
-TWO = tuple(Propeller(0.0, y, 0.437421, 0.254438) for y in (-0.395, 0.395))
+TWO = tuple(Propeller(0.0, y, 0.437421, 0.254438, 16.54) for y in (-0.395, 0.395))
 GUESSED = {
     **{"m11": 60.2815, "m22": 137.5, "m23": 11.0, "m33": 39.325, "X_u": -40.0, "X_uu": -25.0},
     **{"Y_v": -137.5, "Y_vv": -100.403, "Y_rv": -74.677},
@@ -248,7 +304,7 @@ def owners_log(
     rng = np.random.default_rng(seed)
     throttles = steps_of(rng, (-0.1, -0.1), (0.9, 0.9), 6.0)
     sea = Sea((0.15, 0.13), wandering_load(rng, duration, (2.0, 2.0, 0.8), 10.0))
-    motion = sail(boat, lambda t: [16.54 * each for each in throttles(t)], duration, sea)
+    motion = sail(boat, lambda t: [TWO[0].top * each for each in throttles(t)], duration, sea)
     sensors = Sensors(
         gnss=0.1,
         gnss_wander=2.5 / CEP,

@@ -107,6 +107,7 @@ def scored(errors, role="judge", log="a.csv", horizon=30.0):
         (scored((1.3, 1.0)), 0.0, ["a.csv"]),
         (scored((1.3, 1.0)), 1.2, []),  # noise of the positions explains both
         (scored((1.3, 1.0), horizon=5.0) + scored((0.5, 1.0)), 0.0, []),  # 30 s count
+        (scored((1.3, 1.0), horizon=math.inf) + scored((0.5, 1.0)), 0.0, []),
         (scored((1.3, 1.0), horizon=5.0), 0.0, ["a.csv"]),  # where there are any
         (scored((1.3, 1.0), "fit") + scored((0.5, 1.0), log="b.csv"), 0.0, []),
         (scored((1.3, 1.0), "fit"), 0.0, ["a.csv"]),  # worse even along what was fitted

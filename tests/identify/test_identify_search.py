@@ -90,7 +90,8 @@ def test_a_number_that_bends_more_than_is_expected_does_not_hold_back_the_hull()
     """Over q the value bends by 4 c n m + 2 = 82, and Fisher's matrix says 2 near the least value.
 
     The hull's numbers a and b lie in a curved valley, b = a^2, along which q goes with them.
-    Damped together with q they took 100 rounds; what is least is known by another program.
+    Damped together with q they took 100 rounds, and 27 without what damps q apart; what is least is
+    known by another program.
     """
     n, m, c = 400, 0.5, 0.1
 
@@ -105,5 +106,5 @@ def test_a_number_that_bends_more_than_is_expected_does_not_hold_back_the_hull()
     search = HullSearch(innovations, 3, np.zeros(n + 2, int), 2)
     found = estimate_hull(search, starts=1)
     least = minimize(lambda y: np.sum(residuals(y) ** 2) + y @ y, found.y, method="BFGS")
-    assert found.rounds < 30
+    assert found.rounds < 22
     assert found.value == pytest.approx(least.fun, abs=0.02)
