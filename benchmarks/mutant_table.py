@@ -192,6 +192,17 @@ TABLE: dict[str, list[Row]] = {
      "test_verify_is_a_table_of_numbers"),
     ("{escape(line)}", "{line}", "test_a_run_that_diverges_is_a_run_and_its_warnings_are_there"),
 ],
+"pages in a terminal": [
+    ("return law_pages().get(short, short)", "return short",
+     "test_every_law_has_a_page_that_its_name_finds"),
+    ('return words.strip(" |>-").replace(BAR, "|")', 'return words.strip(" |>-")',
+     "test_lists_of_pages_and_places_have_no_marks_of_markdown"),
+    ("        return len(SHOWN_FIRST) + 1\n", "        return 0\n",
+     "test_verbose_shows_every_value_and_where_it_comes_from"),
+    ("for heading, names in (*GROUPS.items(), (OTHERS, others)):",
+     "for heading, names in (*[*GROUPS.items()][1:], (OTHERS, others)):",
+     "test_help_lists_every_command_below_a_heading"),
+],
 "workflows": [
     ("= _place_measured(members, opened_runs)", "= _place_measured(members, opened_runs[::-1])",
      'test_a_log_is_moved_to_the_first_argument_finished_or_not'),
