@@ -558,6 +558,8 @@ def test_the_mass_matrix_stays_symmetric_where_it_was(boat):
             {"logs": [{"file": "a"}], "noise": {"sigma_gps": 0.1}},
             "sigma_gps is no sensor's deviation",
         ),
+        ({"logs": [{"file": "a"}], "noise": {"sigma_p": 0.0}}, "sigma_p is 0; it has to be above"),
+        ({"logs": [{"file": "a"}], "noise": {"wander": -1.0}}, "wander is -1; .* at least 0"),
     ],
 )
 def test_a_section_that_cannot_be_meant_gets_a_sentence(section, sentence):

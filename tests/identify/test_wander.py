@@ -304,9 +304,10 @@ def test_what_was_not_looked_for_is_said():
 
 
 @pytest.mark.slow
-def test_an_owners_log_gives_a_hull_that_predicts_better_or_none(tmp_path):
+@pytest.mark.parametrize("seed", [1, 2])
+def test_an_owners_log_gives_a_hull_that_predicts_better_or_none(tmp_path, seed):
     """Ten minutes of a consumer's GNSS, by a simulator that shares no code with podusv's."""
-    kept = plain_logs.columns_of(plain_logs.owners_log(1), "commands")
+    kept = plain_logs.columns_of(plain_logs.owners_log(seed), "commands")
     pd.DataFrame(kept).to_csv(tmp_path / "owner.csv", index=False, float_format="%.7g")
     (tmp_path / "owner.yaml").write_text(
         "vessel: {preset: otter, X_u: -40.0, X_uu: -25.0}\npath: {kind: line, speed: 0.0}\n"
@@ -315,10 +316,9 @@ def test_an_owners_log_gives_a_hull_that_predicts_better_or_none(tmp_path):
         "    - {file: owner.csv, span: [420, 601], role: judge}\n"
     )
     hull = podusv.identify(tmp_path / "owner.yaml", out=tmp_path / "hull", figures=False)
-    assert not hull.refusal
     judged = hull.scores[(hull.scores.role == "judge") & (hull.scores.horizon == 30.0)]
     errors = judged.set_index("who").position
-    assert errors["identified"] <= 0.7 * errors["prior"]
+    assert hull.refusal or errors["identified"] <= 0.7 * errors["prior"]
     damping = plain_logs.OWN_BOAT.damping
     for row in hull.forces[hull.forces.force != "Y(v)"].itertuples():
         motion_ = (row.at, 0.0, 0.0) if row.force == "X(u)" else (0.0, 0.0, row.at)

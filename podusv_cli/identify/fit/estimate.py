@@ -28,7 +28,7 @@ DAMPINGS = (
     *((0.0, 0.0), (0.0, 3.0), (0.0, 30.0), (0.01, 0.0)),
     *((0.1, 10.0), (1.0, 0.0), (30.0, 0.0), (1e3, 0.0)),
 )
-STARTS, NEARER = 5, 0.5  # searches at most, and how far from the prior's centre they begin
+STARTS, NEARER = 5, 0.5  # searches at most, and how far from the better start others begin
 SETTLED = 0.5  # of -2 log of the posterior: two searches that differ by less came to the same
 ENOUGH = 0.02  # of -2 log of the posterior: what a step has to gain, or the search ends
 # Posterior over prior standard deviation of a direction: above OPEN the logs do not determine it,
@@ -131,25 +131,28 @@ class HullEstimate:
 def estimate_hull(
     search: HullSearch, tell: Tell = lambda i, value: None, *, starts: int = STARTS
 ) -> HullEstimate:
-    """The best of several searches: from the prior's centre, `second`, then draws of the prior.
+    """The best of several searches: from the prior's centre, `second`, then near the better start.
 
     They end when two have come to the same value. An interrupt leaves the best so far. Raises
     UsageError where the filter breaks down at the prior's centre.
     """
-    found = [_search_from(search, np.zeros(search.size), tell)]
+    starts_at = [np.zeros(search.size)]
+    found = [_search_from(search, starts_at[0], tell)]
     if not math.isfinite(found[0].value):
         raise UsageError(f"with the vessel as it is given {BREAKS}")
     rng = np.random.Generator(np.random.PCG64(search.size))
     while len(found) < starts and not (found[-1].interrupted or _agree(found)):
-        start = NEARER * rng.standard_normal(search.size)
+        best = int(np.argmin([e.value for e in found]))
+        start = starts_at[best] + NEARER * rng.standard_normal(search.size)
         if len(found) == 1 and search.second is not None:
             start = search.second
         try:
             found.append(_search_from(search, start, tell))
+            starts_at.append(start)
         except KeyboardInterrupt:  # before its first round
             found[-1] = replace(found[-1], interrupted=True)
-    best = min(found, key=lambda e: e.value)
-    return replace(best, settled=_agree(found), interrupted=found[-1].interrupted)
+    least = min(found, key=lambda e: e.value)
+    return replace(least, settled=_agree(found), interrupted=found[-1].interrupted)
 
 
 def _agree(found: Sequence[HullEstimate]) -> bool:
