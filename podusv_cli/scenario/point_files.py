@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.core import units
 from podusv_cli.core.earth import Plane, error_at
 from podusv_cli.core.timed_rows import TextLine, columns, lines_of
-from podusv_cli.scenario.routes import Pair, RouteFault, RouteFile, beyond_earth, route_of
+from podusv_cli.scenario.routes import Pair, RouteFault, RouteFile, beyond_earth, checked, route_of
 from podusv_cli.scenario.yaml_text import MAX_NODES, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
@@ -68,8 +68,9 @@ class Placing:
         cells = header.cells if header else []
         names = [DEGREES.get(cell.partition("[")[0].strip().lower()) for cell in cells]
         if {"lat", "lon"} <= {*names}:
+            _demand_degrees(cells)
             order = names.index("lat"), names.index("lon")
-        elif not header and self._plane and _about(self._plane, lines):
+        elif not header and lines and self._plane and _about(self._plane, lines):
             order = (0, 1)
             self.remarks.append(
                 "rows without names lie about the origin's own degrees, and are taken for "
@@ -80,10 +81,10 @@ class Placing:
         pairs = []
         for line in lines:
             lat, lon = (_number(line.cells[i]) if i < len(line.cells) else math.nan for i in order)
-            if math.isnan(lat + lon):
+            if math.isnan(lat + lon) or len(line.cells) > max(len(cells), 2):
                 raise RouteFault(f"has no latitude and longitude in line {line.number}")
             pairs.append((lat, lon))
-        return RouteFile(tuple(pairs))
+        return checked(RouteFile(tuple(pairs)))
 
     def _in_metres(
         self, places: Sequence[Pair], name: str, key: str, faults: list[Fault]
@@ -112,9 +113,17 @@ class Placing:
         self._plane = Plane(lat, lon)
         self.remarks.append(
             f"{name}: x = y = 0 is its first waypoint; to lay logs beside the run write "
-            f"origin: {{lat: {lat:.9g}, lon: {lon:.9g}}}"
+            f"origin: {{lat: {lat:.12g}, lon: {lon:.12g}}}"
         )
         return self._plane
+
+
+def _demand_degrees(cells: Sequence[str]) -> None:
+    """Raise RouteFault for a unit in brackets that is none of degrees."""
+    for cell in cells:
+        name, _, unit = cell.partition("[")
+        if DEGREES.get(name.strip().lower()) and unit.strip(" ]") not in ("", "deg", "°"):
+            raise RouteFault("has latitude and longitude in another unit than deg; convert them")
 
 
 def _plane(origin: Node) -> Plane | None:

@@ -36,7 +36,9 @@ COMMANDS = {  # what MAV_CMD of a mission are called that are no places
 }
 USUAL = {"frame": 3, "command": 0}  # of a plan's item that does not say
 MOST_CODE = 1e5
+LONGEST_NAME = 40  # letters of a word that a file gives
 POINTS = re.compile(r"^\s*(?:points|polygon)\s*=\s*(.*)$", re.MULTILINE | re.IGNORECASE)
+LABEL = re.compile(r"\s*[a-z_]+\s*[,=]\s*[A-Za-z_][\w ]*\s*")
 MOOS_PAIR = re.compile(r"\s*([^,:{}\s]+)\s*,\s*([^,:{}\s]+)(?:\s*,[^:]*)?\s*")
 
 
@@ -64,13 +66,13 @@ def route_of(text: str) -> RouteFile | None:
     for begins, read in FORMATS.items():
         if begin.startswith(begins):
             try:
-                return _checked(read(begin))
+                return checked(read(begin))
             except RecursionError as error:
                 raise RouteFault("has brackets in brackets without end") from error
-    return _checked(_moos(begin)) if POINTS.search(begin) else None
+    return checked(_moos(begin)) if POINTS.search(begin) else None
 
 
-def _checked(route: RouteFile) -> RouteFile:
+def checked(route: RouteFile) -> RouteFile:
     """The route without a waypoint that repeats the one before. Raises RouteFault."""
     if not route.pairs:
         raise RouteFault("has no waypoints")
@@ -82,8 +84,8 @@ def _checked(route: RouteFile) -> RouteFile:
 
 
 def _waypoint_list(text: str) -> RouteFile:
-    """`QGC WPL 110`: a row an item; the first is the place of home where its frame is 0."""
-    items = []
+    """`QGC WPL 110`: a row an item; item 0 in frame 0 is where ArduPilot's home was."""
+    items, home = [], False
     for number, line in enumerate(text.splitlines()[1:], 2):
         if not line.strip() or line.startswith("#"):
             continue
@@ -91,8 +93,11 @@ def _waypoint_list(text: str) -> RouteFile:
         if len(cells) < 12 or not all(map(NUMBER.fullmatch, cells[:12])):
             raise RouteFault(f"line {number} is no item of QGC WPL 110, which has 12 numbers")
         frame, command, lat, lon = (float(cells[i]) for i in (2, 3, 8, 9))
+        home = home or (not items and frame == 0.0)
         items.append((_whole(frame), _whole(command), lat, lon))
-    return _of_mission(items)
+    route = _of_mission(items)
+    said = ("nothing of item 0, the home of ArduPilot: it is the first waypoint",) if home else ()
+    return route._replace(left_out=(*route.left_out, *said))
 
 
 def _plan(text: str) -> RouteFile:
@@ -106,10 +111,13 @@ def _plan(text: str) -> RouteFile:
         return _geojson(data)
     items = []
     for item in _simple_items(mission.get("items")):
-        where = _list(item.get("coordinate")) or _list(item.get("params"))[4:6]
-        lat, lon = (_number(part) for part in [*where, 0.0, 0.0][:2])
-        frame, command = (_number(item.get(key, usual)) for key, usual in USUAL.items())
-        items.append((_whole(frame), _whole(command), lat, lon))
+        frame, command = (_whole(_number(item.get(key, usual))) for key, usual in USUAL.items())
+        where: Sequence[Any] = (0.0, 0.0)
+        if command in PLACES:
+            where = _list(item.get("coordinate"))[:2] or _list(item.get("params"))[4:6]
+        if len(where) < 2:
+            raise RouteFault("has a waypoint without latitude and longitude")
+        items.append((frame, command, *map(_number, where)))
     return _of_mission(items)
 
 
@@ -162,7 +170,7 @@ def _geojson(data: Mapping[str, Any]) -> RouteFile:
         elif kind == "Point":
             points.append(where)
         else:
-            others[kind] += 1
+            others[kind[:LONGEST_NAME]] += 1
     chosen, left_out = _line_or_points(lines, points)
     pairs = tuple((_number(_at(p, 1)), _number(_at(p, 0))) for p in _list(chosen))
     return RouteFile(pairs, left_out=(*left_out, *_counts(others)))
@@ -215,7 +223,7 @@ def _gpx(root: ElementTree.Element) -> RouteFile:
     """The first route; the first track where there is none; else the waypoints in their order."""
     ways = [[*_inside(way, "rtept")] for way in _inside(root, "rte")]
     ways += [[*_inside(way, "trkpt")] for way in _inside(root, "trk")]
-    chosen, left_out = _line_or_points(ways, _inside(root, "wpt"))
+    chosen, left_out = _line_or_points([*filter(None, ways)], _inside(root, "wpt"))
     return RouteFile(
         tuple((_number(p.get("lat")), _number(p.get("lon"))) for p in chosen), left_out=left_out
     )
@@ -225,8 +233,9 @@ def _kml(root: ElementTree.Element) -> RouteFile:
     """The first line, else the points in their order; longitude comes first."""
     lines = [_kml_places(line) for line in _inside(root, "linestring")]
     points = [place for point in _inside(root, "point") for place in _kml_places(point)]
-    chosen, left_out = _line_or_points(lines, points)
-    return RouteFile(tuple(chosen), left_out=left_out)
+    chosen, left_out = _line_or_points([*filter(None, lines)], points)
+    others = _counts({"polygons": len(_inside(root, "polygon"))})
+    return RouteFile(tuple(chosen), left_out=(*left_out, *others))
 
 
 def _kml_places(geometry: ElementTree.Element) -> list[Pair]:
@@ -240,13 +249,16 @@ def _moos(text: str) -> RouteFile:
     first, *others = [match[1] for match in POINTS.finditer(text)]
     body = first.partition("//")[0].partition("pts=")[2] or first.partition("//")[0]
     body = body.partition("{")[2].partition("}")[0] if "{" in body else body
-    pairs = []
+    pairs, odd = [], 0
     for part in filter(str.strip, body.split(":")):
         match = MOOS_PAIR.fullmatch(part)
         if not match or not all(map(NUMBER.fullmatch, match.groups())):
-            continue  # `label, survey`: a setting among the points
+            odd += not LABEL.fullmatch(part)  # `label, survey`: a setting among the points
+            continue
         pairs.append((float(match[2]), float(match[1])))
-    left_out = _counts({"lists of points after the first": len(others)})
+    left_out = _counts(
+        {"points that are no two numbers": odd, "lists of points after the first": len(others)}
+    )
     return RouteFile(tuple(pairs), on_earth=False, left_out=left_out)
 
 

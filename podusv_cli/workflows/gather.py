@@ -97,6 +97,11 @@ def _common_plane(members: Sequence[Member]) -> Plane | None:
             f"the runs have origins that differ ({places}), so a log lies beside one of them only; "
             "give all the same `origin`"
         )
+    unplaced = [member.label for member in members if not plane_of(member.about)]
+    if planes and unplaced:
+        raise UsageError(
+            f"{', '.join(unplaced)}: no `origin`, which other runs have; give all the same `origin`"
+        )
     return next(iter(planes), None)
 
 

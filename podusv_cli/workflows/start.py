@@ -229,6 +229,8 @@ def _way(route: str, out: Path) -> StartingLegs | None:
     """The legs of a route beside the scenario `out`; None without one. Raises UsageError."""
     if not route:
         return None
+    if not os.path.isfile(route):
+        raise UsageError(f"--route {route}: there is no such file")
     storage.make_folder(out.parent)  # the route is read from there
     file = os.path.relpath(route, out.parent)
     path = as_yaml(file) if file.isprintable() else repr(file)
@@ -242,7 +244,9 @@ def _way(route: str, out: Path) -> StartingLegs | None:
     points = scenario.path.waypoints()
     lines = [f"  file: {path}"]
     if scenario.origin:
-        lines.append(f"origin: {{lat: {scenario.origin.lat:.9g}, lon: {scenario.origin.lon:.9g}}}")
+        lines.append(
+            f"origin: {{lat: {scenario.origin.lat:.12g}, lon: {scenario.origin.lon:.12g}}}"
+        )
     (x, y), (ahead, right) = points[0], np.subtract(points[1], points[0])
     psi = math.degrees(math.atan2(right, ahead))
     lines.append(f"start: {{x: {x:.10g}, y: {y:.10g}, psi: {psi:.4g} deg}}")

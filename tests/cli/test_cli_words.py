@@ -122,6 +122,7 @@ def test_explain_shows_the_sections_without_a_key(podusv):
         "vessel",
         "nominal",
         "start",
+        "origin",
         "path",
         "disturbance",
         "actuator",

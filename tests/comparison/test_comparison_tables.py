@@ -323,6 +323,7 @@ def test_every_section_of_a_scenario_is_looked_at():
         *BESIDE_RUNS,
         "measurement",
         "estimator",
+        "origin",
     }
     assert sections | rest == set(type(scenario()).model_fields)
 

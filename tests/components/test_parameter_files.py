@@ -56,6 +56,13 @@ def test_a_file_of_old_rovers_asks_for_l1():
     assert "guidance is l1" in remarks[0]
 
 
+def test_limits_that_are_none_are_said_and_cruise_may_be_missing():
+    keys, remarks = of_px4("RO_SPEED_LIM,-1\nRO_SPEED_P,0.2\n")
+    assert keys == {"speed_P": 0.2}
+    assert remarks == ["RO_SPEED_LIM sets no limit; podusv's own stands"]
+    assert of_ardupilot("CRUISE_SPEED,0\nATC_SPEED_FF,0.2\n")[0] == {"speed_FF": 0.2}
+
+
 def test_px4_names_full_throttle_and_a_wheel_track():
     keys, remarks = of_px4(
         "RO_MAX_THR_SPEED 2.5\nRD_WHEEL_TRACK 0.8\nRO_YAW_RATE_CORR 1.5\nRO_YAW_RATE_LIM 0\n"
@@ -66,7 +73,10 @@ def test_px4_names_full_throttle_and_a_wheel_track():
         "rate_FF": pytest.approx(0.24),  # 0.8 * 1.5 / (2 * 2.5)
         "r_least": pytest.approx(math.radians(3.0)),
     }
-    assert remarks == ["no key have RO_JERK_LIM"]
+    assert remarks == [
+        "RO_YAW_RATE_LIM sets no limit; podusv's own stands",
+        "no key have RO_JERK_LIM",
+    ]
 
 
 @pytest.mark.parametrize(("law", "table"), [(ArduPilot, ARDUPILOT), (Px4, PX4)])
@@ -92,6 +102,9 @@ def test_a_scenario_takes_them_and_its_own_keys_go_before(tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
+        ("ATC_SPEED_P\t0,3\n", "line 1 has no name and number of a parameter"),
+        ("ATC_SPEED_P,0,3\n", "line 1 has no name and number of a parameter"),
+        ("ATC_SPEED_P,1\nATC_SPEED_P,2\n", "line 2 gives ATC_SPEED_P a second time"),
         ("ATC_SPEED_P\n", "line 1 has no name and number of a parameter"),
         ("ATC_SPEED_P,abc\n", "line 1 has no name and number of a parameter"),
         ("BATT_MONITOR,4\n", "has no parameter that this law has a key for"),

@@ -35,7 +35,7 @@ AFTER_A_RUN = {
     "the metrics": (execute, "summary"),
     "the law's cost": (execute, "law_costs"),
     "warnings": (execute, "postflight"),
-    "theory.json with the stability monitor's signals": (ideal_weights, "fit_weights"),
+    "theory.json with the signals that follow from others": (ideal_weights, "fit_weights"),
     "figures": (execute, "_draw_figures"),
 }
 AFTER_RUNS = {
@@ -119,7 +119,7 @@ def test_what_a_run_of_a_comparison_lacks_is_told_of_the_run(podusv, monkeypatch
     said = podusv("compare", write("a.yaml", TWO), "--out", "x", "-q", "--no-figures")
     assert said.code == 0
     for label in ("one", "other"):
-        assert f"{label}: theory.json with the stability monitor's signals {BUG}" in said.err
+        assert f"{label}: theory.json with the signals that follow from others {BUG}" in said.err
         assert not Path("x", label, "theory.json").exists()
     assert [part["what"].partition(":")[0] for part in missing("x")] == ["one", "other"]
 
@@ -130,7 +130,7 @@ def test_rerun_tells_what_the_repeated_run_lacks(podusv, monkeypatch):
     monkeypatch.setattr(ideal_weights, "fit_weights", broken)
     said = podusv("rerun", "x")
     assert said.code == 3
-    assert said.err.startswith(f"x: theory.json with the stability monitor's signals {BUG}")
+    assert said.err.startswith(f"x: theory.json with the signals that follow from others {BUG}")
     assert podusv("rerun", "x", "--json").err == said.err
 
 

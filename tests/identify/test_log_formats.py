@@ -1,5 +1,6 @@
 """NMEA 0183, telemetry logs, MATLAB's files, old DataFlash, and what is proposed for PX4's logs."""
 
+import math
 import random
 import struct
 
@@ -55,7 +56,7 @@ def test_sentences_become_columns_with_units_and_times(tmp_path, name):
     ]
     # A heading comes right behind the position of its time, or between two of them.
     assert np.abs(columns["HDT.time"][:150] - begin - 0.1 * np.arange(150)).max() < 0.1
-    assert columns["RPM_1.rpm [rpm]"][:2].tolist() == [600.0, 605.0]
+    assert columns["RPM_S_1.rpm [rpm]"][:2].tolist() == [600.0, 605.0]
     assert columns["ROT.rate_of_turn [deg/s]"][0] == pytest.approx(-0.1)
 
 
@@ -65,7 +66,7 @@ def test_what_a_log_of_sentences_may_be_is_proposed(tmp_path):
         '  lat: "RMC.lat [deg]"',
         '  lon: "RMC.lon [deg]"',
         '  psi: "HDT.heading [deg]"',
-        '  n_1: "RPM_1.rpm [rpm]"',
+        '  n_1: "RPM_S_1.rpm [rpm]"',
         '  delta_1: "RSA.rsa_starboard [deg]"',
         '  r: "ROT.rate_of_turn [deg/s]"',
     ]
@@ -77,6 +78,9 @@ def test_sentences_that_are_damaged_are_left_out_and_counted(tmp_path):
     lines[10] = lines[10].replace("A", "B", 1)
     read = contents_of(nmea(tmp_path, lines))
     assert read.warnings == ("1 sentences with a wrong checksum are left out",)
+    lines[40:60] = [line.replace("1", "2") for line in lines[40:60]]
+    read = contents_of(nmea(tmp_path, lines))
+    assert "sentences with a wrong checksum are left out" in read.warnings[0]
     wrong = [line[:-2] + "00" for line in sentences()]
     read = contents_of(nmea(tmp_path, wrong))
     assert read.warnings[0].endswith("sentences have a wrong checksum; all are read")
@@ -98,6 +102,48 @@ def test_damaged_sentences_end_in_a_sentence(tmp_path):
         except LogFault:
             continue
         assert all(np.isfinite(v).all() for name, v in columns.items() if name.endswith("time"))
+
+
+def test_what_a_receiver_calls_invalid_is_no_value(tmp_path):
+    lines = [
+        sentence("GPRMC,100000.00,A,4812.0000,N,01130.0000,E,1.0,90.0,010124,,,D"),
+        sentence("GPGGA,100000.00,0000.0000,N,00000.0000,E,0,00,99,0,M,0,M,,"),
+        sentence("IIRSA,35.0,V,-5.0,A"),
+        sentence("GPWPL,4900.0000,N,01200.0000,E,GOAL"),
+        sentence("IIRPM,S,1,600.0,,A"),
+        sentence("IIRPM,E,1,1200.0,,A"),
+        sentence("GPRMC,100001.00,A,4875.0000,N,01130.0000,E,1.0,90.0,010124,,,D"),
+        sentence("GPRMC,100002.00,A,4812.0000,,01130.0000,E,1.0,90.0,010124,,,D"),
+        sentence("GPRMC,100003.00,A,4812.0000,N,01130.0000,E,1.0,90.0,010124,,,N"),
+        sentence("GPRMC,100004.00,A,4812.0000,N,01130.0000,E,1.0,90.0,010124,,,D"),
+    ]
+    columns = columns_of(nmea(tmp_path, lines))
+    lat = columns["RMC.lat [deg]"]
+    assert lat[np.isfinite(lat)].tolist() == [48.2, 48.2]
+    assert not any(name.startswith("GGA") for name in columns)
+    assert columns["RPM_S_1.rpm [rpm]"].tolist() == [600.0]
+    assert columns["RPM_E_1.rpm [rpm]"].tolist() == [1200.0]
+    assert "RSA.rsa_starboard [deg]" not in columns
+    assert columns["RSA.rsa_port [deg]"].tolist() == [-5.0]
+    proposed = listing(nmea(tmp_path, lines)).mapping()
+    assert '  lat: "RMC.lat [deg]"' in proposed
+
+
+def test_two_boots_of_a_receiver_are_two_parts(tmp_path):
+    lines = sentences(60, 36_000.0) + sentences(60, 32_400.0)
+    times = columns_of(nmea(tmp_path, lines))["RMC.time"]
+    assert np.diff(times).tolist() == pytest.approx([0.2] * 29 + [-3605.8] + [0.2] * 29, abs=1e-3)
+
+
+def test_a_telemetry_log_is_never_run(tmp_path):
+    """pymavlink's own opening runs a file that lies in a folder called bin."""
+    (tmp_path / "bin").mkdir()
+    script = tmp_path / "bin" / "log.tlog"
+    script.write_text(f"#!/bin/sh\ntouch {tmp_path}/MARK\n")
+    script.chmod(0o755)
+    with pytest.raises(LogFault):
+        contents_of(script)
+    assert not (tmp_path / "MARK").exists()
 
 
 def test_matlab_s_vectors_structures_and_matrices_are_columns(tmp_path):
@@ -173,7 +219,11 @@ def px4_log(path):
             "ddfffff",
             lambda t: (48.2, 11.5, t, 2.0 * t, 1.0, 2.0, 0.05 * t),
         ),
-        "actuator_motors": ("float[2] control;", "ff", lambda t: (0.5, -0.1 * t)),
+        "actuator_motors": (
+            "uint64_t timestamp_sample;uint16_t reversible_flags;float[4] control;",
+            "QHffff",
+            lambda t: (int(1e6 * t), 3, 0.5, -0.1 * t, math.nan, math.nan),
+        ),
     }
     out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message("B", bytes(40))]
     out += [message("F", f"{n}:uint64_t timestamp;{f}".encode()) for n, (f, _, _) in topics.items()]

@@ -163,6 +163,9 @@ def test_rows_without_names_are_places_where_they_lie_about_the_origin(tmp_path)
         ("<svg/>", "neither GPX nor KML"),
         ('<!DOCTYPE gpx [<!ENTITY a "b">]><gpx/>', "document type or entities"),
         ("lat,lon\n48.1,\n48.2,-3\n", "no latitude and longitude in line 2"),
+        ("lat,lon\n48,1,-3,01\n48,2,-3,02\n", "no latitude and longitude in line 2"),
+        ("lat [rad],lon [rad]\n0.84,-0.05\n0.85,-0.05\n", "in another unit than deg"),
+        ("lat,lon\n", "has no waypoints"),
         (geojson({"type": "Point", "coordinates": [1]}), "latitude or longitude is no number"),
     ],
 )
@@ -170,6 +173,29 @@ def test_a_damaged_route_is_one_sentence(tmp_path, text, says):
     with pytest.raises(ScenarioError, match=r"route\.dat") as caught:
         loaded(tmp_path, text)
     assert says in str(caught.value).splitlines()[0]
+
+
+def test_an_item_that_is_no_waypoint_may_have_no_place(tmp_path):
+    camera = {"command": 530, "frame": 2, "params": [0, 2, None, None, None, None, None]}
+    text = json.dumps({"mission": {"items": [camera, *items(*AT)]}})
+    found = loaded(tmp_path, text)
+    assert len(found.scenario.path.points) == 3
+    assert "command (530): 1" in found.remarks[0]
+
+
+def test_an_empty_file_beside_an_origin_is_told(tmp_path):
+    for text in ("", "# nothing\n"):
+        with pytest.raises(ScenarioError, match="at least two points"):
+            loaded(tmp_path, text, "origin: {lat: 48.1, lon: -3.01}\n")
+
+
+def test_home_is_said_and_points_that_are_none_are_counted(tmp_path):
+    home = WPL.replace("0\t0\t3\t16", "0\t0\t0\t16", 1)
+    assert "the home of ArduPilot" in loaded(tmp_path, home).remarks[0]
+    odd = loaded(tmp_path, "points = 1,2 : 3,x4 : 5,6 : label,go\n")
+    assert odd.remarks == (
+        f"{tmp_path}/route.dat: left out of the route: points that are no two numbers: 1",
+    )
 
 
 def test_a_waypoint_that_repeats_the_one_before_is_left_out(tmp_path):

@@ -138,6 +138,7 @@ def possible(data: dict[str, Any]) -> Scenario:
     for law in (data["controller"], *data["controllers"].values()):
         step = data["simulation"]["step"]
         sampled = {"rate": "analytic", "hold_below": 0.0, "check_every": step, "execute": step}
+        sampled["file"] = None  # nor any of an autopilot
         law.update({key: value for key, value in sampled.items() if key in law})
         if "network" in law:
             low, high, widths = (-1.0, -1.0, -1.0), (1.0, 2.0, 0.5), (1.0, 2.0, 3.0)

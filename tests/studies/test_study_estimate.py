@@ -17,7 +17,7 @@ def test_a_study_that_cannot_fit_is_refused_before_the_first_run(tmp_path, podus
     assert valid.err == said.err.replace(str(out), "results/small-sweep")
     free = SimpleNamespace(free=1e15)
     monkeypatch.setattr("podusv_cli.storage.run_folder.shutil.disk_usage", lambda path: free)
-    monkeypatch.setattr("podusv_cli.studies.making.estimate.os.sysconf", lambda name: 100_000)
+    monkeypatch.setattr("podusv_cli.studies.making.estimate.physical_memory", lambda: 10**10)
     said = podusv("sweep", "run", config, "--out", out, "--draws", draws)
     assert said.code == 5
     assert "its tables take 64 GB of memory or more, and this machine has 10 GB" in said.err

@@ -93,9 +93,6 @@ class ArduPilot(Rover):
 
     kind: Literal["ardupilot"] = "ardupilot"
     values_of: ClassVar[dict[str, ValuesOf]] = {"file": of_ardupilot}
-    file: str | None = value(
-        None, "", "parameter file of the autopilot, beside the scenario; read into the other keys"
-    )
     rules: ClassVar[dict[str, Rule]] = Rover.rules | {
         "speed_FF": by.THROTTLE,
         "speed_P": by.THROTTLE,

@@ -23,16 +23,28 @@ Keys = dict[str, float | str]
 
 def parameters(text: str) -> dict[str, float]:
     """The parameters of a file by name. Raises ValueError for a line that is none."""
-    found = {}
+    found: dict[str, float] = {}
     for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
-        cells = line.partition("#")[0].replace(",", " ").split()
+        cells = _cells(line.partition("#")[0])
         if not cells:
             continue
-        cells = cells[2:4] if len(cells) >= OF_QGROUNDCONTROL else cells[:2]
-        if len(cells) < 2 or not NAME.fullmatch(cells[0]) or not NUMBER.fullmatch(cells[1]):
+        if len(cells) == OF_QGROUNDCONTROL:
+            cells = cells[2:4]
+        if len(cells) != 2 or not NAME.fullmatch(cells[0]) or not NUMBER.fullmatch(cells[1]):
             raise ValueError(f"line {number} has no name and number of a parameter")
-        found[cells[0]] = float(cells[1])
+        value = float(cells[1])
+        if found.setdefault(cells[0], value) != value:
+            raise ValueError(f"line {number} gives {cells[0]} a second time, and another number")
     return found
+
+
+def _cells(line: str) -> list[str]:
+    """The parts of a line between tabs, where it has one, else between commas, else blanks.
+
+    So a decimal comma is no separator, and what has one is no number.
+    """
+    mark = next((mark for mark in ("\t", ",") if mark in line), None)
+    return [cell.strip() for cell in line.split(mark)] if line.strip() else []
 
 
 def untaken(given: Parameters, taken: set[str], groups: re.Pattern[str]) -> str:
@@ -75,6 +87,7 @@ PX4 = {
     "RD_TRANS_DRV_TRN": ("stops_at", 1.0),
     "RD_TRANS_TRN_DRV": ("drives_at", 1.0),
 }
+LIMITS = ("r_m", "U")  # keys that are limits
 OF_PX4 = re.compile(r"RO_|RD_|PP_")
 FULL_SPEED, TRACK, CORRECTION = "RO_MAX_THR_SPEED", "RD_WHEEL_TRACK", "RO_YAW_RATE_CORR"
 
@@ -83,15 +96,14 @@ def of_ardupilot(text: str) -> tuple[Keys, list[str]]:
     """Keys of `ardupilot` that a parameter file gives, and remarks. Raises ValueError.
 
     The throttle of a wanted speed is ATC_SPEED_FF + CRUISE_THROTTLE/(100 CRUISE_SPEED)
-    (AR_AttitudeControl::get_throttle_out_speed). Limits of 0 mean none and are left out.
+    (AR_AttitudeControl::get_throttle_out_speed). Limits of 0 mean none.
     """
     given = parameters(text)
-    keys, taken = _direct(given, ARDUPILOT)
-    if given.get("CRUISE_SPEED", 0.0) > 0.0 and "CRUISE_THROTTLE" in given:
-        base = 0.01 * given["CRUISE_THROTTLE"] / given["CRUISE_SPEED"]
-        keys["speed_FF"] = base + given.get("ATC_SPEED_FF", 0.0)
+    keys, taken, remarks = _direct(given, ARDUPILOT)
+    throttle, speed, feed = (given.get(name, 0.0) for name in CRUISE)
+    if {*CRUISE} & given.keys() and (speed > 0.0 or feed > 0.0):
+        keys["speed_FF"] = feed + (0.01 * throttle / speed if speed > 0.0 else 0.0)
         taken |= {*CRUISE}
-    remarks = []
     if "PSC_POS_P" not in given and "NAVL1_PERIOD" in given:
         keys["guidance"] = "l1"
         remarks.append("it has NAVL1_PERIOD and no PSC_POS_P, so guidance is l1")
@@ -105,7 +117,7 @@ def of_px4(text: str) -> tuple[Keys, list[str]]:
     RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED) (RoverControl.cpp). Limits of 0 mean none.
     """
     given = parameters(text)
-    keys, taken = _direct(given, PX4)
+    keys, taken, remarks = _direct(given, PX4)
     if given.get(FULL_SPEED, 0.0) > 0.0:
         keys["speed_FF"] = 1.0 / given[FULL_SPEED]
         taken.add(FULL_SPEED)
@@ -113,17 +125,22 @@ def of_px4(text: str) -> tuple[Keys, list[str]]:
             corrected = given[TRACK] * given.get(CORRECTION, 1.0)
             keys["rate_FF"] = corrected / (2.0 * given[FULL_SPEED])
             taken |= {TRACK, CORRECTION}
-    return _checked(keys, given, taken, OF_PX4, [])
+    return _checked(keys, given, taken, OF_PX4, remarks)
 
 
-def _direct(given: Parameters, table: Mapping[str, tuple[str, float]]) -> tuple[Keys, set[str]]:
-    """Keys that are a parameter times a factor, and the parameters that they took."""
+def _direct(
+    given: Parameters, table: Mapping[str, tuple[str, float]]
+) -> tuple[Keys, set[str], list[str]]:
+    """Keys that are a parameter times a factor, the parameters that they took, and remarks.
+
+    A limit of 0 or less is none for the firmware, and podusv's laws have one: this is said.
+    """
     there = [name for name in table if name in given]
-    keys: Keys = {table[name][0]: given[name] * table[name][1] for name in there}
-    for limit in ("r_m", "U"):
-        if keys.get(limit, 0.0) == 0.0:
-            keys.pop(limit, None)
-    return keys, {*there}
+    none = [name for name in there if table[name][0] in LIMITS and given[name] <= 0.0]
+    keys: Keys = {
+        table[name][0]: given[name] * table[name][1] for name in there if name not in none
+    }
+    return keys, {*there}, [f"{name} sets no limit; podusv's own stands" for name in none]
 
 
 def _checked(

@@ -60,9 +60,6 @@ class Px4(Rover):
 
     kind: Literal["px4"] = "px4"
     values_of: ClassVar[dict[str, ValuesOf]] = {"file": of_px4}
-    file: str | None = value(
-        None, "", "parameter file of the autopilot, beside the scenario; read into the other keys"
-    )
     no_gains: ClassVar[tuple[str, ...]] = (
         *Rover.no_gains,
         "lookahead_min",
@@ -103,11 +100,7 @@ class Px4(Rover):
     )
     u_least: float = value(0.1, "m/s", "measured speed that counts as 0 (RO_SPEED_TH)", ge=0)
     catch_up: float = value(
-        0.2,
-        "1/s",
-        "wanted speed per distance to a target that is ahead; podusv's, for targets "
-        "with a timetable",
-        ge=0,
+        0.2, "1/s", "wanted speed per distance to a target ahead; podusv's, for timed targets", ge=0
     )
 
     def slots(self) -> Slots:

@@ -89,6 +89,9 @@ class Rover(Controller):
         "rate_I": by.STEERING,
     }
 
+    file: str | None = value(
+        None, "", "parameter file of the autopilot, beside the scenario; read into the other keys"
+    )
     surge: Ruled = value(8.0, "N", "surge force at full throttle", gt=0)
     yaw: Ruled = value(2.5, "N m", "yaw moment at full steering", gt=0)
     mixing: Literal["shared", "separate"] = value(

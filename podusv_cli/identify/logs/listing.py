@@ -37,10 +37,11 @@ NAMES = {
     "länge|längengrad|laenge|laengengrad",
     "x": r"x|north|northing|pos_?n|pn|position\.x",
     "y": r"y|east|easting|pos_?e|pe|position\.y",
-    "psi": r"psi|heading|hdg|compass|yaw|kompass|steuerkurs",
+    "psi": r"psi|hdt\.heading|att\.yaw|attitude\.yaw|heading|hdg|compass|yaw|kompass|steuerkurs",
     "u": r"u|surge|linear\.x|speed_?x|vx",
     "v": r"v|sway|linear\.y|speed_?y|vy",
-    "r": r"r|yaw_?rate|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz|xyz\[2\]",
+    "r": r"r|yaw_?rate|yawspeed|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz"
+    r"|xyz\[2\]",
     "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
     ".*propeller.*|.*motor.*|.*esc.*speed.*",
     "delta_#": r"delta_?\d|rsa_starboard|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
@@ -51,7 +52,8 @@ NAMES = {
 # Columns that are none of these, whatever their last word: clocks of messages, what is wanted,
 # where a plane touches the earth, how uncertain a value is, which engine it is.
 NEVER = re.compile(
-    r"\.time$|setpoint|(^|[._ ])(ref|reset|manual|input|target|desired)_|covariance|variance"
+    r"^(cmd|orgn|rall|fnce|home|mission|wpl)[._]|timestamp|_flags$"
+    r"|\.time$|setpoint|(^|[._ ])(ref|reset|manual|input|target|desired)_|covariance|variance"
     r"|(^|[._ ])(std|eph|epv|evh|evv)|engine_no"
 )
 PARTS = "n_part_cmd_#"  # speeds that are asked for in parts of full speed
@@ -229,8 +231,11 @@ def _may_be(column: str, columns: Columns) -> bool:
     plain = _plain(column)
     if NEVER.search(column.lower()) or NEVER.search(plain):
         return False
-    beside = plain.removesuffix("vx").removesuffix("vy")
-    return beside == plain or not {f"{beside}x", f"{beside}y"} <= {*map(_plain, columns)}
+    if not np.isfinite(columns[column]).any():
+        return False
+    beside, known = plain.removesuffix("vx").removesuffix("vy"), {*map(_plain, columns)}
+    on_earth = ({f"{beside}x", f"{beside}y"}, {f"{beside}lat", f"{beside}lon"})
+    return beside == plain or not any(places <= known for places in on_earth)
 
 
 def _in_parts(column: str, columns: Columns) -> bool:

@@ -31,7 +31,8 @@ from podusv_cli.identify.logs.topics import TIME, TopicMessages
 
 LONGEST = 16  # numbers of an array in a message; longer ones are pictures and clouds
 OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simulation's clock set it
-CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3, "T": 1e-3}  # of DataFlash, new and old, to s
+CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}  # of DataFlash, new and old, to s
+BOOTED = "T"  # beside TimeMS, where this is the time of the GPS week: ms since the start
 Reader = Callable[[Path], Contents]
 
 
@@ -152,7 +153,10 @@ def read_dataflash(path: Path) -> Contents:
     messages, first = TopicMessages(), math.nan
     while (message := log.recv_msg()) is not None:
         content = message.to_dict()
-        clock = next((content.pop(name) * s for name, s in CLOCKS.items() if name in content), None)
+        if "TimeMS" in content and BOOTED in content:
+            content["TimeMS"] = content.pop(BOOTED)
+        clocks = (content.pop(name) * unit for name, unit in CLOCKS.items() if name in content)
+        clock = next(clocks, None)
         if clock is None:
             continue
         first = clock if math.isnan(first) else first
@@ -167,8 +171,9 @@ def read_dataflash(path: Path) -> Contents:
 def read_telemetry(path: Path) -> Contents:
     """Every MAVLink message of a ground station's log (.tlog): "MESSAGE.field", by its arrival."""
     library = _library("pymavlink.mavutil", path)
-    log = library.mavlink_connection(str(path))
-    messages, first = TopicMessages(), math.nan
+    # Not `mavlink_connection`: it runs a file in a folder `bin`, and takes names for sockets.
+    log = library.mavmmaplog(str(path))
+    messages, first, systems = TopicMessages(), math.nan, list[int]()
     while (message := log.recv_match()) is not None:
         kind, arrival = message.get_type(), float(getattr(message, "_timestamp", math.nan))
         if kind == "BAD_DATA" or not math.isfinite(arrival):
@@ -176,7 +181,11 @@ def read_telemetry(path: Path) -> Contents:
         first = arrival if math.isnan(first) else first
         content = message.to_dict().items()
         numbers = {f".{n}": float(x) for n, x in content if isinstance(x, Real)}
-        messages.add(kind, arrival - first, numbers)
+        system = int(message.get_srcSystem())
+        if system not in systems:
+            systems.append(system)
+        which = systems.index(system)  # of several vehicles the first has no number
+        messages.add(f"{kind}_{which + 1}" if which else kind, arrival - first, numbers)
     return Contents(messages.columns())
 
 

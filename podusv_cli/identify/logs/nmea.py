@@ -24,7 +24,8 @@ from podusv_cli.identify.logs.topics import TopicMessages
 
 SENTENCE = re.compile(r"[$!]([A-Z]{2}[A-Z]{3}|P[A-Z]{3,4})(,[^*]*)(?:\*([0-9A-Fa-f]{2}))?")
 LEADING = re.compile(r"^([-+]?)0+(?=\d)")  # zeros, as in 091.5
-SELDOM = 0.05  # of the sentences, whose checksum may be wrong
+MOSTLY = 0.9  # of the sentences; where more have a wrong checksum, the logger made these
+PLACES = {"lat": "latitude", "lon": "longitude"}  # what pynmea2 calls them in degrees
 NUMBERED = ("engine_no",)  # fields that count engines and shafts
 DAY = 86400.0  # s
 UNITS = {  # of fields whose unit the standard gives
@@ -66,7 +67,7 @@ def contents_of_sentences(text: str, parse: Any) -> Contents:
     wrong = [bool(m[3]) and _checksum(m[1] + m[2]) != int(m[3], 16) for m in matches]
     rows = [i for i, bad in enumerate(wrong) if not bad]
     warnings = []
-    if sum(wrong) > SELDOM * len(wrong):
+    if sum(wrong) > MOSTLY * len(wrong):
         rows = list(range(len(matches)))
         warnings = [f"{sum(wrong)} of {len(wrong)} sentences have a wrong checksum; all are read"]
     elif any(wrong):
@@ -94,10 +95,13 @@ def _sentence(parse: Any, match: re.Match[str]) -> Sentence | None:
     except Exception:  # a type that it does not know, or a field that is none
         return None
     kind = str(getattr(message, "sentence_type", type(message).__name__))
-    if any(fields.get(name) == "V" for name in ("status", "rmc_status")):
+    invalid = (("status", "V"), ("gps_qual", 0), ("mode_indicator", "N"))
+    if any(fields.get(name) == word for name, word in invalid):
         return None  # the receiver says that it is not valid
     clock, day = fields.get("timestamp"), fields.get("datestamp")
     number = next((str(fields[name]) for name in NUMBERED if fields.get(name)), "")
+    if kind == "RPM" and fields.get("source"):
+        number = f"{fields['source']}_{number}"  # S a shaft's, E an engine's
     return Sentence(
         f"{kind}_{number}" if number else kind,
         dict(_numbers(kind, fields, message)),
@@ -110,9 +114,10 @@ def _numbers(kind: str, fields: Mapping[str, Any], message: Any) -> Iterator[tup
     """The numbers of a sentence by field, with the unit that the standard gives."""
     for name, content in fields.items():
         if name in ("lat", "lon"):
-            degrees = getattr(message, {"lat": "latitude", "lon": "longitude"}[name])
-            if content:
-                yield f".{name} [deg]", float(degrees)
+            if _is_place(str(content), fields.get(f"{name}_dir")):
+                yield f".{name} [deg]", float(getattr(message, PLACES[name], math.nan))
+            continue
+        if fields.get(f"{name}_status") == "V":  # of each of two rudders
             continue
         text = LEADING.sub(r"\1", str(content).strip())
         if not NUMBER.fullmatch(text):
@@ -120,6 +125,15 @@ def _numbers(kind: str, fields: Mapping[str, Any], message: Any) -> Iterator[tup
         own = SPEED_OF_RPM.get(name, name) if kind == "RPM" else name
         unit = f" [{UNITS[own]}]" if own in UNITS else ""
         yield f".{own}{unit}", float(text) * PER_MINUTE.get(own, 1.0)
+
+
+def _is_place(text: str, direction: Any) -> bool:
+    """Whether these are degrees and minutes, ddmm.mmmm, with the side on which they are counted."""
+    return (
+        bool(direction)
+        and NUMBER.fullmatch(LEADING.sub(r"\1", text)) is not None
+        and (float(text) % 100.0 < 60.0)
+    )
 
 
 def _seconds(clock: time) -> float:
@@ -138,5 +152,13 @@ def _times(kept: list[tuple[int, Sentence]]) -> Vector:
     if first:
         clocks += datetime(first.year, first.month, first.day, tzinfo=UTC).timestamp()
     lines = np.array([line for line, _ in kept], float)
-    new = timed[np.flatnonzero(np.diff(clocks[timed], prepend=-np.inf) > 0.0)]
-    return np.asarray(np.interp(lines, lines[new], clocks[new], left=np.nan, right=np.nan))
+    # A clock that steps back begins anew: each part is straight by itself.
+    back = timed[1:][np.diff(clocks[timed]) < 0.0]
+    times = np.full(len(kept), np.nan)
+    for part in np.split(np.arange(len(kept)), back):
+        own = np.intersect1d(part, timed)
+        new = own[np.flatnonzero(np.diff(clocks[own], prepend=-np.inf) > 0.0)]
+        if len(new):
+            inside = part[(part >= new[0]) & (part <= new[-1])]
+            times[inside] = np.interp(lines[inside], lines[new], clocks[new])
+    return times
