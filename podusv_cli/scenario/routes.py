@@ -19,6 +19,7 @@ from xml.etree import ElementTree
 from podusv_cli.core.units import NUMBER
 
 Pair = tuple[float, float]
+MissionItem = tuple[int, int, float, float]  # frame, command, latitude and longitude, or x and y
 GLOBAL, LOCAL = {0, 3, 5, 6, 10, 11}, {1}  # MAV_FRAME: latitude and longitude; north and east [m]
 PLACES = {16, 17, 18, 19, 21, 31, 82}  # MAV_CMD whose place the vehicle goes to
 COMMANDS = {  # what MAV_CMD of a mission are called that are no places
@@ -85,7 +86,7 @@ def checked(route: RouteFile) -> RouteFile:
 
 def _waypoint_list(text: str) -> RouteFile:
     """`QGC WPL 110`: a row an item; item 0 in frame 0 is where ArduPilot's home was."""
-    items, home = [], False
+    items, home = list[MissionItem](), False
     for number, line in enumerate(text.splitlines()[1:], 2):
         if not line.strip() or line.startswith("#"):
             continue
@@ -117,7 +118,7 @@ def _plan(text: str) -> RouteFile:
             where = _list(item.get("coordinate"))[:2] or _list(item.get("params"))[4:6]
         if len(where) < 2:
             raise RouteFault("has a waypoint without latitude and longitude")
-        items.append((frame, command, *map(_number, where)))
+        items.append((frame, command, _number(where[0]), _number(where[1])))
     return _of_mission(items)
 
 
@@ -133,7 +134,7 @@ def _simple_items(items: Any) -> Iterator[Mapping[str, Any]]:
             yield item
 
 
-def _of_mission(items: Sequence[tuple[int, int, float, float]]) -> RouteFile:
+def _of_mission(items: Sequence[MissionItem]) -> RouteFile:
     """The waypoints among mission items: frame, command, latitude and longitude, or x and y."""
     places: list[Pair] = []
     frames: set[bool] = set()
