@@ -12,6 +12,28 @@ Row = tuple[str, str, str]
 
 # fmt: off
 TABLE: dict[str, list[Row]] = {
+"files": [
+    ("from_axis * np.sin(away)", "from_axis * away",
+     "test_north_and_east_are_those_along_the_ellipsoid"),
+    ("pairs.append((float(match[2]), float(match[1])))",
+     "pairs.append((float(match[1]), float(match[2])))", "test_moos_points_have_x_to_the_east"),
+    ("tuple((_number(_at(p, 1)), _number(_at(p, 0)))",
+     "tuple((_number(_at(p, 0)), _number(_at(p, 1)))",
+     "test_places_become_metres_north_and_east_of_the_first"),
+    ("0.01 * throttle / speed", "throttle / speed",
+     "test_files_of_every_ground_station_have_the_same_numbers"),
+    ("library.mavmmaplog(str(path))", "library.mavlink_connection(str(path))",
+     "test_a_telemetry_log_is_never_run"),
+    ('float(variation) * (-1.0 if fields.get("var_dir") == "W" else 1.0)', "-float(variation)",
+     "test_a_compass_is_magnetic_until_the_variation_is_known"),
+    ('(*names, "O_BINARY")', "names", "test_files_are_opened_for_bytes_where_text_is_the_default"),
+    ("    if planes and unplaced:\n", "    if False:\n",
+     "test_with_an_origin_a_log_on_earth_lies_where_it_was"),
+    ("elif not header and lines and self._plane", "elif not header and self._plane",
+     "test_an_empty_file_beside_an_origin_is_told"),
+    ('content["TimeMS"] = content.pop(BOOTED)', "content.pop(BOOTED)",
+     "test_old_gps_has_the_time_of_the_week_beside_that_since_the_start"),
+],
 "identify/logs": [
     (" and not any(line.cells[count:]) for line", " for line",
      "test_a_surplus_cell_with_something_in_it_is_refused"),

@@ -90,8 +90,11 @@ def write_ulog(path, turns=None):
     return path
 
 
-def write_dataflash(path):
-    """ATT at 10 Hz and GPS at 5 Hz of an ArduPilot log, after its FMT messages."""
+def write_dataflash(path, *, old=False):
+    """ATT at 10 Hz and GPS at 5 Hz of an ArduPilot log, after its FMT messages.
+
+    An `old` one has milliseconds, and of GPS those of the week beside those since the start, `T`.
+    """
 
     def form(number, name, codes, columns):
         sizes = {"Q": 8, "L": 4, "f": 4, "I": 4, "H": 2, "B": 1, "C": 2}
@@ -101,16 +104,19 @@ def write_dataflash(path):
 
     head = struct.pack("<4s16s64s", b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     out = [b"\xa3\x95\x80" + struct.pack("<BB", 0x80, 89) + head]
-    out.append(form(1, "ATT", "QCf", "TimeUS,Yaw,DesYaw"))
-    out.append(form(2, "GPS", "QBIHLL", "TimeUS,Status,GMS,GWk,Lat,Lng"))
+    clock, week = ("TimeMS", "T") if old else ("TimeUS", "GMS")
+    out.append(form(1, "ATT", "QCf", f"{clock},Yaw,DesYaw"))
+    out.append(form(2, "GPS", "QBIHLL", f"{clock},Status,{week},GWk,Lat,Lng"))
     for i in range(40):
         time = 3_000_000 + 100_000 * i
-        out.append(b"\xa3\x95\x01" + struct.pack("<QHf", time, 100 * (350 + i) % 36000, 0.0))
+        at = time // 1000 if old else time
+        out.append(b"\xa3\x95\x01" + struct.pack("<QHf", at, 100 * (350 + i) % 36000, 0.0))
         if i % 2 == 0:
             place = (590_000_000 + 90 * i, 100_000_000 + 180 * i)
-            out.append(
-                b"\xa3\x95\x02" + struct.pack("<QBIHii", time + 20_000, 3, 1000, 2300, *place)
-            )
+            received = (time + 20_000) // 1000
+            clocks = (345_595_000 + received, received) if old else (time + 20_000, 1000)
+            row = struct.pack("<QBIHii", clocks[0], 3, clocks[1], 2300, *place)
+            out.append(b"\xa3\x95\x02" + row)
     path.write_bytes(b"".join(out))
     return path
 

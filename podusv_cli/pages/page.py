@@ -38,12 +38,7 @@ class Picture(NamedTuple):
 @cache  # templates are compiled once in a process
 def environment(package: str) -> Environment:
     """A package's templates and the shared ones; what they show is text, escaped as such."""
-    from jinja2 import (  # slow to import
-        ChoiceLoader,
-        Environment,
-        PackageLoader,
-        StrictUndefined,
-    )
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined  # slow to import
 
     loader = ChoiceLoader([PackageLoader(package), PackageLoader("podusv_cli.pages")])
     made = Environment(

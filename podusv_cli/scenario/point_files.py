@@ -11,7 +11,14 @@ import numpy as np
 from podusv_cli.core import units
 from podusv_cli.core.earth import Plane, error_at
 from podusv_cli.core.timed_rows import TextLine, columns, lines_of
-from podusv_cli.scenario.routes import Pair, RouteFault, RouteFile, beyond_earth, checked, route_of
+from podusv_cli.scenario.routes import (
+    Pair,
+    RouteFault,
+    RouteFile,
+    beyond_earth,
+    route_of,
+    without_repeats,
+)
 from podusv_cli.scenario.yaml_text import MAX_NODES, resolve
 from podusv_cli.scenario.yaml_tree import Fault, Mark, Node
 
@@ -84,7 +91,7 @@ class Placing:
             if math.isnan(lat + lon) or len(line.cells) > max(len(cells), 2):
                 raise RouteFault(f"has no latitude and longitude in line {line.number}")
             pairs.append((lat, lon))
-        return checked(RouteFile(tuple(pairs)))
+        return without_repeats(RouteFile(tuple(pairs)))
 
     def _in_metres(
         self, places: Sequence[Pair], name: str, key: str, faults: list[Fault]

@@ -67,13 +67,13 @@ def route_of(text: str) -> RouteFile | None:
     for begins, read in FORMATS.items():
         if begin.startswith(begins):
             try:
-                return checked(read(begin))
+                return without_repeats(read(begin))
             except RecursionError as error:
                 raise RouteFault("has brackets in brackets without end") from error
-    return checked(_moos(begin)) if POINTS.search(begin) else None
+    return without_repeats(_moos(begin)) if POINTS.search(begin) else None
 
 
-def checked(route: RouteFile) -> RouteFile:
+def without_repeats(route: RouteFile) -> RouteFile:
     """The route without a waypoint that repeats the one before. Raises RouteFault."""
     if not route.pairs:
         raise RouteFault("has no waypoints")
@@ -216,15 +216,24 @@ def _tag(element: ElementTree.Element) -> str:
     return str(element.tag).rpartition("}")[2].lower()
 
 
+def _children(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    """The elements of this name right in an element."""
+    return [inner for inner in element if _tag(inner) == name]
+
+
 def _inside(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    """The elements of this name in an element, however deep."""
     return [inner for inner in element.iter() if _tag(inner) == name]
 
 
 def _gpx(root: ElementTree.Element) -> RouteFile:
     """The first route; the first track where there is none; else the waypoints in their order."""
-    ways = [[*_inside(way, "rtept")] for way in _inside(root, "rte")]
-    ways += [[*_inside(way, "trkpt")] for way in _inside(root, "trk")]
-    chosen, left_out = _line_or_points([*filter(None, ways)], _inside(root, "wpt"))
+    ways = [_children(way, "rtept") for way in _children(root, "rte")]
+    ways += [
+        [point for part in _children(way, "trkseg") for point in _children(part, "trkpt")]
+        for way in _children(root, "trk")
+    ]
+    chosen, left_out = _line_or_points([*filter(None, ways)], _children(root, "wpt"))
     return RouteFile(
         tuple((_number(p.get("lat")), _number(p.get("lon"))) for p in chosen), left_out=left_out
     )
@@ -240,7 +249,7 @@ def _kml(root: ElementTree.Element) -> RouteFile:
 
 
 def _kml_places(geometry: ElementTree.Element) -> list[Pair]:
-    texts = [inner.text or "" for inner in _inside(geometry, "coordinates")]
+    texts = [inner.text or "" for inner in _children(geometry, "coordinates")]
     cells = [place.split(",") for text in texts for place in text.split()]
     return [(_number(_at(place, 1)), _number(_at(place, 0))) for place in cells]
 

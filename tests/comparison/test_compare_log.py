@@ -300,6 +300,8 @@ def test_with_an_origin_a_log_on_earth_lies_where_it_was(sailed_on_earth):
     assert "it lies 11.1 km from" in line
     with pytest.raises(PodusvError, match="origins that differ"):
         compared("placed", "far.yaml", "LOG.csv")
+    with pytest.raises(PodusvError, match="no `origin`, which other runs have"):
+        compared("placed", "run", "LOG.csv")
 
 
 def test_a_log_on_earth_is_moved_to_the_run_when_asked(podusv: Command, sailed_on_earth):

@@ -3,6 +3,7 @@
 import math
 import random
 import struct
+import subprocess
 
 import numpy as np
 import pytest
@@ -77,10 +78,10 @@ def test_sentences_that_are_damaged_are_left_out_and_counted(tmp_path):
     lines = sentences(200)
     lines[10] = lines[10].replace("A", "B", 1)
     read = contents_of(nmea(tmp_path, lines))
-    assert read.warnings == ("1 sentences with a wrong checksum are left out",)
+    assert read.warnings[0].startswith("left out for a wrong checksum: 1 of ")
     lines[40:60] = [line.replace("1", "2") for line in lines[40:60]]
     read = contents_of(nmea(tmp_path, lines))
-    assert "sentences with a wrong checksum are left out" in read.warnings[0]
+    assert read.warnings[0].startswith("left out for a wrong checksum: ")
     wrong = [line[:-2] + "00" for line in sentences()]
     read = contents_of(nmea(tmp_path, wrong))
     assert read.warnings[0].endswith("sentences have a wrong checksum; all are read")
@@ -135,15 +136,35 @@ def test_two_boots_of_a_receiver_are_two_parts(tmp_path):
     assert np.diff(times).tolist() == pytest.approx([0.2] * 29 + [-3605.8] + [0.2] * 29, abs=1e-3)
 
 
-def test_a_telemetry_log_is_never_run(tmp_path):
+def test_a_compass_is_magnetic_until_the_variation_is_known(tmp_path):
+    """108.2 deg = 101.1 - 0.4 + 7.5, east added and west taken off."""
+    fix = [sentence(f"GPZDA,10000{i}.00,01,01,2024,00,00") for i in range(3)]
+    compass = (
+        sentence("HCHDG,101.1,0.4,W,7.5,E"),
+        sentence("HCHDM,101.1,M"),
+        sentence("HCHDG,359.0,,,7.5,E"),
+    )
+    columns = columns_of(nmea(tmp_path, [fix[0], *compass[:2], fix[1], compass[2], fix[2]]))
+    assert columns["HDG.heading_magnetic [deg]"].tolist() == [101.1, 359.0]
+    assert columns["HDG.heading [deg]"] == pytest.approx([108.2, 6.5])
+    alone = columns_of(nmea(tmp_path, [fix[0], compass[1], fix[1]]))
+    assert "HDM.heading [deg]" not in alone
+    assert not any(
+        "psi" in line and '"' in line for line in listing(tmp_path / "log.nmea").mapping()
+    )
+
+
+def test_a_telemetry_log_is_never_run(tmp_path, monkeypatch):
     """pymavlink's own opening runs a file that lies in a folder called bin."""
+    begun = []
+    monkeypatch.setattr(subprocess, "Popen", lambda words, *_, **__: begun.append(words))
     (tmp_path / "bin").mkdir()
     script = tmp_path / "bin" / "log.tlog"
-    script.write_text(f"#!/bin/sh\ntouch {tmp_path}/MARK\n")
+    script.write_text("#!/bin/sh\n")
     script.chmod(0o755)
     with pytest.raises(LogFault):
         contents_of(script)
-    assert not (tmp_path / "MARK").exists()
+    assert begun == []
 
 
 def test_matlab_s_vectors_structures_and_matrices_are_columns(tmp_path):
@@ -155,12 +176,18 @@ def test_matlab_s_vectors_structures_and_matrices_are_columns(tmp_path):
         "mass": 55.0,
         "note": "a trial",
         "short": np.arange(7.0),
+        "cells": np.array(["a", t], dtype=object),
+        "cube": np.zeros((50, 2, 3)),
+        "spectrum": t + 1j,
     }
     savemat(tmp_path / "log.mat", content)
     read = contents_of(tmp_path / "log.mat")
     assert set(read.columns) == {"t", "pos_1", "pos_2", "boat.psi", "boat.n_1", "boat.n_2"}
     assert read.columns["boat.n_2"].tolist() == (-t).tolist()
-    assert read.warnings == ("short are left out: they do not have 50 rows as most columns",)
+    assert read.warnings == (
+        "left out, they do not have 50 rows: short",
+        "left out, they are no vectors of real numbers: cells, cube, spectrum",
+    )
 
 
 def test_files_of_matlab_that_cannot_be_read_say_what_to_write(tmp_path):
@@ -182,6 +209,12 @@ def test_dataflash_of_before_microseconds_has_milliseconds(tmp_path):
     micro = columns_of(tmp_path / "log.bin")["ATT.time"]
     (tmp_path / "log.bin").write_bytes(whole.replace(b"TimeUS", b"TimeMS"))
     assert columns_of(tmp_path / "log.bin")["ATT.time"] == pytest.approx(1000.0 * micro)
+
+
+def test_old_gps_has_the_time_of_the_week_beside_that_since_the_start(tmp_path):
+    columns = columns_of(write_dataflash(tmp_path / "log.bin", old=True))
+    assert columns["ATT.time"][:3] == pytest.approx([0.0, 0.1, 0.2])
+    assert columns["GPS.time"][:3] == pytest.approx([0.02, 0.22, 0.42])
 
 
 def test_a_telemetry_log_has_its_messages_by_arrival(tmp_path):

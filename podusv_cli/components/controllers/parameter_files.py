@@ -107,7 +107,7 @@ def of_ardupilot(text: str) -> tuple[Keys, list[str]]:
     if "PSC_POS_P" not in given and "NAVL1_PERIOD" in given:
         keys["guidance"] = "l1"
         remarks.append("it has NAVL1_PERIOD and no PSC_POS_P, so guidance is l1")
-    return _checked(keys, given, taken, OF_ARDUPILOT, remarks)
+    return _demand_keys(keys, given, taken, OF_ARDUPILOT, remarks)
 
 
 def of_px4(text: str) -> tuple[Keys, list[str]]:
@@ -125,7 +125,7 @@ def of_px4(text: str) -> tuple[Keys, list[str]]:
             corrected = given[TRACK] * given.get(CORRECTION, 1.0)
             keys["rate_FF"] = corrected / (2.0 * given[FULL_SPEED])
             taken |= {TRACK, CORRECTION}
-    return _checked(keys, given, taken, OF_PX4, remarks)
+    return _demand_keys(keys, given, taken, OF_PX4, remarks)
 
 
 def _direct(
@@ -143,7 +143,7 @@ def _direct(
     return keys, {*there}, [f"{name} sets no limit; podusv's own stands" for name in none]
 
 
-def _checked(
+def _demand_keys(
     keys: Keys, given: Parameters, taken: set[str], groups: re.Pattern[str], remarks: list[str]
 ) -> tuple[Keys, list[str]]:
     """Keys and remarks, with one on what has no key. Raises ValueError where nothing is taken."""

@@ -33,7 +33,7 @@ def sensor_noise(log: FilterLog) -> Vector:
     """
     found = np.zeros(MOVING)
     for i in range(MOVING):
-        values = _delivered(log, i)[1]
+        values = _sensor_values(log, i)[1]
         if len(values) > 10:
             smooth = np.unwrap(values) if i == 2 else values
             noise = np.median(np.abs(np.diff(smooth, 3))) / 0.6745 / math.sqrt(WHITE)
@@ -79,7 +79,7 @@ def position_wandering(logs: Sequence[FilterLog]) -> Wandering:
     it, and less (S(2M) - S(M))/15 no motion; what is left is the error that wanders, 12 s_g^2 h/T_g
     times M - 1 - M/15.
     """
-    pieces = [p for log in logs for i in range(2) for p in _rates(*_delivered(log, i))]
+    pieces = [p for log in logs for i in range(2) for p in _rates(*_sensor_values(log, i))]
     if len(pieces) < FEWEST:
         return Wandering(0.0, 1.0)
     from scipy.special import stdtr  # slow to import
@@ -91,7 +91,7 @@ def position_wandering(logs: Sequence[FilterLog]) -> Wandering:
     return Wandering(mean, float(stdtr(len(pieces) - 1, -student)))
 
 
-def _delivered(log: FilterLog, i: int) -> tuple[Vector, Vector]:
+def _sensor_values(log: FilterLog, i: int) -> tuple[Vector, Vector]:
     """Times and values of what a sensor delivered."""
     rows = log.record.rows
     new = rows[:, DELIVERED + i] != 0.0

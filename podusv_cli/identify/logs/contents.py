@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 
 Columns = Mapping[str, Vector]
+LISTED = 30  # columns that a message names
 
 
 class LogFault(UsageError):
@@ -34,3 +35,10 @@ class Contents:
     columns: Columns
     doubts: Mapping[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+
+
+def list_names(columns: Iterable[str]) -> str:
+    """The first of the names, and how many more there are."""
+    names = list(columns)
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(names[:LISTED]) + more

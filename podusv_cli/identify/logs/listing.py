@@ -15,16 +15,10 @@ import yaml
 from podusv_cli.core.earth import PLACE
 from podusv_cli.core.escaping import visible
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
-from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
+from podusv_cli.identify.logs.contents import Columns, Contents, LogFault, list_names
 from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
-from podusv_cli.identify.logs.reading import (
-    UNITS,
-    clock_of,
-    list_names,
-    mark_new_values,
-    split_unit,
-)
+from podusv_cli.identify.logs.reading import UNITS, clock_of, mark_new_values, split_unit
 from podusv_cli.identify.logs.topics import TIME
 
 SIDES = "left|right|port|starboard|stbd"
@@ -50,9 +44,10 @@ NAMES = {
     "tau_r": r"tau_r|yaw_?moment|torque\.z",
 }
 # Columns that are none of these, whatever their last word: clocks of messages, what is wanted,
-# where a plane touches the earth, how uncertain a value is, which engine it is.
+# where a plane touches the earth, how uncertain a value is, which engine it is, a course in
+# hundredths of a degree (MAVLink's hdg, beside which ATTITUDE has a yaw).
 NEVER = re.compile(
-    r"^(cmd|orgn|rall|fnce|home|mission|wpl)[._]|timestamp|_flags$"
+    r"^(cmd|orgn|rall|fnce|home|mission|wpl)[._]|timestamp|_flags$|position_int\.hdg"
     r"|\.time$|setpoint|(^|[._ ])(ref|reset|manual|input|target|desired)_|covariance|variance"
     r"|(^|[._ ])(std|eph|epv|evh|evv)|engine_no"
 )

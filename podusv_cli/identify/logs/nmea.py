@@ -34,6 +34,7 @@ UNITS = {  # of fields whose unit the standard gives
     "true_course": "deg",
     "true_track": "deg",
     "heading": "deg",
+    "heading_magnetic": "deg",
     "true_heading": "deg",
     "rsa_starboard": "deg",
     "rsa_port": "deg",
@@ -43,7 +44,12 @@ UNITS = {  # of fields whose unit the standard gives
     "rate_of_turn": "deg/s",
 }
 PER_MINUTE = {"rate_of_turn": 1.0 / 60.0}  # deg/min, to deg/s
-SPEED_OF_RPM = {"speed": "rpm"}  # what RPM calls its field
+# What RPM calls its speed, and headings that are the compass's, from magnetic north.
+RENAMED = {
+    "RPM": {"speed": "rpm"},
+    "HDG": {"heading": "heading_magnetic"},
+    "HDM": {"heading": "heading_magnetic"},
+}
 
 
 class Sentence(NamedTuple):
@@ -71,7 +77,7 @@ def contents_of_sentences(text: str, parse: Any) -> Contents:
         rows = list(range(len(matches)))
         warnings = [f"{sum(wrong)} of {len(wrong)} sentences have a wrong checksum; all are read"]
     elif any(wrong):
-        warnings = [f"{sum(wrong)} sentences with a wrong checksum are left out"]
+        warnings = [f"left out for a wrong checksum: {sum(wrong)} of {len(wrong)} sentences"]
     sentences = [_sentence(parse, matches[i]) for i in rows]
     kept = [(i, s) for i, s in zip(rows, sentences, strict=True) if s]
     times = _times(kept)
@@ -112,6 +118,8 @@ def _sentence(parse: Any, match: re.Match[str]) -> Sentence | None:
 
 def _numbers(kind: str, fields: Mapping[str, Any], message: Any) -> Iterator[tuple[str, float]]:
     """The numbers of a sentence by field, with the unit that the standard gives."""
+    if kind == "HDG" and (true := _true_heading(fields)) is not None:
+        yield ".heading [deg]", true
     for name, content in fields.items():
         if name in ("lat", "lon"):
             if _is_place(str(content), fields.get(f"{name}_dir")):
@@ -122,9 +130,21 @@ def _numbers(kind: str, fields: Mapping[str, Any], message: Any) -> Iterator[tup
         text = LEADING.sub(r"\1", str(content).strip())
         if not NUMBER.fullmatch(text):
             continue
-        own = SPEED_OF_RPM.get(name, name) if kind == "RPM" else name
+        own = RENAMED.get(kind, {}).get(name, name)
         unit = f" [{UNITS[own]}]" if own in UNITS else ""
         yield f".{own}{unit}", float(text) * PER_MINUTE.get(own, 1.0)
+
+
+def _true_heading(fields: Mapping[str, Any]) -> float | None:
+    """A compass's heading with deviation and variation, east added [deg]; None without the last."""
+    parts = (fields.get("heading"), fields.get("deviation"), fields.get("variation"))
+    heading, deviation, variation = (LEADING.sub(r"\1", str(part or "")) for part in parts)
+    if not NUMBER.fullmatch(heading) or not NUMBER.fullmatch(variation):
+        return None
+    turn = float(variation) * (-1.0 if fields.get("var_dir") == "W" else 1.0)
+    if NUMBER.fullmatch(deviation):
+        turn += float(deviation) * (-1.0 if fields.get("dev_dir") == "W" else 1.0)
+    return (float(heading) + turn) % 360.0
 
 
 def _is_place(text: str, direction: Any) -> bool:

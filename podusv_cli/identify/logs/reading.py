@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +19,7 @@ from podusv_cli.core.earth import PLACE, Plane
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
 from podusv_cli.core.units import spell_unit, units_allowed_for
-from podusv_cli.identify.logs.contents import Columns, Contents, LogFault
+from podusv_cli.identify.logs.contents import Columns, Contents, LogFault, list_names
 from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import from_frame, local_plane
 from podusv_cli.identify.logs.ranges import PLACES, may_be_minutes, on_earth, without_none
@@ -30,7 +30,6 @@ Whole = npt.NDArray[np.int64]
 CLOCK = Signal(TIME, "s", "time")
 SELDOM = 0.05  # of a sensor's values, that may come at another time than the others
 SLACK = 1e-5  # of a step, to which times of a date are true
-LISTED = 30  # columns that a message names
 BOOT = 20  # rows at least, between two steps back of a clock and in each, which then began anew
 SENSED = {signal.name for signal in (*STATE, *PLACE)}
 OPTIONAL = {signal.name for signal in STATE[3:]}  # that may be in a log without any number
@@ -362,13 +361,6 @@ def _of_clock(times: Vector, row: int) -> str:
         f"before ({times[row - 1]:.10g} s){' and other values' if same else ''}; leave out what is "
         "there twice, or split the log where its clock was set, as two logs with a span each"
     )
-
-
-def list_names(columns: Iterable[str]) -> str:
-    """The first of the names, and how many more there are."""
-    names = list(columns)
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return ", ".join(names[:LISTED]) + more
 
 
 def mark_new_values(*columns: Vector) -> Marks:
