@@ -14,6 +14,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import podusv
+from podusv_cli.core.kernel import Vector
+from podusv_cli.core.past_run import PastRun
+from podusv_cli.core.recording import Recording
 from podusv_cli.figures.looks import TARGET_LOOK, nth_style
 from podusv_cli.figures.style import house_style, image, new_figure
 
@@ -36,26 +39,37 @@ SHOWN = {
 LEAST = 1e-4  # m, the lower end of the axis of errors
 
 
-def error(run: podusv.Run) -> tuple[np.ndarray, str]:
-    """The distance that the law makes small, and what the axis calls it."""
-    if "z_e" in run.past.recording.signals:
-        return run["z_e"], "distance to target [m]"
-    return np.abs(run["e_ct"]), "distance to leg [m]"
+def error(log: Recording) -> tuple[Vector, str]:
+    """The distance that the law makes small [m], and what the axis calls it."""
+    if "z_e" in log.signals:
+        return log["z_e"], "distance to target [m]"
+    return np.abs(log["e_ct"]), "distance to leg [m]"
 
 
-def draw(panels: tuple[Axes, Axes], runs: dict[str, podusv.Run]) -> None:
-    """Tracks from above on the left, errors over time on the right."""
+def reference(run: PastRun) -> tuple[str, Vector]:
+    """What a run is to follow, its name and its points [m]: the legs, or the target's track."""
+    if run.about.follows:
+        return "legs", np.array(run.about.waypoints)
+    log = run.counted_recording
+    return "target", np.column_stack([log["x_d"], log["y_d"]])
+
+
+def draw(panels: tuple[Axes, Axes], runs: dict[str, PastRun]) -> None:
+    """Tracks from above on the left, errors over time on the right, up to the path's end."""
     tracks, errors = panels
-    for place, (name, run) in enumerate(runs.items()):
-        color, linestyle, _ = nth_style(place)
-        if not place and "y_d" in run.past.recording.signals:
-            tracks.plot(run["y_d"], run["x_d"], zorder=0, label="target", **TARGET_LOOK)
-        tracks.plot(run["y"], run["x"], color=color, linestyle=linestyle, label=name)
-        distance, label = error(run)
-        errors.semilogy(run["time"], np.maximum(distance, LEAST), color=color, linestyle=linestyle)
+    name, points = reference(next(iter(runs.values())))
+    tracks.plot(points[:, 1], points[:, 0], zorder=0, label=name, **TARGET_LOOK)
+    for place, (law, run) in enumerate(runs.items()):
+        log, (color, linestyle, _) = run.counted_recording, nth_style(place)
+        tracks.plot(log["y"], log["x"], color=color, linestyle=linestyle, label=law)
+        distance, label = error(log)
+        errors.semilogy(log["time"], np.maximum(distance, LEAST), color=color, linestyle=linestyle)
         errors.set(xlabel="time [s]", ylabel=label)
     tracks.set(xlabel="y, east [m]", ylabel="x, north [m]")
-    tracks.set_aspect("equal", adjustable="datalim")
+    if np.ptp(points, axis=0).min() > 0.0:
+        tracks.set_aspect("equal", adjustable="datalim")
+    else:  # along a line all that happens is across it
+        tracks.set_title("not to scale", fontsize=6.5)
     tracks.legend(fontsize=6.5)
 
 
@@ -67,7 +81,7 @@ def main() -> None:
         singles = podusv.load(f"podusv:{shown}.yaml").singles()
         with house_style():
             figure = new_figure(2, 2.4)
-            draw(figure.subplots(1, 2), {law: podusv.simulate(singles[law]) for law in laws})
+            draw(figure.subplots(1, 2), {law: podusv.simulate(singles[law]).past for law in laws})
             (folder / f"{page}.png").write_bytes(image(figure, "png"))
 
 
