@@ -25,10 +25,16 @@ def folder(room: str = "configs") -> Path:
 
 
 @cache
-def names(form: str = "yaml") -> tuple[str, ...]:
-    """Every shipped file as a scenario names it, sorted: `podusv:mu_2017/base.yaml`."""
-    paths = folder().rglob(f"*.{form}")
+def all_files() -> tuple[str, ...]:
+    """Scenarios and the files that they take something from, sorted, each by its `podusv:` name."""
+    paths = folder().rglob("*.*")
     return tuple(sorted(PREFIX + path.relative_to(folder()).as_posix() for path in paths))
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Every shipped scenario as another names it, sorted: `podusv:mu_2017/base.yaml`."""
+    return tuple(name for name in all_files() if name.endswith(".yaml"))
 
 
 @cache
@@ -57,7 +63,7 @@ def file_of(name: str) -> str:
     """
     if not is_shipped(name):
         return name
-    if present(name) not in (*names(), *names("safetensors")):
+    if present(name) not in all_files():
         hint = did_you_mean(name, names())
         raise ValueError(f"podusv has no scenario of this name{hint} (`podusv init` lists them)")
     return str(folder() / present(name).removeprefix(PREFIX))

@@ -12,11 +12,11 @@ from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.plugins import installed_plugins
 from podusv_cli.findings.finding import finding_kinds
 from podusv_cli.scenario import shipped
-from podusv_cli.scenario.layers import extended_files
 from podusv_cli.scenario.load import load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.schema import TITLE, schema_text
 from podusv_cli.scenario.yaml_text import read
+from podusv_cli.scenario.yaml_tree import Node
 from podusv_cli.storage import files
 from podusv_cli.workflows import docs, example_logs
 from podusv_cli.workflows.examples import ROOM, examples, texts
@@ -60,7 +60,7 @@ def starting_points() -> dict[str, str]:
 def init(name: str, out: Path | None = None) -> Begun:
     """Copy a starting point: a scenario with the schema for editors beside it, or an example.
 
-    A scenario's copy has the keys and comments of the shipped file and extends the same shipped
+    A scenario's copy has the keys and comments of the shipped file and names the same shipped
     files. Raises UsageError for an unknown name, StorageError where a file exists.
     """
     short, known = _short(name), starting_points() | examples()
@@ -124,15 +124,25 @@ def _command(scenario: Scenario) -> tuple[str, ...]:
 
 
 def own_copy(source: str) -> str:
-    """A shipped scenario's text as a file anywhere: what it extends is named in full."""
+    """A shipped scenario's text as a file anywhere: files that it names are named in full."""
     text = _text(source)
     lines = text.splitlines(keepends=True)
     node = read(text, source, [])
-    for name in reversed(extended_files(node) if node else ()):
-        row, start = name.mark.line - 1, name.mark.column - 1
-        rest = lines[row][start + len(name.content) :]
-        lines[row] = lines[row][:start] + shipped.relative_to(source, name.content) + rest
+    for scalar in reversed(_scalars(node) if node else []):
+        whole = shipped.relative_to(source, str(scalar.content))
+        if whole in shipped.all_files():
+            row, start = scalar.mark.line - 1, scalar.mark.column - 1
+            rest = lines[row][start:].replace(scalar.content, whole, 1)
+            lines[row] = lines[row][:start] + rest
     return EDITOR_LINE.sub(f"# yaml-language-server: $schema={SCHEMA}", "".join(lines))
+
+
+def _scalars(node: Node) -> list[Node]:
+    """The values of a tree that are neither lists nor mappings, in the order of the text."""
+    inner = node.content if isinstance(node.content, tuple) else tuple(node.mapping.values())
+    if not inner and not isinstance(node.content, str):
+        return []
+    return [scalar for part in inner for scalar in _scalars(part)] if inner else [node]
 
 
 def _text(name: str) -> str:

@@ -15,7 +15,13 @@ from podusv_cli.workflows.examples import examples, texts
 from podusv_cli.workflows.init import FIRST, SCHEMA, starting_points
 
 CONFIGS = ROOT / "configs"
-TELLING = ("own_vessel", "mu_2017/figures_compare", "pod/vessels/otter", "studies/hull_and_sea")
+TELLING = (
+    "own_vessel",
+    "mu_2017/figures_compare",
+    "pod/vessels/otter",
+    "studies/hull_and_sea",
+    "files/mission",
+)
 
 
 @pytest.fixture
