@@ -77,8 +77,8 @@ class Piece(NamedTuple):
         """Its object code. Raises TypeError as `bitcode`."""
         with interrupts_deferred():
             if ready := self.shipped_bitcode:
-                alone, name = self.compiler == ALONE_BY, self.function.__qualname__
-                return finish.object_code(ready, SYMBOLS[self.compiler], name, alone)
+                name = self.function.__qualname__
+                return finish.object_code(ready, SYMBOLS[self.compiler], name)
             made = self.translator().object_code(self.function, self.prototype)
             return cast(object_cache.Code, made)
 

@@ -72,7 +72,7 @@ def object_code(function: Any, prototype: Any) -> Code:
     Raises TypeError for a kernel that needs more than arithmetic and the mathematical library.
     """
     code = bitcode(function, prototype)
-    return finish.object_code(code, finish.SYMBOL, function.__qualname__, True)
+    return finish.object_code(code, finish.SYMBOL, function.__qualname__)
 
 
 def bitcode(function: Any, prototype: Any) -> bytes:
@@ -86,7 +86,7 @@ def bitcode(function: Any, prototype: Any) -> bytes:
         raise TypeError(in_short(str(error))) from error
     made = llvm.parse_assembly(compiled.inspect_llvm())
     made.get_function(compiled.native_name).name = finish.SYMBOL
-    return finish.simplify_module(made, finish.SYMBOL)
+    return finish.optimise_module(made, finish.SYMBOL)
 
 
 # Settings of numba while it compiles kernels. It would optimise each kernel by itself, and again in

@@ -24,19 +24,22 @@ NEUTRAL = "x86_64-unknown-linux-gnu"  # its triple and layout are replaced by th
 
 @cache
 def neutral_machine() -> Any:
-    """What kernels are simplified for before they are for one machine: nothing it has matters."""
+    """What kernels are optimised for, once for all machines: vectors of four numbers.
+
+    A machine that has none takes such a vector apart when its own code is emitted.
+    """
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     return llvm.Target.from_triple(NEUTRAL).create_target_machine(
-        cpu="x86-64", features="", opt=3, reloc="pic", codemodel="jitdefault", jit=True
+        cpu="x86-64-v3", features="", opt=3, reloc="pic", codemodel="jitdefault", jit=True
     )
 
 
-def simplify_module(made: Any, symbol: str) -> bytes:
+def optimise_module(made: Any, symbol: str) -> bytes:
     """Bitcode of a module with one function, into which all kernels that it calls are inlined.
 
-    Loops are brought into the form that LLVM vectorises: without this the march is slower by up to
-    10 %. What numba would do about an error goes, where no kernel has any.
+    Loops are first brought into the form that LLVM vectorises: without this the march is slower by
+    up to 10 %. What numba would do about an error goes, where no kernel has any.
     """
     machine = neutral_machine()
     made.triple, made.data_layout = machine.triple, str(machine.target_data)
@@ -47,6 +50,12 @@ def simplify_module(made: Any, symbol: str) -> bytes:
     passes.add_loop_rotate_pass()
     passes.add_instruction_combine_pass()
     passes.add_jump_threading_pass()
+    passes.add_ipsccp_pass()
+    passes.add_simplify_cfg_pass()
+    passes.run(made, builder)
+    passes, builder = _passes(machine, 3)
+    for function in made.functions:
+        builder.getFunctionPassManager().run(function, builder)
     passes.add_ipsccp_pass()
     passes.add_simplify_cfg_pass()
     passes.run(made, builder)
@@ -73,31 +82,19 @@ def _hide(made: Any, symbol: str) -> None:
             part.linkage = "internal"
 
 
+def object_code(bitcode: bytes, symbol: str, name: str) -> Code:
+    """Object code for this machine. Raises TypeError as `module`."""
+    return Code(symbol, _this_machine().emit_object(module(bitcode, name)))
+
+
+_this_machine = cache(target)  # an engine that loads code takes one of its own, and keeps it
+
+
 def module(bitcode: bytes, name: str) -> Any:
-    """The same, optimised for this machine. Raises TypeError as `check_calls`."""
-    made, machine = read(bitcode), target()
-    passes, whole = _passes(machine, 3)
-    for function in made.functions:
-        whole.getFunctionPassManager().run(function, whole)
-    passes.add_ipsccp_pass()
-    passes.add_simplify_cfg_pass()
-    passes.add_global_dead_code_eliminate_pass()
-    passes.run(made, whole)
-    check_calls(made, name)
-    return made
-
-
-def object_code(bitcode: bytes, symbol: str, name: str, alone: bool) -> Code:
-    """Object code for this machine; what is for lanes is optimised before it is widened."""
-    made = module(bitcode, name) if alone else read(bitcode)
-    check_calls(made, name)
-    return Code(symbol, target().emit_object(made))
-
-
-def read(bitcode: bytes) -> Any:
-    """A module for this machine."""
-    made, machine = llvm.parse_bitcode(bitcode), target()
+    """A module for this machine. Raises TypeError as `check_calls`."""
+    made, machine = llvm.parse_bitcode(bitcode), _this_machine()
     made.triple, made.data_layout = machine.triple, str(machine.target_data)
+    check_calls(made, name)
     return made
 
 

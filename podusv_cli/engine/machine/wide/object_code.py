@@ -36,7 +36,7 @@ def object_code(function: Any, prototype: Any) -> Code:
     """
     try:
         code = bitcode(function, prototype)
-        return finish.object_code(code, widening.NAME, function.__qualname__, False)
+        return finish.object_code(code, widening.NAME, function.__qualname__)
     except (MemoryError, OSError) as error:
         raise TypeError(in_a_line(error)) from error
     except NumbaError as error:
