@@ -274,7 +274,7 @@ class Identification:
             return [AXES[place].force(*row, k) for row in nu.tolist()]
 
         after, before = (
-            np.quantile([along(hull) for hull in hulls], (0.025, 0.975), axis=0)
+            np.quantile([along(hull) for hull in hulls], (0.025, 0.975), axis=0, method="weibull")
             for hulls in (self.draws, self.before)
         )
         return np.array(along(self.vessel)), after, before
