@@ -96,6 +96,7 @@ class HullSearch:
             return self._score(y)
 
     def _score(self, y: Vector) -> Scored:
+        """The same, where numbers that are not finite may come up."""
         own, other = SHIFTS
         shifts = np.where(np.arange(self.size) < self.hull, own, other)
         nus, variances = self.innovations([y, *(y + np.diag(shifts))])
