@@ -5,8 +5,9 @@
 Set by set, a hull is drawn from the prior, and `plain_logs` makes four logs of 120 s of it. Rows,
 what a log has of the actuator, GNSS, sea and hull come in turn, so that every value of each has the
 same number of sets. out.csv has a line for every number and force of every set, also where the
-search did not settle, podusv refused the hull or gave none at all; the table counts all of them.
-Sets that out.csv has already are not made again, so a long run may be made in parts.
+search did not settle, podusv refused the hull or gave none at all;
+`examples/reproduce/identify_coverage.py` makes a table of them. Sets that out.csv has already are
+not made again, so a long run may be made in parts.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
-from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -244,49 +244,8 @@ def _line(what: str, name: str, truth: float, found: Any, off: float) -> dict[st
     return {"what": what, "name": name, **ends, **judged}
 
 
-def table_by_cell(made: pd.DataFrame) -> pd.DataFrame:
-    """Of all sets, of each value of a factor and of those that settled or were refused: a row.
-
-    A row counts the sets, and of what would count as determined had all searches settled says how
-    much its interval holds, with the rms of errors over their deviations. All sets count.
-    """
-    rows = [{"factor": "all", "value": "", **_count_held(made)}]
-    for factor in (*FACTORS, "settled", "refused"):
-        for value, cell in sorted(made.groupby(factor), key=lambda pair: _place(factor, pair[0])):
-            rows.append({"factor": factor, "value": value, **_count_held(cell)})
-    return pd.DataFrame(rows)
-
-
-def table_by_pair(made: pd.DataFrame) -> pd.DataFrame:
-    """The same of each pair of values of two factors."""
-    return pd.DataFrame(
-        {"factor": f"{a}, {b}", "value": f"{of[0]}, {of[1]}", **_count_held(cell)}
-        for a, b in combinations(FACTORS, 2)
-        for of, cell in made.groupby([a, b])
-    )
-
-
-def _place(factor: str, value: Any) -> int:
-    return list(FACTORS.get(factor, (True, False))).index(value)
-
-
-def _count_held(cell: pd.DataFrame) -> dict[str, Any]:
-    sets, there = cell.groupby("number"), cell[cell.what != "none"]
-    known = there[there.determined.astype(bool)]
-    return {
-        "sets": len(sets),
-        "no hull": len(sets) - there.number.nunique(),
-        "settled": there[there.settled.astype(bool)].number.nunique(),
-        "refused": there[there.refused.astype(bool)].number.nunique(),
-        "determined": len(known),
-        "held": float(known.holds.astype(float).mean()),
-        "rms z": float(np.sqrt(np.mean(known.off.astype(float) ** 2))),
-        "CPU a set [s]": float(sets.cpu.first().mean()),
-    }
-
-
 def main() -> None:
-    """Make the sets that are not there yet, and print the table of all."""
+    """Make the sets that are not there yet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--first", type=int, default=0)
@@ -300,7 +259,6 @@ def main() -> None:
         for lines in pool.map(make_set, wanted):
             made = pd.concat([made, pd.DataFrame(lines)], ignore_index=True)
             made.to_csv(asked.out, index=False, float_format="%.6g")
-    print(table_by_cell(made).to_string(index=False, float_format="{:.3g}".format))
 
 
 if __name__ == "__main__":
