@@ -20,7 +20,7 @@ from podusv_cli.identify.logs.reading import Whole
 # Of a point's coordinate, for slopes: of the hull's numbers, and of all else. Where sway changes
 # its sign the filter's slopes of |v| r and |r| v do, so that -2 log of the posterior has steps of
 # 0.1 to 0.5 that are a hundredth of a current's prior wide. Slopes within such a step lead nowhere:
-# with 1e-4 searches took 60 to 100 rounds. Wider ones make no error of the estimate: whatever they
+# with 1e-4 the search in such a log took 60 rounds or more. Wider ones make no error: whatever they
 # are, their products with innovations of the true hull have the mean 0.
 SHIFTS = (3e-3, 0.03)
 TINY = 1e-4  # of a coordinate: a step that needs no shortening
