@@ -5,16 +5,18 @@
 Set by set, a hull is drawn from the prior, and `plain_logs` makes four logs of 120 s of it. Rows,
 what a log has of the actuator, GNSS, sea and hull come in turn, so that every value of each has the
 same number of sets. out.csv has a line for every number and force of every set, also where the
-search did not settle or podusv gave no hull at all; the table counts all of them. Sets that out.csv
-has already are not made again, so a long run may be made in parts.
+search did not settle, podusv refused the hull or gave none at all;
+`examples/reproduce/identify_coverage.py` makes a table of them. Sets that out.csv has already are
+not made again, so a long run may be made in parts.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,20 +25,21 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from pydantic import ValidationError
 
 import podusv
 from benchmarks import plain_logs
 from podusv_cli.core.errors import UsageError
 from podusv_cli.identify.answer import SIDE, Identification
-from podusv_cli.identify.fit.estimate import OPEN, directions, estimate_hull, prior_kept
+from podusv_cli.identify.fit.estimate import OPEN
 from podusv_cli.identify.fit.numbers import hull_numbers
-from podusv_cli.identify.fit.problem import FitProblem
 from podusv_cli.identify.intake import logs_of
 from podusv_cli.scenario.identify import Identify, LogFile
 from podusv_cli.scenario.model import Scenario
+from podusv_cli.workflows.identify import answer_logs
 
 LOGS, DURATION = 4, 120.0
-WANTED = Identify(logs=(LogFile(file="-"),), draws=50)
+WANTED = Identify(logs=(LogFile(file="-"),))
 # What a set may have, by factor.
 FACTORS: dict[str, Sequence[Any]] = {
     "rows": (5, 10, 20, 50),  # 1/s
@@ -51,7 +54,7 @@ ACTUATORS = {
     "revolt": "revolt",
     "cybership2 with rudders": "cybership2_rudders",
 }
-LOAD, MEAN = 0.02, 0.08  # of full thrust: deviation of a load that wanders, and one that stays
+LOAD, MEAN = 0.02, 0.08  # of full thrust: deviation of a load that wanders, and a mean load
 TURN = 0.35  # rad, the largest angle that is asked for
 
 
@@ -122,7 +125,7 @@ def propellers(hull: str) -> list[plain_logs.Propeller]:
             {"angle_lag": pod.angle_lag, "angle_rate": pod.angle_rate} if pod.angle_limit else {}
         )
         rudder = {"lift": pod.rudder.lift, "stall": pod.rudder.stall} if pod.rudder else {}
-        place = (pod.x, pod.y, pod.T_nn, pod.T_nn_astern, pod.n_max, pod.n_lag)
+        place = (pod.x, pod.y, pod.T_nn, pod.T_nn_astern, pod.n_max, pod.n_lag, pod.n_rate)
         found.append(plain_logs.Propeller(*place, **turns, **rudder))
     return found
 
@@ -137,7 +140,9 @@ def sea_of(cell: CoverageSet, most: float, arm: float, rng: np.random.Generator)
         load = plain_logs.wandering_load(rng, DURATION, LOAD * sizes, 10.0)
         return plain_logs.Sea(current, load)
     if cell.sea == "mean load":
-        mean = (MEAN * sizes * rng.uniform(-1.0, 1.0, 3)).tolist()
+        to = rng.uniform(-math.pi, math.pi)
+        shares = np.array([math.cos(to), math.sin(to), rng.uniform(-1.0, 1.0)])
+        mean = (MEAN * sizes * shares).tolist()
         return plain_logs.Sea(current, lambda t: mean)
     if cell.sea == "gusts":  # nothing above 1.6 rad/s
         rates, phases = rng.uniform(0.05, 1.6, (8, 3)), rng.uniform(0.0, 2.0 * math.pi, (8, 3))
@@ -153,34 +158,36 @@ def write_logs(
 ) -> Iterator[Path]:
     """Four logs of a boat whose propellers and angles change every 4 to 12 s."""
     arm = 0.5 * before.vessel.length
-    full = np.array([p.top for p in boat.propellers])
     most = sum(p.ahead * p.top**2 for p in boat.propellers)
+    period = 1.0 / cell.rows
+    sensors = plain_logs.Sensors(gnss=cell.gnss, gnss_period=max(0.2, period), row=period)
     for i in range(LOGS):
         rng = np.random.default_rng([cell.number, i])
-        share = 0.3 + 0.2 * i
-        top = full * math.sqrt(share)
-        angles = [TURN if p.angle_lag else 0.0 for p in boat.propellers]
-        if len(set(angles)) == 1 and len(full) > 1 and angles[0]:  # pods that turn together
-            driven = plain_logs.steps_of(rng, (0.4 * top[0], -TURN), (top[0], TURN), 4.0)
-            asked = _together(driven, top / top[0], angles)
-        else:
-            low = [*(-0.1 * top), *(-np.array(angles))]
-            asked = plain_logs.steps_of(rng, low, [*top, *angles], 4.0)
+        asked = speeds_and_angles(boat, 0.3 + 0.2 * i, rng)
         motion = plain_logs.sail(boat, asked, DURATION, sea_of(cell, most, arm, rng))
-        period = 1.0 / cell.rows
-        sensors = plain_logs.Sensors(gnss=cell.gnss, gnss_period=max(0.2, period), row=period)
         columns = plain_logs.columns_of(plain_logs.log_columns(motion, sensors, rng), cell.logged)
+        if cell.hull == "revolt":  # whose speeds are parts of the full one
+            columns = {re.sub("^n_", "n_part_", name): c for name, c in columns.items()}
         path = folder / f"{i}.csv"
         pd.DataFrame(columns).to_csv(path, index=False, float_format="%.9g")
         yield path
 
 
-def _together(driven: Any, shares: Any, angles: Sequence[float]) -> Any:
-    """Speeds and angles of pods that turn together."""
+def speeds_and_angles(
+    boat: plain_logs.PlainBoat, share: float, rng: np.random.Generator
+) -> Callable[[float], Sequence[float]]:
+    """Of all propellers speeds [1/s], then angles [rad], up to a share of full thrust.
+
+    Propellers that turn or have rudders do as one.
+    """
+    top = np.array([p.top for p in boat.propellers]) * math.sqrt(share)
+    if not boat.propellers[0].angle_lag:
+        return plain_logs.steps_of(rng, -0.1 * top, top, 4.0)
+    driven = plain_logs.steps_of(rng, (0.4, -TURN), (1.0, TURN), 4.0)
 
     def asked(t: float) -> list[float]:
-        n, angle = driven(t)
-        return [*(n * shares), *(angle for _ in angles)]
+        part, angle = driven(t)
+        return [*(part * top), *(angle for _ in top)]
 
     return asked
 
@@ -190,22 +197,20 @@ def make_set(number: int) -> list[dict[str, Any]]:
     cell, begun = coverage_set(number), time.process_time()
     before = known_before(cell)
     boat = true_boat(before, cell, np.random.default_rng([cell.number, 99]))
-    with TemporaryDirectory() as folder:
-        try:
+    try:
+        with TemporaryDirectory() as folder:
             given = [
-                log
+                (log, "fit")
                 for path in write_logs(Path(folder), boat, cell, before)
                 for log in logs_of(path, LogFile(file=path.name, delay=0.0), before)
             ]
-            problem = FitProblem(before, WANTED, given)
-            found = prior_kept(problem.search, estimate_hull(problem.search))
-            ways = directions(found.covariance, len(problem.hull))
-            answer = Identification(problem, found, ways, (), ())
-            lines = [*numbers_beside_truth(answer, boat), *forces_beside_truth(answer, boat)]
-        except UsageError as error:
-            return [asdict(cell) | {"what": "none", "name": str(error)}]
-    cpu = time.process_time() - begun
-    of = {"settled": found.settled, "rounds": found.rounds, "wander": problem.wander, "cpu": cpu}
+        answer = answer_logs(before, WANTED, given, None)
+        lines = [*numbers_beside_truth(answer, boat), *forces_beside_truth(answer, boat)]
+    except (UsageError, ValidationError, np.linalg.LinAlgError) as error:
+        return [asdict(cell) | {"what": "none", "name": str(error)}]
+    found, wander = answer.estimate, answer.problem.wander
+    of = {"settled": found.settled, "refused": bool(answer.refused_by), "rounds": found.rounds}
+    of |= {"wander": wander, "cpu": time.process_time() - begun}
     return [asdict(cell) | line | of for line in lines]
 
 
@@ -239,33 +244,8 @@ def _line(what: str, name: str, truth: float, found: Any, off: float) -> dict[st
     return {"what": what, "name": name, **ends, **judged}
 
 
-def table_by_cell(made: pd.DataFrame) -> pd.DataFrame:
-    """Of every value of each factor: sets, settled ones, and of what counts as determined how much
-    its interval holds, with the rms of errors over their deviations. All sets count.
-    """
-    rows = []
-    for factor in FACTORS:
-        for value, cell in [*made.groupby(factor, sort=False)]:
-            rows.append({"factor": factor, "value": value, **_count_held(cell)})
-    return pd.DataFrame([{"factor": "all", "value": "", **_count_held(made)}, *rows])
-
-
-def _count_held(cell: pd.DataFrame) -> dict[str, Any]:
-    sets, none = cell.groupby("number"), cell[cell.what == "none"]
-    known = cell[(cell.what != "none") & (cell.determined == True)]  # noqa: E712
-    return {
-        "sets": len(sets),
-        "no hull": none.number.nunique(),
-        "settled": cell[cell.settled == True].number.nunique(),  # noqa: E712
-        "determined": len(known),
-        "held": float(known.holds.astype(float).mean()) if len(known) else math.nan,
-        "rms z": float(np.sqrt(np.mean(known.off.astype(float) ** 2))) if len(known) else math.nan,
-        "CPU a set [s]": float(sets.cpu.first().mean()) if "cpu" in cell else math.nan,
-    }
-
-
 def main() -> None:
-    """Make the sets that are not there yet, and print the table of all."""
+    """Make the sets that are not there yet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--first", type=int, default=0)
@@ -279,7 +259,6 @@ def main() -> None:
         for lines in pool.map(make_set, wanted):
             made = pd.concat([made, pd.DataFrame(lines)], ignore_index=True)
             made.to_csv(asked.out, index=False, float_format="%.6g")
-    print(table_by_cell(made).to_string(index=False, float_format="{:.3g}".format))
 
 
 if __name__ == "__main__":

@@ -106,6 +106,8 @@ TABLE: dict[str, list[Row]] = {
      "test_the_filter_with_an_error_that_wanders_is_that_of_plain_numpy"),
     ("guessed = self.wandering.deviation if self.wandering.is_sure else 0.0",
      "guessed = self.wandering.deviation", "test_which_numbers_are_looked_for"),
+    ("SHIFTS = (3e-3, 0.03)", "SHIFTS = (1e-4, 1e-4)",
+     "test_a_search_does_not_end_in_steps_of_the_filter_where_sway_changes_its_sign"),
     ("beside = np.diag(2.0 * (np.arange(len(y)) >= hull))", "beside = 0.0 * curvature",
      "test_a_number_that_bends_more_than_is_expected_does_not_hold_back_the_hull"),
     (".ratio and y > LARGE:", ".ratio and abs(y) > LARGE:",

@@ -27,9 +27,9 @@ class Propeller:
     """A propeller: where it is [m], thrust over squared speed [N s2] ahead and astern.
 
     `top` is its largest speed ahead [1/s]; its speed follows what is asked for with the time
-    constant `lag` [s]. It turns with its axis where `angle_lag` [s] is not 0, at most at
-    `angle_rate` [rad/s]; or a rudder does in its stream, whose normal force is `lift` n^2 times its
-    angle, up to the angle `stall` [rad].
+    constant `lag` [s], at most at `rate` [1/s2]. It turns with its axis where `angle_lag` [s] is
+    not 0, at most at `angle_rate` [rad/s]; or a rudder does in its stream, whose normal force is
+    `lift` n^2 times its angle, up to the angle `stall` [rad].
     """
 
     x: float
@@ -38,6 +38,7 @@ class Propeller:
     astern: float
     top: float
     lag: float = 0.1
+    rate: float = math.inf
     angle_lag: float = 0.0
     angle_rate: float = math.inf
     lift: float = 0.0
@@ -54,10 +55,11 @@ class Propeller:
 
     def rates(self, n: float, angle: float, asked: Sequence[float]) -> tuple[float, float]:
         """How fast speed and angle change."""
+        faster = min(max((asked[0] - n) / self.lag, -self.rate), self.rate)
         if not self.angle_lag:
-            return (asked[0] - n) / self.lag, 0.0
+            return faster, 0.0
         turn = (asked[1] - angle) / self.angle_lag
-        return (asked[0] - n) / self.lag, min(max(turn, -self.angle_rate), self.angle_rate)
+        return faster, min(max(turn, -self.angle_rate), self.angle_rate)
 
 
 @dataclass(frozen=True)

@@ -206,6 +206,7 @@ class Identification:
         determined, open_ways = np.split(ways.basis, [ways.determined_count], axis=1)
 
         def point(normal: Vector) -> Vector:
+            """The point of a draw; not finite where a number would change its sign."""
             near, far = np.split(ways.widths * normal, [ways.determined_count])
             off = np.expm1(sd * (open_ways @ far)) / sd
             off += determined @ (near - determined.T @ off)
@@ -274,7 +275,7 @@ class Identification:
             return [AXES[place].force(*row, k) for row in nu.tolist()]
 
         after, before = (
-            np.quantile([along(hull) for hull in hulls], (0.025, 0.975), axis=0)
+            np.quantile([along(hull) for hull in hulls], (0.025, 0.975), axis=0, method="weibull")
             for hulls in (self.draws, self.before)
         )
         return np.array(along(self.vessel)), after, before
@@ -285,6 +286,7 @@ class Identification:
         return [w for log in self.problem.logs for w in self._whiteness(log)]
 
     def _whiteness(self, log: FilterLog) -> Iterator[Whiteness]:
+        """Of the sensors along a log that deliver enough values to tell."""
         followed = self.problem.follow(log, [self.estimate.y])
         normal = followed.innovations[:, 0] / np.sqrt(followed.variances[:, 0])
         of = channels(log)

@@ -97,6 +97,7 @@ def free_runs(problem: FitProblem, log: FilterLog, y: Vector) -> list[FreeRun]:
 
 
 def _free_run(problem: FitProblem, log: FilterLog, y: Vector, first: int) -> FreeRun:
+    """From a row to the end of a log: the filter is told nothing from there on."""
     rows = log.record.rows.copy()
     rows[first:, DELIVERED : DELIVERED + MOVING] = 0.0
     cut = log.of(rows)

@@ -137,6 +137,7 @@ class Clocks:
         return replace(way, value=float(problem.search.values([y])[0]))
 
     def _fit_way(self, way: Way) -> Way:
+        """With the hull fitted to the log, and the delay that came out."""
         problem = self._problem(way)
         search = problem.search
         if not np.isfinite(search.values([np.zeros(search.size)])[0]):

@@ -141,6 +141,7 @@ def rows_of_draws(answer: Identification) -> list[dict[str, float]]:
 
 
 def _pictures(answer: Identification, extras: Extras) -> list[Picture]:
+    """The figures; what cannot be drawn is left to `extras`."""
     from podusv_cli.figures.sketch import render_sketches
     from podusv_cli.identify.figures import sketches  # matplotlib is slow to import
 

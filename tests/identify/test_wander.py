@@ -305,7 +305,7 @@ def test_what_was_not_looked_for_is_said():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_an_owners_log_gives_a_hull_that_predicts_better_or_none(tmp_path, seed):
+def test_an_owners_log_gives_a_hull_that_predicts_better(tmp_path, seed):
     """Ten minutes of a consumer's GNSS, by a simulator that shares no code with podusv's."""
     kept = plain_logs.columns_of(plain_logs.owners_log(seed), "commands")
     pd.DataFrame(kept).to_csv(tmp_path / "owner.csv", index=False, float_format="%.7g")
@@ -318,7 +318,8 @@ def test_an_owners_log_gives_a_hull_that_predicts_better_or_none(tmp_path, seed)
     hull = podusv.identify(tmp_path / "owner.yaml", out=tmp_path / "hull", figures=False)
     judged = hull.scores[(hull.scores.role == "judge") & (hull.scores.horizon == 30.0)]
     errors = judged.set_index("who").position
-    assert hull.refusal or errors["identified"] <= 0.7 * errors["prior"]
+    assert not hull.refusal
+    assert errors["identified"] <= 0.7 * errors["prior"]
     damping = plain_logs.OWN_BOAT.damping
     for row in hull.forces[hull.forces.force != "Y(v)"].itertuples():
         motion_ = (row.at, 0.0, 0.0) if row.force == "X(u)" else (0.0, 0.0, row.at)

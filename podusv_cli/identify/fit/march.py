@@ -211,6 +211,7 @@ def side_by_side(actuator: Actuator) -> Follow:
     def follow_wide(
         record: FilterRecord, constants: Sequence[Vector], starts: Sequence[Vector], tracked: bool
     ) -> Followed:
+        """Follow a record, each run in a lane."""
         count, width = record.rows.shape
         rows, apart = (count, N) if tracked else (1, 0)
         out, track = room(2 * record.delivered * LANES), room(N * rows * LANES)

@@ -315,6 +315,7 @@ class FitProblem:
         values = [self.at(y) for y in points]
 
         def fill(log: FilterLog, begin: int, end: int) -> None:
+            """Write the rows of a log; runs that are alike along it are made once."""
             flows = [self._currents(log, each) for each in values]
             both = zip(values, flows, strict=True)
             rows = [np.append(self.constants(v, f), self.start(log, f, v)) for v, f in both]

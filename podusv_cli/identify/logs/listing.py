@@ -188,6 +188,7 @@ def _no_clocks(contents: Contents) -> Iterator[tuple[str, str]]:
 
 
 def _list_column(name: str, columns: Columns, guesses: dict[str, str]) -> Listed:
+    """What a column has, and which quantity it may be."""
     values, quantity = columns[name], guesses.get(name, "")
     known = values[np.isfinite(values)]
     ends = (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)

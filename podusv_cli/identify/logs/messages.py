@@ -44,6 +44,7 @@ def _fence_reader(read: Reader) -> Reader:
 
     @wraps(read)
     def read_fenced(path: Path) -> Contents:
+        """Read; what the library prints is said once, what it raises is a fault of the file."""
         with TemporaryFile("w+", errors="replace") as printed:
             try:
                 with _printed_into(printed):

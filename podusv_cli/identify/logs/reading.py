@@ -294,6 +294,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def _factor(signal: Signal, unit: str, name: str) -> float:
+    """What a value in this unit is times, in podusv's. Raises LogFault for another quantity's."""
     known = UNITS.get(signal.unit, {signal.unit: 1.0})
     if unit and spell_unit(unit) not in known:
         raise LogFault(f"{name}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}")
