@@ -13,6 +13,20 @@ Row = tuple[str, str, str]
 # fmt: off
 TABLE: dict[str, list[Row]] = {
 "files": [
+    ("if before <= T <= after and before < after:", "if before <= T <= after:",
+     "test_the_command_for_a_thrust_is_the_least_one"),
+    ("return 0.0 * T if T == 0.0 else found + 0.0 * T", "return found + 0.0 * T",
+     "test_the_command_for_a_thrust_is_the_least_one"),
+    ("(len(self.pods) - i) * WIDTH + len(curves)", "len(self.pods) * WIDTH + len(curves)",
+     "test_thrust_lies_on_straight_lines_between_rows"),
+    ("return float((n - pod[DEAD_AHEAD]) * pod[STRETCH_AHEAD])", "return n",
+     "test_a_dead_band_takes_its_part_of_n_and_the_rest_goes_to_full_thrust"),
+    ("normal = pod[LIFT] * turns * turns *", "normal = pod[LIFT] * turns *",
+     "test_a_rudder_behind_a_dead_band_stands_in_its_own_stream"),
+    ("    if not 0.0 < most <= NOISE * full:\n", "    if not 0.0 < most:\n",
+     "test_a_damaged_table_is_named_with_its_file"),
+    ('"guidance" not in beside', "True",
+     "test_what_the_scenario_gives_itself_is_no_matter_of_the_file"),
     ("from_axis * np.sin(away)", "from_axis * away",
      "test_north_and_east_are_those_along_the_ellipsoid"),
     ("pairs.append((float(match[2]), float(match[1])))",

@@ -23,7 +23,7 @@ from podusv_cli.components.actuators.recorded import (
     rows_of,
     table_of,
 )
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import KernelPart, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
 from podusv_cli.core.signal import DEMAND, TAU, Signal
 
@@ -48,7 +48,7 @@ def pass_loads(demand: Vector, tau: Vector) -> None:
         tau[i] = demand[i]
 
 
-class Actuator(Component):
+class Actuator(KernelPart):
     """What turns a demand (tau_u, tau_r) into loads on the hull.
 
     `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
