@@ -42,6 +42,7 @@ from podusv_cli.components.actuators.rudder import loads
 from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
+from podusv_cli.core.units import Scale, Scales
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9
@@ -320,6 +321,17 @@ class Pods(Actuator):
     def lagged(self) -> tuple[Signal, ...]:
         """Speed and angle of every pod, as they were asked for."""
         return self._each(SPEEDS[self.counts][1], DELTA_CMD)
+
+    @property
+    def scales(self) -> Scales:
+        """Pulses of pods that have `pwm`."""
+        speeds = [signal.name for signal in SPEEDS[self.counts]]
+        return {
+            f"{name}_{i}": {"us": Scale(pod.pwm.rest, 1.0 / pod.pwm.span)}
+            for name in speeds
+            for i, pod in enumerate(self.pods, 1)
+            if pod.pwm
+        }
 
     @staticmethod
     @kernel
