@@ -13,6 +13,11 @@ Row = tuple[str, str, str]
 # fmt: off
 TABLE: dict[str, list[Row]] = {
 "files": [
+    ("taken[guess] < known[guess]", "True", "test_a_mapping_is_that_of_the_boat"),
+    ("np.where(none, rest, np.where(beyond, np.nan, values))", "np.where(none, rest, values)",
+     "test_pulses_become_parts_of_full_speed"),
+    ("return (values - scale.zero) * scale.factor, doubt", "return values * scale.factor, doubt",
+     "test_pulses_become_parts_of_full_speed"),
     ("if before <= T <= after and before < after:", "if before <= T <= after:",
      "test_the_command_for_a_thrust_is_the_least_one"),
     ("return 0.0 * T if T == 0.0 else found + 0.0 * T", "return found + 0.0 * T",

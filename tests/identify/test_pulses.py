@@ -13,7 +13,6 @@ from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.reading import NamedQuantities, table
 from podusv_cli.scenario.load import load_text
 
-
 PWM_BOAT = """
 name: pwm
 vessel: {preset: otter}
@@ -37,7 +36,9 @@ def pulses_log(folder, span, column, pulses):
     """The table of a log whose column `left` has these pulses, as `identify` takes it."""
     boat = PWM_BOAT.replace("SPAN", f"{span}").replace("COLUMN", f'"{column}"')
     rows = [f"{0.1 * i:g},{0.05 * i:g},0,0,{us:g},1500" for i, us in enumerate(pulses)]
-    (folder / "log.csv").write_text("time,x,y,psi,left,n_part_cmd_2 [us]\n" + "\n".join([*rows, ""]))
+    (folder / "log.csv").write_text(
+        "time,x,y,psi,left,n_part_cmd_2 [us]\n" + "\n".join([*rows, ""])
+    )
     scenario = load_text(boat, str(folder / "boat.yaml")).scenario
     named = NamedQuantities(scenario.identify.columns, scales=scenario.actuator.scales)
     wanted = (*STATE, *scenario.actuator.lagged)
@@ -57,7 +58,7 @@ def test_pulses_become_parts_of_full_speed(tmp_path, span, column):
 
 
 def test_pulses_without_pwm_or_unit_are_told(tmp_path):
-    with pytest.raises(LogFault, match="pulses of PWM need pwm: {rest: 1500, span: 400}"):
+    with pytest.raises(LogFault, match=r"pulses of PWM need pwm: \{rest: 1500, span: 400\}"):
         table(
             pulses_log_file(tmp_path),
             (*STATE, Signal("n_part_cmd_1", "1", "")),

@@ -14,12 +14,11 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.core.kernel import Vector
 from podusv_cli.core.units import PURE
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.heading_checks import FEWEST_BINS, OF_HEADINGS
 from podusv_cli.identify.logs.motion import FAST, BinnedMotion
-from podusv_cli.identify.logs.ranges import IN_MINUTES, PULSES, TO_PULSES
+from podusv_cli.identify.logs.ranges import IN_MINUTES, TO_PULSES, like_pulses
 from podusv_cli.identify.logs.reading import SENSED, UNITS, LogTable, delivered_each
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
@@ -80,7 +79,7 @@ def _out_of_reach(motion: BinnedMotion) -> Iterator[str]:
         if reach is None or most <= BEYOND * reach:
             continue
         what = f"{signal.name} reaches {most:.4g} {signal.unit}, and the actuator {reach:.4g}"
-        if signal.unit == PURE and _like_pulses(values):
+        if signal.unit == PURE and like_pulses(values):
             raise LogFault(
                 f"{what}; pulses of PWM are written as [us]: give each pod {TO_PULSES}, and write "
                 'the quantity as "COLUMN [us]" under identify.columns'
@@ -90,14 +89,6 @@ def _out_of_reach(motion: BinnedMotion) -> Iterator[str]:
             forms = " or ".join(f'{signal.name}: "COLUMN [{unit}]"' for unit in units)
             raise LogFault(f"{what}; write {forms} under identify.columns")
         yield what
-
-
-def _like_pulses(values: Vector) -> bool:
-    """Whether all values but 0 are pulses [us], or hundredths of some."""
-    known = values[np.isfinite(values) & (values != 0.0)]
-    return any(
-        np.all((known * scale > PULSES[0]) & (known * scale < PULSES[1])) for scale in (1.0, 100.0)
-    )
 
 
 def _clock(motion: BinnedMotion) -> Iterator[str]:

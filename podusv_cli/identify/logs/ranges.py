@@ -58,6 +58,13 @@ def without_none(values: Vector) -> tuple[Vector, str]:
     return values, " and ".join(words)
 
 
+def like_pulses(values: Vector) -> bool:
+    """Whether there are values, and all but 0 are pulses [us], or hundredths of some."""
+    known = values[np.isfinite(values) & (values != 0.0)]
+    sized = [(known * scale > PULSES[0]) & (known * scale < PULSES[1]) for scale in (1.0, 100.0)]
+    return bool(len(known)) and any(map(np.all, sized))
+
+
 def pulses_alone(values: Vector, rest: float) -> tuple[Vector, str]:
     """Pulses [us], and which values are none: 0, which is taken for `rest`, and all out of range.
 
