@@ -14,17 +14,13 @@ from podusv_cli.cli.terminal import Warnings, echo, echo_result, echo_table, sho
 from podusv_cli.core.errors import UsageError
 
 if TYPE_CHECKING:
-    from podusv_cli.components.actuators.base import Actuator
     from podusv_cli.identify.logs.listing import Listing
     from podusv_cli.identify.outputs import Identified
     from podusv_cli.workflows.look import LookedAt
 
 
-def _show_columns(log: Path, boat: Actuator | None, as_json: bool) -> None:
+def _show_columns(found: Listing, as_json: bool) -> None:
     """Print the columns of a log, or as JSON; warnings go to the standard error."""
-    from podusv_cli.identify.logs.listing import listing
-
-    found = listing(log, boat)
     for line in found.warnings:
         echo(f"warning: {line}", err=True)
     echo_result(found, lambda: _report_columns(found), as_json=as_json, quiet=False)
@@ -93,7 +89,7 @@ def identify(
     known before. What the logs do not determine is named. Exit code 3 when the hull predicts a log
     worse than `vessel`: it is kept aside, and no scenario takes it.
     """
-    from podusv_cli.workflows.look import actuator_of, look_at  # heavy imports only when needed
+    from podusv_cli.workflows.look import list_log, look_at  # heavy imports only when needed
     from podusv_cli.workflows.request import Request
 
     warned = Warnings(quiet)
@@ -107,11 +103,10 @@ def identify(
         trust=trust,
         warn=warned,
     )
-    if log := columns or look:
-        boat = actuator_of(Path(config), request) if config else None
-        if columns:
-            return _show_columns(log, boat, as_json)
-        return _show_page(look_at(log, boat, request), as_json=as_json, quiet=quiet)
+    if columns:
+        return _show_columns(list_log(columns, config, request), as_json)
+    if look:
+        return _show_page(look_at(look, config, request), as_json=as_json, quiet=quiet)
     if not config:
         raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
     from podusv_cli.cli.progress import progress_bars

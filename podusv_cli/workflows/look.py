@@ -35,16 +35,28 @@ class LookedAt:
         return {**self.listing.as_json(), "page": str(self.page)}
 
 
-def actuator_of(config: Path, request: Request) -> Actuator:
-    """The actuator of the boat in a scenario. Raises ScenarioError."""
-    return open_scenario(config, request, (unknown_codes,)).scenario.actuator
+def list_log(log: Path, config: str, request: Request) -> Listing:
+    """The columns of a log, for the boat in the scenario `config`, "" for any boat.
+
+    Raises LogFault, StorageError, ScenarioError.
+    """
+    boat = _actuator_of(config, request)
+    return list_contents(contents_of(log), log.name, boat)
 
 
-def look_at(log: Path, boat: Actuator | None, request: Request) -> LookedAt:
-    """Write the page of a log, beside which nothing else is needed.
+def _actuator_of(config: str, request: Request) -> Actuator | None:
+    """The actuator of the boat in a scenario; None without one. Raises ScenarioError."""
+    if not config:
+        return None
+    return open_scenario(Path(config), request, (unknown_codes,)).scenario.actuator
+
+
+def look_at(log: Path, config: str, request: Request) -> LookedAt:
+    """Write the page of a log, beside which nothing else is needed; `config` as in `list_log`.
 
     Raises LogFault for what is no log, StorageError where the page exists and is not replaced.
     """
+    boat = _actuator_of(config, request)
     page = request.out or Path(f"{log.stem}_look.html")
     if page.exists() and not request.force:
         raise StorageError(f"{page} exists; name another with --out, or replace it with --force")

@@ -159,16 +159,16 @@ def _in_quotes(text: str) -> str:
     return dumped.strip()
 
 
-def listing(path: Path, actuator: Actuator | None = None) -> Listing:
-    """The columns of a log; what they may be is for a boat with this actuator, where it is given.
-
-    Raises LogFault, StorageError.
-    """
-    return list_contents(contents_of(path), path.name, actuator)
+def listing(path: Path) -> Listing:
+    """The columns of a log. Raises LogFault, StorageError."""
+    return list_contents(contents_of(path), path.name)
 
 
 def list_contents(contents: Contents, name: str, actuator: Actuator | None = None) -> Listing:
-    """As `listing`, of what a file called `name` holds."""
+    """The columns of what a file called `name` holds.
+
+    What they may be is for a boat with this actuator, where it is given.
+    """
     columns = contents.columns
     guesses = dict(_guesses(columns))
     if actuator:
