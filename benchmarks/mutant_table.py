@@ -14,11 +14,9 @@ Row = tuple[str, str, str]
 TABLE: dict[str, list[Row]] = {
 "files": [
     ("wrong = [cut if not m[3] else", "wrong = [False if not m[3] else",
-     "test_of_damaged_sentences_only_whole_ones_are_read"),
-    ('or kind.startswith("UNKNOWN")', "or False",
-     "test_damaged_binary_logs_are_read_or_refused"),
+     "test_a_piece_of_a_sentence_is_counted"),
     ("    if not found or line[found[-1].end() :].strip():\n        return True\n", "",
-     "test_of_damaged_sentences_only_whole_ones_are_read"),
+     "test_a_piece_of_a_sentence_is_counted"),
     ("taken[guess] < known[guess]", "True", "test_a_mapping_is_that_of_the_boat"),
     ("np.where(none, rest, np.where(beyond, np.nan, values))", "np.where(none, rest, values)",
      "test_pulses_become_parts_of_full_speed"),
