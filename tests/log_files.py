@@ -134,3 +134,46 @@ def written(path, columns):
 
 def read(path, columns=None, frame="ned"):
     return table(path, WANTED, NamedQuantities(columns or {}, frame))
+
+
+def sentence(body):
+    """With its checksum, the exclusive or of the letters."""
+    check = 0
+    for letter in body:
+        check ^= ord(letter)
+    return f"${body}*{check:02X}"
+
+
+def sentences(count=60, begins=86_390.0):
+    """Positions at 5 Hz, headings at 10 Hz, an engine at 2 Hz; over midnight of 10 January 2024."""
+    lines = []
+    for i in range(count):
+        at = begins + 0.1 * i
+        day, of_day = 10 + int(at >= 86_400.0), at % 86_400.0
+        clock = f"{int(of_day // 3600):02d}{int(of_day % 3600 // 60):02d}{of_day % 60:05.2f}"
+        if i % 2 == 0:
+            place = f"{4812.0 + 1e-4 * i:09.4f},N,{1130.0 + 2e-4 * i:010.4f},W"
+            lines.append(f"GPRMC,{clock},A,{place},1.500,090.0,{day:02d}0124,3.4,W,D")
+        lines.append(f"GNHDT,{(355.0 + 0.5 * i) % 360.0:05.1f},T")
+        if i % 5 == 0:
+            lines += [f"IIRPM,S,1,{600 + i}.0,,A", f"IIRSA,{-0.1 * i:.1f},A,,V", "TIROT,-6.0,A"]
+    return [sentence(line) for line in lines]
+
+
+def write_tlog(path):
+    """Positions at 10 Hz and servo outputs, each behind its time of arrival."""
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    pack = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    out = b""
+    for i in range(20):
+        messages = (
+            mavlink.MAVLink_global_position_int_message(
+                100 * i, 590_000_000 + i, 100_000_000, 0, 0, 0, 0, 0, 100 * i
+            ),
+            mavlink.MAVLink_servo_output_raw_message(1000 * i, 0, *[1500 + i] * 8),
+        )
+        for message in messages:
+            out += struct.pack(">Q", 1_700_000_000_000_000 + 100_000 * i) + message.pack(pack)
+    path.write_bytes(out)
+    return path

@@ -16,16 +16,21 @@ from podusv_cli.core.errors import UsageError
 if TYPE_CHECKING:
     from podusv_cli.identify.logs.listing import Listing
     from podusv_cli.identify.outputs import Identified
+    from podusv_cli.workflows.look import LookedAt
 
 
-def _show_columns(log: Path, as_json: bool) -> None:
+def _show_columns(found: Listing, as_json: bool) -> None:
     """Print the columns of a log, or as JSON; warnings go to the standard error."""
-    from podusv_cli.identify.logs.listing import listing
-
-    found = listing(log)
     for line in found.warnings:
         echo(f"warning: {line}", err=True)
     echo_result(found, lambda: _report_columns(found), as_json=as_json, quiet=False)
+
+
+def _show_page(done: LookedAt, *, as_json: bool, quiet: bool) -> None:
+    """Print where the page of a log is; warnings go to the standard error."""
+    for line in done.listing.warnings:
+        echo(f"warning: {line}", err=True)
+    show(done, lambda: echo(f"page: {done.page}"), as_json=as_json, quiet=quiet)
 
 
 def _report_columns(found: Listing) -> None:
@@ -52,7 +57,15 @@ Columns = Annotated[
     typer.Option(
         "--columns",
         metavar="LOG",
-        help="Only list the columns of a log, and what each may be; needs no CONFIG.",
+        help="Only list the columns of a log, and what each may be; with CONFIG for its boat.",
+    ),
+]
+Look = Annotated[
+    Path | None,
+    typer.Option(
+        "--look",
+        metavar="LOG",
+        help="Only draw a log, its track and every signal, as a page; nothing is fitted.",
     ),
 ]
 
@@ -60,6 +73,7 @@ Columns = Annotated[
 def identify(
     config: options.Config = "",
     columns: Columns = None,
+    look: Look = None,
     assign: options.Assignments = None,
     out: options.Out = None,
     force: Force = False,
@@ -75,21 +89,9 @@ def identify(
     known before. What the logs do not determine is named. Exit code 3 when the hull predicts a log
     worse than `vessel`: it is kept aside, and no scenario takes it.
     """
-    if columns:
-        return _show_columns(columns, as_json)
-    if not config:
-        raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
-    from podusv_cli.cli.progress import progress_bars
-    from podusv_cli.identify.logs.formats import READERS
-    from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
+    from podusv_cli.workflows.look import list_log, look_at  # heavy imports only when needed
     from podusv_cli.workflows.request import Request
 
-    ending = Path(config).suffix.lower()
-    if ending and ending in READERS:
-        raise UsageError(
-            f"{config} is a log; CONFIG is a scenario that names logs, as `podusv init "
-            f"identify/otter` copies one. `podusv identify --columns {config}` lists its columns"
-        )
     warned = Warnings(quiet)
     request = Request(
         assign or (),
@@ -101,6 +103,22 @@ def identify(
         trust=trust,
         warn=warned,
     )
+    if columns:
+        return _show_columns(list_log(columns, config, request), as_json)
+    if look:
+        return _show_page(look_at(look, config, request), as_json=as_json, quiet=quiet)
+    if not config:
+        raise typer.BadParameter("CONFIG is missing: a scenario with the section `identify`")
+    from podusv_cli.cli.progress import progress_bars
+    from podusv_cli.identify.logs.formats import READERS
+    from podusv_cli.workflows import identify as workflow  # heavy imports only when needed
+
+    ending = Path(config).suffix.lower()
+    if ending and ending in READERS:
+        raise UsageError(
+            f"{config} is a log; CONFIG is a scenario that names logs, as `podusv init "
+            f"identify/otter` copies one. `podusv identify --columns {config}` lists its columns"
+        )
     with progress_bars(wanted=not (quiet or as_json)) as bars:
         done = workflow.identify(Path(config), request, bars)
     show(done, lambda: _report(done), as_json=as_json, quiet=quiet)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -49,8 +49,9 @@ class Rule(NamedTuple):
     exact: bool = False  # another key's number, not rounded to DIGITS
 
 
-# From the text of another program's file to values by field, and remarks; raises ValueError.
-ValuesOf = Callable[[str], tuple[dict[str, Any], list[str]]]
+# From the text of another program's file, and the fields that are given beside it, to values by
+# field, and remarks; raises ValueError.
+ValuesOf = Callable[[str, Collection[str]], tuple[dict[str, Any], list[str]]]
 
 
 class Component(BaseModel):
@@ -146,6 +147,10 @@ class Component(BaseModel):
     def choices(self) -> frozenset[str]:
         """Names of those constants that are choices or whole numbers."""
         return frozenset(_choices(self))
+
+
+class KernelPart(Component):
+    """A component with kernels, which also read a `table` of numbers beside the constants."""
 
     def table(self) -> Vector:
         """Numbers whose count depends on the scenario (nodes, waypoints); one zero where none."""

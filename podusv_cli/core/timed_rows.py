@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
-from podusv_cli.core.units import NUMBER, spell_unit, units_allowed_for
+from podusv_cli.core.units import NUMBER, Scale, spell_unit, units_allowed_for
 
 LARGEST = 900_000  # characters: the resolved scenario, which has the rows, must be readable
 NOT_FINITE = re.compile(r"[-+]?(nan|inf|infinity)", re.IGNORECASE)
+ScaledUnits = Mapping[tuple[str, str], Scale]  # by column and unit
+NONE: ScaledUnits = {}
 Layouts = Mapping[int, Sequence[str]]  # by count: the columns' names, as `b_u [N]`
 
 
@@ -23,12 +25,12 @@ class TextLine(NamedTuple):
     cells: list[str]
 
 
-def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
+def timed_rows(text: str, noun: str, layouts: Layouts, scales: ScaledUnits = NONE) -> Vector:
     """The rows, each with as many numbers as one of `layouts`, in the order of its columns.
 
     The names in a header say which column is which, and in brackets its unit where that is another
-    one, as `n_1 [rpm]`. `noun` is what the text is called. Raises ValueError, which does not repeat
-    the text: a file may hold what its reader may not see.
+    one, as `n_1 [rpm]`; `scales` are further units. `noun` is what the text is called. Raises
+    ValueError, which does not repeat the text: a file may hold what its reader may not see.
     """
     if len(text) > LARGEST:
         raise ValueError(f"{noun} is longer than {LARGEST:,} characters; leave rows out")
@@ -39,8 +41,8 @@ def timed_rows(text: str, noun: str, layouts: Layouts) -> Vector:
     rows = _numbers(lines, noun)
     if header:
         names = layouts[rows.shape[1]]
-        header, factors = _in_own_units(header, names)
-        rows[:, : len(factors)] *= factors
+        header, units = _in_own_units(header, names, scales)
+        rows = (rows - [unit.zero for unit in units]) * [unit.factor for unit in units]
         rows = _in_order(rows, columns(header, names, noun), header, noun)
     late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
     if late.size:
@@ -144,16 +146,19 @@ def _in_order(rows: Vector, order: list[int], header: TextLine, noun: str) -> Ve
     return rows[:, order]
 
 
-def _in_own_units(header: TextLine, names: Sequence[str]) -> tuple[TextLine, list[float]]:
-    """The header with the units that columns of these names have, and the factor to each."""
+def _in_own_units(
+    header: TextLine, names: Sequence[str], scales: ScaledUnits
+) -> tuple[TextLine, list[Scale]]:
+    """The header with the units that columns of these names have, and the scale to each."""
     own = dict(map(_split_unit, names))
-    cells, factors = list(header.cells), [1.0] * len(header.cells)
+    cells, units = list(header.cells), [Scale(0.0, 1.0)] * len(header.cells)
     for i, cell in enumerate(header.cells):
         name, unit = _split_unit(cell)
         factor = units_allowed_for(own[name]).get(spell_unit(unit)) if own.get(name) else None
-        if factor:
-            cells[i], factors[i] = f"{name} [{own[name]}]", float(factor)
-    return TextLine(header.number, cells), factors
+        scale = Scale(0.0, float(factor)) if factor else scales.get((name, spell_unit(unit)))
+        if scale:
+            cells[i], units[i] = f"{name} [{own[name]}]", scale
+    return TextLine(header.number, cells), units
 
 
 def _split_unit(cell: str) -> tuple[str, str]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Mapping
 from fractions import Fraction
+from typing import NamedTuple
 
 from podusv_cli.core.phrases import did_you_mean
 
@@ -85,6 +87,16 @@ SPELLINGS = {
     "mi/h": "mph",
 }
 SIGNS = str.maketrans({"°": "deg", "º": "deg", "·": " ", "*": " ", "^": "", "²": "2", "³": "3"})
+
+
+class Scale(NamedTuple):
+    """A unit that has its zero elsewhere: `zero` is 0 of podusv's, and one more is `factor`."""
+
+    zero: float
+    factor: float
+
+
+Scales = Mapping[str, Mapping[str, Scale]]  # by signal, then by unit
 WITH_UNIT = re.compile(rf"({NUMBER.pattern})(?:\s*(?=[^\W\d_]|[°º%])|\s+(?=1/))(\S.*)")
 
 

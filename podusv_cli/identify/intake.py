@@ -35,7 +35,7 @@ def logs_of(path: Path, given: LogFile, scenario: Scenario) -> list[FilterLog]:
     boots = tables(
         path,
         signals,
-        NamedQuantities(wanted.columns, wanted.frame, scenario.plane),
+        NamedQuantities(wanted.columns, wanted.frame, scenario.plane, actuator.scales),
         name=given.name,
     )
     found = []

@@ -114,13 +114,23 @@ def _under(
     rest = {n: entry for n, entry in given.mapping.items() if n != key}
     text = read_text(name, file.mark, dotted, faults)
     try:
-        values, said = values_of(text) if text is not None else ({}, [])
+        values, said = values_of(text, rest.keys()) if text is not None else ({}, [])
     except ValueError as error:
         faults.append(Fault(Mark(name), dotted, f"the file {error}"))
         values, said = {}, []
-    remarks += (f"{name}: {line}" for line in said)
-    below = {n: Node(content, Mark(name), text=str(content)) for n, content in values.items()}
+    lines = (f"{name}: {line}" for line in said)
+    remarks += (line for line in lines if line not in remarks)
+    below = {n: _as_node(content, Mark(name)) for n, content in values.items()}
     return replace(given, content=below | rest, faulty=given.faulty or not values)
+
+
+def _as_node(content: Any, mark: Mark) -> Node:
+    """A value of a file as a node, with the values in it."""
+    if isinstance(content, dict):
+        return Node({name: _as_node(part, mark) for name, part in content.items()}, mark)
+    if isinstance(content, tuple):
+        return Node(tuple(_as_node(part, mark) for part in content), mark)
+    return Node(content, mark, text=str(content))
 
 
 def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
@@ -142,7 +152,7 @@ def without_files(given: Node, section: str, model: type[Component], faults: lis
     named = (model.rows_of, model.texts_of, model.bytes_of, model.folders_of, model.values_of)
     for key in (*chain.from_iterable(named), *preset):
         file = given.mapping.get(key)
-        if file and file.mark.line and file.content is not None:
+        if file and file.mark.line and isinstance(file.content, str):
             faults.append(Fault(file.mark, f"{section}.{key}", ELSEWHERE))
     return given
 

@@ -41,6 +41,7 @@ AFT = 0.4  # of the length, that thrusters are behind the middle
 BESIDE = "path: {kind: line}\ndisturbance: {kind: none}\ncontroller: {kind: los_pid}\n"
 THRUSTERS = re.compile(r"(\d)\s*x\s*([^@]+)@\s*(.+)")
 EXAMPLE = "2x180N@1.0: two of 180 N each, 1.0 m beside the centre line"
+BY_TABLE = "2xFILE.csv@1.0 for the table of a bollard test"
 # From models that fit in a hand to the largest ships; far beyond, the formulas overflow.
 SIZES = {"m": (1e-3, 1e3), "kg": (1e-3, 1e9), "N": (1e-4, 1e8), "m/s": (1e-3, 100.0)}
 # What is drawn in a study: a factor on each of these keys, by the name in `SCATTER`.
@@ -71,12 +72,16 @@ class Boat:
 
 @dataclass(frozen=True)
 class Thrusters:
-    """So many alike, each with its largest thrust [N], its lever [m] and its largest angle."""
+    """So many alike, each with its largest thrust [N], its lever [m] and its largest angle.
+
+    `table` is the file of a bollard test that gives their thrust, "" where there is none.
+    """
 
     count: int
     thrust: float
     lever: float
     turn: float
+    table: str = ""
 
     @property
     def levers(self) -> list[float]:
@@ -106,9 +111,9 @@ def start(boat: Boat, out: Path, route: str = "") -> Path:
     length, mass, speed or set of thrusters, and for a route that cannot be read; StorageError where
     the file exists.
     """
-    hull, thrusters = _hull(boat)
+    hull, thrusters = _hull(boat, out)
     way = _way(route, out)
-    return _write_new(out, _of_dimensions(hull, thrusters, way, known=bool(boat.speed)))
+    return _write_new(out, _of_dimensions(hull, thrusters, way, out, known=bool(boat.speed)))
 
 
 def start_from(preset: str, out: Path, route: str = "") -> Path:
@@ -116,7 +121,7 @@ def start_from(preset: str, out: Path, route: str = "") -> Path:
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
         raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
-    return _write_new(out, _of_preset(preset, _way(route, out)))
+    return _write_new(out, _of_preset(preset, _way(route, out), out))
 
 
 def _write_new(out: Path, text: str) -> Path:
@@ -142,9 +147,12 @@ def _check(text: str, out: Path) -> None:
         ) from error
 
 
-def _hull(boat: Boat) -> tuple[Hull, Thrusters]:
-    """Hull and thrusters of the boat that a user describes. Raises UsageError."""
-    thrusters = _thrusters(boat)
+def _hull(boat: Boat, out: Path) -> tuple[Hull, Thrusters]:
+    """Hull and thrusters of the boat that a user describes, for the scenario `out`.
+
+    Raises UsageError.
+    """
+    thrusters = _thrusters(boat, out)
     given = {"length": (boat.length, "m"), "beam": (boat.beam, "m"), "mass": (boat.mass, "kg")}
     if boat.speed:
         given["speed"] = (boat.speed, "m/s")
@@ -204,14 +212,15 @@ def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
     return float(number)
 
 
-def _thrusters(boat: Boat) -> Thrusters:
+def _thrusters(boat: Boat, out: Path) -> Thrusters:
     """Thrusters from words as `EXAMPLE` has them. Raises UsageError."""
     match = THRUSTERS.fullmatch(boat.thrusters.strip())
     if not match:
-        raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}")
+        raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}; or {BY_TABLE}")
     count, turn = int(match[1]), _number("turn", boat.turn, "rad") if boat.turn else 0.0
+    thrust, table = _thrust(match[2].strip(), boat.thrusters, out)
     lever = _number("thrusters", match[3], "m", zero=True)
-    made = Thrusters(count, _number("thrusters", match[2].strip(), "N"), lever, turn)
+    made = Thrusters(count, thrust, lever, turn, table)
     if count not in (1, 2, 4) or (count > 1) != (lever > 0.0):
         raise UsageError(
             f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
@@ -223,6 +232,36 @@ def _thrusters(boat: Boat) -> Thrusters:
     if count == 1 and not turn:
         raise UsageError("a single thruster that does not turn cannot steer: give --turn 35deg")
     return made
+
+
+def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
+    """The largest thrust [N] of a thruster, and the file of its table as `out` names it, or "".
+
+    `words` are a force or a file, `given` the whole option. Raises UsageError.
+    """
+    if words[:1].isdigit() and not os.path.isfile(words):
+        return _number("thrusters", words, "N"), ""
+    if not os.path.isfile(words):
+        raise UsageError(
+            f"--thrusters {given}: {words} is neither a force in N nor a file; podusv has no "
+            f"makers' tables (podusv docs pod says where they are); write {BY_TABLE}"
+        )
+    storage.make_folder(out.parent)  # the table is read from there
+    name = os.path.relpath(words, out.parent)
+    file = as_yaml(name) if name.isprintable() else repr(name)
+    alike = [
+        f"{{x: -1, y: {y}, table: {file}, n_rate: 4, n_lag: 0.3, angle_limit: 0}}" for y in (-1, 1)
+    ]
+    text = (
+        "name: boat\nvessel: {preset: otter}\n"
+        f"actuator: {{kind: pod, counts: parts, pods: [{', '.join(alike)}]}}\n{BESIDE}"
+    )
+    try:
+        actuator = load_text(text, str(out)).scenario.actuator
+    except ScenarioError as error:
+        raise UsageError(f"--thrusters {given}: {str(error).splitlines()[0]}") from error
+    assert isinstance(actuator, Pods)
+    return actuator.pods[0].most_thrust[0], file
 
 
 def _way(route: str, out: Path) -> StartingLegs | None:
@@ -255,30 +294,30 @@ def _way(route: str, out: Path) -> StartingLegs | None:
 
 
 def _of_dimensions(
-    hull: Hull, thrusters: Thrusters, way: StartingLegs | None, *, known: bool
+    hull: Hull, thrusters: Thrusters, way: StartingLegs | None, out: Path, *, known: bool
 ) -> str:
     """The scenario's text for a boat of these dimensions; `known` says if its speed was given."""
     numbers = {name: float(f"{x:.3g}") for name, x in estimate_vessel(hull).items()}
     boat = "\n".join([*_vessel(hull, numbers, known), "", *_actuator(hull, thrusters)])
     title = f"A boat of {hull.length:g} m; inertia and damping are estimates from its dimensions."
-    return _fill_template(title, boat, "\n".join(_study(numbers)), way)
+    return _fill_template(title, boat, "\n".join(_study(numbers)), way, out)
 
 
-def _of_preset(preset: str, way: StartingLegs | None) -> str:
+def _of_preset(preset: str, way: StartingLegs | None, out: Path) -> str:
     """The scenario's text for a vessel of podusv with its thrusters."""
     boat = (
         f"vessel: {{preset: {preset}}} # its source and validity: podusv explain {preset}\n"
         f"actuator: {{kind: pod, preset: {preset}}}"
     )
-    return _fill_template(f"{preset} of podusv with its thrusters.", boat, "", way)
+    return _fill_template(f"{preset} of podusv with its thrusters.", boat, "", way, out)
 
 
-def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None) -> str:
+def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, out: Path) -> str:
     """The scenario's text: `boat` and `study` are YAML; a task that suits the boat is worked out.
 
     Speed and duration follow from the hull, so that it can keep up; legs, too, without a `way`.
     """
-    scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", "boat").scenario
+    scenario = load_text(f"name: boat\n{boat}\n{BESIDE}", str(out)).scenario
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
     holds = vessel.envelope.speed if vessel.envelope else math.inf
@@ -349,10 +388,12 @@ def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]
 def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
     """The lines of `actuator`: a pod for each thruster."""
     turning = "fixed" if not thrusters.turn else "turning"
-    yield f"actuator: # {turning} thrusters; n from -1 to 1, so T_nn is the largest thrust [N]"
+    law = "thrust by a table" if thrusters.table else "so T_nn is the largest thrust [N]"
+    yield f"actuator: # {turning} thrusters; n from -1 to 1, {law}"
     yield "  kind: pod"
     yield "  counts: parts"
-    yield "  # x ahead, y to starboard of the middle [m]; rates, lags and thrust astern are guesses"
+    guesses = "rates and lags" if thrusters.table else "rates, lags and thrust astern"
+    yield f"  # x ahead, y to starboard of the middle [m]; {guesses} are guesses"
     yield "  pods:"
     angle = f"angle_limit: {math.degrees(thrusters.turn):.4g} deg"
     if thrusters.turn:
@@ -360,8 +401,9 @@ def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
     for lever in thrusters.levers:
         place = f"x: {-AFT * hull.length:.3g}, y: {lever:g}"
         force = f"T_nn: {thrusters.thrust:g}, T_nn_astern: {thrusters.thrust:g}"
-        speed = "n_max: 1, n_max_astern: 1, n_rate: 4, n_lag: 0.3"
-        yield f"    - {{{place}, {force}, {speed}, {angle}}}"
+        force += ", n_max: 1, n_max_astern: 1"
+        force = f"table: {thrusters.table}" if thrusters.table else force
+        yield f"    - {{{place}, {force}, n_rate: 4, n_lag: 0.3, {angle}}}"
 
 
 def _study(numbers: dict[str, float]) -> Iterator[str]:

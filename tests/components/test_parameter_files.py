@@ -39,7 +39,7 @@ path: {kind: line}
 @pytest.mark.parametrize("line", ["{},{}", "{} {}", "{}\t{}", "1\t1\t{}\t{}\t9"])
 def test_files_of_every_ground_station_have_the_same_numbers(line):
     text = "# saved\n" + "".join(line.format(*pair) + "\n" for pair in ROVER.items())
-    keys, remarks = of_ardupilot(text)
+    keys, remarks = of_ardupilot(text, ())
     assert keys == {
         "speed_P": 0.4,
         "rate_FF": 0.35,
@@ -51,22 +51,29 @@ def test_files_of_every_ground_station_have_the_same_numbers(line):
 
 
 def test_a_file_of_old_rovers_asks_for_l1():
-    keys, remarks = of_ardupilot("NAVL1_PERIOD,12\nNAVL1_DAMPING,0.7\n")
+    keys, remarks = of_ardupilot("NAVL1_PERIOD,12\nNAVL1_DAMPING,0.7\n", ())
     assert keys == {"l1_period": 12.0, "l1_damping": 0.7, "guidance": "l1"}
     assert "guidance is l1" in remarks[0]
 
 
+def test_what_the_scenario_gives_itself_is_no_matter_of_the_file():
+    keys, remarks = of_ardupilot("NAVL1_PERIOD,12\nATC_STR_RAT_MAX,0\n", ("guidance", "r_m"))
+    assert keys == {"l1_period": 12.0}
+    assert remarks == []
+
+
 def test_limits_that_are_none_are_said_and_cruise_may_be_missing():
-    keys, remarks = of_px4("RO_SPEED_LIM,-1\nRO_SPEED_P,0.2\n")
+    keys, remarks = of_px4("RO_SPEED_LIM,-1\nRO_SPEED_P,0.2\n", ())
     assert keys == {"speed_P": 0.2}
     assert remarks == ["RO_SPEED_LIM sets no limit; podusv's own stands"]
-    assert of_ardupilot("CRUISE_SPEED,0\nATC_SPEED_FF,0.2\n")[0] == {"speed_FF": 0.2}
+    assert of_ardupilot("CRUISE_SPEED,0\nATC_SPEED_FF,0.2\n", ())[0] == {"speed_FF": 0.2}
 
 
 def test_px4_names_full_throttle_and_a_wheel_track():
     keys, remarks = of_px4(
         "RO_MAX_THR_SPEED 2.5\nRD_WHEEL_TRACK 0.8\nRO_YAW_RATE_CORR 1.5\nRO_YAW_RATE_LIM 0\n"
-        "RO_YAW_RATE_TH 3\nRO_JERK_LIM 1\n"
+        "RO_YAW_RATE_TH 3\nRO_JERK_LIM 1\n",
+        (),
     )
     assert keys == {
         "speed_FF": pytest.approx(0.4),

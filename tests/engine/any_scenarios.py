@@ -21,6 +21,20 @@ PODS = {
     "actuator": {"kind": "pod", "preset": "otter", "failure": {"time": 0.2, "pod": 1}},
     "vessel": {"preset": "otter"},
 }
+ROWS = [
+    [-1, -30],
+    [-0.5, -8.3],
+    [-0.0625, 0],
+    [0.0625, 0],
+    [0.2, 3],
+    [0.6, 31.7],
+    [0.9, 52],
+    [1, 52],
+]
+TABLES = [
+    {"x": -0.8, "y": y, "table": ROWS, "n_rate": 4, "n_lag": 0.1, "angle_limit": 0}
+    for y in (-0.4, 0.4)
+]
 COMMANDED = {"command": {"resolution_u": 0.1, "dead_zone_r": 0.02}}
 SENSORS = {"measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}}
 # Parts that are put together in another way, with a metric that is gathered at every instant
@@ -32,6 +46,11 @@ KINDS: dict[str, dict[str, Any]] = {
         "actuator": COMMANDED,
     },
     "pods of which one fails": {"controller": {"kind": "momentum_vector"}, **PODS},
+    "thrusters by a table": {
+        "controller": {"kind": "momentum_vector"},
+        "vessel": {"preset": "otter"},
+        "actuator": {"kind": "pod", "counts": "parts", "pods": TABLES},
+    },
     "sensors in a sea": {
         "controller": {"kind": "adrc"},
         **SENSORS,

@@ -7,36 +7,12 @@ import subprocess
 
 import numpy as np
 import pytest
-from log_files import write_dataflash
+from log_files import sentence, sentences, write_dataflash, write_tlog
 from scipy.io import savemat
 
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.formats import columns_of, contents_of
 from podusv_cli.identify.logs.listing import listing
-
-
-def sentence(body):
-    """With its checksum, the exclusive or of the letters."""
-    check = 0
-    for letter in body:
-        check ^= ord(letter)
-    return f"${body}*{check:02X}"
-
-
-def sentences(count=60, begins=86_390.0):
-    """Positions at 5 Hz, headings at 10 Hz, an engine at 2 Hz; over midnight of 10 January 2024."""
-    lines = []
-    for i in range(count):
-        at = begins + 0.1 * i
-        day, of_day = 10 + int(at >= 86_400.0), at % 86_400.0
-        clock = f"{int(of_day // 3600):02d}{int(of_day % 3600 // 60):02d}{of_day % 60:05.2f}"
-        if i % 2 == 0:
-            place = f"{4812.0 + 1e-4 * i:09.4f},N,{1130.0 + 2e-4 * i:010.4f},W"
-            lines.append(f"GPRMC,{clock},A,{place},1.500,090.0,{day:02d}0124,3.4,W,D")
-        lines.append(f"GNHDT,{(355.0 + 0.5 * i) % 360.0:05.1f},T")
-        if i % 5 == 0:
-            lines += [f"IIRPM,S,1,{600 + i}.0,,A", f"IIRSA,{-0.1 * i:.1f},A,,V", "TIROT,-6.0,A"]
-    return [sentence(line) for line in lines]
 
 
 def nmea(tmp_path, lines, name="log.nmea"):
@@ -218,20 +194,7 @@ def test_old_gps_has_the_time_of_the_week_beside_that_since_the_start(tmp_path):
 
 
 def test_a_telemetry_log_has_its_messages_by_arrival(tmp_path):
-    from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
-    pack = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
-    out = b""
-    for i in range(20):
-        messages = (
-            mavlink.MAVLink_global_position_int_message(
-                100 * i, 590_000_000 + i, 100_000_000, 0, 0, 0, 0, 0, 100 * i
-            ),
-            mavlink.MAVLink_servo_output_raw_message(1000 * i, 0, *[1500 + i] * 8),
-        )
-        for message in messages:
-            out += struct.pack(">Q", 1_700_000_000_000_000 + 100_000 * i) + message.pack(pack)
-    (tmp_path / "log.tlog").write_bytes(out)
+    write_tlog(tmp_path / "log.tlog")
     columns = columns_of(tmp_path / "log.tlog")
     assert columns["GLOBAL_POSITION_INT.time"] == pytest.approx(0.1 * np.arange(20), abs=1e-6)
     assert columns["GLOBAL_POSITION_INT.lat"][3] == 590_000_003
@@ -280,3 +243,17 @@ def test_of_a_px4_log_the_boat_s_own_motion_is_proposed(tmp_path):
         "n_part_cmd_1": "actuator_motors.control[0]",
         "n_part_cmd_2": "actuator_motors.control[1]",
     }
+
+
+@pytest.mark.parametrize(
+    ("end", "says"),
+    [
+        ("$GNHDT,12", "left out for a wrong checksum: 1 of"),
+        ("$II" + sentence("TIROT,-6.0,A"), "no whole sentences, of which parts are left out: 1 of"),
+        (sentence("TIROT,-6.0,A") + "GNHDT,12", "no whole sentences, of which parts are left"),
+    ],
+)
+def test_a_piece_of_a_sentence_is_counted(tmp_path, end, says):
+    read = contents_of(nmea(tmp_path, [*sentences(30), end]))
+    assert read.warnings[0].startswith(says)
+    assert 12.0 not in read.columns["HDT.heading [deg]"]

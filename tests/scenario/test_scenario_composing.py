@@ -455,8 +455,8 @@ def test_an_item_of_a_list_can_be_set_by_its_place_also_where_a_preset_brings_th
     assert (one.n_lag, one.angle_lag, one.T_nn) == (0.3, 0.2, 3.65034e-3)
     assert (two.n_lag, two.angle_lag, two.y) == (0.5, 0.1, 0.078)
     assert told(PODS, ["actuator.pods.1.T_nn=-1"]) == [
-        "--set actuator.pods.1.T_nn=-1: actuator.pods[1].T_nn: must be a number above 0 [N s2], "
-        "found -1"
+        "--set actuator.pods.1.T_nn=-1: actuator.pods[1].T_nn: must be a number or null above 0 "
+        "[N s2], found -1"
     ]
 
 

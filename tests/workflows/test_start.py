@@ -222,6 +222,22 @@ def test_a_thruster_turns_to_90_degrees(podusv):
     assert podusv("start", "boat", *BOAT, "--turn", "90deg").code == 0
 
 
+def test_thrusters_have_the_table_of_a_bollard_test(podusv):
+    """Top speed follows from what it gives: 2 x 12.5 kgf."""
+    Path("deep").mkdir()
+    Path("bollard.csv").write_text("pwm [us],thrust [kgf]\n1100,-8\n1475,0\n1525,0\n1900,12.5\n")
+    words = (*BOAT[:-1], "2xbollard.csv@1.0", "--out", "deep/boat.yaml")
+    assert podusv("start", "boat", *words).code == 0
+    scenario = load("deep/boat.yaml").scenario
+    assert [pod.y for pod in scenario.actuator.pods] == [-1.0, 1.0]
+    assert pytest.approx(2.0 * 12.5 * 9.80665, rel=1e-3) == scenario.facts.F
+    assert scenario.actuator.pods[0].most_thrust[1] == pytest.approx(8.0 * 9.80665)
+    Path("bollard.csv").write_text("pwm [us],thrust [kg]\n1100,-8\n1500,0\n1900,12.5\n")
+    said = podusv("start", "boat", *BOAT[:-1], "2xbollard.csv@1.0")
+    assert said.code == 2
+    assert "write kgf for the weight of so many kg" in said.err
+
+
 def test_units_are_those_of_scenarios(podusv):
     podusv("start", "boat", *BOATS["with units"])
     scenario = load("boat.yaml").scenario
@@ -238,7 +254,13 @@ def test_units_are_those_of_scenarios(podusv):
         (
             (*BOAT[:-1], "two"),
             "--thrusters two: write them as 2x180N@1.0: two of 180 N each, 1.0 m "
-            "beside the centre line",
+            "beside the centre line; or 2xFILE.csv@1.0 for the table of a bollard test",
+        ),
+        (
+            (*BOAT[:-1], "2xT200@16V"),
+            "--thrusters 2xT200@16V: T200 is neither a force in N nor a file; podusv has no "
+            "makers' tables (podusv docs pod says where they are); write 2xFILE.csv@1.0 for the "
+            "table of a bollard test",
         ),
         (
             (*BOAT[:-1], "2x180kg@1"),

@@ -23,9 +23,10 @@ from podusv_cli.components.actuators.recorded import (
     rows_of,
     table_of,
 )
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import KernelPart, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
 from podusv_cli.core.signal import DEMAND, TAU, Signal
+from podusv_cli.core.units import Scales
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
 ROUNDS = 20  # of Newton's method
@@ -48,7 +49,7 @@ def pass_loads(demand: Vector, tau: Vector) -> None:
         tau[i] = demand[i]
 
 
-class Actuator(Component):
+class Actuator(KernelPart):
     """What turns a demand (tau_u, tau_r) into loads on the hull.
 
     `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
@@ -128,6 +129,11 @@ class Actuator(Component):
         """Of signals `replayed` the largest size that they can have, where one is known."""
         return {}
 
+    @property
+    def scales(self) -> Scales:
+        """Units beside podusv's that signals `replayed` and `lagged` may have, by signal."""
+        return {}
+
     def commands(self, recorded: Recorded) -> Vector:
         """The rows of recorded commands: t [s] and one for each of `replayed`.
 
@@ -138,7 +144,17 @@ class Actuator(Component):
                 f"gives commands to propellers, and {self.label} takes surge force and yaw moment; "
                 "write columns t, tau_u, tau_r, or choose the actuator that had these commands"
             )
-        return rows_of(recorded.rows, self.replayed, self.lagged, self.zero_where_missing)
+        return rows_of(
+            recorded.rows,
+            self.replayed,
+            self.lagged,
+            self.zero_where_missing,
+            tuple(
+                (name, unit, scale)
+                for name, own in self.scales.items()
+                for unit, scale in own.items()
+            ),
+        )
 
     def constants_with(self, recorded: Recorded | None) -> dict[str, float]:
         """The constants, with those of recorded commands where there are any."""

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Self
+from collections.abc import Sequence
+from typing import ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from podusv_cli.components.actuators.command import EffectivenessLoss
-from podusv_cli.core.component import Component, value
+from podusv_cli.components.actuators.thrust_table import PwmCommand, check_rows, curve_of, of_file
+from podusv_cli.core.component import Component, ValuesOf, value
+from podusv_cli.core.kernel import Vector
+
+ThrustRow = tuple[float, float]  # n, or a pulse [us]; thrust [N]
+BY_SQUARE = ("T_nn", "T_nn_astern", "n_max", "n_max_astern")  # keys that a table stands for
 
 
 class Rudder(Component):
@@ -24,19 +31,43 @@ class Pod(Component):
     """One propeller and the pod that turns it, or the rudder behind it.
 
     `n` counts turns a second, or parts of full speed where the actuator's `counts` says so; units
-    with s for it then go without.
+    with s for it then go without. Thrust goes with |n|n, or is that of a `table`; a dead band of
+    `pwm` is left out of n in the former.
     """
 
+    values_of: ClassVar[dict[str, ValuesOf]] = {"table": of_file}
     x: float = value(..., "m", "position ahead of the body origin; negative at the stern")
     y: float = value(0.0, "m", "position to starboard of the body origin")
-    T_nn: float = value(..., "N s2", "thrust over |n|n ahead, at rest", gt=0)
-    T_nn_astern: float = value(..., "N s2", "thrust over |n|n astern, at rest", gt=0)
+    T_nn: float | None = value(
+        None, "N s2", "thrust over |n|n ahead, at rest; needed without a table", gt=0
+    )
+    T_nn_astern: float | None = value(
+        None, "N s2", "thrust over |n|n astern, at rest; needed without a table", gt=0
+    )
+    table: tuple[ThrustRow, ...] | None = value(
+        None,
+        "1",
+        "in place of T_nn, T_nn_astern, n_max, n_max_astern: rows of n and thrust [N] of a bollard "
+        "test, or the CSV file that has them; podusv docs pod",
+        strict=False,
+    )
+    table_in: Literal["n", "us"] = value(
+        "n", "", "what the commands of the table are: n, or pulses of `pwm`"
+    )
+    table_factor: float = value(1.0, "", "factor on the thrust of the table", gt=0)
+    pwm: PwmCommand | None = value(
+        None, "", "pulses that command n, of logs and tables in us; with counts: parts"
+    )
     T_nV: float = value(0.0, "N s2/m", "change of thrust over |n| times speed", ge=0)
     T_nV_astern: float | None = value(
         None, "N s2/m", "the same with the propeller astern; without it as ahead", ge=0
     )
-    n_max: float = value(..., "1/s", "largest propeller speed ahead", gt=0)
-    n_max_astern: float = value(..., "1/s", "largest propeller speed astern", ge=0)
+    n_max: float | None = value(
+        None, "1/s", "largest propeller speed ahead; needed without a table", gt=0
+    )
+    n_max_astern: float | None = value(
+        None, "1/s", "largest propeller speed astern; needed without a table", ge=0
+    )
     n_rate: float = value(..., "1/s2", "fastest change of the propeller's speed", gt=0)
     n_lag: float = value(..., "s", "time constant of the propeller's speed", gt=0)
     angle_limit: float = value(
@@ -72,25 +103,98 @@ class Pod(Component):
             )
         return self
 
+    @model_validator(mode="after")
+    def _thrusting(self) -> Self:
+        """Raises ValueError for a pod that has no law of thrust, or two."""
+        given = [name for name in BY_SQUARE if getattr(self, name) is not None]
+        if self.table is not None:
+            self._check_beside_table(given)
+            check_rows(self.rows)
+        elif lacking := [name for name in BY_SQUARE if name not in given]:
+            them = "it" if len(lacking) == 1 else "them"
+            raise ValueError(
+                f"has no {', '.join(lacking)}; give {them}, or the table of a bollard test"
+            )
+        return self
+
+    def _check_beside_table(self, given: Sequence[str]) -> None:
+        """Raise ValueError for keys that do not go with a table; `given` are those `BY_SQUARE`."""
+        if given:
+            raise ValueError(
+                f"has a table and {', '.join(given)}; the table gives thrust and largest n, so "
+                "leave them out"
+            )
+        if self.rudder:
+            raise ValueError(
+                "has a table and a rudder, whose force goes with n^2; give T_nn and T_nn_astern "
+                "in place of the table"
+            )
+        if self.table_in == "us" and not self.pwm:
+            raise ValueError(
+                "has a table in us and no pwm; give it, as pwm: {rest: 1500, span: 400}"
+            )
+        if self.pwm and self.pwm.dead_band:
+            raise ValueError(
+                "has a table and pwm.dead_band; the dead band of a table is its part without "
+                "thrust, so leave pwm.dead_band out"
+            )
+
+    @property
+    def rows(self) -> Vector:
+        """The table's n and thrust [N], n increasing (rows, 2); without a table none."""
+        rows = np.array(self.table or np.zeros((0, 2)))
+        if self.table_in == "us" and self.pwm:
+            rows = rows[:: int(math.copysign(1.0, self.pwm.span))]
+            rows[:, 0] = (rows[:, 0] - self.pwm.rest) / self.pwm.span
+        return rows * [1.0, self.table_factor]
+
+    @property
+    def most_n(self) -> tuple[float, float]:
+        """The largest n ahead and astern."""
+        if self.table is not None:
+            return float(self.rows[-1, 0]), float(max(-self.rows[0, 0], 0.0))
+        return self.n_max or 0.0, self.n_max_astern or 0.0
+
+    @property
+    def most_thrust(self) -> tuple[float, float]:
+        """The largest thrust at rest [N], ahead and astern."""
+        if self.table is not None:
+            return float(self.rows[-1, 1]), float(max(-self.rows[0, 1], 0.0))
+        ahead, astern = self.most_n
+        return (self.T_nn or 0.0) * ahead * ahead, (self.T_nn_astern or 0.0) * astern * astern
+
+    def curves(self) -> list[Vector]:
+        """The table ahead and astern as `thrust_curve` has them; without a table none."""
+        return [curve_of(self.rows, side) for side in (1.0, -1.0)] if self.table else []
+
     def lags(self) -> tuple[float, float]:
         """Time constants of the speed and of the angle [s]; that of an angle that is fixed is 0."""
         return self.n_lag, self.angle_lag or 0.0 if self.angle_limit > 0.0 else 0.0
 
-    def numbers(self) -> list[float]:
+    def _dead_band(self) -> list[float]:
+        """Its ends ahead and astern, and how much faster the rest of n goes to full speed."""
+        ends = self.pwm.dead_ends() if self.pwm else (0.0, 0.0)
+        full = [
+            most / (most - end) if most else 1.0
+            for most, end in zip(self.most_n, ends, strict=True)
+        ]
+        return [*ends, *full]
+
+    def numbers(self, places: Sequence[float] = (0.0, 0.0)) -> list[float]:
         """The pod's row in the actuator's table, see `propeller`.
 
-        A fixed angle never moves, so any rate and lag above 0 do for it.
+        `places` are where its `curves` begin, counted from the row's own begin. A fixed angle never
+        moves, so any rate and lag above 0 do for it.
         """
         astern = self.T_nV if self.T_nV_astern is None else self.T_nV_astern
         return [
             self.x,
             self.y,
-            self.T_nn,
-            self.T_nn_astern,
+            self.T_nn or 0.0,
+            self.T_nn_astern or 0.0,
             self.T_nV,
             astern,
-            self.n_max,
-            self.n_max_astern,
+            *self.most_n,
             self.angle_limit,
             self.n_rate,
             self.angle_rate or 1.0,
@@ -99,6 +203,8 @@ class Pod(Component):
             self.power_nnn or 0.0,
             self.rudder.lift if self.rudder else 0.0,
             self.rudder.stall if self.rudder else 0.0,
+            *self._dead_band(),
+            *places,
         ]
 
 

@@ -36,11 +36,13 @@ from podusv_cli.components.actuators.propeller import (
     force,
     inflow,
     thrust,
+    turning,
 )
 from podusv_cli.components.actuators.rudder import loads
 from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
 from podusv_cli.core.signal import Signal
+from podusv_cli.core.units import Scale, Scales
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
 NEARLY = 1.0 - 1e-9
@@ -63,7 +65,7 @@ def act(
         pod, delta = tail(table, i * WIDTH), state[count + i]
         flows[i] = inflow(x, pod, delta, k)
         T = thrust(state[i], flows[i], pod, k)
-        along, across = loads(state[i], T, delta, pod)
+        along, across = loads(turning(state[i], pod), T, delta, pod)
         thrusts[i] = T
         tau[0] += along
         tau[1] += 0.0 if k.neglect_sway_force > 0.0 else across
@@ -112,8 +114,9 @@ def pursue(state: Vector, k: Any, table: Vector, rate: Vector, signals: Vector) 
     if k.power_known > 0.0:
         power = tail(signals, FLAGS + 3 * count)
         for i in range(count):
-            n = abs(state[i])
-            power[i] = table[i * WIDTH + POWER] * n * n * n
+            pod = tail(table, i * WIDTH)
+            n = abs(turning(state[i], pod))
+            power[i] = pod[POWER] * n * n * n
 
 
 class Pods(Actuator):
@@ -192,22 +195,32 @@ class Pods(Actuator):
         return self
 
     @model_validator(mode="after")
+    def _in_parts(self) -> Self:
+        """Raises ValueError for pulses of turns, and for a table beyond full speed in parts."""
+        for i, pod in enumerate(self.pods):
+            if self.counts == "turns" and pod.pwm:
+                raise ValueError(
+                    f"has pwm in pods[{i}], which commands parts of full speed; write counts: parts"
+                )
+            if self.counts == "parts" and pod.table and max(pod.most_n) > 1.0 + SMALL:
+                raise ValueError(
+                    f"has a table in pods[{i}] whose commands reach {max(pod.most_n):g} parts of "
+                    "full speed; write 'throttle [%]' or 'pwm [us]' as the name of its first column"
+                    ", or change pwm.span"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _computable(self) -> Self:
         """Raises ValueError for thrust or moment beyond `STRONGEST`."""
-        most = [
-            max(
-                pod.T_nn * pod.n_max * pod.n_max,
-                pod.T_nn_astern * pod.n_max_astern * pod.n_max_astern,
-            )
-            for pod in self.pods
-        ]
+        most = [max(pod.most_thrust) for pod in self.pods]
         arms = [math.sqrt(pod.x * pod.x + pod.y * pod.y) for pod in self.pods]
         force, moment = sum(most), sum(T * arm for T, arm in zip(most, arms, strict=True))
         if not max(force, moment) <= STRONGEST:
             raise ValueError(
                 f"has a full thrust of {force:g} N and a yaw moment of {moment:g} N m, of which no "
                 f"more than {STRONGEST:g} can be computed with; take smaller T_nn, T_nn_astern, "
-                "n_max, n_max_astern, x or y"
+                "n_max, n_max_astern, table, x or y"
             )
         return self
 
@@ -234,8 +247,15 @@ class Pods(Actuator):
         }
 
     def table(self) -> Vector:
-        """The pods' numbers, row after row."""
-        return np.array([number for pod in self.pods for number in pod.numbers()])
+        """The pods' numbers, row after row, then the curves of those that have a table."""
+        rows, curves = list[float](), list[float]()
+        for i, pod in enumerate(self.pods):
+            places = list[float]()
+            for curve in pod.curves():
+                places.append(float((len(self.pods) - i) * WIDTH + len(curves)))
+                curves += curve.tolist()
+            rows += pod.numbers(places or (0.0, 0.0))
+        return np.array(rows + curves)
 
     def shortest_lag(self) -> float:
         """Of speeds, and of angles that turn."""
@@ -282,7 +302,7 @@ class Pods(Actuator):
 
         At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
         """
-        force = sum(pod.T_nn * pod.n_max * pod.n_max for pod in self.pods) / 3.0
+        force = sum(pod.most_thrust[0] for pod in self.pods) / 3.0
         at, still, small = np.array([force, 0.0]), np.zeros(6), SMALL * force
         if not small:
             return np.zeros((3, 2))
@@ -302,6 +322,17 @@ class Pods(Actuator):
         """Speed and angle of every pod, as they were asked for."""
         return self._each(SPEEDS[self.counts][1], DELTA_CMD)
 
+    @property
+    def scales(self) -> Scales:
+        """Pulses of pods that have `pwm`."""
+        speeds = [signal.name for signal in SPEEDS[self.counts]]
+        return {
+            f"{name}_{i}": {"us": Scale(pod.pwm.rest, 1.0 / pod.pwm.span)}
+            for name in speeds
+            for i, pod in enumerate(self.pods, 1)
+            if pod.pwm
+        }
+
     @staticmethod
     @kernel
     def lag(state: Vector, command: Vector, k: Any, table: Vector, rate: Vector) -> None:
@@ -311,7 +342,7 @@ class Pods(Actuator):
     @property
     def reach(self) -> dict[str, float]:
         """Of speeds, and of angles that turn."""
-        speeds = [max(pod.n_max, pod.n_max_astern) for pod in self.pods]
+        speeds = [max(pod.most_n) for pod in self.pods]
         most = [*speeds, *(pod.angle_limit for pod in self.pods)]
         return {s.name: m for s, m in zip(self.replayed, most, strict=True) if m > 0.0}
 
@@ -347,7 +378,7 @@ class Pods(Actuator):
         lost = part * thrusts[i]
         along, across = force(lost, state[count + i])
         if pod[LIFT] > 0.0:
-            along, across = loads(state[i], thrusts[i], state[count + i], pod)
+            along, across = loads(turning(state[i], pod), thrusts[i], state[count + i], pod)
             along, across = part * along, part * across
         thrusts[i] -= lost
         tau[0] -= along

@@ -1,12 +1,13 @@
-"""A propeller's thrust (8) and its inverse, as kernels."""
+"""A propeller's thrust, by (8) or by a table, and its inverse, as kernels."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+from podusv_cli.components.actuators.thrust_curve import command_for, thrust_at
 from podusv_cli.core.elementary import cos_sin
-from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.core.kernel import Vector, kernel, tail
 from podusv_cli.core.signal import Signal
 
 POD = ("pod",)
@@ -58,8 +59,14 @@ PHYSICAL = 0.0
     POWER,
     LIFT,
     STALL,
+    DEAD_AHEAD,
+    DEAD_ASTERN,
+    STRETCH_AHEAD,
+    STRETCH_ASTERN,
+    CURVE_AHEAD,
+    CURVE_ASTERN,
     WIDTH,
-) = range(17)
+) = range(23)
 
 
 @kernel
@@ -77,13 +84,36 @@ def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     return math.sqrt(x[3] * x[3] + x[4] * x[4])
 
 
+# n is in 1/s; `pod` is its row of the table.
+@kernel
+def turning(n: float, pod: Vector) -> float:
+    """How fast the propeller turns at n: not at all in its dead band, in full at full n.
+
+    Without a dead band it is n to the last bit; what is no number stays none.
+    """
+    if n > pod[DEAD_AHEAD]:
+        return float((n - pod[DEAD_AHEAD]) * pod[STRETCH_AHEAD])
+    if n < -pod[DEAD_ASTERN]:
+        return float((n + pod[DEAD_ASTERN]) * pod[STRETCH_ASTERN])
+    return 0.0 * n
+
+
 # n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table.
 @kernel
 def thrust(n: float, flow: float, pod: Vector, k: Any) -> float:
-    """Thrust [N] at the propeller speed n: T_nn |n| n + T_nV flow |n|, or as printed flow n."""
-    T_nn = pod[T_AHEAD] if n >= 0.0 else pod[T_ASTERN]
-    gain = (pod[T_NV] if n >= 0.0 else pod[T_NV_ASTERN]) * flow
-    return float(T_nn * abs(n) * n + gain * (abs(n) if k.thrust_form == PHYSICAL else n))
+    """Thrust [N] at the propeller speed n: T_nn |n| n + T_nV flow |n|, or as printed flow n.
+
+    With a table, its thrust stands for the first term.
+    """
+    turns = turning(n, pod)
+    gain = (pod[T_NV] if turns >= 0.0 else pod[T_NV_ASTERN]) * flow
+    carried = gain * (abs(turns) if k.thrust_form == PHYSICAL else turns)
+    if pod[CURVE_AHEAD] > 0.0:
+        if turns >= 0.0:
+            return float(thrust_at(turns, tail(pod, int(pod[CURVE_AHEAD]))) + carried)
+        return float(carried - thrust_at(-turns, tail(pod, int(pod[CURVE_ASTERN]))))
+    T_nn = pod[T_AHEAD] if turns >= 0.0 else pod[T_ASTERN]
+    return float(T_nn * abs(turns) * turns + carried)
 
 
 @kernel
@@ -98,13 +128,21 @@ def force(T: float, delta: float) -> tuple[float, float]:
 def speed_for(T: float, flow: float, pod: Vector, k: Any) -> float:
     """A propeller speed n with thrust(n) = T [N]: never astern for T >= 0, never ahead for T < 0.
 
-    In the water's flow a propeller that turns slowly brakes, so n jumps where T changes sign.
+    In the water's flow a propeller that turns slowly brakes, so n jumps where T changes sign. So it
+    does over a dead band.
     """
     if T >= 0.0:
-        return float(_positive_root(pod[T_AHEAD], pod[T_NV] * flow, T))
+        gain = pod[T_NV] * flow
+        if pod[CURVE_AHEAD] > 0.0:
+            return float(command_for(T, gain, tail(pod, int(pod[CURVE_AHEAD]))))
+        turns = _positive_root(pod[T_AHEAD], gain, T)
+        return float(turns / pod[STRETCH_AHEAD] + pod[DEAD_AHEAD]) if turns > 0.0 else turns
     gain = pod[T_NV_ASTERN] * flow
     along = -gain if k.thrust_form == PHYSICAL else gain
-    return float(-_positive_root(pod[T_ASTERN], along, -T))
+    if pod[CURVE_AHEAD] > 0.0:
+        return float(-command_for(-T, along, tail(pod, int(pod[CURVE_ASTERN]))))
+    turns = _positive_root(pod[T_ASTERN], along, -T)
+    return -float(turns / pod[STRETCH_ASTERN] + pod[DEAD_ASTERN]) if turns > 0.0 else -turns
 
 
 @kernel

@@ -14,8 +14,10 @@ from podusv_cli.core.interpolation import linear, segment
 from podusv_cli.core.kernel import Vector, scratch, specialise, tail, taking
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.timed_rows import lines_of, timed_rows
+from podusv_cli.core.units import Scale
 
 Signals = tuple[Signal, ...]
+KnownScales = tuple[tuple[str, str, Scale], ...]  # signal, unit, and its scale
 MOST = 32  # commands at one time
 NOUN = "the schedule"
 TIME = "t [s]"
@@ -29,18 +31,21 @@ class Recorded(NamedTuple):
 
 
 @lru_cache(maxsize=4)  # asked for table and constants of every run
-def rows_of(text: str, replayed: Signals, lagged: Signals, zero: Sequence[str]) -> Vector:
+def rows_of(
+    text: str, replayed: Signals, lagged: Signals, zero: Sequence[str], scales: KnownScales = ()
+) -> Vector:
     """The rows of the text (rows, 1 + commands): t [s], and each of the signals `replayed`.
 
     Columns are called as these, or as the commands `lagged` that they follow. Those that belong to
-    signals called in `zero` may all be left out. Raises ValueError.
+    signals called in `zero` may all be left out; `scales` are further units of some. Raises
+    ValueError.
     """
     header, _ = lines_of(text)
     names = {cell.partition(" [")[0] for cell in header.cells} if header else set()
     signals = lagged if names & {signal.name for signal in lagged} else replayed
     needed = [s for s, there in zip(signals, replayed, strict=True) if there.name not in zero]
     layouts = {1 + len(some): (TIME, *map(_column, some)) for some in (signals, needed)}
-    rows = timed_rows(text, NOUN, layouts)
+    rows = timed_rows(text, NOUN, layouts, {(name, unit): scale for name, unit, scale in scales})
     given = signals if rows.shape[1] == 1 + len(signals) else needed
     whole = np.zeros((len(rows), 1 + len(signals)))
     whole[:, [0, *(1 + signals.index(signal) for signal in given)]] = rows

@@ -21,6 +21,7 @@ from podusv_cli.components.actuators.propeller import (
     T_AHEAD,
     force,
     speed_for,
+    turning,
 )
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
@@ -32,13 +33,16 @@ AGREED = 1.001  # of the largest angle: more is out of reach
 
 
 @kernel
-def loads(n: float, T: float, delta: float, pod: Vector) -> tuple[float, float]:
-    """Force [N] along and across the vessel of a pod at angle delta [rad], or of its rudder."""
+def loads(turns: float, T: float, delta: float, pod: Vector) -> tuple[float, float]:
+    """Force [N] along and across the vessel of a pod at angle delta [rad], or of its rudder.
+
+    `turns` is how fast its propeller is `turning`.
+    """
     if pod[LIFT] <= 0.0:
         return force(T, delta)
-    if n <= 0.0:
+    if turns <= 0.0:
         return T, 0.0
-    normal = pod[LIFT] * n * n * min(max(delta, -pod[STALL]), pod[STALL])
+    normal = pod[LIFT] * turns * turns * min(max(delta, -pod[STALL]), pod[STALL])
     cosine, sine = cos_sin(delta)
     return T - normal * sine, normal * cosine
 
@@ -72,7 +76,8 @@ def steer_rudder(T: float, angle: float, flow: float, pod: Vector, k: Any, out: 
     for _ in range(ROUNDS):
         cosine, sine = cos_sin(delta)
         n = speed_for(along + across * sine / cosine, flow, pod, k)
-        wanted = across / (pod[LIFT] * n * n * cosine + LEAST)
+        turns = turning(n, pod)
+        wanted = across / (pod[LIFT] * turns * turns * cosine + LEAST)
         delta = min(max(wanted, -most), most)
     out[0], out[1] = min(n, pod[N_AHEAD]), delta
     return bool(n <= pod[N_AHEAD] and abs(wanted) <= AGREED * most)

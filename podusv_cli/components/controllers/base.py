@@ -11,7 +11,7 @@ import numpy as np
 from podusv_cli.components.actuators.recorded import Recorded
 from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import KernelPart
 from podusv_cli.core.kernel import Vector, absent
 from podusv_cli.core.signal import Signal
 
@@ -49,7 +49,7 @@ class ManoeuvreTrial(NamedTuple):
     switch: float = 0.0
 
 
-class Controller(Component):
+class Controller(KernelPart):
     """A law from (state, target) to a demand (tau_u [N], tau_r [N m]).
 
     `law(t, x, memory, target, k, table, tau, rate, signals, work)` is a kernel. It takes those of

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import model_validator
 
-from podusv_cli.core.component import Component, value
+from podusv_cli.core.component import KernelPart, value
 from podusv_cli.core.derived import Derived, norm
 from podusv_cli.core.elementary import exponential
 from podusv_cli.core.kernel import Vector, kernel, padded_rounds, tail, whole_lanes
@@ -43,7 +43,7 @@ NODE_DISTANCE = Signal(
 ACTIVATION = Signal("activation", "1", "largest output of a network node (14)", r"\max\Phi")
 
 
-class Network(Component):
+class Network(KernelPart):
     """Nodes of both networks: a grid over (u, v, r), or a list of centres.
 
     Neither nodes nor widths are printed in the paper; the defaults are podusv's choice.

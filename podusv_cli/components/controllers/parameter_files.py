@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from podusv_cli.core.units import NUMBER
 
@@ -92,32 +92,34 @@ OF_PX4 = re.compile(r"RO_|RD_|PP_")
 FULL_SPEED, TRACK, CORRECTION = "RO_MAX_THR_SPEED", "RD_WHEEL_TRACK", "RO_YAW_RATE_CORR"
 
 
-def of_ardupilot(text: str) -> tuple[Keys, list[str]]:
+def of_ardupilot(text: str, beside: Collection[str]) -> tuple[Keys, list[str]]:
     """Keys of `ardupilot` that a parameter file gives, and remarks. Raises ValueError.
 
-    The throttle of a wanted speed is ATC_SPEED_FF + CRUISE_THROTTLE/(100 CRUISE_SPEED)
-    (AR_AttitudeControl::get_throttle_out_speed). Limits of 0 mean none.
+    `beside` are keys that the scenario itself gives. The throttle of a wanted speed is
+    ATC_SPEED_FF + CRUISE_THROTTLE/(100 CRUISE_SPEED) (AR_AttitudeControl::get_throttle_out_speed).
+    Limits of 0 mean none.
     """
     given = parameters(text)
-    keys, taken, remarks = _direct(given, ARDUPILOT)
+    keys, taken, remarks = _direct(given, ARDUPILOT, beside)
     throttle, speed, feed = (given.get(name, 0.0) for name in CRUISE)
     if {*CRUISE} & given.keys() and (speed > 0.0 or feed > 0.0):
         keys["speed_FF"] = feed + (0.01 * throttle / speed if speed > 0.0 else 0.0)
         taken |= {*CRUISE}
-    if "PSC_POS_P" not in given and "NAVL1_PERIOD" in given:
+    if "PSC_POS_P" not in given and "NAVL1_PERIOD" in given and "guidance" not in beside:
         keys["guidance"] = "l1"
         remarks.append("it has NAVL1_PERIOD and no PSC_POS_P, so guidance is l1")
     return _demand_keys(keys, given, taken, OF_ARDUPILOT, remarks)
 
 
-def of_px4(text: str) -> tuple[Keys, list[str]]:
+def of_px4(text: str, beside: Collection[str]) -> tuple[Keys, list[str]]:
     """Keys of `px4` that a parameter file gives, and remarks. Raises ValueError.
 
-    The throttle of a wanted speed is 1/RO_MAX_THR_SPEED, the steering of a wanted yaw rate
+    `beside` are keys that the scenario itself gives. The throttle of a wanted speed is
+    1/RO_MAX_THR_SPEED, the steering of a wanted yaw rate
     RD_WHEEL_TRACK RO_YAW_RATE_CORR/(2 RO_MAX_THR_SPEED) (RoverControl.cpp). Limits of 0 mean none.
     """
     given = parameters(text)
-    keys, taken, remarks = _direct(given, PX4)
+    keys, taken, remarks = _direct(given, PX4, beside)
     if given.get(FULL_SPEED, 0.0) > 0.0:
         keys["speed_FF"] = 1.0 / given[FULL_SPEED]
         taken.add(FULL_SPEED)
@@ -129,18 +131,27 @@ def of_px4(text: str) -> tuple[Keys, list[str]]:
 
 
 def _direct(
-    given: Parameters, table: Mapping[str, tuple[str, float]]
+    given: Parameters, table: Mapping[str, tuple[str, float]], beside: Collection[str]
 ) -> tuple[Keys, set[str], list[str]]:
     """Keys that are a parameter times a factor, the parameters that they took, and remarks.
 
-    A limit of 0 or less is none for the firmware, and podusv's laws have one: this is said.
+    A limit of 0 or less is none for the firmware, and podusv's laws have one: this is said, but for
+    keys `beside` that the scenario gives.
     """
     there = [name for name in table if name in given]
     none = [name for name in there if table[name][0] in LIMITS and given[name] <= 0.0]
     keys: Keys = {
         table[name][0]: given[name] * table[name][1] for name in there if name not in none
     }
-    return keys, {*there}, [f"{name} sets no limit; podusv's own stands" for name in none]
+    return (
+        keys,
+        {*there},
+        [
+            f"{name} sets no limit; podusv's own stands"
+            for name in none
+            if table[name][0] not in beside
+        ],
+    )
 
 
 def _demand_keys(

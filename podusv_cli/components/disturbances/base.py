@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import KernelPart
 from podusv_cli.core.kernel import Vector, absent, bundle, call
 from podusv_cli.core.signal import Signal
 
@@ -35,7 +35,7 @@ FLOW = (
 ARGUMENTS = ("t", "x", "k", "table", "b", "again", "stage")
 
 
-class Disturbance(Component):
+class Disturbance(KernelPart):
     """A load on the hull in the body frame.
 
     `evaluate(t, x, k, table, b, again, stage)` is a kernel and takes those of these arguments that

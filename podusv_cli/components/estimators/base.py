@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from podusv_cli.components.vessels.vessel import Vessel
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import KernelPart
 from podusv_cli.core.kernel import Vector, absent
 from podusv_cli.core.signal import STATE, Signal
 
@@ -36,7 +36,7 @@ def mean_squared_innovation(squares: Vector, counts: Vector) -> float:
     return float(squares.sum()) / count if count else math.nan
 
 
-class Estimator(Component):
+class Estimator(KernelPart):
     """From measurements to the state that the law works with.
 
     Its own state is part of the closed loop's, and its first six numbers are the estimate. Two

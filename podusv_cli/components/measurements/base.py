@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import KernelPart
 from podusv_cli.core.kernel import Vector, absent
 from podusv_cli.core.signal import STATE, Signal
 
@@ -16,7 +16,7 @@ from podusv_cli.core.signal import STATE, Signal
 VALUE, FRESH, KNOWN, OWN = 0, len(STATE), 2 * len(STATE), 3 * len(STATE)
 
 
-class Measurement(Component):
+class Measurement(KernelPart):
     """What is measured of the vessel's state, and how well.
 
     `sense(t, instant, x, b, k, table, seen)` is a kernel that is called at every instant of the

@@ -16,7 +16,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from podusv_cli.components.paths.fillet import Fillet
-from podusv_cli.core.component import Component
+from podusv_cli.core.component import KernelPart
 from podusv_cli.core.kernel import Vector, absent, bundle, call
 from podusv_cli.core.signal import Signal
 
@@ -33,7 +33,7 @@ class Break:
     what: Literal["position", "velocity", "acceleration"]
 
 
-class Path(Component):
+class Path(KernelPart):
     """A target moving in the plane.
 
     `evaluate(t, x, place, k, table, target)` is a kernel that writes position [m], velocity [m/s]

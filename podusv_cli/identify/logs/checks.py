@@ -14,10 +14,11 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.core.units import PURE
 from podusv_cli.identify.logs.contents import LogFault
 from podusv_cli.identify.logs.heading_checks import FEWEST_BINS, OF_HEADINGS
 from podusv_cli.identify.logs.motion import FAST, BinnedMotion
-from podusv_cli.identify.logs.ranges import IN_MINUTES
+from podusv_cli.identify.logs.ranges import IN_MINUTES, TO_PULSES, like_pulses
 from podusv_cli.identify.logs.reading import SENSED, UNITS, LogTable, delivered_each
 
 SLOWEST = 5.0  # s between rows, with which no turn of a boat can be followed
@@ -78,6 +79,11 @@ def _out_of_reach(motion: BinnedMotion) -> Iterator[str]:
         if reach is None or most <= BEYOND * reach:
             continue
         what = f"{signal.name} reaches {most:.4g} {signal.unit}, and the actuator {reach:.4g}"
+        if signal.unit == PURE and like_pulses(values):
+            raise LogFault(
+                f"{what}; pulses of PWM are written as [us]: give each pod {TO_PULSES}, and write "
+                'the quantity as "COLUMN [us]" under identify.columns'
+            )
         units = [u for u, f in UNITS[signal.unit].items() if f < 1.0 and most * f <= BEYOND * reach]
         if units:
             forms = " or ".join(f'{signal.name}: "COLUMN [{unit}]"' for unit in units)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -12,15 +13,25 @@ from typing import Any
 import numpy as np
 import yaml
 
+from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.core.earth import PLACE
 from podusv_cli.core.escaping import visible
+from podusv_cli.core.kernel import Vector
 from podusv_cli.identify.logs.checks import FINER, SLOWEST
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault, list_names
 from podusv_cli.identify.logs.formats import contents_of
-from podusv_cli.identify.logs.ranges import PLACES, integers_of, on_earth, without_none
+from podusv_cli.identify.logs.ranges import (
+    PLACES,
+    TO_PULSES,
+    integers_of,
+    like_pulses,
+    on_earth,
+    without_none,
+)
 from podusv_cli.identify.logs.reading import UNITS, clock_of, mark_new_values, split_unit
 from podusv_cli.identify.logs.topics import TIME
 
+SERVO = r"rcou\.c\d+|servo_output_raw\.servo\d+_raw"  # channels, of which many drive nothing
 SIDES = "left|right|port|starboard|stbd"
 # What the end of a column's name says of it, the likelier first; "_?" may be a blank, too. "#"
 # stands for 1, 2, ... in the order of the log.
@@ -37,7 +48,7 @@ NAMES = {
     "r": r"r|yaw_?rate|yawspeed|rate_?of_?turn|rot|angular\.z|angular_velocity\.z|gyro_?z|gyrz"
     r"|xyz\[2\]",
     "n_#": rf"n_?\d|(?<![./ _])(n_?)?({SIDES})|.*rpm.*|.*rps.*|"
-    ".*propeller.*|.*motor.*|.*esc.*speed.*",
+    rf".*propeller.*|.*motor.*|.*esc.*speed.*|{SERVO}",
     "delta_#": r"delta_?\d|rsa_starboard|.*rudder.*|.*azimuth.*|.*steer.*|.*pod_?angle.*",
     "tau_u": r"tau_u|surge_?force|force\.x",
     "tau_v": r"tau_v|sway_?force|force\.y",
@@ -53,6 +64,8 @@ NEVER = re.compile(
 )
 PARTS = "n_part_cmd_#"  # speeds that are asked for in parts of full speed
 FULL = 1.001  # largest of these
+PERCENT = 100.0  # largest of these in percent
+DRIVES = {"n_#", PARTS, "delta_#", "tau_u", "tau_v", "tau_r"}  # what an actuator does
 # Of each of these a log needs one, the first where nothing is known.
 DRIVEN = ("n_1", "n_part_cmd_1", "delta_1", "tau_u")
 NEEDED = ((TIME,), ("x", "lat"), ("y", "lon"), ("psi",), DRIVEN)
@@ -130,6 +143,8 @@ class Listing:
             known |= {TIME}  # every message has its own
         lacking = [names[0] for names in NEEDED if not known & {*names}]
         lines += [f"  # {name}: ?   (not guessed; see podusv docs identify)" for name in lacking]
+        if any(own.unit == "us" and own.quantity.startswith("n_part") for own in self.columns):
+            lines.append(f"  # [us] needs {TO_PULSES} in each of actuator.pods")
         left = [visible(own.name) for own in self.columns if not own.quantity]
         if left:
             lines.append(f"  # columns not guessed: {list_names(left)}")
@@ -146,19 +161,53 @@ def _in_quotes(text: str) -> str:
 
 def listing(path: Path) -> Listing:
     """The columns of a log. Raises LogFault, StorageError."""
-    contents = contents_of(path)
+    return list_contents(contents_of(path), path.name)
+
+
+def list_contents(contents: Contents, name: str, actuator: Actuator | None = None) -> Listing:
+    """The columns of what a file called `name` holds.
+
+    What they may be is for a boat with this actuator, where it is given.
+    """
     columns = contents.columns
     guesses = dict(_guesses(columns))
+    if actuator:
+        guesses = dict(_of_boat(guesses, columns, actuator))
     doubts = [f"{name!r} {doubt}" for name, doubt in contents.doubts.items() if name in guesses]
     for column, reason in _no_places(columns, guesses):
         doubts.append(f"{column!r} is not taken for {guesses.pop(column)}: {reason}")
     for column, reason in _no_clocks(contents):
         doubts.append(f"{column!r} is not taken for {TIME}: it {reason}")
     return Listing(
-        [_list_column(name, columns, guesses) for name in columns],
-        any(name.endswith("orientation.yaw") for name in guesses),
-        tuple(f"{path.name}: {line}." for line in (*contents.warnings, *doubts)),
+        [_list_column(own, columns, guesses) for own in columns],
+        any(own.endswith("orientation.yaw") for own in guesses),
+        tuple(f"{name}: {line}." for line in (*contents.warnings, *doubts)),
     )
+
+
+def _of_boat(
+    guesses: dict[str, str], columns: Columns, actuator: Actuator
+) -> Iterator[tuple[str, str]]:
+    """The guesses that this actuator takes, as many of each as it has.
+
+    Where it counts in parts, numbers up to 100 are percents.
+    """
+    fixed = {name for name in actuator.zero_where_missing if name != _numbered(name)}
+    signals = (*actuator.replayed, *actuator.lagged)
+    known = Counter(_numbered(s.name) for s in signals if s.name not in fixed)
+    taken = Counter[str]()
+    for column, guess in guesses.items():
+        most = float(np.nanmax(np.abs(columns[column]), initial=0.0))
+        if guess == "n_#" and known[PARTS] and "rp" not in _plain(column) and most <= PERCENT:
+            guess = PARTS
+        if guess not in DRIVES or taken[guess] < known[guess]:
+            taken[guess] += 1
+            yield column, guess
+
+
+def _numbered(name: str) -> str:
+    """`n_part_cmd_2` as all of its kind: `n_part_cmd_#`."""
+    return re.sub(r"\d+$", "#", name)
 
 
 def _places(guesses: dict[str, str]) -> dict[str, str]:
@@ -229,16 +278,30 @@ def _may_be(column: str, columns: Columns) -> bool:
         return False
     if not np.isfinite(columns[column]).any():
         return False
+    if re.search(SERVO, column.lower()):
+        return like_pulses(columns[column]) and float(np.nanmin(columns[column])) < float(
+            np.nanmax(columns[column])
+        )
     beside, known = plain.removesuffix("vx").removesuffix("vy"), {*map(_plain, columns)}
     on_earth = ({f"{beside}x", f"{beside}y"}, {f"{beside}lat", f"{beside}lon"})
     return beside == plain or not any(places <= known for places in on_earth)
 
 
 def _in_parts(column: str, columns: Columns) -> bool:
-    """Whether a propeller's numbers are percents, or lie between full astern and full ahead."""
+    """Whether a propeller's numbers are percents, pulses, or from full astern to full ahead."""
     values = columns[column]
+    if _in_pulses(column, values):
+        return True
     most = float(np.nanmax(np.abs(values), initial=0.0))
     return split_unit(column)[1] == "%" or ("rp" not in _plain(column) and 0.0 < most <= FULL)
+
+
+def _in_pulses(column: str, values: Vector) -> bool:
+    """Whether a propeller's numbers are pulses [us], by unit or by size."""
+    unit, most = split_unit(column)[1], float(np.nanmax(np.abs(values), initial=0.0))
+    return unit == "us" or (
+        not unit and "rp" not in _plain(column) and most > 100.0 and like_pulses(values)
+    )
 
 
 def _pattern(quantity: str) -> str:
@@ -264,8 +327,11 @@ def _unit(name: str, columns: Columns, guesses: dict[str, str]) -> str:
     """Of a column: in brackets, at the end of its name, or by its range."""
     quantity, (own, unit) = guesses[name], split_unit(name)
     values, _ = without_none(columns[name])
+    most = float(np.nanmax(np.abs(values), initial=0.0))
     if unit:
         return unit
+    if quantity == PARTS:
+        return "us" if _in_pulses(name, columns[name]) else "%" if most > FULL else ""
     ending = next((e for e in ENDINGS if re.search(rf"(^|[._]){e}$", own.lower())), None)
     if ending is not None:
         return ENDINGS[ending]
@@ -277,7 +343,6 @@ def _unit(name: str, columns: Columns, guesses: dict[str, str]) -> str:
     if quantity in PLACES and places.keys() == PLACES.keys():
         lat, lon = (without_none(columns[places[place]])[0] for place in PLACES)
         return "1e-7 deg" if integers_of(lat, lon) else ""
-    most = float(np.nanmax(np.abs(values), initial=0.0))
     return next((unit for least, unit in BEYOND.get(quantity, ()) if most > least), "")
 
 

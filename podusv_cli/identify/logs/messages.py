@@ -174,10 +174,12 @@ def read_telemetry(path: Path) -> Contents:
     library = _library("pymavlink.mavutil", path)
     # Not `mavlink_connection`: it runs a file in a folder `bin`, and takes names for sockets.
     log = library.mavmmaplog(str(path))
-    messages, first, systems = TopicMessages(), math.nan, list[int]()
+    messages, first, systems, lost = TopicMessages(), math.nan, list[int](), 0
     while (message := log.recv_match()) is not None:
         kind, arrival = message.get_type(), float(getattr(message, "_timestamp", math.nan))
-        if kind == "BAD_DATA" or not math.isfinite(arrival):
+        # Of what pymavlink does not know it checks nothing, not even whose it is.
+        if kind == "BAD_DATA" or kind.startswith("UNKNOWN") or not math.isfinite(arrival):
+            lost += 1
             continue
         first = arrival if math.isnan(first) else first
         content = message.to_dict().items()
@@ -187,7 +189,8 @@ def read_telemetry(path: Path) -> Contents:
             systems.append(system)
         which = systems.index(system)  # of several vehicles the first has no number
         messages.add(f"{kind}_{which + 1}" if which else kind, arrival - first, numbers)
-    return Contents(messages.columns())
+    said = f"left out, damaged or of no known type: {lost} messages"
+    return Contents(messages.columns(), warnings=(said,) if lost else ())
 
 
 @_fence_reader

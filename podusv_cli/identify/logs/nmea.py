@@ -11,7 +11,7 @@ import functools
 import math
 import operator
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, date, datetime, time
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from podusv_cli.core.units import NUMBER
 from podusv_cli.identify.logs.contents import Contents, LogFault
 from podusv_cli.identify.logs.topics import TopicMessages
 
-SENTENCE = re.compile(r"[$!]([A-Z]{2}[A-Z]{3}|P[A-Z]{3,4})(,[^*]*)(?:\*([0-9A-Fa-f]{2}))?")
+SENTENCE = re.compile(r"[$!]([A-Z]{2}[A-Z]{3}|P[A-Z]{3,4})(,[^*$!]*)(?:\*([0-9A-Fa-f]{2}))?")
 LEADING = re.compile(r"^([-+]?)0+(?=\d)")  # zeros, as in 091.5
 MOSTLY = 0.9  # of the sentences; where more have a wrong checksum, the logger made these
 PLACES = {"lat": "latitude", "lon": "longitude"}  # what pynmea2 calls them in degrees
@@ -69,15 +69,15 @@ def is_nmea(text: str) -> bool:
 
 def contents_of_sentences(text: str, parse: Any) -> Contents:
     """The columns of a log; `parse` is pynmea2's. Raises LogFault where no sentence has a clock."""
-    matches = [match for line in text.splitlines() if (match := SENTENCE.search(line))]
-    wrong = [bool(m[3]) and _checksum(m[1] + m[2]) != int(m[3], 16) for m in matches]
-    rows = [i for i, bad in enumerate(wrong) if not bad]
-    warnings = []
-    if sum(wrong) > MOSTLY * len(wrong):
-        rows = list(range(len(matches)))
-        warnings = [f"{sum(wrong)} of {len(wrong)} sentences have a wrong checksum; all are read"]
-    elif any(wrong):
-        warnings = [f"left out for a wrong checksum: {sum(wrong)} of {len(wrong)} sentences"]
+    lines = [line for line in text.splitlines() if line.strip()]
+    found = [list(SENTENCE.finditer(line)) for line in lines]
+    matches = [match for line in found for match in line]
+    rows, warnings = _sound_rows(matches)
+    odd = [_has_pieces(line, own) for line, own in zip(lines, found, strict=True)]
+    if lost := sum(odd):
+        warnings.append(
+            f"no whole sentences, of which parts are left out: {lost} of {len(lines)} lines"
+        )
     sentences = [_sentence(parse, matches[i]) for i in rows]
     kept = [(i, s) for i, s in zip(rows, sentences, strict=True) if s]
     times = _times(kept)
@@ -86,6 +86,31 @@ def contents_of_sentences(text: str, parse: Any) -> Contents:
         if sentence.numbers and math.isfinite(at):
             topics.add(sentence.kind, at, sentence.numbers)
     return Contents(topics.columns(), warnings=tuple(warnings))
+
+
+def _has_pieces(line: str, found: Sequence[re.Match[str]]) -> bool:
+    """Whether a line has pieces of sentences beside those that were found in it.
+
+    What a logger writes before them is its own affair; behind them nothing belongs.
+    """
+    if not found or line[found[-1].end() :].strip():
+        return True
+    return any(mark in SENTENCE.sub("", line) for mark in "$!*")
+
+
+def _sound_rows(matches: Sequence[re.Match[str]]) -> tuple[list[int], list[str]]:
+    """Which sentences have a right checksum, and how many have not.
+
+    One without any is cut where most have theirs.
+    """
+    without = [not m[3] for m in matches]
+    cut = sum(without) < 0.5 * len(matches)
+    wrong = [cut if not m[3] else _checksum(m[1] + m[2]) != int(m[3], 16) for m in matches]
+    if sum(wrong) > MOSTLY * len(wrong):
+        said = f"{sum(wrong)} of {len(wrong)} sentences have a wrong checksum; all are read"
+        return list(range(len(matches))), [said]
+    said = f"left out for a wrong checksum: {sum(wrong)} of {len(wrong)} sentences"
+    return [i for i, bad in enumerate(wrong) if not bad], [said] if any(wrong) else []
 
 
 def _checksum(body: str) -> int:

@@ -20,6 +20,8 @@ IN_MINUTES = (
 FINE, COARSE = 1e-7, 1e-6  # deg, the units of positions that are integers
 FEWEST = 1e3  # times the largest degrees, below which integers are in none of these
 TURN = 360.0  # deg
+PULSES = (800.0, 2200.0)  # us, of servos and speed controllers
+TO_PULSES = "pwm: {rest: 1500, span: 400}"
 NEARBY = 1.0  # deg, within which a log's track stays
 APART = 0.2  # of the range of all other values, that one for "none" lies beyond them
 # What sensors and buses write where they have no value: the largest numbers of 16 and 32 bits with
@@ -54,6 +56,29 @@ def without_none(values: Vector) -> tuple[Vector, str]:
             )
             values = np.where(alike, np.nan, values)
     return values, " and ".join(words)
+
+
+def like_pulses(values: Vector) -> bool:
+    """Whether there are values, and all but 0 are pulses [us], or hundredths of some."""
+    known = values[np.isfinite(values) & (values != 0.0)]
+    sized = [(known * scale > PULSES[0]) & (known * scale < PULSES[1]) for scale in (1.0, 100.0)]
+    return bool(len(known)) and any(map(np.all, sized))
+
+
+def pulses_alone(values: Vector, rest: float) -> tuple[Vector, str]:
+    """Pulses [us], and which values are none: 0, which is taken for `rest`, and all out of range.
+
+    `rest` is the pulse at which a thruster stands, as it does without any.
+    """
+    none = values == 0.0
+    beyond = ((values < PULSES[0]) | (values > PULSES[1])) & ~none
+    words = []
+    if none.any():
+        words.append(f"is 0 us {_often(none)}, which is no pulse and taken for rest")
+    if beyond.any():
+        first = float(values[beyond][0])
+        words.append(f"is out of range {_often(beyond)}: {first:.10g} us, which is left out")
+    return np.where(none, rest, np.where(beyond, np.nan, values)), " and ".join(words)
 
 
 def _often(marks: Marks) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,11 +19,18 @@ from podusv_cli.core import units
 from podusv_cli.core.earth import PLACE, Plane
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.signal import STATE, Signal
-from podusv_cli.core.units import spell_unit, units_allowed_for
+from podusv_cli.core.units import Scale, Scales, spell_unit, units_allowed_for
 from podusv_cli.identify.logs.contents import Columns, Contents, LogFault, list_names
 from podusv_cli.identify.logs.formats import contents_of
 from podusv_cli.identify.logs.frames import from_frame, local_plane
-from podusv_cli.identify.logs.ranges import PLACES, may_be_minutes, on_earth, without_none
+from podusv_cli.identify.logs.ranges import (
+    PLACES,
+    TO_PULSES,
+    may_be_minutes,
+    on_earth,
+    pulses_alone,
+    without_none,
+)
 from podusv_cli.identify.logs.topics import TIME
 
 Marks = npt.NDArray[np.bool_]
@@ -97,12 +105,14 @@ class LogTable:
 class NamedQuantities(NamedTuple):
     """What a log calls quantities, the frame that it has them in, and where x = y = 0 is on earth.
 
-    Without a plane x and y of latitudes and longitudes count from the first fix.
+    Without a plane x and y of latitudes and longitudes count from the first fix. `scales` are units
+    that the boat's actuator has beside those of all.
     """
 
     columns: Mapping[str, str] = {}
     frame: Literal["ned", "enu"] = "ned"
     plane: Plane | None = None
+    scales: Scales = MappingProxyType({})
 
 
 class _Series(NamedTuple):
@@ -192,9 +202,9 @@ def _series(
         used |= {signal.name: found.column}
         if clock and own == clock.column:
             used[CLOCK.name] = own
-        values, doubt = _plausible(signal, columns[found.column], found.factor, name)
+        values, doubt = _plausible(signal, columns[found.column], found.scale, name)
         words += [f"{signal.name} {doubt}"] if doubt else []
-        factor = clock.factor if clock and own == clock.column else 1.0
+        factor = clock.scale.factor if clock and own == clock.column else 1.0
         series[signal.name] = _Series(own, columns[own] * factor, values)
     if not series:
         raise LogFault(
@@ -205,15 +215,18 @@ def _series(
     return series, [*_doubts(contents, used, name), *words]
 
 
-def _plausible(signal: Signal, values: Vector, factor: float, name: str) -> tuple[Vector, str]:
+def _plausible(signal: Signal, values: Vector, scale: Scale, name: str) -> tuple[Vector, str]:
     """The values of a column in podusv's unit, and which of them are left out."""
+    if scale.zero:
+        values, doubt = pulses_alone(values, scale.zero)
+        return (values - scale.zero) * scale.factor, doubt
     if signal.name not in SENSED:
-        return values * factor, ""
+        return values * scale.factor, ""
     values, doubt = without_none(values)
     if signal.name not in PLACES:
-        return values * factor, doubt
+        return values * scale.factor, doubt
     try:
-        places, beyond = on_earth(signal, values * factor)
+        places, beyond = on_earth(signal, values * scale.factor)
     except LogFault as fault:
         raise LogFault(f"{name}: {fault}") from fault
     return places, " and ".join(filter(None, (doubt, beyond)))
@@ -256,13 +269,13 @@ def _boots(series: Mapping[str, _Series]) -> list[Mapping[str, _Series]]:
 
 class _Found(NamedTuple):
     column: str
-    factor: float
+    scale: Scale
 
 
 def _find_column(
     columns: Columns, signal: Signal, named: NamedQuantities, name: str
 ) -> _Found | None:
-    """The column that has a quantity, and what its numbers are multiplied by.
+    """The column that has a quantity, and the scale of its numbers.
 
     None where there is none and none was named. Raises LogFault.
     """
@@ -279,7 +292,9 @@ def _find_column(
             f"identify.columns, as {signal.name}: {alike[0]!r}"
         )
     if alike:
-        return _Found(alike[0], sign * _factor(signal, unit or split_unit(alike[0])[1], name))
+        unit = unit or split_unit(alike[0])[1]
+        zero, factor = _scale(signal, unit, named.scales.get(signal.name, {}), name)
+        return _Found(alike[0], Scale(zero, sign * factor))
     if place is None:
         return None
     near = difflib.get_close_matches(asked, columns, 1)
@@ -293,12 +308,17 @@ def split_unit(name: str) -> tuple[str, str]:
     return (match[1], match[2] or match[3]) if match else (name, "")
 
 
-def _factor(signal: Signal, unit: str, name: str) -> float:
-    """What a value in this unit is times, in podusv's. Raises LogFault for another quantity's."""
-    known = UNITS.get(signal.unit, {signal.unit: 1.0})
-    if unit and spell_unit(unit) not in known:
-        raise LogFault(f"{name}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}")
-    return known[spell_unit(unit)] if unit else 1.0
+def _scale(signal: Signal, unit: str, own: Mapping[str, Scale], name: str) -> Scale:
+    """That of a unit, "" for podusv's; `own` are those of the boat's actuator. Raises LogFault."""
+    factors = UNITS.get(signal.unit, {signal.unit: 1.0})
+    known = {there: Scale(0.0, factor) for there, factor in factors.items()} | {**own}
+    spelled = spell_unit(unit)
+    if unit and spelled not in known:
+        pulses = f"; pulses of PWM need {TO_PULSES} in each pod" if spelled == "us" else ""
+        raise LogFault(
+            f"{name}: {signal.name} is given in {unit!r}; allowed: {', '.join(known)}{pulses}"
+        )
+    return known[spelled] if unit else Scale(0.0, 1.0)
 
 
 def clock_of(column: str, columns: Collection[str]) -> str | None:
