@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
 
 # Those that a system has: SIGHUP where the terminal is lost, SIGBREAK by Ctrl-Break on Windows.
 SIGNALS = tuple(
@@ -11,6 +15,11 @@ SIGNALS = tuple(
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     if hasattr(signal, name)
 )
+
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+TRIES = 10  # of a rename on Windows, where a virus scanner may have a file open for a moment
+PAUSE = 0.05  # s between two of them
 
 
 def open_flags(*names: str) -> int:
@@ -56,3 +65,52 @@ def belongs_to_user(status: os.stat_result) -> bool:
     """Whether a file is the user's own; Windows keeps owners elsewhere, and homes private."""
     whose = getattr(os, "getuid", None)
     return whose is None or status.st_uid == whose()
+
+
+def has_display() -> bool:
+    """Whether a browser can show a page."""
+    return sys.platform in ("darwin", "win32") or any(map(os.environ.get, DISPLAYS))
+
+
+def sync_disk() -> bool:
+    """Write all files to the disk; False where a system cannot but file by file."""
+    sync = getattr(os, "sync", None)
+    if sync:
+        sync()
+    return sync is not None
+
+
+def name_of_open_file(descriptor: int, path: Path) -> str:
+    """A name of an open file that stays its own, whatever is put in its place meanwhile.
+
+    Windows puts nothing in the place of a file that is open.
+    """
+    return str(path) if os.name == "nt" else f"/dev/fd/{descriptor}"
+
+
+def relative_path(path: str | Path, folder: str | Path = ".") -> str:
+    """A path from a folder on, written as every system reads it; whole from another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).absolute().as_posix()
+
+
+def rename_folder(folder: Path, final: Path) -> None:
+    """Give a folder another name, in place of an empty folder if there is one. Raises OSError.
+
+    Windows replaces no folder, and renames none while a file in it is open.
+    """
+    if os.name != "nt":
+        os.rename(folder, final)
+        return
+    with suppress(OSError):  # it holds something, or is not there
+        os.rmdir(final)
+    for left in reversed(range(TRIES)):
+        try:
+            os.rename(folder, final)
+            return
+        except PermissionError:
+            if not left:
+                raise
+            time.sleep(PAUSE)

@@ -33,7 +33,7 @@ Job = Callable[[Progress], Any]
 Report = Callable[[int, float], None]
 GRACE = 1.5  # s after an interrupt, in which jobs may return a partial result
 INTERRUPTED = "interrupted"
-FORK = multiprocessing.get_context("fork")  # workers inherit imported and compiled code
+FORK: Any = multiprocessing.get_context("fork")  # workers inherit imported and compiled code
 SHARE = 4  # small jobs, at least, that are worth a process
 TRIES = 2  # a job whose process is killed runs once more
 

@@ -15,6 +15,7 @@ from typing import BinaryIO
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
+from podusv_cli.core.system import sync_disk
 from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 from podusv_cli.storage import files
 
@@ -140,7 +141,10 @@ class Archive:
                 copyfileobj(self._archive.open(entry), file)
             done += entry.file_size
             tell(done / whole)
-        os.sync()  # to sync each of thousands of small files takes a hundred times as long
+        # To sync each of thousands of small files takes a hundred times as long.
+        if not sync_disk():
+            for name in self._entries:
+                files.sync_file(folder / name)
 
     def fault(self, why: str) -> StorageError:
         """An error that says why this archive is not unpacked."""
