@@ -8,6 +8,10 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
 
 # Those that a system has: SIGHUP where the terminal is lost, SIGBREAK by Ctrl-Break on Windows.
 SIGNALS = tuple(
@@ -59,6 +63,15 @@ def is_running(process: int) -> bool:
         return bool(psutil.pid_exists(process))
     except (OverflowError, OSError):
         return True
+
+
+def ask_to_end(process: BaseProcess) -> None:
+    """Ask a worker process to end with what it has.
+
+    Windows would end it at once, and has told all processes of a terminal by itself.
+    """
+    if os.name != "nt":
+        process.terminate()
 
 
 def belongs_to_user(status: os.stat_result) -> bool:
