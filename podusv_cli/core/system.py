@@ -21,6 +21,9 @@ SIGNALS = tuple(
 )
 
 
+# What Windows takes for a device, with any ending: no file and no folder there has such a name.
+PORTS = [f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10)]
+DEVICES = {"con", "prn", "aux", "nul", *PORTS}
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 TRIES = 10  # of a rename on Windows, where a virus scanner may have a file open for a moment
 PAUSE = 0.05  # s between two of them
@@ -78,6 +81,24 @@ def belongs_to_user(status: os.stat_result) -> bool:
     """Whether a file is the user's own; Windows keeps owners elsewhere, and homes private."""
     whose = getattr(os, "getuid", None)
     return whose is None or status.st_uid == whose()
+
+
+def name_refused(name: str) -> str:
+    """Why no folder can have this name on Windows; "" where it can. Results go to others."""
+    if name.partition(".")[0].rstrip().lower() in DEVICES:
+        return f"{name} is a device on Windows, so no folder can have this name; take another one"
+    if name.endswith((".", " ")):
+        return f"{name!r} ends in {name[-1]!r}, which Windows leaves out; take another name"
+    return ""
+
+
+def stays_inside(name: str) -> bool:
+    """Whether this system takes `a/b` for a file b in a folder a, and for nothing else.
+
+    On Windows `\\` parts folders, a colon names a drive or a stream, and some names are devices.
+    """
+    is_odd = "\\" in name or ":" in name or any(map(name_refused, name.split("/")))
+    return os.name != "nt" or not is_odd
 
 
 def has_display() -> bool:
