@@ -5,8 +5,6 @@ import sys
 
 from podusv_cli import WITHOUT_DOCSTRINGS
 
-ELSEWHERE = "podusv runs on Linux; on Windows use WSL, on macOS a container or virtual machine"
-
 
 def leave_out_current_folder() -> None:
     """Take the folder where `python -m` begins off `sys.path`, unless podusv itself lies there.
@@ -23,8 +21,6 @@ def main() -> None:
 
     Python's own handler would print where in the imports it was.
     """
-    if sys.platform != "linux":
-        sys.exit(ELSEWHERE)
     if sys.flags.optimize > 1:
         sys.exit(WITHOUT_DOCSTRINGS)
     import signal

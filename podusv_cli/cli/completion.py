@@ -158,7 +158,7 @@ def laws(context: typer.Context, incomplete: str) -> Offered:
     from pathlib import Path
 
     try:
-        about = json.loads((Path(context.params["study"]) / "study.json").read_text())
+        about = json.loads((Path(context.params["study"]) / "study.json").read_text("utf-8"))
         return _beginning(incomplete, dict.fromkeys(map(str, about["laws"]), ""))
     except (KeyError, TypeError, OSError, ValueError):
         return []  # no study, or none that can be read: there is no place for a message

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +12,7 @@ from podusv_cli.cli import options
 from podusv_cli.cli.compare import SOME_FAILED, echo_comparison
 from podusv_cli.cli.exit_codes import INTERRUPTED
 from podusv_cli.cli.terminal import echo
+from podusv_cli.core.system import has_display
 
 SCENARIO = "podusv:demo.yaml"
 HEADER = 2  # its lines for editors and maintainers
@@ -24,7 +24,6 @@ it, and its propellers give no more than 8 N and 2.5 N m. This file has all of i
 MEANWHILE = """\
 Simulating, which takes some seconds, and a few more where numba has to compile a kernel.
 Watch pid_winds_up on the page: while the limit holds the vessel back, the law's integral grows."""
-DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def demo(
@@ -73,6 +72,5 @@ def _open(page: Path, wanted: bool) -> None:
     """Open a page where there is a display, and name it."""
     import webbrowser
 
-    has_display = sys.platform == "darwin" or any(map(os.environ.get, DISPLAYS))
-    opened = wanted and has_display and webbrowser.open(page.resolve().as_uri())
+    opened = wanted and has_display() and webbrowser.open(page.resolve().as_uri())
     echo(f"{'opened' if opened else 'open this page in a browser:'} {page}")

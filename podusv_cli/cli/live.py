@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import sys
 from functools import partial
 from typing import Annotated
@@ -11,8 +10,9 @@ from typing import Annotated
 import typer
 
 from podusv_cli.cli import options
-from podusv_cli.cli.demo import DISPLAYS, SCENARIO
+from podusv_cli.cli.demo import SCENARIO
 from podusv_cli.cli.terminal import echo
+from podusv_cli.core.system import has_display
 
 
 def live(
@@ -52,8 +52,7 @@ def live(
         """Print the page's address, and open it where there is a display."""
         import webbrowser
 
-        has_display = sys.platform == "darwin" or any(map(os.environ.get, DISPLAYS))
-        opened = browser and has_display and webbrowser.open(address)
+        opened = browser and has_display() and webbrowser.open(address)
         echo(f"{'opened' if opened else 'open in a browser:'} {address}", "Ctrl-C ends it")
         sys.stdout.flush()
 

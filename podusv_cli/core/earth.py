@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import arctangents
 from podusv_cli.core.recording import Allocate, Recording, blocks
 from podusv_cli.core.signal import Signal
 
@@ -65,8 +66,8 @@ class Plane:
         with np.errstate(invalid="ignore"):
             rise = -rest / (half + np.sqrt(half * half - square * rest))
         outward, upward = outward + rise * c, upward + rise * s
-        lat = np.degrees(np.arctan2(upward * stretch, np.hypot(outward, east)))
-        lon = self.lon + np.degrees(np.arctan2(east, outward))
+        lat = np.degrees(arctangents(upward * stretch, np.sqrt(outward**2 + east**2)))
+        lon = self.lon + np.degrees(arctangents(east, outward))
         return lat, (lon + 180.0) % 360.0 - 180.0
 
 

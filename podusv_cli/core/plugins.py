@@ -83,6 +83,10 @@ class Plugin:
             what = f"installed package {self}: entry point {point.name} = {point.value}"
             raise LawError(f"{what} cannot be imported: {in_a_line(error)}") from error
 
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        """A file crosses to another process as its path and text; its module does not."""
+        return (from_file, (self.path, self.text)) if self.text else super().__reduce__()
+
     def as_json(self) -> dict[str, str]:
         """What provenance.json says of it."""
         which = {"file": self.path} if self.path else {"package": self.name}

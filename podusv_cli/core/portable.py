@@ -1,7 +1,8 @@
-"""Exponential, logarithm and normal quantiles of arrays, with the same bits on every machine.
+"""Functions and sums of arrays, with the same bits on every machine.
 
-Only plain arithmetic and square roots; logarithms and exponentials of libraries differ in the last
-bit between processors. So drawn numbers depend on no machine.
+Only plain arithmetic and square roots: functions of libraries differ in the last bit between
+processors, and so do sums, in whose order a library has a free choice. So drawn numbers, and what
+is computed after a march, depend on no machine.
 """
 
 from __future__ import annotations
@@ -10,7 +11,17 @@ import math
 
 import numpy as np
 
-from podusv_cli.core.elementary import LN2, LOG2_E, E
+from podusv_cli.core.elementary import (
+    LARGEST_ANGLE,
+    LN2,
+    LOG2_E,
+    QUARTER,
+    QUARTER_PI,
+    ROUND,
+    STEEPEST,
+    A,
+    E,
+)
 from podusv_cli.core.kernel import Vector
 
 # Wichura (1988), algorithm AS 241, PPND16: numerator and denominator of each of its three parts.
@@ -43,6 +54,9 @@ CENTRAL, TAIL, FAR_TAIL = (
 # fmt: on
 
 
+WITHIN = (-746.0, 710.0)  # beyond, e^x is 0 or infinite
+
+
 def _polynomial(x: Vector, coefficients: tuple[float, ...]) -> Vector:
     """Horner's scheme at x (n,), the highest power first."""
     result = np.full_like(x, coefficients[0])
@@ -62,10 +76,79 @@ def logarithm(x: Vector) -> Vector:
 
 
 def exponential(x: Vector) -> Vector:
-    """e^x of x (n,), to two units in the last place."""
+    """e^x of x of any shape, to two units in the last place; 0 or infinity beyond its range."""
+    x = np.clip(x, *WITHIN)
     n = np.rint(x * LOG2_E)
     r = (x - n * LN2[0]) - n * LN2[1]
     return np.ldexp(_polynomial(r, E[::-1]), n.astype(np.int32))
+
+
+def cosine_and_sine(angle: Vector) -> tuple[Vector, Vector]:
+    """Cosine and sine of angles [rad] (n,), with the bits of `elementary.cos_sin`."""
+    angle = np.where(np.abs(angle) <= LARGEST_ANGLE, angle, np.nan)
+    z = angle * (2.0 / math.pi) + ROUND
+    n = z - ROUND
+    r = ((angle - n * QUARTER[0]) - n * QUARTER[1]) - n * QUARTER[2]
+    q = -r * r
+    q4 = (q * q) * (q * q)
+    even = _cubic(q, E[2:9:2]) + q4 * _cubic(q, E[10:17:2])
+    odd = _cubic(q, E[3:10:2]) + q4 * _cubic(q, E[11:18:2])
+    cosine, sine = 1.0 + q * even, r + r * q * odd
+    quarters = z.view(np.int64)  # its last two bits count quarter turns
+    turned, over = (quarters & 1) > 0, np.where(quarters & 2, -1.0, 1.0)
+    cosine, sine = np.where(turned, -sine, cosine), np.where(turned, cosine, sine)
+    return over * cosine, over * sine
+
+
+def arctangents(y: Vector, x: Vector) -> Vector:
+    """Angles [rad] of vectors (x, y) from the x axis (n,), in the bits of `arctangent`."""
+    across, along = np.abs(y), np.abs(x)
+    steep = across > along
+    short, long = np.minimum(across, along), np.maximum(across, along)
+    beyond = short > STEEPEST * long
+    above = np.where(beyond, short - long, short)
+    below = np.where(beyond, short + long, long)
+    z = above / np.where(below > 0.0, below, 1.0)
+    w = z * z
+    w4 = (w * w) * (w * w)
+    series = _cubic(w, A[:4]) + w4 * (_cubic(w, A[4:8]) + w4 * _cubic(w, A[8:12]))
+    angle = z + z * (w * series)
+    angle = np.where(beyond, QUARTER_PI[0] + (QUARTER_PI[1] + angle), angle)
+    angle = np.where(steep, 2.0 * QUARTER_PI[0] - (angle - 2.0 * QUARTER_PI[1]), angle)
+    angle = np.where(x < 0.0, 4.0 * QUARTER_PI[0] - (angle - 4.0 * QUARTER_PI[1]), angle)
+    return np.where(y < 0.0, -angle, angle)
+
+
+def _cubic(x: Vector, c: tuple[float, ...]) -> Vector:
+    """A polynomial of four coefficients at x (n,), in the order of `elementary`."""
+    return (c[0] + x * c[1]) + (x * x) * (c[2] + x * c[3])
+
+
+def total(terms: Vector) -> Vector:
+    """The sum over the first axis of terms (n, ...), by halves."""
+    terms = np.asarray(terms)
+    while len(terms) > 1:
+        half, odd = divmod(len(terms), 2)
+        folded = terms[:half] + terms[half : 2 * half]
+        if odd:
+            folded[0] += terms[-1]
+        terms = folded
+    return terms[0] if len(terms) else np.zeros(terms.shape[1:])
+
+
+def solve(matrix: Vector, right: Vector) -> Vector:
+    """x of matrix x = right, for a symmetric positive definite matrix (n, n) and right (n,).
+
+    By elimination without pivots, which such a matrix does not need.
+    """
+    rest, x = matrix.copy(), right.copy()
+    for i in range(len(x) - 1):
+        factors = rest[i + 1 :, i] / rest[i, i]
+        rest[i + 1 :, i + 1 :] -= factors[:, None] * rest[i, i + 1 :]
+        x[i + 1 :] -= factors * x[i]
+    for i in reversed(range(len(x))):
+        x[i] = (x[i] - total(rest[i, i + 1 :] * x[i + 1 :])) / rest[i, i]
+    return x
 
 
 def _ratio(x: Vector, part: tuple[tuple[float, ...], tuple[float, ...]]) -> Vector:

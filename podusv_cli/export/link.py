@@ -21,6 +21,7 @@ MACHINES = {
     ("Linux", "aarch64"): "aarch64-linux",
     ("Windows", "AMD64"): "win64",
     ("Darwin", "x86_64"): "darwin64",
+    ("Darwin", "arm64"): "aarch64-darwin",
 }
 NO_ZIG = (
     "there is no linker for {0}: install a C compiler, or zig with pip install "

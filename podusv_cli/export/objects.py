@@ -49,6 +49,9 @@ PLATFORMS: Mapping[str, Platform] = {
     ),
     "win64": Platform("x86_64-pc-windows-gnu", "x86-64", zig="x86_64-windows-gnu", library=".dll"),
     "darwin64": Platform("x86_64-apple-darwin", "x86-64", zig="x86_64-macos", library=".dylib"),
+    "aarch64-darwin": Platform(
+        "arm64-apple-darwin", "apple-m1", zig="aarch64-macos", library=".dylib"
+    ),
     "aarch64-linux": Platform(
         "aarch64-unknown-linux-gnu", "generic", zig="aarch64-linux-gnu", library=".so"
     ),

@@ -1,26 +1,32 @@
 """Jobs in processes of their own: a job that kills its process affects no other job.
 
-So each process has a pipe of its own. The pools of concurrent.futures and pebble share one, and a
+A process is forked for each job where that is safe, on Linux. Elsewhere a process begins empty,
+which takes a second, and does one job after the other.
+
+Each process has a pipe of its own. The pools of concurrent.futures and pebble share one, and a
 process that is killed while it sends its result stops all others.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import pickle
+import sys
 import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from pickle import PicklingError, UnpicklingError
-from typing import Any
+from types import ModuleType
+from typing import Any, Protocol
 
 from podusv_cli.core.errors import PodusvError, StorageError
-from podusv_cli.core.system import usable_cores
+from podusv_cli.core.system import ask_to_end, usable_cores
 from podusv_cli.process.interrupts import (
     Interrupts,
     interrupts_caught,
@@ -31,9 +37,9 @@ from podusv_cli.process.interrupts import (
 Progress = Callable[[float], None]
 Job = Callable[[Progress], Any]
 Report = Callable[[int, float], None]
+Pipe = Any  # the end of one, whose class is another on Windows
 GRACE = 1.5  # s after an interrupt, in which jobs may return a partial result
 INTERRUPTED = "interrupted"
-FORK = multiprocessing.get_context("fork")  # workers inherit imported and compiled code
 SHARE = 4  # small jobs, at least, that are worth a process
 TRIES = 2  # a job whose process is killed runs once more
 
@@ -149,6 +155,105 @@ def run_each(
     return True
 
 
+class Crew(Protocol):
+    """How processes come to their jobs."""
+
+    def begin(self, job: Job, others: Iterable[Pipe]) -> tuple[Pipe, BaseProcess]:
+        """The pipe of a process that does a job now, and the process; `others` are under way."""
+
+    def end(self, pipe: Pipe, process: BaseProcess) -> None:
+        """A process has sent its outcome, or has ended."""
+
+    def dismiss(self) -> None:
+        """No job comes any more."""
+
+
+class Forked:
+    """A process a job: it inherits the job, and all code that is imported and compiled."""
+
+    def __init__(self) -> None:
+        """Nothing is shared between two jobs."""
+        self._context: Any = multiprocessing.get_context("fork")
+
+    def begin(self, job: Job, others: Iterable[Pipe]) -> tuple[Pipe, BaseProcess]:
+        """As `Crew` says."""
+        ours, theirs = self._context.Pipe(duplex=False)
+        # A process notices that its parent has ended only if no other holds the pipe's end.
+        process = self._context.Process(target=_work, args=(job, theirs, [ours, *others]))
+        process.start()
+        theirs.close()
+        return ours, process
+
+    def end(self, pipe: Pipe, process: BaseProcess) -> None:
+        """As `Crew` says; it was for this job alone."""
+        pipe.close()
+        process.join()
+
+    def dismiss(self) -> None:
+        """Nobody waits."""
+
+
+class Spawned:
+    """Processes that begin empty, and do one job after the other, which cross as bytes."""
+
+    def __init__(self) -> None:
+        """No process yet."""
+        self._context: Any = multiprocessing.get_context("spawn")
+        self._idle: list[tuple[Pipe, BaseProcess]] = []
+
+    def begin(self, job: Job, others: Iterable[Pipe]) -> tuple[Pipe, BaseProcess]:
+        """As `Crew` says. Raises PicklingError, TypeError for a job that cannot cross."""
+        from podusv_cli.process.job_bytes import as_bytes  # which is not needed with `fork`
+
+        content = as_bytes(job)
+        pipe, process = self._idle.pop() if self._idle else self._start()
+        with suppress(OSError):  # it has ended, which `receive` notices
+            pipe.send_bytes(content)
+        return pipe, process
+
+    def _start(self) -> tuple[Pipe, BaseProcess]:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(theirs,))
+        with _without_main():
+            process.start()
+        theirs.close()
+        return ours, process
+
+    def end(self, pipe: Pipe, process: BaseProcess) -> None:
+        """As `Crew` says; it waits for another job, unless it has ended."""
+        if process.is_alive():
+            self._idle.append((pipe, process))
+        else:
+            pipe.close()
+            process.join()
+
+    def dismiss(self) -> None:
+        """End the processes that wait."""
+        for pipe, _ in self._idle:
+            pipe.close()
+        for _, process in self._idle:
+            process.join()
+
+
+CREW: type[Forked] | type[Spawned] = Forked if sys.platform == "linux" else Spawned
+
+
+def workers_inherit() -> bool:
+    """Whether a worker has all that this process has imported and made."""
+    return CREW is Forked
+
+
+@contextmanager
+def _without_main() -> Iterator[None]:
+    """A spawned process would first run the user's script once more, which no job needs."""
+    before = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = before
+
+
 class _Pool:
     """Jobs that wait, running processes by their pipe, and where outcomes go."""
 
@@ -162,7 +267,8 @@ class _Pool:
         self._jobs, self._done, self._progress = jobs, done, progress
         self._tries = Counter[int]()
         self._again: list[tuple[int, Job]] = []
-        self.running: dict[Connection, tuple[int, Job, BaseProcess]] = {}
+        self._crew: Crew = CREW()
+        self.running: dict[Pipe, tuple[int, Job, BaseProcess]] = {}
 
     def start(self, most: int) -> bool:
         """Start jobs until `most` processes run; whether any runs."""
@@ -171,14 +277,9 @@ class _Pool:
             if waiting is None:
                 break
             number, job = waiting
-            ours, theirs = FORK.Pipe(duplex=False)
-            # A process notices that its parent has ended only if no other holds the pipe's end.
-            inherited = [ours, *self.running]
-            process = FORK.Process(target=_work, args=(job, theirs, inherited))
-            process.start()
-            theirs.close()
+            pipe, process = self._crew.begin(job, self.running)
             self._tries[number] += 1
-            self.running[ours] = number, job, process
+            self.running[pipe] = number, job, process
         return bool(self.running)
 
     def receive(self, ready: Iterable[Any]) -> None:
@@ -189,12 +290,12 @@ class _Pool:
                 message = pipe.recv()
             except (EOFError, OSError, UnpicklingError):  # killed, perhaps within a message
                 message = None
+                process.join()
             if isinstance(message, float):
                 self._progress(number, message)
                 continue
             del self.running[pipe]
-            pipe.close()
-            process.join()
+            self._crew.end(pipe, process)
             if message is None and self._tries[number] < TRIES:
                 self._again.append((number, job))
                 continue
@@ -209,29 +310,47 @@ class _Pool:
         self._tries.update(dict.fromkeys((number for number, _, _ in self.running.values()), TRIES))
         end = time.monotonic() + GRACE
         for _, _, process in self.running.values():
-            process.terminate()
+            ask_to_end(process)
         while self.running and (left := end - time.monotonic()) > 0:
             self.receive(wait(self.running, left))
 
     def kill(self) -> None:
-        """Kill all processes that still run."""
+        """Kill all processes that still run, and let those go that wait."""
         for pipe, (_, _, process) in self.running.items():
             process.kill()
             process.join()
             pipe.close()
+        self._crew.dismiss()
 
 
-def _work(job: Job, pipe: Connection, inherited: Iterable[Connection]) -> None:
+def _work(job: Job, pipe: Pipe, inherited: Iterable[Pipe]) -> None:
     """Run a job in a new process and send its outcome; `inherited` are others' ends of pipes."""
     for end in inherited:
         end.close()
     # A broken pipe means that the parent has ended.
     with interrupts_caught() as interrupts, interrupts_deferred(), suppress(BrokenPipeError):
-        outcome = outcome_of(job, pipe.send, interrupts)
-        try:
-            pipe.send(outcome)
-        except (AttributeError, TypeError, PicklingError) as error:
-            pipe.send(Outcome(failure=f"its result cannot be sent: {error}"))
+        _send_outcome(job, pipe, interrupts)
+
+
+def _serve(pipe: Pipe) -> None:
+    """Run the jobs that come through the pipe, until it is closed, and send their outcomes."""
+    with interrupts_caught() as interrupts, interrupts_deferred(), suppress(EOFError, OSError):
+        while content := pipe.recv_bytes():
+            _send_outcome(partial(_run_job_of_bytes, content), pipe, interrupts)
+
+
+def _run_job_of_bytes(content: bytes, tell: Progress) -> Any:
+    """The result of a job that crossed as bytes; what it raises, or what reading it raises."""
+    return pickle.loads(content)(tell)
+
+
+def _send_outcome(job: Job, pipe: Pipe, interrupts: Interrupts) -> None:
+    """Run a job and send its outcome. Raises BrokenPipeError where the parent has ended."""
+    outcome = outcome_of(job, pipe.send, interrupts)
+    try:
+        pipe.send(outcome)
+    except (AttributeError, TypeError, PicklingError) as error:
+        pipe.send(Outcome(failure=f"its result cannot be sent: {error}"))
 
 
 def outcome_of(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,10 @@ class Case:
     def of(cls, scenario: Scenario, identify: Identify | None = None) -> Case:
         """Of a scenario that nobody has planned yet."""
         return cls(scenario, scenario.plan(), identify)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The scenario alone: its plan has kernels that other processes cannot name."""
+        return Case.of, (self.scenario, self.identify)
 
     @cached_property
     def reference(self) -> Reference:

@@ -9,6 +9,7 @@ from podusv_cli.core.component import describe, wrong_default
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit, nearest_hint, whole_steps
+from podusv_cli.core.system import name_refused
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
@@ -158,6 +159,10 @@ def _names(scenario: Scenario) -> Conflicts:
             yield f"controllers.{label}", LABEL_IN_WORDS
         if label == "figures":
             yield (f"controllers.{label}", "is the folder of the figures; take another name")
+        if refused := name_refused(label):
+            yield f"controllers.{label}", refused
+    if refused := name_refused(scenario.name):
+        yield "name", refused
     for name in scenario.claims:
         if not CLAIM.fullmatch(name):
             yield f"claims.{name}", CLAIM_IN_WORDS

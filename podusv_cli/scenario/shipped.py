@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import posixpath
 from functools import cache
 from pathlib import Path
 
@@ -75,5 +76,5 @@ def relative_to(source: str, name: str) -> str:
         return name
     if not is_shipped(source):
         return os.path.join(os.path.dirname(source), name)
-    beside = os.path.join(os.path.dirname(source.removeprefix(PREFIX)), name)
-    return PREFIX + os.path.normpath(beside)
+    beside = posixpath.join(posixpath.dirname(source.removeprefix(PREFIX)), name)
+    return PREFIX + posixpath.normpath(beside)

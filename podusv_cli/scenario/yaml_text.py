@@ -51,6 +51,7 @@ NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 SYNTAX = {
     r"'\t' that cannot start": "a tab; use spaces",
     "that cannot start any token": "{problem}; put the value in quotes",
+    "unknown escape character": "{problem}; in a path write / for \\, or put it in single quotes",
     "mapping values are not allowed": "a colon where no key can be; check the indentation, the "
     "space after every colon, and quote text with a colon in it",
     "unexpected end of stream": "the text in quotes that starts here never ends",
@@ -80,7 +81,7 @@ def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | 
         reason = str((isinstance(error, OSError) and error.strerror) or error)
         reason = reason[:1].lower() + reason[1:]
         if isinstance(error, FileNotFoundError):
-            reason += _guess_path(path)
+            reason += _guess_path(path) or _hint_at_backslash(path)
             if named:
                 reason += f"; looked in {os.path.dirname(os.path.abspath(path))}"
         faults.append(Fault(mark, key, f"{named}cannot be read: {reason}"))
@@ -104,6 +105,13 @@ def _guess_path(path: str) -> str:
     stems = {os.path.splitext(file)[0]: file for file in near}
     close = get_close_matches(os.path.splitext(name)[0], stems, n=1)
     return f"; did you mean {quote(os.path.join(folder, stems[close[0]]))}?" if close else ""
+
+
+def _hint_at_backslash(path: str) -> str:
+    """What helps where a path of Windows was meant, which is no file here; "" for other paths."""
+    if not path.isprintable():
+        return "; in double quotes \\t, \\n and the like are single letters; write / in a path"
+    return "; write / between folders" if "\\" in path and os.sep == "/" else ""
 
 
 def read_text(path: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:

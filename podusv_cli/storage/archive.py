@@ -15,6 +15,7 @@ from typing import BinaryIO
 
 from podusv_cli.core.errors import StorageError
 from podusv_cli.core.quantities import bytes_in_words
+from podusv_cli.core.system import stays_inside, sync_disk
 from podusv_cli.process.temporary_names import remove_abandoned_files, temporary_name
 from podusv_cli.storage import files
 
@@ -66,6 +67,7 @@ def name_fault(name: str) -> str:
     """
     parts = PurePosixPath(name).parts
     inside = len(parts) > 1 and not {"..", "/", "."} & {*parts} and "\\" not in name
+    inside = inside and stays_inside(name)
     if str(PurePosixPath(name)) != name or not inside or not name.isprintable():
         return f"{name!r} is no file inside a folder"
     if any(part[0] in ".-" for part in parts):
@@ -140,7 +142,10 @@ class Archive:
                 copyfileobj(self._archive.open(entry), file)
             done += entry.file_size
             tell(done / whole)
-        os.sync()  # to sync each of thousands of small files takes a hundred times as long
+        # To sync each of thousands of small files takes a hundred times as long.
+        if not sync_disk():
+            for name in self._entries:
+                files.sync_file(folder / name)
 
     def fault(self, why: str) -> StorageError:
         """An error that says why this archive is not unpacked."""

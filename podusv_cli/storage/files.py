@@ -148,7 +148,9 @@ def disk_array(folder: Path, size: int) -> Vector:
     (SIGBUS) when a number is stored; ZFS, macOS and Windows reserve nothing.
     """
     failure = f"cannot keep the log in {folder} ({8 * size} bytes)"
-    with storage_errors(failure), tempfile.TemporaryFile(dir=folder) as file:
+    # Windows gives the file a name until the array is gone, and renames no folder with it inside.
+    place = None if os.name == "nt" else folder
+    with storage_errors(failure), tempfile.TemporaryFile(dir=place) as file:
         if hasattr(os, "posix_fallocate"):
             os.posix_fallocate(file.fileno(), 0, 8 * size)
         else:
@@ -189,12 +191,18 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
 
 
+def sync_file(path: Path) -> None:
+    """Sync a file to the disk. Raises StorageError."""
+    with storage_errors(f"cannot write {path} to the disk"), path.open("r+b") as file:
+        os.fsync(file.fileno())
+
+
 def sync_folder(folder: Path) -> None:
     """Sync the names in `folder` to the disk, where the system can. Raises StorageError."""
     if not hasattr(os, "O_DIRECTORY"):
         return  # Windows opens no folders
     with storage_errors(f"cannot write {folder} to the disk"):
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        descriptor = os.open(folder, open_flags("O_RDONLY", "O_DIRECTORY", "O_CLOEXEC"))
         try:
             os.fsync(descriptor)
         except OSError as error:

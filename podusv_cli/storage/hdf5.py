@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 
 from podusv_cli.core.errors import StorageError
+from podusv_cli.core.system import name_of_open_file
 from podusv_cli.storage import files
 
 # What h5py raises on damaged files; ValueError includes text that is not UTF-8.
@@ -52,7 +53,7 @@ def _descriptor(path: Path) -> Iterator[str]:
     HDF5 reads it by itself, as it may close it when Python has ended and cannot be called.
     """
     with files.open_regular(path) as raw:
-        yield f"/dev/fd/{raw.fileno()}"
+        yield name_of_open_file(raw.fileno(), path)
 
 
 def check_link(group: h5py.h5g.GroupID, name: str) -> None:

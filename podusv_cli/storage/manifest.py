@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from podusv_cli.core import json_text
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.core.recording import Status
+from podusv_cli.core.system import stays_inside
 from podusv_cli.storage import files as atomic
 from podusv_cli.storage import json_files
 from podusv_cli.storage.files import ELSEWHERE, LARGEST_FILE, fingerprint
@@ -146,7 +147,7 @@ def place(folder: Path, name: str) -> Path:
     """The path of a listed file; StorageError if it is not inside the folder."""
     relative = PurePosixPath(name)
     plain = str(relative) == name and name.isprintable() and name not in (".", NAME)
-    if not plain or relative.is_absolute() or ".." in relative.parts:
+    if not (plain and stays_inside(name)) or relative.is_absolute() or ".." in relative.parts:
         raise StorageError(f"{folder / NAME}: damaged: {name!r} is no file of this folder")
     path = folder / relative
     if path.parent.resolve() != folder.resolve() / relative.parent:

@@ -92,7 +92,8 @@ def _git(folder: Path, *words: str) -> str | None:
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,
-            text=True,
+            encoding="utf-8",
+            errors="replace",
             timeout=GIT_PATIENCE,
             check=True,
         )

@@ -14,6 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from podusv_cli.core.errors import StorageError
+from podusv_cli.core.system import rename_folder
 from podusv_cli.process.temporary_names import find_abandoned, temporary_name
 from podusv_cli.storage import files
 
@@ -70,7 +71,7 @@ class Staging:
     def _rename(self) -> None:
         """Give the folder its final name. Raises Taken where something has it."""
         try:
-            os.rename(self.folder, self.final)
+            rename_folder(self.folder, self.final)
         except OSError as error:
             if error.errno not in _TAKEN:
                 raise
@@ -81,7 +82,7 @@ class Staging:
         """Put the folder in place of the old one, in one step where the system can."""
         if not self._exchange():
             with suppress(FileNotFoundError):
-                os.rename(self.final, _old(self._box))
+                rename_folder(self.final, _old(self._box))
             self._rename()
 
     def _exchange(self) -> bool:
@@ -119,7 +120,7 @@ def _remove_box(box: Path, final: Path) -> None:
     with suppress(OSError):
         if _old(box).exists():
             # Renamed before it is deleted, so that half of a folder is never restored.
-            os.rename(_old(box), box / "replaced" if final.exists() else final)
+            rename_folder(_old(box), box / "replaced" if final.exists() else final)
         shutil.rmtree(box, ignore_errors=True)
 
 

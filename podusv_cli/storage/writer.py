@@ -47,7 +47,8 @@ def sole_writer(
             path.write_text(f"{os.getpid()} {platform.node()}")
         yield
     finally:
-        path.unlink(missing_ok=True)  # while it is locked; who waits for it looks for a new one
+        with suppress(PermissionError):  # of Windows, where its release removes it
+            path.unlink(missing_ok=True)  # while it is locked; who waits for it looks for a new one
         lock.release()
 
 

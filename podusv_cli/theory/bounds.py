@@ -18,6 +18,7 @@ from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import Replayed
 
+SWEEPS = 12  # over all pairs of an eigenvalue's rotations; the last do nothing
 TRIES = 400  # values of lambda that are tried for the lowest bound
 
 
@@ -86,6 +87,24 @@ class UltimateBound:
     conditions: tuple[GainCondition, ...]
 
 
+def least_eigenvalue(form: Vector) -> float:
+    """The least eigenvalue of a finite symmetric matrix (n, n), n small.
+
+    By Jacobi's rotations (Golub and Van Loan, "Matrix Computations", 4th ed., 8.5): LAPACK's last
+    bits depend on the processor.
+    """
+    a, n = np.array(form), len(form)
+    pairs = [(p, q) for p in range(n) for q in range(p + 1, n)]
+    for p, q in SWEEPS * pairs:
+        if a[p, q] != 0.0:
+            slope = float(a[q, q] - a[p, p]) / (2.0 * float(a[p, q]))
+            t = math.copysign(1.0 / (abs(slope) + math.sqrt(slope * slope + 1.0)), slope)
+            c = 1.0 / math.sqrt(t * t + 1.0)
+            a[[p, q]] = c * a[[p, q]] + t * c * np.array([-a[q], a[p]])
+            a[:, [p, q]] = c * a[:, [p, q]] + t * c * np.array([-a[:, q], a[:, p]]).T
+    return float(a.diagonal().min())
+
+
 @dataclass(frozen=True)
 class _Axis:
     """Gains of one axis: surge (z_e, u_e, y_u, ...) or yaw (psi_e, r_e, y_r, ...)."""
@@ -103,7 +122,7 @@ class _Axis:
         size = 3 if math.isfinite(self.A) else 2  # without a filter there is no y
         scale = np.sqrt([1.0, self.mass, 1.0])
         scaled = (form / np.outer(scale, scale))[:size, :size]
-        return float(np.linalg.eigvalsh(scaled)[0]) if np.isfinite(scaled).all() else math.nan
+        return least_eigenvalue(scaled) if np.isfinite(scaled).all() else math.nan
 
     def limit(self) -> float:
         """The value that k must exceed for a positive lambda."""

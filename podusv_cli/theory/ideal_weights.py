@@ -14,6 +14,7 @@ import numpy as np
 from podusv_cli.components.controllers.network import Network
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import exponential, solve, total
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.running.replay import Replayed
@@ -60,7 +61,7 @@ def exponents(network: Network, log: Recording) -> Vector:
 
 def outputs(network: Network, factors: Vector) -> Vector:
     """Phi (14), shape (rows, nodes), from the `exponents`."""
-    plane, bells = network.factors[1], np.exp(-factors)
+    plane, bells = network.factors[1], exponential(-factors)
     return (bells[:, plane:, None] * bells[:, None, :plane]).reshape(len(bells), -1)
 
 
@@ -72,8 +73,8 @@ def node_distance(network: Network, factors: Vector) -> Vector:
 
 
 def network_output(phi: Vector, weights: Vector) -> Vector:
-    """W . Phi (15) at every row; einsum, because threads of BLAS are slow on a busy machine."""
-    return np.asarray(np.einsum("ij,j->i", phi, weights))
+    """W . Phi (15) at every row of phi (rows, nodes), for weights (nodes,)."""
+    return total((phi * weights).T)
 
 
 def fit_weights(
@@ -88,7 +89,7 @@ def fit_weights(
         (f_u, loop.vessel.m11, loop.nominal.m11, law.sigma_u),
         (f_r, loop.vessel.m33, loop.nominal.m33, law.sigma_r),
     ):
-        aim = f[usable] * (mass / nominal) - start * phi.sum(axis=1)
+        aim = f[usable] * (mass / nominal) - start * total(phi.T)
         damping = np.float64(sigma * len(phi)) / (
             nominal * nominal
         )  # a float would raise on overflow
@@ -100,16 +101,26 @@ def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
     """W(f, c) that minimises |f - Phi W|^2 + c |W|^2, by the smaller of Phi^T Phi and Phi Phi^T."""
     tall = phi.shape[0] >= phi.shape[1]
     short = phi if tall else phi.T
-    square = np.einsum("ki,kj->ij", short, short)
-    least = SINGULAR * float(np.trace(square)) or 1.0
+    square = _gram_matrix(short)
+    least = SINGULAR * float(total(square.diagonal())) or 1.0
 
     def weights(f: Vector, c: float) -> Vector:
         """The weights (nodes,) that fit `f` (rows,); c is the weight of their own size."""
         right = network_output(phi.T, f) if tall else f
-        solved = np.linalg.solve(square + max(c, least) * np.eye(len(square)), right)
+        solved = solve(square + max(c, least) * np.eye(len(square)), right)
         return np.asarray(solved if tall else network_output(phi.T, solved))
 
     return weights
+
+
+def _gram_matrix(short: Vector) -> Vector:
+    """A^T A of A (rows, n), row by row: the order of a library's sum depends on the processor."""
+    square = np.zeros((short.shape[1], short.shape[1]))
+    product = np.empty_like(square)
+    for row in short:
+        np.multiply(row[:, None], row, out=product)
+        square += product
+    return square
 
 
 def rows_to_fit(rows: int, nodes: int) -> Vector:

@@ -6,6 +6,7 @@ import numpy as np
 
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import cosine_and_sine, total
 from podusv_cli.core.recording import Recording
 from podusv_cli.core.signal import Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
@@ -31,7 +32,7 @@ TERMS = (
 
 
 def _dot(a: Vector, b: Vector) -> Vector:
-    return np.asarray(np.einsum("ij,ij->i", a, b))
+    return total((a * b).T)
 
 
 def norms(weights: Vector) -> Vector:
@@ -91,7 +92,10 @@ def remainders(
     gain_u = law.k_ue + log["b_hat_u"] / (4.0 * law.partial)
     gain_r = law.k_re + log["b_hat_r"] / (4.0 * law.partial)
     known_u = (
-        s["b_u"] + sign * e.z_e * np.cos(e.psi_e) - gain_u * e.u_e - nominal.m11 * s["f_hat_u"]
+        s["b_u"]
+        + sign * e.z_e * cosine_and_sine(e.psi_e)[0]
+        - gain_u * e.u_e
+        - nominal.m11 * s["f_hat_u"]
     )
     known_r = s["b_r"] + sign * e.psi_e - gain_r * e.r_e - nominal.m33 * s["f_hat_r"]
     return m.m11 * e.u_e_dot - known_u, m.m33 * e.r_e_dot - known_r

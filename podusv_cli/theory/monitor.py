@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -11,6 +12,7 @@ from podusv_cli.components.controllers.network import ACTIVATION, NODE_DISTANCE,
 from podusv_cli.components.controllers.polar_backstepping import Y_R, Y_U, PolarBackstepping
 from podusv_cli.core.derived import Derived
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import exponential, total
 from podusv_cli.core.recording import Allocate, Recording, blocks, largest
 from podusv_cli.core.signal import Signal, by_name
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
@@ -206,7 +208,7 @@ def _traces(
         "y_r": e.y_r,
         "W_norm_u": norms(log["W_hat_u"]),
         "W_norm_r": norms(log["W_hat_r"]),
-        "activation": np.exp(-0.5 * distance**2),
+        "activation": exponential(-0.5 * distance**2),
         "node_distance": distance,
     }
 
@@ -238,7 +240,7 @@ class _Bounds:
     def _observe_rows(self, rows: slice) -> bounds.Observed:
         """What the proof takes as bounded, as large as it was in these rows."""
         start, ideal = self.law.network.initial_weight, self.ideal
-        W = (float(np.linalg.norm(weights - start)) for weights in (ideal.W_u, ideal.W_r))
+        W = (math.sqrt(total((weights - start) ** 2)) for weights in (ideal.W_u, ideal.W_r))
         return bounds.Observed(
             b=self.b,
             W=bounds.Pair(*W),

@@ -8,6 +8,7 @@ import numpy as np
 
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import cosine_and_sine
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import Replayed
 
@@ -88,8 +89,8 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
     """
     s, d, u, v = now.signals, now.rates, log["u"], log["v"]
     psi_e, psi_d, distance = s["psi_e"], s["psi_d"], s["z_e"]
-    turn = np.where(np.cos(psi_e - psi_d + log["psi"]) < 0.0, -1.0, 1.0)
-    cos_e, sin_e = turn * np.cos(psi_e), turn * np.sin(psi_e)
+    turn = np.where(cosine_and_sine(psi_e - psi_d + log["psi"])[0] < 0.0, -1.0, 1.0)
+    cos_e, sin_e = (turn * part for part in cosine_and_sine(psi_e))
     x_e, y_e = s["x_d"] - log["x"], s["y_d"] - log["y"]
     x_e_dot, y_e_dot = s["x_d_dot"] - d["x"], s["y_d_dot"] - d["y"]
     distance_rate = (x_e * x_e_dot + y_e * y_e_dot) / distance
@@ -113,7 +114,7 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
 
 def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
     """Components (rows,) of an earth-fixed vector (x, y) along and across the line of sight."""
-    cos_d, sin_d = np.cos(psi_d), np.sin(psi_d)
+    cos_d, sin_d = cosine_and_sine(psi_d)
     return x * cos_d + y * sin_d, y * cos_d - x * sin_d
 
 
@@ -122,7 +123,7 @@ def _alpha_u_rate(
 ) -> Vector:
     """Rate of (21) (rows,) [m/s2]; the paper's X_1 (40) with the true accelerations."""
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]
-    cos_e, sin_e, spin = np.cos(psi_e), np.sin(psi_e), sight.w - log["r"]
+    (cos_e, sin_e), spin = cosine_and_sine(psi_e), sight.w - log["r"]
     approach = sight.side * (law.k_ze * sight.distance_rate + sight.P_rate)
     swing = (alpha_u * sin_e - v * cos_e) * spin
     return np.asarray((approach - now.rates["v"] * sin_e + swing) / cos_e)

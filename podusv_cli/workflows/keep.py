@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from functools import partial
 from pathlib import Path
 
+from podusv_cli.core.system import relative_path
 from podusv_cli.process.extras import Extras, Failure
 from podusv_cli.process.interrupts import interrupts_enabled
 from podusv_cli.process.workers import run_all
@@ -33,7 +33,7 @@ def scenario_of_draw(plan: StudyPlan, law: str, cell: int, draw: int) -> Scenari
 def seen_from(place: Path, study: Path, scenario: Scenario) -> Scenario:
     """A scenario of a study, with its plug-in files named as in another folder."""
     kept = scenario.plugin_files()
-    names = {name: os.path.relpath(study / name, place) for name in kept}
+    names = {name: relative_path(study / name, place) for name in kept}
     plugins = {names.get(name, name): required for name, required in scenario.plugins.items()}
     return scenario.model_copy(update={"plugins": plugins})
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import shlex
 import time
@@ -21,6 +20,7 @@ from podusv_cli.core.errors import PodusvError, ScenarioError, StorageError, Usa
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.phrases import unknown_word
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.system import relative_path
 from podusv_cli.engine.running.simulate import run_together
 from podusv_cli.figures.chase import chase
 from podusv_cli.figures.shown import dress_runs
@@ -366,7 +366,7 @@ class Live:
             for step in steps[: end - 1]:
                 inner, node = inner.setdefault(str(step), {}), node.mapping[str(step)]
             inner[str(steps[end - 1])] = plain(node.mapping[str(steps[end - 1])])
-        base = self.source if self.source.startswith("podusv:") else os.path.relpath(self.source)
+        base = self.source if self.source.startswith("podusv:") else relative_path(self.source)
         text = yaml_text({"extends": base, **changed})
         own = {name: getattr(loaded.scenario, name) for name in ("name", "description")}
         new = load_text(text, str(file), (), (), self.files, of_files(self.trust)).scenario

@@ -22,6 +22,7 @@ from podusv_cli.core.component import unit_of
 from podusv_cli.core.errors import ScenarioError, StorageError, UsageError
 from podusv_cli.core.phrases import as_yaml, unknown_word
 from podusv_cli.core.plugins import installed_plugins
+from podusv_cli.core.system import relative_path
 from podusv_cli.findings.finding import finding_kinds, unknown_codes
 from podusv_cli.scenario.limits import limits
 from podusv_cli.scenario.load import load_text
@@ -271,7 +272,7 @@ def _way(route: str, out: Path) -> StartingLegs | None:
     if not os.path.isfile(route):
         raise UsageError(f"--route {route}: there is no such file")
     storage.make_folder(out.parent)  # the route is read from there
-    file = os.path.relpath(route, out.parent)
+    file = relative_path(route, out.parent)
     path = as_yaml(file) if file.isprintable() else repr(file)
     text = f"name: boat\nvessel: {{preset: otter}}\nactuator: {{kind: ideal}}\n{BESIDE}".replace(
         "kind: line", f"kind: legs, file: {path}"

@@ -10,6 +10,7 @@ import pytest
 from command_samples import Command
 
 from podusv_cli.cli import demo
+from podusv_cli.core import system
 from podusv_cli.workflows import compare
 
 
@@ -18,7 +19,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Addresses that a browser was asked for; there is no display."""
     asked: list[str] = []
     monkeypatch.setattr(webbrowser, "open", lambda address: not asked.append(address))
-    for name in demo.DISPLAYS:
+    for name in system.DISPLAYS:
         monkeypatch.delenv(name, raising=False)
     return asked
 

@@ -1,9 +1,15 @@
 """What podusv does where a system lacks what Linux has: tests with an `os` that lacks it, too."""
 
+import errno
+import ntpath
 import os
 import signal
 import subprocess
 import sys
+import tempfile
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path, PureWindowsPath
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +19,7 @@ from podusv_cli.core import system
 from podusv_cli.process import code_folder, temporary_names
 from podusv_cli.scenario import yaml_text
 from podusv_cli.scenario.yaml_tree import Mark
-from podusv_cli.storage import files, staging
+from podusv_cli.storage import files, staging, writer
 
 LACKING = (  # what Windows lacks of what podusv uses
     "O_CLOEXEC",
@@ -25,6 +31,7 @@ LACKING = (  # what Windows lacks of what podusv uses
     "sched_getaffinity",
     "sysconf",
 )
+NO_EXCHANGE = OSError(errno.ENOSYS, "no such call")
 
 
 @pytest.fixture
@@ -59,6 +66,109 @@ def test_a_long_log_lies_in_a_file_of_its_size(elsewhere, tmp_path):
     array = files.disk_array(tmp_path, 1000)
     array[:] = np.arange(1000.0)
     assert array.sum() == 499_500.0
+
+
+def test_a_log_that_is_mapped_lies_in_no_folder_that_is_renamed(monkeypatch, tmp_path):
+    """Windows gives a mapped file a name, and renames no folder with it inside."""
+    asked = []
+
+    def make(dir=None):
+        asked.append(dir)
+        return tempfile.TemporaryFile(dir=tmp_path)
+
+    monkeypatch.setattr(files, "tempfile", SimpleNamespace(TemporaryFile=make))
+    monkeypatch.setattr(files, "os", SimpleNamespace(name="nt"))
+    array = files.disk_array(tmp_path / "new", 10)
+    array[:] = 1.0
+    assert (asked, array.sum()) == ([None], 10.0)
+
+
+def rename_as_windows(source, target, *, busy=None):
+    """`os.rename` as it is there: no folder is replaced, and one with an open file stays."""
+    if busy:
+        busy.pop()
+        raise PermissionError(errno.EACCES, "in use")
+    if os.path.lexists(target):
+        raise FileExistsError(errno.EEXIST, "exists")
+    rename(source, target)
+
+
+rename = os.rename
+
+
+def on_windows(monkeypatch, busy=None):
+    """The names of `os` as renaming finds them there, with `busy` attempts that fail."""
+    own = SimpleNamespace(
+        name="nt", rmdir=os.rmdir, rename=partial(rename_as_windows, busy=busy), path=os.path
+    )
+    monkeypatch.setattr(system, "os", own)
+
+
+def test_a_folder_takes_the_place_of_an_empty_one_where_rename_replaces_none(monkeypatch, tmp_path):
+    for name in ("a", "empty", "full"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x").touch() if name != "empty" else None
+    on_windows(monkeypatch)
+    with pytest.raises(FileExistsError):
+        system.rename_folder(tmp_path / "a", tmp_path / "full")
+    system.rename_folder(tmp_path / "a", tmp_path / "empty")
+    assert [path.name for path in (tmp_path / "empty").iterdir()] == ["x"]
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_folder_with_a_file_that_is_open_for_a_moment_is_renamed(monkeypatch, tmp_path, more):
+    (tmp_path / "a").mkdir()
+    on_windows(monkeypatch, busy=[None] * (system.TRIES - 1 + more))
+    monkeypatch.setattr(system, "PAUSE", 0.0)
+    with pytest.raises(PermissionError) if more else nullcontext():
+        system.rename_folder(tmp_path / "a", tmp_path / "b")
+    assert (tmp_path / "b").exists() == (not more)
+
+
+def test_a_run_is_written_and_replaced_with_the_calls_that_windows_has(monkeypatch, tmp_path):
+    on_windows(monkeypatch)
+    monkeypatch.setattr(staging, "exchange", lambda one, other: (_ for _ in ()).throw(NO_EXCHANGE))
+    for content in (b"old", b"new"):
+        made = staging.Staging(tmp_path / "run")
+        files.create(made.folder / "log", content)
+        made.publish(replace=True)
+    assert (tmp_path / "run/log").read_bytes() == b"new"
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_an_open_file_is_read_by_the_name_that_a_system_gives_it(monkeypatch, tmp_path):
+    assert system.name_of_open_file(7, tmp_path / "log.h5") == "/dev/fd/7"
+    monkeypatch.setattr(system, "os", SimpleNamespace(name="nt"))
+    assert system.name_of_open_file(7, tmp_path / "log.h5") == str(tmp_path / "log.h5")
+
+
+def test_paths_in_files_are_written_as_every_system_reads_them(monkeypatch, tmp_path):
+    assert system.relative_path(tmp_path / "a/b.csv", tmp_path / "c") == "../a/b.csv"
+    monkeypatch.setattr(os.path, "relpath", ntpath.relpath)
+    monkeypatch.setattr(system, "Path", PureWindowsPath)
+    assert system.relative_path("C:\\data\\a\\b.csv", "C:\\data\\c") == "../a/b.csv"
+
+
+def test_a_folder_is_free_again_where_its_lock_cannot_be_removed_while_it_is_held(
+    monkeypatch, tmp_path
+):
+    def unlink(path, missing_ok=False):
+        raise PermissionError(errno.EACCES, "in use")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", unlink)
+        with writer.sole_writer(tmp_path):
+            pass
+    with writer.sole_writer(tmp_path):
+        pass
+
+
+def test_files_of_an_archive_are_synced_one_by_one_without_the_system_call(monkeypatch, tmp_path):
+    monkeypatch.delattr(os, "sync")
+    assert not system.sync_disk()
+    (tmp_path / "a").write_bytes(b"x")
+    files.sync_file(tmp_path / "a")
+    assert (tmp_path / "a").read_bytes() == b"x"
 
 
 def test_two_folders_are_exchanged_in_two_steps_without_the_system_call(monkeypatch, tmp_path):

@@ -297,6 +297,7 @@ def test_every_platform_gets_object_code_and_nothing_of_this_machine():
         "linux64": b"\x7fELF",
         "win64": b"\x64\x86",
         "darwin64": b"\xcf\xfa\xed\xfe",
+        "aarch64-darwin": b"\xcf\xfa\xed\xfe",
         "aarch64-linux": b"\x7fELF",
         "armv7": b"\x7fELF",
         "thumbv7em": b"\x7fELF",

@@ -17,7 +17,7 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.engine.machine import finish, object_cache, shipped, signatures
 from podusv_cli.engine.machine.kernel_faults import check_kernel, unsupported_construct
 from podusv_cli.process.interrupts import interrupts_deferred
-from podusv_cli.process.workers import available_workers, run_all
+from podusv_cli.process.workers import available_workers, run_all, workers_inherit
 
 # What compiles kernels for a run, and for lanes
 ALONE_BY, LANES_BY = "compile_numba", "wide.object_code"
@@ -100,6 +100,8 @@ def _kept_as(piece: Piece) -> str:
 def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None) -> None:
     """Have the code of these pieces on the disk, compiled by as many processes as there are cores.
 
+    Where processes begin empty this one compiles: a kernel is no thing that crosses as bytes.
+
     `tell` is called with the fraction that is compiled, if there is anything to compile. A piece
     that cannot be compiled is left to `compile_piece`, which says why. Raises KeyboardInterrupt.
     """
@@ -108,9 +110,8 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
         return
     sizes = {piece: piece.size for piece in missing}
     whole = sum(sizes.values())
-    shares: list[list[Piece]] = [
-        [] for _ in range(max(1, min(available_workers(), whole // SHARE)))
-    ]
+    most = min(available_workers(), whole // SHARE) if workers_inherit() else 1
+    shares: list[list[Piece]] = [[] for _ in range(max(1, most))]
     for piece in sorted(missing, key=lambda piece: -sizes[piece]):
         min(shares, key=lambda share: sum(sizes[other] for other in share)).append(piece)
     done = [0.0] * len(shares)

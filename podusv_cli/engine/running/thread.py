@@ -126,9 +126,8 @@ class Work:
         """Call the function in its thread; its result or error stays with the work."""
         # Looked up by the thread itself, since the system crashes if the thread has ended.
         look_up = getattr(time, "pthread_getcpuclockid", None)
-        self._clock = (
-            partial(time.clock_gettime, look_up(get_ident())) if look_up else time.process_time
-        )
+        read = getattr(time, "clock_gettime", None)  # macOS has this one alone, Windows neither
+        self._clock = partial(read, look_up(get_ident())) if look_up and read else time.process_time
         try:
             self.result = self._function()
         except BaseException as error:  # a law may raise anything
