@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
+
 import podusv_cli
 
 ROOT = Path(podusv_cli.__file__).parents[1]
@@ -26,8 +28,12 @@ def python(*words: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedPr
 
 
 def said(*words: str, home: Path, **more: str) -> str:
-    """What a process prints, which has to end well."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "HOME": str(home), **more}
+    """What a process prints, which has to end well.
+
+    In a new home matplotlib would make its list of fonts anew, and say so where that takes long.
+    """
+    fonts = {"MPLCONFIGDIR": matplotlib.get_cachedir()}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "HOME": str(home), **fonts, **more}
     done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
     assert done.stderr == ""
     return done.stdout
