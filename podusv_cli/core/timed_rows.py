@@ -42,7 +42,8 @@ def timed_rows(text: str, noun: str, layouts: Layouts, scales: ScaledUnits = NON
     if header:
         names = layouts[rows.shape[1]]
         header, units = _in_own_units(header, names, scales)
-        rows = (rows - [unit.zero for unit in units]) * [unit.factor for unit in units]
+        named = rows[:, : len(units)]  # a header may leave the gains of a motion out
+        named[:] = (named - [unit.zero for unit in units]) * [unit.factor for unit in units]
         rows = _in_order(rows, columns(header, names, noun), header, noun)
     late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
     if late.size:

@@ -157,9 +157,9 @@ def _names(scenario: Scenario) -> Conflicts:
     for label in scenario.controllers:
         if not LABEL.fullmatch(label):
             yield f"controllers.{label}", LABEL_IN_WORDS
-        if label == "figures":
+        elif label == "figures":
             yield (f"controllers.{label}", "is the folder of the figures; take another name")
-        if refused := name_refused(label):
+        elif refused := name_refused(label):
             yield f"controllers.{label}", refused
     if refused := name_refused(scenario.name):
         yield "name", refused

@@ -67,8 +67,9 @@ def test_a_function_within_a_function_crosses(spawned):
 
 def test_a_worker_does_not_run_the_script_that_started_it(spawned, monkeypatch, tmp_path):
     (tmp_path / "script.py").write_text(DAMAGED)
-    monkeypatch.setattr(sys.modules["__main__"], "__file__", str(tmp_path / "script.py"))
-    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)
+    own = str(tmp_path / "script.py")
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", own, raising=False)
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None, raising=False)
     assert run_all([close_over(3)])[0].result == 9
 
 
