@@ -35,11 +35,7 @@ def _show_page(done: LookedAt, *, as_json: bool, quiet: bool) -> None:
 
 def _report_columns(found: Listing) -> None:
     """Print a row for each column, and a section `identify` to begin with."""
-    rows = [
-        [c.name, f"{c.rate:.4g}", f"{c.least:.5g}", f"{c.most:.5g}", f"{c.missing:.1%}", c.guess]
-        for c in found.columns
-    ]
-    echo_table(["column", "new values a second", "least", "most", "missing", "may be"], rows)
+    echo_table([*found.HEAD], [[*own.cells] for own in found.columns])
     for line in ("", "identify:", *(f"  {line}" for line in found.mapping())):
         echo(line)
 

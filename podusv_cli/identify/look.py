@@ -28,7 +28,6 @@ MOST = 60  # signals that are drawn
 EACH = 12  # of them in one figure
 ROW, TRACK = 1.1, 4.0  # inches, the height of two signals beside each other, and of the track
 IN_METRES, ON_EARTH = ("x", "y"), ("lat", "lon")
-HEAD = ("column", "new values a second", "least", "most", "missing", "may be")
 
 
 def sketches_of(contents: Contents, found: Listing) -> Iterator[Sketch]:
@@ -104,7 +103,9 @@ def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figu
         times, label = _clock(contents, found, own.name)
         values = contents.columns[own.name]
         there = np.isfinite(times) & np.isfinite(values)
-        axes.plot(*thin_curve(times[there], values[there]), lw=0.7)
+        alone = "." if there.sum() == 1 else ""  # a line through one value would not be seen
+        axes.plot(*thin_curve(times[there], values[there]), lw=0.7, marker=alone)
+        axes.ticklabel_format(useOffset=False)  # an offset lies on the neighbour's title
         guess = f" = {own.guess}" if own.guess else ""
         axes.set_title(escaping.figure(f"{own.name[-40:]}{guess}"), fontsize="small")
         axes.set_xlabel(label, fontsize="x-small")
@@ -128,10 +129,7 @@ def _clock(contents: Contents, found: Listing, name: str) -> tuple[Vector, str]:
 
 def page_of(path: Path, found: Listing, pictures: Sequence[Picture]) -> str:
     """The page: what is doubtful, the track and signals, and the columns with a mapping."""
-    rows = [
-        (c.name, f"{c.rate:.4g}", f"{c.least:.5g}", f"{c.most:.5g}", f"{c.missing:.1%}", c.guess)
-        for c in found.columns
-    ]
+    rows = [own.cells for own in found.columns]
     return (
         environment("podusv_cli.identify")
         .get_template("look.html.j2")
@@ -139,7 +137,7 @@ def page_of(path: Path, found: Listing, pictures: Sequence[Picture]) -> str:
             title=f"{path.name}, as it was logged",
             warnings=[*found.warnings, *filter(None, [left_out(found)])],
             pictures=list(enumerate(pictures, 1)),
-            columns=(HEAD, rows),
+            columns=(found.HEAD, rows),
             mapping="\n".join(["identify:", *(f"  {line}" for line in found.mapping())]),
         )
     )

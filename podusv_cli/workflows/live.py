@@ -326,6 +326,8 @@ class Live:
             "beam": scenario.vessel.beam,
             "waypoints": tuple(map(tuple, path.waypoints())),
             "circles": tuple(map(tuple, path.circles())),
+            "path_end": scenario.passed_by(1.0),
+            "path_steady": scenario.passed_by(1.0 - scenario.metrics.steady_fraction),
             "standoff": approach.standoff if approach else 0.0,
             "values": {**case.about.values, "path": path.model_dump(mode="json")},
         }

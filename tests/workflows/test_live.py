@@ -103,6 +103,15 @@ def test_every_value_gives_the_same_both_ways(source: str) -> None:
                 assert moving[part] == rest[part], (moved, part)
 
 
+def test_a_moved_waypoint_moves_what_counts_as_settled() -> None:
+    """The scale of the cross-track error follows the settled part, which begins on the legs."""
+    live = Live("podusv:laws/legs.yaml", laws=("velocity_vector", "pid"))
+    live.frame({}, (), rest=True, wanted=True)
+    moved = {"path.points[0][1]": -8.24}
+    moving, rest = (framed(live, moved, rest=rest) for rest in (False, True))
+    assert moving["curves"] == rest["curves"]
+
+
 def test_a_refused_value_has_the_sentence_of_podusv_at_its_key_and_the_page_goes_on(live) -> None:
     for rest in (False, True):
         answer = framed(live, {"vessel.X_u": 200.0}, rest=rest)

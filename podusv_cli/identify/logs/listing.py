@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import yaml
@@ -112,10 +112,19 @@ class Listed:
         """As in a table."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The column as a row of a table under `Listing.HEAD`; "-" where there is no number."""
+        numbers = (f"{self.rate:.4g}", f"{self.least:.5g}", f"{self.most:.5g}")
+        shown = (text.replace("nan", "-") for text in numbers)
+        return self.name, *shown, f"{self.missing:.1%}", self.guess
+
 
 @dataclass(frozen=True)
 class Listing:
     """All columns of a log, and what is doubtful about the file."""
+
+    HEAD: ClassVar = ("column", "new values a second", "least", "most", "missing", "may be")
 
     columns: list[Listed]
     turned: bool  # whether headings are those of quaternions, which ROS counts from the east
@@ -192,9 +201,9 @@ def _of_boat(
 
     Where it counts in parts, numbers up to 100 are percents.
     """
-    fixed = {name for name in actuator.zero_where_missing if name != _numbered(name)}
+    fixed = {name for name in actuator.zero_where_missing if name != _hide_number(name)}
     signals = (*actuator.replayed, *actuator.lagged)
-    known = Counter(_numbered(s.name) for s in signals if s.name not in fixed)
+    known = Counter(_hide_number(s.name) for s in signals if s.name not in fixed)
     taken = Counter[str]()
     for column, guess in guesses.items():
         most = float(np.nanmax(np.abs(columns[column]), initial=0.0))
@@ -205,7 +214,7 @@ def _of_boat(
             yield column, guess
 
 
-def _numbered(name: str) -> str:
+def _hide_number(name: str) -> str:
     """`n_part_cmd_2` as all of its kind: `n_part_cmd_#`."""
     return re.sub(r"\d+$", "#", name)
 
