@@ -105,7 +105,6 @@ def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figu
         there = np.isfinite(times) & np.isfinite(values)
         alone = "." if there.sum() == 1 else ""  # a line through one value would not be seen
         axes.plot(*thin_curve(times[there], values[there]), lw=0.7, marker=alone)
-        axes.ticklabel_format(useOffset=False)  # an offset lies on the neighbour's title
         guess = f" = {own.guess}" if own.guess else ""
         axes.set_title(escaping.figure(f"{own.name[-40:]}{guess}"), fontsize="small")
         axes.set_xlabel(label, fontsize="x-small")
