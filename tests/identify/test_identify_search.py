@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize
 
-from podusv_cli.identify.fit.estimate import HullSearch, Scored, covariance, estimate_hull
+from podusv_cli.identify.fit.estimate import (
+    HullEstimate,
+    HullSearch,
+    Scored,
+    covariance,
+    estimate_hull,
+    prior_kept,
+)
 
 
 def test_the_search_finds_mean_and_deviation_of_numbers_as_algebra_does():
@@ -108,3 +115,23 @@ def test_a_number_that_bends_more_than_is_expected_does_not_hold_back_the_hull()
     least = minimize(lambda y: np.sum(residuals(y) ** 2) + y @ y, found.y, method="BFGS")
     assert found.rounds < 22
     assert found.value == pytest.approx(least.fun, abs=0.02)
+
+
+def test_a_hull_is_left_as_it_was_where_the_filter_breaks_down_beside_the_rest():
+    """The logs say nothing of y[0]; with y[0] as before, the filter breaks down above y[1] = 1.5.
+
+    Then y[1] is looked for from the prior's centre, up to where the filter is whole.
+    """
+    z = np.full(40, 2.0)
+
+    def innovations(points):
+        a, b = np.array(points).T
+        broken = (a < 0.5) & (b > 1.5)
+        return z[:, None] - b, np.where(broken, -1.0, 0.01) * np.ones((40, 1))
+
+    search = HullSearch(innovations, 2, np.arange(40) // 20, 1)
+    found = HullEstimate(np.array([1.0, 2.0]), 0.0, np.eye(2), rounds=1)
+    kept = prior_kept(search, found)
+    assert np.isfinite(kept.covariance).all()
+    assert kept.y[0] == 0.0
+    assert 0.5 < kept.y[1] <= 1.5

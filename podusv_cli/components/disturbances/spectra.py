@@ -111,7 +111,8 @@ def in_bins(density: Density, edges: Vector) -> Vector:
     """The variance (n - 1,) in each bin between neighbouring edges (n,) [Hz or rad/s]."""
     width = np.diff(edges)
     count = max(SAMPLES, math.ceil(ALL_SAMPLES / len(width)))
-    samples = (density(edges[:-1] + (i + 0.5) / count * width) for i in range(count))
+    places = (np.arange(count) + 0.5) / count
+    samples = density(edges[:-1] + places[:, None] * width)
     return np.asarray(sum(samples) * width / count)
 
 

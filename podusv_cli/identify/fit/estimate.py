@@ -270,7 +270,8 @@ def prior_kept(
 ) -> HullEstimate:
     """The estimate with those directions of the hull as before that the logs say nothing of.
 
-    All else is looked for again beside them. An interrupt leaves the best so far.
+    All else is looked for again beside them, from the prior's centre where the filter breaks down
+    at the rest of the estimate. An interrupt leaves the best so far.
     """
     try:
         whole, silent = _silent(search, found.y)
@@ -282,7 +283,10 @@ def prior_kept(
             return search.innovations([rest @ point for point in points])
 
         within = HullSearch(innovations, rest.shape[1], search.blocks, search.hull - len(silent))
-        again = _search_from(within, rest.T @ found.y, tell)
+        start = rest.T @ found.y
+        if not math.isfinite(within.values([start])[0]):
+            start = np.zeros(within.size)
+        again = _search_from(within, start, tell)
     except KeyboardInterrupt:  # before the first round
         return replace(found, interrupted=True)
     covered = rest @ again.covariance @ rest.T + before @ before.T
