@@ -56,6 +56,12 @@ TABLE: dict[str, list[Row]] = {
      "test_an_empty_file_beside_an_origin_is_told"),
     ('content["TimeMS"] = content.pop(BOOTED)', "content.pop(BOOTED)",
      "test_old_gps_has_the_time_of_the_week_beside_that_since_the_start"),
+    ("rows[:, 2] = np.unwrap(rows[:, 2])", "pass",
+     "test_a_flow_is_straight_between_its_rows_and_held_beyond_them"),
+    ("load_of_wind(k.share * speed, c_from", "load_of_wind(-k.share * speed, c_from",
+     "test_wind_has_the_direction_that_it_comes_from"),
+    ("    turned = np.flatnonzero(turns > OPPOSITE)\n", "    turned = turns[:0]\n",
+     "test_a_wrong_flow_is_told_in_a_sentence"),
 ],
 "systems": [
     ("square += product", "square = short.T @ short",
