@@ -92,7 +92,7 @@ def write_ulog(path, turns=None):
     return path
 
 
-def write_dataflash(path, *, old=False):
+def write_dataflash(path, *, old=False, rows=40):
     """ATT at 10 Hz and GPS at 5 Hz of an ArduPilot log, after its FMT messages.
 
     An `old` one has milliseconds, and of GPS those of the week beside those since the start, `T`.
@@ -109,7 +109,7 @@ def write_dataflash(path, *, old=False):
     clock, week = ("TimeMS", "T") if old else ("TimeUS", "GMS")
     out.append(form(1, "ATT", "QCf", f"{clock},Yaw,DesYaw"))
     out.append(form(2, "GPS", "QBIHLL", f"{clock},Status,{week},GWk,Lat,Lng"))
-    for i in range(40):
+    for i in range(rows):
         time = 3_000_000 + 100_000 * i
         at = time // 1000 if old else time
         out.append(b"\xa3\x95\x01" + struct.pack("<QHf", at, 100 * (350 + i) % 36000, 0.0))
