@@ -10,9 +10,9 @@ import pytest
 from log_files import sentence, sentences, write_dataflash, write_tlog
 from scipy.io import savemat
 
-from podusv_cli.identify.logs.contents import LogFault
+from podusv_cli.identify.logs.contents import Contents, LogFault
 from podusv_cli.identify.logs.formats import columns_of, contents_of
-from podusv_cli.identify.logs.listing import listing
+from podusv_cli.identify.logs.listing import _plain, list_contents, listing
 
 
 def nmea(tmp_path, lines, name="log.nmea"):
@@ -257,3 +257,11 @@ def test_a_piece_of_a_sentence_is_counted(tmp_path, end, says):
     read = contents_of(nmea(tmp_path, [*sentences(30), end]))
     assert read.warnings[0].startswith(says)
     assert 12.0 not in read.columns["HDT.heading [deg]"]
+
+
+def test_of_a_thousand_columns_each_name_is_taken_apart_once():
+    """As many as a log of PX4 has; a look at all of them for each took minutes."""
+    columns = {f"message_{i}.{name}": np.arange(9.0) for i in range(250) for name in "xyzw"}
+    _plain.cache_clear()
+    list_contents(Contents(columns), "a.ulg", None)
+    assert _plain.cache_info().misses <= len(columns)

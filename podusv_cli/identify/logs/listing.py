@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -274,7 +275,7 @@ def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
             for column in columns:
                 free = column not in taken and (numbered or quantity not in taken)
                 may_be = _may_be_clock if quantity == TIME else _may_be
-                if free and may_be(column, columns) and re.search(form, _plain(column)):
+                if free and re.search(form, _plain(column)) and may_be(column, columns):
                     taken |= {column, quantity}
                     parts = quantity == "n_#" and _in_parts(column, columns)
                     yield column, PARTS if parts else quantity
@@ -291,9 +292,12 @@ def _may_be(column: str, columns: Columns) -> bool:
         return like_pulses(columns[column]) and float(np.nanmin(columns[column])) < float(
             np.nanmax(columns[column])
         )
-    beside, known = plain.removesuffix("vx").removesuffix("vy"), {*map(_plain, columns)}
+    beside = plain.removesuffix("vx").removesuffix("vy")
+    if beside == plain:
+        return True
+    known = {*map(_plain, columns)}
     on_earth = ({f"{beside}x", f"{beside}y"}, {f"{beside}lat", f"{beside}lon"})
-    return beside == plain or not any(places <= known for places in on_earth)
+    return not any(places <= known for places in on_earth)
 
 
 def _in_parts(column: str, columns: Columns) -> bool:
@@ -322,6 +326,7 @@ def _may_be_clock(column: str, columns: Columns) -> bool:
     return clock_of(column, columns) is None and bool(np.isfinite(columns[column]).any())
 
 
+@lru_cache(maxsize=10_000)  # a log of PX4 has a thousand names, each asked for dozens of times
 def _plain(column: str) -> str:
     """A name in small letters, without its unit, but that of a propeller's speed."""
     own, unit = split_unit(column)
