@@ -149,6 +149,30 @@ def test_messages_of_a_type_that_the_bag_does_not_define_are_told(tmp_path):
     assert found.warnings == (said,)
 
 
+def test_topics_that_nobody_can_read_leave_the_others(tmp_path):
+    """A type without a definition, as of a service's events, and messages that are too short."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store, kind = get_typestore(Stores.ROS2_HUMBLE), "std_msgs/msg/Float64"
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        sound = writer.add_connection("/depth", kind, typestore=store)
+        short = writer.add_connection("/short", kind, typestore=store)
+        event = writer.add_connection(
+            "/event", "lab/srv/Add_Event", msgdef="int64 a\n---\nint64 b\n", rihs01="none"
+        )
+        for i in range(3):
+            raw = store.serialize_cdr(store.types[kind](0.5 * i), kind)
+            for topic, content in ((sound, raw), (short, raw[:6]), (event, raw)):
+                writer.write(topic, 10**18 + i * 10**9, content)
+    found = contents_of(the_file(tmp_path / "bag"))
+    np.testing.assert_array_equal(found.columns["depth.data"], [0.0, 0.5, 1.0])
+    assert found.warnings == (
+        "left out, of types whose definition cannot be read: /event (lab/srv/Add_Event)",
+        "left out, damaged or of another version of their type: 3 of /short (std_msgs/msg/Float64)",
+    )
+
+
 # --- bags of ROS 1
 
 

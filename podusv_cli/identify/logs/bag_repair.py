@@ -27,11 +27,12 @@ BAGS = (".mcap", ".db3", ".bag")
 
 
 class Topic(NamedTuple):
-    """What a bag says of a topic: its name, type and the type's definition and digest."""
+    """What a bag says of a topic: its name, type, the type's definition, its form and digest."""
 
     name: str
     kind: str
     definition: str
+    form: str
     digest: str
 
 
@@ -41,6 +42,14 @@ class BagMessage(NamedTuple):
     topic: Topic
     arrival: int
     raw: bytes
+
+
+class Repaired(NamedTuple):
+    """A copy of a bag, whether the bag itself was closed, and topics whose types cannot be read."""
+
+    path: Path
+    closed: bool = False
+    unread: tuple[str, ...] = ()
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -55,33 +64,47 @@ def has_journal(path: Path) -> bool:
     return journal.exists() and journal.stat().st_size > 0
 
 
-def repair_bag(path: Path, folder: Path) -> Path:
+def repair_bag(path: Path, folder: Path) -> Repaired:
     """A copy of a bag in a folder. Raises LogFault where nothing of it is whole."""
     with path.open("rb") as file:
         begin = file.read(len(ROS1))
         if not begin:
             raise LogFault(f"{path}: is empty")
         if not begin.startswith((MCAP, ROS1)):
-            return _copy_rows(path, folder / f"{path.stem}.db3")
+            return Repaired(_copy_rows(path, folder / f"{path.stem}.db3"))
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
             if begin.startswith(MCAP):
-                return _copy_mcap(WholeMcap(content), folder / path.stem)
-            return _copy_ros1(WholeRos1(content), folder / f"{path.stem}.bag")
+                closed = content[-len(MCAP) :] == MCAP
+                return _copy_mcap(WholeMcap(content), folder / path.stem)._replace(closed=closed)
+            return Repaired(_copy_ros1(WholeRos1(content), folder / f"{path.stem}.bag"))
 
 
-def _copy_mcap(messages: WholeMcap, folder: Path) -> Path:
-    """A ROS 2 bag of these messages."""
+def _copy_mcap(messages: WholeMcap, folder: Path) -> Repaired:
+    """A ROS 2 bag of these messages, but for those of types whose definition cannot be read."""
     from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import get_types_from_msg
+    from rosbags.typesys.base import TypesysError
+
+    unread = dict[Topic, None]()
 
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         own: dict[Topic, Any] = {}
         for topic, arrival, raw in messages:
+            if topic in unread:
+                continue
             if topic not in own:
+                try:
+                    if topic.form == "ros2msg":
+                        get_types_from_msg(topic.definition, topic.kind)
+                except TypesysError:
+                    unread[topic] = None
+                    continue
                 own[topic] = writer.add_connection(
                     topic.name, topic.kind, msgdef=topic.definition, rihs01=topic.digest
                 )
             writer.write(own[topic], arrival, raw)
-    return folder / f"{folder.name}.mcap"
+    names = tuple(f"{topic.name} ({topic.kind})" for topic in unread)
+    return Repaired(folder / f"{folder.name}.mcap", unread=names)
 
 
 def _copy_ros1(messages: WholeRos1, path: Path) -> Path:
@@ -105,7 +128,7 @@ class WholeMcap:
     def __init__(self, content: mmap.mmap) -> None:
         """Of a file's content."""
         self.content = content
-        self.schemas: dict[int, tuple[str, str]] = {}
+        self.schemas: dict[int, tuple[str, str, str]] = {}
         self.channels: dict[int, Topic] = {}
 
     def __iter__(self) -> Iterator[BagMessage]:
@@ -140,11 +163,11 @@ class WholeMcap:
         """Keep what a record says of a type or of a topic."""
         number, second = struct.unpack_from("<HH", body)
         if kind == SCHEMA:
-            name, _, definition = _texts(body, 2, 3)
-            self.schemas[number] = name, definition
+            name, form, definition = _texts(body, 2, 3)
+            self.schemas[number] = name, definition, form
         else:
             (topic,) = _texts(body, 4, 1)
-            self.channels[number] = Topic(topic, *self.schemas.get(second, ("", "")), "none")
+            self.channels[number] = Topic(topic, *self.schemas.get(second, ("", "", "")), "none")
 
 
 def _texts(body: bytes, at: int, count: int) -> list[str]:
@@ -189,8 +212,8 @@ def _topic(fields: dict[str, bytes], data: bytes) -> Topic:
     own = dict(_fields(data))
     room, _, name = own["type"].decode().partition("/")
     kind = f"{room}/msg/{name}" if "/" not in name else f"{room}/{name}"
-    words = (own[key].decode("utf-8", "replace") for key in ("message_definition", "md5sum"))
-    return Topic(fields["topic"].decode(), kind, *words)
+    text, digest = (own[n].decode("utf-8", "replace") for n in ("message_definition", "md5sum"))
+    return Topic(fields["topic"].decode(), kind, text, "ros1msg", digest)
 
 
 def _records(content: bytes | mmap.mmap, at: int) -> Iterator[tuple[dict[str, bytes], bytes, bool]]:

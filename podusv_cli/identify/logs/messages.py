@@ -11,6 +11,7 @@ import importlib
 import math
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
@@ -112,8 +113,12 @@ def read_ros(path: Path) -> Contents:
 def _read_repaired(files: list[Path]) -> Contents:
     """What is whole in the files of a bag that cannot be read as they are, with a warning."""
     with TemporaryDirectory() as folder:
-        contents = _read_bags([repair_bag(file, Path(folder)) for file in files])
-    return _with_extent(contents)
+        copies = [repair_bag(file, Path(folder)) for file in files]
+        contents = _read_bags([copy.path for copy in copies])
+    if unread := visible(", ".join(name for copy in copies for name in copy.unread)):
+        said = f"left out, of types whose definition cannot be read: {unread}"
+        contents = replace(contents, warnings=(said, *contents.warnings))
+    return contents if all(copy.closed for copy in copies) else _with_extent(contents)
 
 
 def _with_extent(contents: Contents) -> Contents:
@@ -129,7 +134,7 @@ def _read_bags(paths: list[Path]) -> Contents:
     """The messages in files or folders of one bag; those of types that it does not say are told."""
     reader, typesys = _library("rosbags.highlevel", paths[0]), _library("rosbags.typesys", paths[0])
     store = typesys.get_typestore(typesys.Stores.LATEST)
-    topics, unknown, damaged = TopicMessages(), dict[str, str](), 0
+    topics, unknown, damaged = TopicMessages(), dict[str, str](), Counter[str]()
     with reader.AnyReader(paths, default_typestore=store) as bag:
         for connection, arrival, raw in bag.messages():
             if connection.topic in unknown:
@@ -140,7 +145,7 @@ def _read_bags(paths: list[Path]) -> Contents:
                 unknown[connection.topic] = connection.msgtype
                 continue
             except reader.AnyReaderError:
-                damaged += 1
+                damaged[f"{connection.topic} ({connection.msgtype})"] += 1
                 continue
             since = (arrival - bag.start_time) * 1e-9
             if stamp := getattr(getattr(message, "header", None), "stamp", None):
@@ -150,7 +155,8 @@ def _read_bags(paths: list[Path]) -> Contents:
             topics.add(connection.topic.strip("/"), since, dict(_numbers(message, "")))
     named = visible(", ".join(f"{topic} ({kind})" for topic, kind in unknown.items()))
     said = {f"left out, of types that the bag does not define: {named}": bool(unknown)}
-    said |= {f"left out, damaged: {damaged} messages": damaged > 0}
+    counts = visible(", ".join(f"{count} of {topic}" for topic, count in damaged.items()))
+    said |= {f"left out, damaged or of another version of their type: {counts}": bool(damaged)}
     return Contents(topics.columns(), warnings=tuple(text for text, is_so in said.items() if is_so))
 
 
