@@ -68,6 +68,8 @@ REQUIRED: dict[str, dict[str, Any]] = {
     "wind": {"speed": 8.0},
     "waves": {"height": 0.1, "period": 1.5},
     "file": {"rows": "0, 1, 0.5, 0\n10, -1, 0.2, 0.1\n"},
+    "wind_file": {"rows": "0, 8, 0.5\n10, 6, 0.2\n"},
+    "current_file": {"rows": "0, 0.2, 0.5\n10, 0.1, 0.9\n"},
     "schedule": {"rows": "0, 1, 0\n200, 2, 0.5\n"},
     "policy": {"content": content(symmetric())},
 }

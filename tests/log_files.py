@@ -11,12 +11,14 @@ from podusv_cli.core.signal import STATE, TAU
 from podusv_cli.identify.logs.reading import NamedQuantities, table
 
 
-def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, tilted=None):
+def write_bag(
+    folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, tilted=None, storage="SQLITE3"
+):
     """Odometry at 10 Hz, whose stamps are 5 ms older than its arrival, and a thruster at 4 Hz.
 
     Stamps may be those of another clock [ns]; `tilted` turns the boat about its own axes first.
     """
-    from rosbags.rosbag2 import Writer
+    from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
@@ -25,7 +27,7 @@ def write_bag(folder, begin=1_700_000_000_000_000_000, *, stamped_from=None, til
     def make(name, *parts):
         return kinds[name](*parts)
 
-    with Writer(folder, version=9) as writer:
+    with Writer(folder, version=9, storage_plugin=StoragePlugin[storage]) as writer:
         odometry = writer.add_connection("/boat/odom", "nav_msgs/msg/Odometry", typestore=store)
         thruster = writer.add_connection("/left", "std_msgs/msg/Float64", typestore=store)
         for i in range(25):
@@ -90,7 +92,7 @@ def write_ulog(path, turns=None):
     return path
 
 
-def write_dataflash(path, *, old=False):
+def write_dataflash(path, *, old=False, rows=40):
     """ATT at 10 Hz and GPS at 5 Hz of an ArduPilot log, after its FMT messages.
 
     An `old` one has milliseconds, and of GPS those of the week beside those since the start, `T`.
@@ -107,7 +109,7 @@ def write_dataflash(path, *, old=False):
     clock, week = ("TimeMS", "T") if old else ("TimeUS", "GMS")
     out.append(form(1, "ATT", "QCf", f"{clock},Yaw,DesYaw"))
     out.append(form(2, "GPS", "QBIHLL", f"{clock},Status,{week},GWk,Lat,Lng"))
-    for i in range(40):
+    for i in range(rows):
         time = 3_000_000 + 100_000 * i
         at = time // 1000 if old else time
         out.append(b"\xa3\x95\x01" + struct.pack("<QHf", at, 100 * (350 + i) % 36000, 0.0))

@@ -17,7 +17,8 @@ from podusv_cli.figures.shown import Shown, about, axis_label, constants
 from podusv_cli.figures.style import legend, new_figure
 
 ELEVATION = "zeta"
-SIGNALS = (ELEVATION, "V_w", "V_c", "beta_c")  # the wind's direction does not change
+SIGNALS = (ELEVATION, "V_w", "V_c", "beta_c")
+FROM = "beta_w"  # drawn where the wind veers
 PANEL_HEIGHT = 1.25  # inches
 WAVES = 20  # in the panel of single waves
 
@@ -28,12 +29,14 @@ WAVES = 20  # in the panel of single waves
     signals=SIGNALS,
     caption="waves, wind and current where the vessel is: elevation of the sea over the last "
     f"{WAVES} waves and over the whole run, speed of the wind, speed and direction of the "
-    "current",
+    "current; where the wind turns, also its direction",
 )
 def sea(runs: Sequence[Shown], columns: int) -> Figure:
     """A panel for each signal over the whole run; above them, the last waves one by one."""
     held = constants(runs, SIGNALS)
     names = [name for name in SIGNALS if name not in held and any(run.has(name) for run in runs)]
+    if any(run.has(FROM) and np.ptp(run.signal(FROM)) > 0.0 for run in runs):
+        names.append(FROM)
     waves = int(ELEVATION in names)
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * (waves + len(names)))
     panels: list[Axes] = figure.subplots(waves + len(names), 1, squeeze=False)[:, 0].tolist()

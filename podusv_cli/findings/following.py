@@ -39,9 +39,14 @@ def short_leg(case: Case) -> Sentences:
     if not path.circles():
         return
     lengths, radius = _lengths(path), path.circles()[0][2]
-    for leg in np.flatnonzero(lengths < ROOM * radius):
+    short = np.flatnonzero(lengths < ROOM * radius)
+    if short.size:
+        leg = short[np.argmin(lengths[short])]
+        others = (
+            f", and {short.size - 1} more of {len(lengths)} are short" if short.size > 1 else ""
+        )
         yield (
-            f"leg {leg} is {lengths[leg]:.3g} m long, and the acceptance radius of its "
+            f"leg {leg} is {lengths[leg]:.3g} m long{others}, and the acceptance radius of their "
             f"waypoints is {radius:g} m, so the vessel leaves it before it is on it; take "
             "a smaller path.acceptance, or fewer waypoints"
         )

@@ -161,10 +161,11 @@ def _start(case: Case) -> Sentences:
     if away > FAR * length:
         axis = int(abs(east) > abs(north))
         number = (start.x, start.y)[axis]
-        if path.follows and away > GRID:
+        if path.waypoints() and away > GRID:
+            which = "nearest" if path.follows else "first"
             yield At(
                 "path.points",
-                f"the nearest waypoint is {away / 1000.0:.3g} km from the start; are the points "
+                f"the {which} waypoint is {away / 1000.0:.4g} km from the start; are the points "
                 "coordinates of a grid, as UTM's? write metres north and east of a place nearby, "
                 "or a start beside them",
             )

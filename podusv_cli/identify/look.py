@@ -26,6 +26,7 @@ from podusv_cli.pages.page import Picture, environment
 
 MOST = 60  # signals that are drawn
 EACH = 12  # of them in one figure
+ENDING = 34  # letters of a name above its picture
 ROW, TRACK = 1.1, 4.0  # inches, the height of two signals beside each other, and of the track
 IN_METRES, ON_EARTH = ("x", "y"), ("lat", "lon")
 
@@ -106,7 +107,8 @@ def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figu
         alone = "." if there.sum() == 1 else ""  # a line through one value would not be seen
         axes.plot(*thin_curve(times[there], values[there]), lw=0.7, marker=alone)
         guess = f" = {own.guess}" if own.guess else ""
-        axes.set_title(escaping.figure(f"{own.name[-40:]}{guess}"), fontsize="small")
+        axes.set_title(escaping.figure(f"{own.name[-ENDING:]}{guess}"), fontsize="x-small")
+        axes.ticklabel_format(axis="y", useOffset=False)  # it would stand in the title
         axes.set_xlabel(label, fontsize="x-small")
     for axes in panels[len(part) :]:
         axes.set_axis_off()

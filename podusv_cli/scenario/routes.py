@@ -39,6 +39,7 @@ USUAL = {"frame": 3, "command": 0}  # of a plan's item that does not say
 MOST_CODE = 1e5
 LONGEST_NAME = 40  # letters of a word that a file gives
 POINTS = re.compile(r"^\s*(?:points|polygon)\s*=\s*(.*)$", re.MULTILINE | re.IGNORECASE)
+FORM = re.compile(r"\s*format\s*=", re.IGNORECASE)
 LABEL = re.compile(r"\s*[a-z_]+\s*[,=]\s*[A-Za-z_][\w ]*\s*")
 MOOS_PAIR = re.compile(r"\s*([^,:{}\s]+)\s*,\s*([^,:{}\s]+)(?:\s*,[^:]*)?\s*")
 
@@ -76,7 +77,8 @@ def route_of(text: str) -> RouteFile | None:
 def without_repeats(route: RouteFile) -> RouteFile:
     """The route without a waypoint that repeats the one before. Raises RouteFault."""
     if not route.pairs:
-        raise RouteFault("has no waypoints")
+        others = f"; left out: {', '.join(route.left_out)}" if route.left_out else ""
+        raise RouteFault(f"has no waypoints{others}")
     pairs = route.pairs
     kept = [pair for i, pair in enumerate(pairs) if i == 0 or pair != pairs[i - 1]]
     again = len(pairs) - len(kept)
@@ -110,8 +112,11 @@ def _plan(text: str) -> RouteFile:
     mission = data.get("mission")
     if not isinstance(mission, Mapping):
         return _geojson(data)
-    items = []
+    items, others = list[MissionItem](), Counter[str]()
     for item in _simple_items(mission.get("items")):
+        if kind := item.get("complexItemType"):
+            others[str(kind)[:LONGEST_NAME]] += 1
+            continue
         frame, command = (_whole(_number(item.get(key, usual))) for key, usual in USUAL.items())
         where: Sequence[Any] = (0.0, 0.0)
         if command in PLACES:
@@ -119,7 +124,8 @@ def _plan(text: str) -> RouteFile:
         if len(where) < 2:
             raise RouteFault("has a waypoint without latitude and longitude")
         items.append((frame, command, _number(where[0]), _number(where[1])))
-    return _of_mission(items)
+    route = _of_mission(items)
+    return route._replace(left_out=(*route.left_out, *_counts(others)))
 
 
 def _simple_items(items: Any) -> Iterator[Mapping[str, Any]]:
@@ -242,6 +248,7 @@ def _gpx(root: ElementTree.Element) -> RouteFile:
 def _kml(root: ElementTree.Element) -> RouteFile:
     """The first line, else the points in their order; longitude comes first."""
     lines = [_kml_places(line) for line in _inside(root, "linestring")]
+    lines += [_track_places(track) for track in _inside(root, "track")]
     points = [place for point in _inside(root, "point") for place in _kml_places(point)]
     chosen, left_out = _line_or_points([*filter(None, lines)], points)
     others = _counts({"polygons": len(_inside(root, "polygon"))})
@@ -254,10 +261,24 @@ def _kml_places(geometry: ElementTree.Element) -> list[Pair]:
     return [(_number(_at(place, 1)), _number(_at(place, 0))) for place in cells]
 
 
+def _track_places(track: ElementTree.Element) -> list[Pair]:
+    """Those of Google Earth's gx:Track: longitude, latitude and height between blanks."""
+    cells = [(inner.text or "").split() for inner in _children(track, "coord")]
+    return [(_number(_at(place, 1)), _number(_at(place, 0))) for place in cells]
+
+
 def _moos(text: str) -> RouteFile:
-    """The first `points` of a MOOS-IvP behaviour, whose x is east and y north."""
-    first, *others = [match[1] for match in POINTS.finditer(text)]
-    body = first.partition("//")[0].partition("pts=")[2] or first.partition("//")[0]
+    """The first points of a MOOS-IvP behaviour, whose x is east and y north.
+
+    A polygon by its form (`format=radial, x=75, ...`) has no points.
+    """
+    lists = [match[1].partition("//")[0] for match in POINTS.finditer(text)]
+    written = [body for body in lists if not FORM.match(body)]
+    forms = {"polygons by their form (write their points)": len(lists) - len(written)}
+    if not written:
+        return RouteFile((), on_earth=False, left_out=_counts(forms))
+    first, *others = written
+    body = first.partition("pts=")[2] or first
     body = body.partition("{")[2].partition("}")[0] if "{" in body else body
     pairs, odd = [], 0
     for part in filter(str.strip, body.split(":")):
@@ -266,9 +287,8 @@ def _moos(text: str) -> RouteFile:
             odd += not LABEL.fullmatch(part)  # `label, survey`: a setting among the points
             continue
         pairs.append((float(match[2]), float(match[1])))
-    left_out = _counts(
-        {"points that are no two numbers": odd, "lists of points after the first": len(others)}
-    )
+    counts = {"points that are no two numbers": odd, "lists of points after the first": len(others)}
+    left_out = _counts(counts | forms)
     return RouteFile(tuple(pairs), on_earth=False, left_out=left_out)
 
 

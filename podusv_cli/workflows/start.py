@@ -114,7 +114,7 @@ def start(boat: Boat, out: Path, route: str = "") -> Path:
     """
     hull, thrusters = _hull(boat, out)
     way = _way(route, out)
-    return _write_new(out, _of_dimensions(hull, thrusters, way, out, known=bool(boat.speed)))
+    return _write_new(out, _of_dimensions(hull, thrusters, way, out, known=bool(boat.speed)), way)
 
 
 def start_from(preset: str, out: Path, route: str = "") -> Path:
@@ -122,14 +122,15 @@ def start_from(preset: str, out: Path, route: str = "") -> Path:
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
         raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
-    return _write_new(out, _of_preset(preset, _way(route, out), out))
+    way = _way(route, out)
+    return _write_new(out, _of_preset(preset, way, out), way)
 
 
-def _write_new(out: Path, text: str) -> Path:
+def _write_new(out: Path, text: str, way: StartingLegs | None) -> Path:
     """Write a scenario that loads, and its schema. Raises StorageError where `out` exists."""
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
-    _check(text, out)
+    _check(text, out, way)
     plugins, schema = installed_plugins(), out.with_name(SCHEMA)
     storage.make_folder(out.parent)
     known = schema_text(tuple(finding_kinds(plugins)), plugins)
@@ -137,14 +138,17 @@ def _write_new(out: Path, text: str) -> Path:
     return out
 
 
-def _check(text: str, out: Path) -> None:
+def _check(text: str, out: Path, way: StartingLegs | None) -> None:
     """Raise UsageError for a scenario that `podusv validate` would refuse."""
     try:
         load_text(text, str(out), checks=(unknown_codes, limits(insist=""), sweep_faults))
     except ScenarioError as error:
+        hint = "check length, beam, mass, thrusters and speed, whether they are those of one boat"
+        if way:
+            hint = f"the route is {way.length / 1000.0:.4g} km long; write a file with a part of it"
         raise UsageError(
             f"{out} is not written, since podusv would refuse it: {str(error).splitlines()[0]}; "
-            "check length, beam, mass, thrusters and speed, whether they are those of one boat"
+            f"{hint}"
         ) from error
 
 

@@ -281,6 +281,12 @@ def test_the_sea_is_shown_as_far_as_it_is_logged():
     assert not FIGURES["sea"].fits(shown(("a", recording())))
 
 
+def test_the_direction_of_a_wind_has_a_panel_where_the_wind_turns():
+    for directions, count in ((np.ones_like, 1), (np.sqrt, 2)):
+        figure = drawn("sea", shown(("a", recording(V_w=SEA["V_w"], beta_w=directions))))
+        assert len(figure.axes) == count
+
+
 def test_the_last_waves_are_shown_one_by_one():
     axes = drawn("sea", shown(("a", recording(**SEA)))).axes[0]
     assert axes.get_xlim() == pytest.approx(

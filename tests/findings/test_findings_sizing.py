@@ -159,6 +159,16 @@ NONSENSE = [  # overrides, the key that is named, and what is proposed
         "latitude and longitude in degrees? 0.002 deg of latitude are 222 m",
     ),
     (["path.points=[[0, 0], [0.6, 0], [0.6, 0.6]]"], "path.points", "in degrees?"),
+    (
+        ["path.points=[[7033500, 569000], [7033600, 569050]]"],
+        "path.points",
+        "the nearest waypoint is 7056 km from the start; are the points coordinates of a grid, as",
+    ),
+    (
+        ["path={kind: waypoints, points: [[569000, 7033500], [569050, 7033600]], speed: 1}"],
+        "path.points",
+        "the first waypoint is 7056 km from the start; are the points coordinates of a grid, as",
+    ),
     (["start.x=-6000"], "start.x", "given in mm? then write -6"),
     (["start.y=7000", "path={kind: circle}"], "start.y", "given in mm? then write 7"),
 ]
@@ -183,6 +193,7 @@ def test_a_value_in_another_unit_is_told_with_the_unit(overrides, key, says):
         [SEEING[0], "measurement.position.noise=5"],
         ["path.points=[[6000, 10], [6000.5, 10], [6001, 10.1], [6003, 10]]", "start={x: 6000}"],
         ["start.x=-600"],
+        ["path.points=[[7033500, 569000], [7033600, 569050]]", "start={x: 7033490, y: 569000}"],
     ],
 )
 def test_an_unusual_value_is_not(overrides):

@@ -10,9 +10,9 @@ import pytest
 from log_files import sentence, sentences, write_dataflash, write_tlog
 from scipy.io import savemat
 
-from podusv_cli.identify.logs.contents import LogFault
+from podusv_cli.identify.logs.contents import Contents, LogFault
 from podusv_cli.identify.logs.formats import columns_of, contents_of
-from podusv_cli.identify.logs.listing import listing
+from podusv_cli.identify.logs.listing import _plain, list_contents, listing
 
 
 def nmea(tmp_path, lines, name="log.nmea"):
@@ -245,6 +245,54 @@ def test_of_a_px4_log_the_boat_s_own_motion_is_proposed(tmp_path):
     }
 
 
+# Messages that real logs have before those of the boat's own motion.
+BESIDE_MOTION = (
+    "test_motor.motor_number",
+    "multirotor_motor_limits.saturation_status",
+    "control_allocator_status.handled_motor_failure_mask",
+    "estimator_innovation_test_ratios.heading",
+    "estimator_local_position.x",
+    "estimator_local_position.y",
+    "sensor_accel.x",
+    "sensor_gyro.y",
+    "transponder_report.lat",
+    "transponder_report.lon",
+    "transponder_report.heading",
+    "vehicle_acceleration.xyz[2]",
+    "AHR2.Lat",
+    "AHR2.Lng",
+    "GPS.U",
+    "AIRSPEED_AUTOCAL.vx",
+    "GSV.azimuth_1 [deg]",
+)
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {
+            "x": "vehicle_local_position.x",
+            "y": "vehicle_local_position.y",
+            "lat": "vehicle_gps_position.lat",
+            "lon": "vehicle_gps_position.lon",
+            "psi": "vehicle_local_position.heading",
+            "r": "vehicle_angular_velocity.xyz[2]",
+        },
+        {"lat": "POS.Lat", "lon": "POS.Lng", "psi": "ATT.Yaw", "r": "IMU.GyrZ"},
+        {"x": "LOCAL_POSITION_NED.x", "y": "LOCAL_POSITION_NED.y", "psi": "ATTITUDE.yaw"},
+    ],
+)
+def test_what_real_logs_have_beside_the_motion_is_not_proposed_for_it(own):
+    names = [*BESIDE_MOTION, *own.values()]
+    columns = {name: np.linspace(0.1, 1.2, 50) + 0.01 * i for i, name in enumerate(names)}
+    columns |= {f"{name.partition('.')[0]}.time": np.arange(50.0) for name in names}
+    found = {one.quantity: one.name for one in list_contents(Contents(columns), "a", None).columns}
+    found.pop("", None)
+    second = {"x": "estimator_local_position.x", "y": "estimator_local_position.y"}
+    second |= {"lat": "AHR2.Lat", "lon": "AHR2.Lng"}
+    assert found == second | own
+
+
 @pytest.mark.parametrize(
     ("end", "says"),
     [
@@ -257,3 +305,11 @@ def test_a_piece_of_a_sentence_is_counted(tmp_path, end, says):
     read = contents_of(nmea(tmp_path, [*sentences(30), end]))
     assert read.warnings[0].startswith(says)
     assert 12.0 not in read.columns["HDT.heading [deg]"]
+
+
+def test_of_a_thousand_columns_each_name_is_taken_apart_once():
+    """As many as a log of PX4 has; a look at all of them for each took minutes."""
+    columns = {f"message_{i}.{name}": np.arange(9.0) for i in range(250) for name in "xyzw"}
+    _plain.cache_clear()
+    list_contents(Contents(columns), "a.ulg", None)
+    assert _plain.cache_info().misses <= len(columns)

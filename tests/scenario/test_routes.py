@@ -71,6 +71,11 @@ FILES = {
             for lat, lon in PLACES
         )
     ),
+    "KML track of Google Earth": KML.format(
+        '<Placemark><gx:Track xmlns:gx="http://www.google.com/kml/ext/2.2"><when>2026</when>'
+        + "".join(f"<gx:coord>{lon} {lat} 12.5</gx:coord>" for lat, lon in PLACES)
+        + "</gx:Track></Placemark>"
+    ),
     "GeoJSON": geojson(LINE),
     "GeoJSON points": geojson(*({"type": "Point", "coordinates": p[::-1]} for p in PLACES)),
     "CSV": "lat,lon\n" + "".join(f"{lat},{lon}\n" for lat, lon in PLACES),
@@ -133,6 +138,13 @@ def test_moos_points_have_x_to_the_east(tmp_path):
         assert scenario.origin is None
 
 
+def test_a_polygon_by_its_form_is_passed_over_for_points(tmp_path):
+    text = "polygon = format=radial, x=75, y=-75, radius=30, pts=8\npoints = 0,-20 : 30,-20\n"
+    found = loaded(tmp_path, text)
+    assert found.scenario.path.points == ((-20.0, 0.0), (-20.0, 30.0))
+    assert "polygons by their form (write their points): 1" in found.remarks[0]
+
+
 def test_local_frames_of_a_mission_are_metres(tmp_path):
     text = "QGC WPL 110\n0 1 1 16 0 0 0 0 5.0 -3.0 0 1\n1 0 1 16 0 0 0 0 25.0 7.0 0 1\n"
     scenario = loaded(tmp_path, text).scenario
@@ -154,7 +166,15 @@ def test_rows_without_names_are_places_where_they_lie_about_the_origin(tmp_path)
     ("text", "says"),
     [
         (plan((16, (4806.0, -300.6)), (16, (4805.97, -300.58))), "degrees and minutes, ddmm.mmmm?"),
-        (plan((178, (0, 0))), "has no waypoints"),
+        (plan((178, (0, 0))), "has no waypoints; left out: change of speed (178): 1"),
+        (
+            '{"mission": {"items": [{"complexItemType": "StructureScan", "Layers": 2}]}}',
+            "has no waypoints; left out: StructureScan: 1",
+        ),
+        (
+            "polygon = format=radial, x=75, y=-75, radius=30, pts=8",
+            "has no waypoints; left out: polygons by their form (write their points): 1",
+        ),
         ('{"mission": {"items": [3]}}', "a mission item that is no mapping"),
         ("QGC WPL 110\n0 1 0 16 0\n", "line 2 is no item of QGC WPL 110, which has 12 numbers"),
         ('{"type": "Plan", ', "is no JSON"),

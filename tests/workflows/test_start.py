@@ -404,6 +404,14 @@ def test_what_validate_would_refuse_is_not_written(podusv):
     assert not Path("b8.yaml").exists()
 
 
+def test_a_route_that_no_log_holds_says_how_long_it_is(podusv):
+    """Ten degrees of latitude, as the plane has them."""
+    Path("far.csv").write_text("lat,lon\n50,6\n60,6\n")
+    said = podusv("start", "far", "--preset", "otter", "--route", "far.csv")
+    assert said.code == 2
+    assert "the route is 1108 km long; write a file with a part of it" in one_line(said.err)
+
+
 def test_hulls_too_narrow_name_the_option_that_says_how_wide_they_are(podusv):
     given = ("--length", "1.6", "--beam", "0.7", "--mass", "45", "--thrusters", "2x50N@0.2")
     said = podusv("start", "small", *given, "--hulls", "2")

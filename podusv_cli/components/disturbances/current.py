@@ -19,6 +19,24 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit
 
 
+# V_c [m/s], beta_c [rad]; k has the hull's coefficients and `form`. Writes b (3) [N, N, N m].
+@kernel
+def load_of_flow(V_c: float, beta_c: float, x: Vector, k: Any, b: Vector) -> None:
+    """The load that makes the equations of calm water those of water that moves at V_c."""
+    u, v, r = x[3], x[4], x[5]
+    cosine, sine = cos_sin(beta_c - x[2])
+    u_c, v_c = V_c * cosine, V_c * sine
+    turned = 1.0 if k.form == 0.0 else 0.0
+    u_c_dot, v_c_dot = turned * r * v_c, -turned * r * u_c
+    b[0] = surge_force(u - u_c, v - v_c, r, k) - surge_force(u, v, r, k) + k.m11 * u_c_dot
+    b[1] = sway_force(u - u_c, v - v_c, r, k) - sway_force(u, v, r, k) + k.m22 * v_c_dot
+    b[2] = yaw_moment(u - u_c, v - v_c, r, k) - yaw_moment(u, v, r, k) + k.m32 * v_c_dot
+    past, still = lacking(u - u_c, v - v_c, r, k), lacking(u, v, r, k)
+    b[0] += past[0] - still[0]
+    b[1] += past[1] - still[1]
+    b[2] += past[2] - still[2]
+
+
 class Current(Disturbance):
     """Water that flows at the same velocity everywhere; the hull moves through it.
 
@@ -81,22 +99,11 @@ class Current(Disturbance):
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:
-        """The load that makes the equations of calm water those of moving water."""
+        """The load of a flow on straight lines between two numbers of its table."""
         at = min(t / k.interval, table[0] + 1.0)
         piece = min(int(at), int(table[0]))
         here, share = tail(table, 1 + 2 * piece), at - piece
         V_c = here[0] + share * (here[2] - here[0])
         beta_c = here[1] + share * (here[3] - here[1])
-        u, v, r = x[3], x[4], x[5]
-        cosine, sine = cos_sin(beta_c - x[2])
-        u_c, v_c = V_c * cosine, V_c * sine
-        turned = 1.0 if k.form == 0.0 else 0.0
-        u_c_dot, v_c_dot = turned * r * v_c, -turned * r * u_c
-        b[0] = surge_force(u - u_c, v - v_c, r, k) - surge_force(u, v, r, k) + k.m11 * u_c_dot
-        b[1] = sway_force(u - u_c, v - v_c, r, k) - sway_force(u, v, r, k) + k.m22 * v_c_dot
-        b[2] = yaw_moment(u - u_c, v - v_c, r, k) - yaw_moment(u, v, r, k) + k.m32 * v_c_dot
-        past, still = lacking(u - u_c, v - v_c, r, k), lacking(u, v, r, k)
-        b[0] += past[0] - still[0]
-        b[1] += past[1] - still[1]
-        b[2] += past[2] - still[2]
+        load_of_flow(V_c, beta_c, x, k, b)
         b[3], b[4] = V_c, beta_c

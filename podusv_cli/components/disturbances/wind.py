@@ -70,9 +70,39 @@ def blendermann(u_r: float, v_r: float, k: Any, b: Vector) -> None:
         b[2] = (k.s_L - LEVER * (angle - 0.5 * math.pi) * k.length) * b[1]
 
 
-def _logarithmic(wind: Wind) -> float:
+# Speed [m/s], cosine and sine of where it comes from; x the state; writes b (3) [N, N, N m].
+@kernel
+def load_of_wind(speed: float, c_from: float, s_from: float, x: Vector, k: Any, b: Vector) -> None:
+    """The load of a wind on a hull that moves."""
+    c_psi, s_psi = cos_sin(x[2])
+    ahead = c_psi * c_from + s_psi * s_from
+    aside = c_psi * s_from - s_psi * c_from
+    blendermann(x[3] + speed * ahead, x[4] + speed * aside, k, b)
+
+
+def logarithmic_shear(drag: float) -> float:
     """C of the profile over a surface with this drag."""
-    return 2.5 * math.sqrt(wind.drag)
+    return 2.5 * math.sqrt(drag)
+
+
+def share_of_wind(at: float, C: float) -> float:
+    """What the wind at a height `at` [m] is of that at 10 m: 1 + C ln(at/10).
+
+    Raises ValueError where the profile has ended above that height.
+    """
+    share = 1.0 + C * math.log(at / 10.0)
+    if share <= 0.0:
+        calm = 10.0 * math.exp(-1.0 / C)
+        raise ValueError(
+            f"at {at:g} m the profile has no wind left, which ends {calm:.3g} m above the sea; "
+            "give a larger `at`"
+        )
+    return share
+
+
+def _logarithmic(wind: Wind) -> float:
+    """C over a surface with this wind's drag."""
+    return logarithmic_shear(wind.drag)
 
 
 def _norsok(wind: Wind) -> float:
@@ -133,18 +163,13 @@ class Wind(Disturbance):
                 f"lowest {self.lowest:g} Hz must be below highest {self.highest:g} Hz; 0.0017 and "
                 "0.5 are usual"
             )
-        if self.mean <= 0.0:
-            calm = 10.0 * math.exp(-1.0 / SHEAR[self.gusts](self))
-            raise ValueError(
-                f"at {self.at:g} m the profile has no wind left, which ends {calm:.3g} m above the "
-                "sea; give a larger `at`"
-            )
+        share_of_wind(self.at, SHEAR[self.gusts](self))
         return self
 
     @property
     def mean(self) -> float:
         """The mean speed at the height where it acts [m/s]."""
-        return self.speed * (1.0 + SHEAR[self.gusts](self) * math.log(self.at / 10.0))
+        return self.speed * share_of_wind(self.at, SHEAR[self.gusts](self))
 
     @property
     def signals(self) -> tuple[Signal, ...]:
@@ -222,11 +247,8 @@ class Wind(Disturbance):
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float) -> None:
         """The load, the wind's speed and where it comes from; the speed depends on t alone."""
-        c_psi, s_psi = cos_sin(x[2])
         speed = b[3] if again > 0.0 else k.mean + _gust(t, int(k.lanes), table)
-        ahead = c_psi * k.c_from + s_psi * k.s_from
-        aside = c_psi * k.s_from - s_psi * k.c_from
-        blendermann(x[3] + speed * ahead, x[4] + speed * aside, k, b)
+        load_of_wind(speed, k.c_from, k.s_from, x, k, b)
         b[3], b[4] = speed, k.direction
 
 

@@ -33,7 +33,7 @@ def contents_of(path: Path) -> Contents:
         raise LogFault(f"{path}: there is no such file")
     if not (path.is_file() or path.is_dir()):
         raise LogFault(f"{path}: is a pipe or a device; a log is a file, or the folder of a bag")
-    read = READERS.get(path.suffix.lower())
+    read = read_ros if path.is_dir() else READERS.get(path.suffix.lower())
     if not read:
         raise LogFault(
             f"{path}: a log is a file with one of these endings: {', '.join(filter(None, READERS))}"
@@ -79,6 +79,7 @@ READERS: dict[str, Callable[[Path], Contents]] = {
     ".db3": read_ros,
     ".mcap": read_ros,
     ".bag": read_ros,
+    ".active": read_ros,
     "": read_ros,
     ".ulg": read_ulog,
     ".bin": read_dataflash,

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -55,13 +56,18 @@ NAMES = {
     "tau_r": r"tau_r|yaw_?moment|torque\.z",
 }
 # Columns that are none of these, whatever their last word: clocks of messages, what is wanted,
-# where a plane touches the earth, how uncertain a value is, which engine it is, a course in
-# hundredths of a degree (MAVLink's hdg, beside which ATTITUDE has a yaw).
+# where a plane touches the earth, satellites, how uncertain a value is, which engine it is, a
+# course in hundredths of a degree (MAVLink's hdg, beside which ATTITUDE has a yaw).
 NEVER = re.compile(
-    r"^(cmd|orgn|rall|fnce|home|mission|wpl)[._]|timestamp|_flags$|position_int\.hdg"
+    r"^(cmd|orgn|rall|fnce|home|mission|wpl|gsv)[._]|satellite|timestamp|_flags$|position_int\.hdg"
     r"|\.time$|setpoint|(^|[._ ])(ref|reset|manual|input|target|desired)_|covariance|variance"
     r"|(^|[._ ])(std|eph|epv|evh|evv)|engine_no"
+    # Tests, faults and limits; accelerations; which satellites are used; a wind's filter; others.
+    r"|innov|test_ratio|^test_motor|fail|saturation|_mask$|_limits\.|accel|^gps(_\d)?\.u$"
+    r"|^(airspeed_autocal|transponder|adsb|ais|follow_|landing_)|^(sensor|vehicle)_(gyro|mag|magnetometer|imu|baro|air_data)"
 )
+# Messages that are taken where no other has the quantity: single filters and sensors, a simulator.
+SECOND = re.compile(r"^(estimator_|sensor_|ahr2|ahrs2|sim\d*[._]|simstate)")
 PARTS = "n_part_cmd_#"  # speeds that are asked for in parts of full speed
 FULL = 1.001  # largest of these
 PERCENT = 100.0  # largest of these in percent
@@ -266,15 +272,16 @@ def _number_name(quantity: str, name: str, guesses: dict[str, str]) -> str:
 def _guesses(columns: Columns) -> Iterator[tuple[str, str]]:
     """Columns and what they are, each quantity once but those that are numbered."""
     taken: set[str] = set()
+    ranked = sorted(columns, key=lambda column: bool(SECOND.match(column.lower())))
     for quantity in NAMES:
         pattern = _pattern(quantity)
         numbered = "#" in quantity
         likely = [pattern] if numbered else pattern.split("|")
         for form in [form.format(name) for form in FORMS for name in likely]:
-            for column in columns:
+            for column in ranked:
                 free = column not in taken and (numbered or quantity not in taken)
                 may_be = _may_be_clock if quantity == TIME else _may_be
-                if free and may_be(column, columns) and re.search(form, _plain(column)):
+                if free and re.search(form, _plain(column)) and may_be(column, columns):
                     taken |= {column, quantity}
                     parts = quantity == "n_#" and _in_parts(column, columns)
                     yield column, PARTS if parts else quantity
@@ -291,9 +298,12 @@ def _may_be(column: str, columns: Columns) -> bool:
         return like_pulses(columns[column]) and float(np.nanmin(columns[column])) < float(
             np.nanmax(columns[column])
         )
-    beside, known = plain.removesuffix("vx").removesuffix("vy"), {*map(_plain, columns)}
+    beside = plain.removesuffix("vx").removesuffix("vy")
+    if beside == plain:
+        return True
+    known = {*map(_plain, columns)}
     on_earth = ({f"{beside}x", f"{beside}y"}, {f"{beside}lat", f"{beside}lon"})
-    return beside == plain or not any(places <= known for places in on_earth)
+    return not any(places <= known for places in on_earth)
 
 
 def _in_parts(column: str, columns: Columns) -> bool:
@@ -322,6 +332,7 @@ def _may_be_clock(column: str, columns: Columns) -> bool:
     return clock_of(column, columns) is None and bool(np.isfinite(columns[column]).any())
 
 
+@lru_cache(maxsize=10_000)  # a log of PX4 has a thousand names, each asked for dozens of times
 def _plain(column: str) -> str:
     """A name in small letters, without its unit, but that of a propeller's speed."""
     own, unit = split_unit(column)

@@ -11,13 +11,14 @@ import importlib
 import math
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
 from functools import wraps
 from numbers import Real
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ import numpy as np
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.escaping import visible
 from podusv_cli.core.kernel import Vector
+from podusv_cli.identify.logs.bag_repair import bag_files, has_journal, repair_bag
 from podusv_cli.identify.logs.contents import Contents, LogFault
 from podusv_cli.identify.logs.nmea import contents_of_sentences
 from podusv_cli.identify.logs.topics import TIME, TopicMessages
@@ -32,6 +34,8 @@ from podusv_cli.identify.logs.topics import TIME, TopicMessages
 LONGEST = 16  # numbers of an array in a message; longer ones are pictures and clouds
 OTHER_CLOCK = 3600.0  # s between a stamp and its arrival, from which on a simulation's clock set it
 CLOCKS = {"TimeUS": 1e-6, "TimeMS": 1e-3}  # of DataFlash, new and old, to s
+ULOG_HEAD = 16  # bytes
+STAMP = 8  # bytes of the arrival before each message of a ground station's log
 BOOTED = "T"  # beside TimeMS, where this is the time of the GPS week: ms since the start
 Reader = Callable[[Path], Contents]
 
@@ -87,23 +91,73 @@ def _printed_into(file: IO[str]) -> Iterator[None]:
 
 @_fence_reader
 def read_ros(path: Path) -> Contents:
-    """Every topic of a ROS 2 bag: "topic.field.field"; of a quaternion also its `yaw` [rad].
+    """Every topic of a ROS bag: "topic.field.field"; of a quaternion also its `yaw` [rad].
 
-    Times are those of the header where a message has one, and otherwise those of its arrival.
+    Times are those of the header where a message has one, and otherwise those of its arrival. Of a
+    bag that was not closed, or was cut, what is whole is read.
     """
-    reader, typesys = _library("rosbags.highlevel", path), _library("rosbags.typesys", path)
+    files = bag_files(path)
+    if not files:
+        raise LogFault(f"{path}: the folder has no .mcap, .db3 or .bag file, so it is no bag")
+    whole = path.is_file() or (path / "metadata.yaml").exists()
+    if any(map(has_journal, files)):
+        return _read_repaired(files)
+    try:
+        return _read_bags([path] if whole else files)
+    except UsageError:
+        raise
+    except Exception:
+        return _read_repaired(files)
+
+
+def _read_repaired(files: list[Path]) -> Contents:
+    """What is whole in the files of a bag that cannot be read as they are, with a warning."""
+    with TemporaryDirectory() as folder:
+        copies = [repair_bag(file, Path(folder)) for file in files]
+        contents = _read_bags([copy.path for copy in copies])
+    if unread := visible(", ".join(name for copy in copies for name in copy.unread)):
+        said = f"left out, of types whose definition cannot be read: {unread}"
+        contents = replace(contents, warnings=(said, *contents.warnings))
+    return contents if all(copy.closed for copy in copies) else _with_extent(contents)
+
+
+def _with_extent(contents: Contents) -> Contents:
+    """The contents of a file that is cut, with a warning that says how much was read."""
+    times = [times for name, times in contents.columns.items() if name.endswith(f".{TIME}")]
+    count, end = sum(map(len, times)), max((float(t[-1]) for t in times if len(t)), default=0.0)
+    read = f"what is whole was read: {count} messages, up to {end:.1f} s"
+    said = f"it was not closed or is cut; {read}"
+    return replace(contents, warnings=(said, *contents.warnings))
+
+
+def _read_bags(paths: list[Path]) -> Contents:
+    """The messages in files or folders of one bag; those of types that it does not say are told."""
+    reader, typesys = _library("rosbags.highlevel", paths[0]), _library("rosbags.typesys", paths[0])
     store = typesys.get_typestore(typesys.Stores.LATEST)
-    topics = TopicMessages()
-    with reader.AnyReader([path], default_typestore=store) as bag:
+    topics, unknown, damaged = TopicMessages(), dict[str, str](), Counter[str]()
+    with reader.AnyReader(paths, default_typestore=store) as bag:
         for connection, arrival, raw in bag.messages():
-            message = bag.deserialize(raw, connection.msgtype)
+            if connection.topic in unknown:
+                continue
+            try:
+                message = bag.deserialize(raw, connection.msgtype)
+            except KeyError:
+                unknown[connection.topic] = connection.msgtype
+                continue
+            except reader.AnyReaderError:
+                damaged[f"{connection.topic} ({connection.msgtype})"] += 1
+                continue
             since = (arrival - bag.start_time) * 1e-9
             if stamp := getattr(getattr(message, "header", None), "stamp", None):
                 nanoseconds = int(stamp.sec) * 10**9 + int(stamp.nanosec)
                 stamped = (nanoseconds - bag.start_time) * 1e-9
                 since = stamped if abs(stamped - since) < OTHER_CLOCK else since
             topics.add(connection.topic.strip("/"), since, dict(_numbers(message, "")))
-    return Contents(topics.columns())
+    named = visible(", ".join(f"{topic} ({kind})" for topic, kind in unknown.items()))
+    said = {f"left out, of types that the bag does not define: {named}": bool(unknown)}
+    counts = visible(", ".join(f"{count} of {topic}" for topic, count in damaged.items()))
+    said |= {f"left out, damaged or of another version of their type: {counts}": bool(damaged)}
+    return Contents(topics.columns(), warnings=tuple(text for text, is_so in said.items() if is_so))
 
 
 def _numbers(content: Any, name: str) -> Iterator[tuple[str, float]]:
@@ -143,7 +197,16 @@ def read_ulog(path: Path) -> Contents:
             )
         columns |= {f"{own}.{name}": values for name, values in fields.items()}
     damage = "some of its messages are damaged; their values may be wrong"
-    return Contents(columns, warnings=(damage,) if log.file_corruption else ())
+    contents = Contents(columns, warnings=(damage,) if log.file_corruption else ())
+    return _with_extent(contents) if _ends_within_message(path.read_bytes()) else contents
+
+
+def _ends_within_message(content: bytes) -> bool:
+    """Whether a ULog, whose messages each begin with their length, ends before one does."""
+    at = ULOG_HEAD
+    while at + 2 <= len(content):
+        at += 3 + int.from_bytes(content[at : at + 2], "little")
+    return at != len(content)
 
 
 @_fence_reader
@@ -165,7 +228,8 @@ def read_dataflash(path: Path) -> Contents:
         name = message.get_type() + (f"_{which}" if which else "")
         numbers = {f".{n}": float(x) for n, x in content.items() if isinstance(x, Real)}
         messages.add(name, clock - first, numbers)
-    return Contents(messages.columns())
+    contents = Contents(messages.columns())
+    return _with_extent(contents) if log.offset < log.data_len else contents
 
 
 @_fence_reader
@@ -175,7 +239,9 @@ def read_telemetry(path: Path) -> Contents:
     # Not `mavlink_connection`: it runs a file in a folder `bin`, and takes names for sockets.
     log = library.mavmmaplog(str(path))
     messages, first, systems, lost = TopicMessages(), math.nan, list[int](), 0
+    unread = path.stat().st_size
     while (message := log.recv_match()) is not None:
+        unread -= STAMP + len(message.get_msgbuf())
         kind, arrival = message.get_type(), float(getattr(message, "_timestamp", math.nan))
         # Of what pymavlink does not know it checks nothing, not even whose it is.
         if kind == "BAD_DATA" or kind.startswith("UNKNOWN") or not math.isfinite(arrival):
@@ -190,7 +256,8 @@ def read_telemetry(path: Path) -> Contents:
         which = systems.index(system)  # of several vehicles the first has no number
         messages.add(f"{kind}_{which + 1}" if which else kind, arrival - first, numbers)
     said = f"left out, damaged or of no known type: {lost} messages"
-    return Contents(messages.columns(), warnings=(said,) if lost else ())
+    contents = Contents(messages.columns(), warnings=(said,) if lost else ())
+    return _with_extent(contents) if unread > 0 and not lost else contents
 
 
 @_fence_reader

@@ -250,21 +250,30 @@ def _doubts(contents: Contents, used: Mapping[str, str], name: str) -> list[str]
 
 
 def _boots(series: Mapping[str, _Series]) -> list[Mapping[str, _Series]]:
-    """The quantities in parts, before and after each time that their one clock begins anew.
+    """The quantities in parts, before and after each time that their clocks begin anew.
 
-    A clock that steps back by little, or again within a few rows, does not begin anew.
+    Clocks that do not all begin as often stay whole, and so does a log with a part of a few rows.
     """
-    if len({own.clock for own in series.values()}) != 1:
+    clocks = {own.clock: own.times for own in series.values()}
+    parts = {clock: _parts_of_clock(times) for clock, times in clocks.items()}
+    finest = parts[max(clocks, key=lambda clock: len(clocks[clock]))]
+    if min(part.stop - part.start for part in finest) < BOOT:
         return [series]
-    times = next(iter(series.values())).times
+    if {len(own) for own in parts.values()} != {len(finest)}:
+        return [series]
+    return [
+        {name: own.part(parts[own.clock][i]) for name, own in series.items()}
+        for i in range(len(finest))
+    ]
+
+
+def _parts_of_clock(times: Vector) -> list[slice]:
+    """The rows before and after each time that a clock [s] steps back by many of its steps."""
     timed = np.flatnonzero(np.isfinite(times))
     steps = np.diff(times[timed])
     # Two rows that are exchanged, or a clock that is corrected a little, is no new beginning.
     back = timed[1:][steps < -BOOT * np.median(np.abs(steps))] if len(steps) else timed[:0]
-    parts = [slice(a, b) for a, b in pairwise((0, *back.tolist(), len(times)))]
-    if min(part.stop - part.start for part in parts) < BOOT:
-        return [series]
-    return [{name: own.part(rows) for name, own in series.items()} for rows in parts]
+    return [slice(a, b) for a, b in pairwise((0, *back.tolist(), len(times)))]
 
 
 class _Found(NamedTuple):

@@ -167,6 +167,10 @@ def test_findings_tell_of_a_leg_too_short_and_of_legs_that_are_left() -> None:
 
     legs = SCENARIO["path"]
     assert "short-leg" in codes(path=legs | {"acceptance": 6.0})
+    (short,) = (
+        w for w in run("los_pid", path=legs | {"acceptance": 60.0}).warnings if "short" in w
+    )
+    assert f", and {len(legs['points']) - 2} more of {len(legs['points']) - 1} are short" in short
     assert not {"short-leg", "never-arrives", "never-settles"} & codes()
     assert "never-arrives" in codes(**{"simulation.duration": 40.0})
     missed = run("los_pid", path=legs | {"acceptance": 0.05})
