@@ -99,7 +99,7 @@ doubt: $(VENV)/run.done ## what the verdicts on papers and studies depend on, in
 
 bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench/
 	@$(BIN)/podusv bench --force --out results/.bench && mkdir -p results/bench && \
-	    cp results/.bench/leaderboard.md results/.bench/runs.csv results/bench && \
+	    cp results/.bench/runs.csv results/bench && \
 	    cp results/.bench/figures/profiles.png results/bench/figures
 	@$(BIN)/podusv bench configs/bench_boats --force --out results/.bench_boats && \
 	    cp results/.bench_boats/runs.csv results/bench/boats.csv

@@ -40,8 +40,7 @@ A claim that is put as an expression after its runs exist can be bent towards th
 changes whose texts could both be judged, {turns} turn the verdict on today's runs.
 
 A claim that was put after its runs existed describes what was seen. Only a run that was not \
-seen tests it: other [readings and steps](README.md#what-the-verdicts-depend-on), \
-[values](../docs/doubt.md#what-our-verdicts-depend-on), \
+seen tests it: other [values](../docs/doubt.md#what-our-verdicts-depend-on), \
 [draws](../docs/studies.md#what-the-committed-studies-found).
 
 Every text of every claim, with date, verdict on today's runs and reason: \
@@ -198,12 +197,15 @@ def page(texts: Sequence[Text]) -> str:
     turns = [(old, new) for old, new in known if old.verdict != new.verdict]
     claims = len({text.key for text in texts})
     head = HEAD.format(changed=len(changed), claims=claims, turns=len(turns), known=len(known))
-    return head + "".join(_row(old, new) for old, new in turns)
+    reasons = ["", *(new.reason for _, new in turns)]
+    return head + "".join(_row(*pair, before) for pair, before in zip(turns, reasons, strict=False))
 
 
-def _row(old: Text, new: Text) -> str:
+def _row(old: Text, new: Text, before: str) -> str:
+    """A change of a text; a reason that the row before gives is not repeated."""
     claim = f"{new.claim} of {new.config}"
-    return f"| {claim} | {new.date} | {old.verdict} | {new.verdict} | {new.reason} |\n"
+    reason = "the same" if new.reason == before else new.reason
+    return f"| {claim} | {new.date} | {old.verdict} | {new.verdict} | {reason} |\n"
 
 
 def main(*words: str) -> None:

@@ -82,13 +82,12 @@ def pairs(made: pd.DataFrame) -> pd.DataFrame:
 
 
 def paragraph(made: pd.DataFrame) -> str:
-    """The pooled numbers, the lowest cells, and the processor time of a set."""
-    pooled, cpu = count_held(made), made.groupby("number").cpu.first()
+    """The pooled numbers and the lowest cells."""
+    pooled = count_held(made)
     return (
         f"Of the {pooled['determined']} numbers and forces that count as determined "
-        f"{pooled['held']:.1f} % lie in their intervals, with an rms of {pooled['rms']:.2f}. "
-        f"{_lowest_pairs(pairs(made))}A set takes {cpu.median():.0f} s of processor time in the "
-        f"median, at most {cpu.max():.0f} s."
+        f"{pooled['held']:.1f} % lie in their intervals, with an rms of {pooled['rms']:.2f}."
+        f"{_lowest_pairs(pairs(made))}"
     )
 
 
@@ -98,7 +97,7 @@ def _lowest_pairs(cells: pd.DataFrame) -> str:
         return ""
     lowest = cells.sort_values("held").head(3)
     told = ", ".join(f"{row.cell} {row.held:.0f} %" for row in lowest.itertuples())
-    return f"{len(cells)} pairs of values have {LARGE} sets or more; the lowest are {told}. "
+    return f" {len(cells)} pairs of values have {LARGE} sets or more; the lowest are {told}."
 
 
 def filled(page: str) -> str:

@@ -91,21 +91,7 @@ def signs(letter, sets, laws=("adaptive_neural", "full_backstepping", "pid")):
     return {v.name: SIGNS[v.verdict] for v in judge(told, entries)}
 
 
-def sensitivity():
-    """(letter, keys, claim and sign that change) of every line of the README's second table."""
-    table = README.partition("## What the verdicts depend on")[2].partition("\n## ")[0]
-    for line in table.splitlines():
-        if line.startswith("| `"):
-            _, sets, changes, _ = line.split("|")
-            for part in changes.split(";"):
-                letters, _, told = part.partition(":")
-                for letter in re.findall("[PFSC]", letters):
-                    flips = dict(re.findall(r"(C\d+[a-z]?) ([-+?])", told))
-                    assert flips or told.strip() == "none"
-                    yield letter, tuple(re.findall("`(.*?)`", sets)), flips
-
-
-UNMOVED = {  # "... change none": what the README says above its table
+UNMOVED = {  # "... change none"
     "simulation.step=0.00125": "P",
     "simulation.step=0.005": "FSC",
     "simulation.step=0.0025": "FSC",
@@ -115,20 +101,18 @@ UNMOVED = {  # "... change none": what the README says above its table
 }
 
 
-def telling():
-    """All lines; but for those with the most and with the fewest changes they are slow tests."""
-    unmoved = [(letter, (keys,), {}) for keys, letters in UNMOVED.items() for letter in letters]
-    lines = [*unmoved, *sensitivity()]
-    by_changes = [sorted((x for x in lines if x[0] == a), key=lambda x: len(x[2])) for a in "PFSC"]
-    soon = [lines[-1] for lines in by_changes] + [by_changes[-1][0]]
-    return [pytest.param(*line, marks=[pytest.mark.slow] * (line not in soon)) for line in lines]
+def unmoved():
+    """What changes no verdict, in each reading; but for one of each reading they are slow tests."""
+    for keys, letters in UNMOVED.items():
+        for letter in letters:
+            slow = not keys.startswith("metrics")
+            yield pytest.param(letter, keys, marks=[pytest.mark.slow] * slow)
 
 
 @pytest.mark.papers
-@pytest.mark.parametrize(("letter", "sets", "flips"), telling())
-def test_the_verdicts_hang_on_what_the_readme_says(letter, sets, flips):
-    before = committed(letter)
-    assert {k: v for k, v in signs(letter, sets).items() if v != before[k]} == flips
+@pytest.mark.parametrize(("letter", "keys"), list(unmoved()))
+def test_what_changes_no_verdict_is_as_the_readme_says(letter, keys):
+    assert signs(letter, (keys,)) == committed(letter)
 
 
 def test_the_readme_tells_the_committed_verdicts():

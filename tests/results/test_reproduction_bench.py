@@ -11,7 +11,6 @@ import pytest
 import podusv
 from podusv_cli.scenario.load import load
 from podusv_cli.studies.bench.cases import AXES, shipped_bench
-from podusv_cli.studies.bench.page import as_markdown
 from podusv_cli.studies.bench.standing import by_vessel, leaderboard, middle
 from podusv_cli.studies.making.draws import draw_scenario, draws
 from podusv_cli.studies.tuning.check import tune_faults
@@ -30,7 +29,6 @@ def count(law, query):
 
 
 def test_the_leaderboard_is_that_of_the_runs():
-    assert as_markdown(RUNS) == (RESULTS / "bench" / "leaderboard.md").read_text()
     boards = [leaderboard(rows) for rows in by_vessel(RUNS).values()]
     for law in RUNS.law.unique():
         cells = [f"{board.mean_rank[law]:.1f}, {board.failed[law]:.0f}" for board in boards]
@@ -390,19 +388,10 @@ def test_the_sentences_about_the_error_beyond_the_standoff_are_those_of_the_stud
     )
     pid, li = hulls.loc["pid"], hulls.loc["full_backstepping"]
     assert f"better in {100 * pid.a_wins:.1f} % and worse in {100 * pid.b_wins:.1f} %" in text
-    assert f"by the error in {100 * li.b_wins:.1f} % and {100 * li.a_wins:.1f} %" in text
-    assert f"the errors {li.ratio:.3f} [{li.ratio_low:.3f}, {li.ratio_high:.3f}]" in text
-    assert (
-        f"{100 * (li.ratio - 1):.0f} % worse in the median" in (RESULTS / "README.md").read_text()
-    )
-    for law in ("no_adaptation", "full_backstepping"):
-        row = told.loc[law]
-        assert f"{row.ratio:.3f} [{row.ratio_low:.3f}, {row.ratio_high:.3f}]" in text
-    assert (
-        f"with full backstepping better in {100 * told.loc['full_backstepping'].b_wins:.1f} %"
-        in text
-    )
-    assert told.loc["pid"].a_wins == 1.0
+    assert f"the error {li.ratio:.3f} [{li.ratio_low:.3f}, {li.ratio_high:.3f}]" in text
+    assert f"[{100 * (li.ratio - 1):.0f} % worse in the med" in (RESULTS / "paper.md").read_text()
+    row = told.loc["no_adaptation"]
+    assert f"{row.ratio:.3f} [{row.ratio_low:.3f}, {row.ratio_high:.3f}]" in text
 
 
 @pytest.mark.parametrize("config", sorted(STUDIES.glob("*.yaml")), ids=lambda path: path.stem)
@@ -439,26 +428,18 @@ def test_the_sentences_about_forces_fixed_to_the_earth_are_those_of_the_study():
     section = " ".join(
         STUDIES_PAGE.partition("**With forces fixed")[2].partition("**On Cyber")[0].split()
     )
-    fixed, body = (table("summary.csv", name) for name in ("rivals_earth", "rivals"))
-
-    def told(metric, law, column, scale=1.0):
-        rows = (one.set_index(["metric", "law"]).loc[metric, law][column] for one in (fixed, body))
-        return [scale * row for row in rows]
-
-    assert "{:.0f} in place of {:.0f} m s".format(*told("iae", "velocity_vector", "q50")) in section
-    after = told("error_after_max", "velocity_vector", "q50", 1000)
-    assert "{:.0f} in place of {:.0f} mm".format(*after) in section
-    lost = told("iae", "adaptive_neural", "failed", 100)
-    assert lost[0] == lost[1]
-    assert f"{lost[0]:.1f} % of the draws both times" in section
+    after = [
+        table("summary.csv", name)
+        .set_index(["metric", "law"])
+        .loc["error_after_max", "velocity_vector"]
+        .q50
+        for name in ("rivals_earth", "rivals")
+    ]
+    assert "{:.0f} in place of {:.0f} mm".format(*(1000 * one for one in after)) in section
     pairs = table("pairs.csv", "rivals_earth").query("metric == 'iae'").set_index(["a", "b"])
-    for rival in ("momentum_vector", "adrc"):
-        pair = pairs.loc["velocity_vector", rival]
-        ratio = f"{pair.ratio:.3f} [{pair.ratio_low:.3f}, {pair.ratio_high:.3f}]"
-        assert (
-            f"`velocity_vector` / `{rival}` is {ratio}" in section
-            or f"`{rival}` {ratio}" in section
-        )
+    pair = pairs.loc["velocity_vector", "momentum_vector"]
+    ratio = f"{pair.ratio:.3f} [{pair.ratio_low:.3f}, {pair.ratio_high:.3f}]"
+    assert f"`velocity_vector` / `momentum_vector` is {ratio}" in section
 
 
 @pytest.mark.papers

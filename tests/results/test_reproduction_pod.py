@@ -92,28 +92,14 @@ def test_what_the_findings_hang_on_comes_out(name, keys, adaptive_neural, pid):
 
 
 def test_the_lines_that_say_so_are_there():
-    assert len(LINES) == 8
+    assert len(LINES) == 5
 
 
 @pytest.mark.papers
 @pytest.mark.parametrize(
     ("name", "keys", "told"),
-    [
-        ("kept", ("disturbance.b_v.mean=-0.5",), "{} against 861 J"),
-        ("dropped", ("disturbance.b_v.mean=-0.5",), "495 against {} J"),
-        ("kept", tuple(f"actuator.pods.{i}.T_nV=0.075" for i in (0, 1)), "({} against 337 J)"),
-    ],
+    [("kept", tuple(f"actuator.pods.{i}.T_nV=0.075" for i in (0, 1)), "({} against 337 J)")],
 )
 def test_what_else_costs_at_the_propeller_comes_out(name, keys, told):
     law = load(ROOT / f"configs/pod/{name}.yaml", keys).scenario.singles()["adaptive_neural"]
     assert told.format(round(rerun(law).metrics["energy_pod"])) in " ".join(FOUND.split())
-
-
-@pytest.mark.papers
-def test_unequal_thrust_holds_twice_the_disturbance_as_told():
-    keys = ("disturbance.scale=2",)
-    law = load(ROOT / "configs/pod/kept.yaml", keys).scenario.singles()["adaptive_neural"]
-    got = rerun(law).metrics
-    assert f"limit for {100 * got['at_angle_limit']:.0f} % of the time" in FOUND
-    assert f"(z_e {got['z_e_steady']:.3f} m, no more propeller energy" in FOUND
-    assert got["energy_pod"] < float(committed("kept").loc["energy_pod", "adaptive_neural"])
