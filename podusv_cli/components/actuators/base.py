@@ -25,7 +25,7 @@ from podusv_cli.components.actuators.recorded import (
 )
 from podusv_cli.core.component import KernelPart, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
-from podusv_cli.core.signal import DEMAND, TAU, Signal
+from podusv_cli.core.signal import DEMAND, DEMAND_SIZE, TAU, Signal
 from podusv_cli.core.units import Scales
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
@@ -84,6 +84,7 @@ class Actuator(KernelPart):
 
     feels_motion: ClassVar[bool] = True  # False: `drive` does not look at x, nor in a subclass
     cuts: ClassVar[bool] = False  # True: loads are the demand cut at `limits()`, in a subclass, too
+    takes_sway: ClassVar[bool] = False  # True: the demand has a sway force behind the yaw moment
     command: Command | None = value(
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )
@@ -234,6 +235,7 @@ class Actuator(KernelPart):
     def _drive_once(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
         """Loads (3,) [N, N, N m] and rate of the state (states,) for x (6,) and demand (2,)."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
+        demand = np.concatenate([demand, np.zeros(DEMAND_SIZE - len(demand))])
         call(
             self.drive,
             t=0.0,
@@ -256,7 +258,7 @@ class Actuator(KernelPart):
         """
         columns = [
             (self.settled(np.zeros(6), demand) - self.settled(np.zeros(6), -demand)) / (2.0 * SMALL)
-            for demand in SMALL * np.eye(len(DEMAND))
+            for demand in SMALL * np.eye(DEMAND_SIZE if self.takes_sway else len(DEMAND))
         ]
         return np.array(columns).T
 

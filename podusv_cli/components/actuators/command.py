@@ -14,7 +14,7 @@ from typing import Any
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
-from podusv_cli.core.signal import DEMAND, Signal
+from podusv_cli.core.signal import DEMAND_SIZE, Signal
 
 Drive = Callable[..., None]
 DRIVE = ("t", "x", "state", "demand", "k", "table", "tau", "rate", "signals")  # its arguments
@@ -24,7 +24,7 @@ GIVEN = (
     Signal("tau_u_in", "N", "surge force that the actuator is given", r"\tau_{u,\mathrm{in}}"),
     Signal("tau_r_in", "N m", "yaw moment that the actuator is given", r"\tau_{r,\mathrm{in}}"),
 )
-BEGAN = len(DEMAND)  # behind the demand there is when the present step began [s]
+BEGAN = DEMAND_SIZE  # behind the demand there is when the present step began [s]
 DRIVEN = BEGAN + 1  # numbers of both
 LOGGED = len(GIVEN)
 WHOLE = 1.5 * 2.0**52  # a number below 2^51 that is added to it, and taken off, is rounded

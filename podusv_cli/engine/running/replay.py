@@ -10,7 +10,8 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
+from podusv_cli.core.signal import DEMAND_SIZE
+from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -28,7 +29,8 @@ def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
     names = [*STATE, *dict.fromkeys(plan.states["law"])]
     logged = np.column_stack([recording[name][chosen] for name in names])
-    return np.column_stack([times[chosen], plan.loop.path.targets(times[chosen].tolist()), logged])
+    targets = plan.loop.path.whole_targets(times[chosen].tolist())
+    return np.column_stack([times[chosen], targets, logged])
 
 
 def replayer(
@@ -46,7 +48,7 @@ def replayer(
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
     constants = plan.law_constants
     p = np.array(list(constants.values()))
-    buffers = (rows.ravel(), p, plan.law_table, np.zeros(len(DEMAND)), np.zeros(room))
+    buffers = (rows.ravel(), p, plan.law_table, np.zeros(DEMAND_SIZE), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compile.routine(
         compile.Piece(rk4.evaluate_all, signatures.EVALUATE_ALL)

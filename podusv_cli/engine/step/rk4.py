@@ -16,6 +16,7 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, shared, tail, unpacker
+from podusv_cli.core.signal import TARGET_SIZE
 from podusv_cli.engine.step.delay_line import BEGAN, GIVEN, begin_step, pass_on
 from podusv_cli.engine.step.layout import (
     DISTANCE,
@@ -286,8 +287,8 @@ def evaluate_all(
             row = tail(rows, i * width)
             law(
                 row[0],
-                tail(row, 7),
-                tail(row, 13),
+                tail(row, 1 + TARGET_SIZE),
+                tail(row, 7 + TARGET_SIZE),
                 tail(row, 1),
                 p,
                 table,

@@ -85,6 +85,7 @@ def sample_and_hold(
         held[0] = t
         for i in range(6):
             held[HELD_X + i] = given[i]
+        for i in range(n.target):
             held[HELD_TARGET + i] = aim[i]
         if n.update_first > 0 and k > 0:
             for _ in range(n.hold_every):  # the period that ends, with its loads
