@@ -77,9 +77,9 @@ SWAY_DEMAND = Signal(
 DEMAND_SIZE = len(DEMAND) + 1  # numbers that the loop keeps for a demand
 # What a path may ask of a vessel that can push sideways.
 HEADING = (
-    Signal("psi_d", "rad", "heading that the path asks for, not wrapped", r"\psi_d"),
-    Signal("r_d", "rad/s", "rate of the heading that the path asks for", "r_d"),
-    Signal("r_d_dot", "rad/s2", "its acceleration", r"\dot r_d"),
+    Signal("heading_d", "rad", "heading that the path asks for, not wrapped", r"\psi_d"),
+    Signal("heading_d_dot", "rad/s", "rate of the heading that the path asks for", r"\dot\psi_d"),
+    Signal("heading_d_ddot", "rad/s2", "acceleration of that heading", r"\ddot\psi_d"),
 )
 # Numbers of a target: position, velocity and acceleration (x, y each), the vessel's distance to it,
 # and from PSI_D on a heading, 0 of a path that has none.

@@ -154,7 +154,7 @@ class EpisodeTask:
 
     def _limits(self, given: Limits | None) -> Vector:
         """Largest surge force [N] and yaw moment [N m], (2,). Raises UsageError."""
-        limits = numbers(self.scenario.actuator.limits() if given is None else given)
+        limits = numbers(self.scenario.actuator.limits()[:OUTPUTS] if given is None else given)
         if limits.shape != (OUTPUTS,) or not (limits >= 0.0).all():
             raise UsageError(
                 f"podusv.gym: the limits are {given!r}; give the largest surge force and yaw "

@@ -1,24 +1,25 @@
-"""Trajectory tracking and positioning of a fully actuated vessel: vectorial backstepping with PI.
+"""Tracking and positioning of a fully actuated vessel: vectorial backstepping with an integral.
 
 Source: T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2021), MIMO
-nonlinear backstepping; and T. I. Fossen and S. P. Berge, CDC 1997. With R = R(psi) and
-S = [0 -1 0; 1 0 0; 0 0 0],
+nonlinear backstepping, after T. I. Fossen and S. P. Berge, "Nonlinear vectorial backstepping design
+for global exponential tracking of marine vessels in the presence of actuator dynamics", CDC 1997;
+neither was at hand. The integral in the body frame is podusv's.
 
-    z_1 = R^T (eta - eta_d);  alpha = R^T eta_d' - K_p z_1 - K_i zeta;  zeta' = z_1 - r S zeta
-    z_2 = nu - alpha;  tau = M alpha' - f(nu) - z_1 - K_d M z_2
-
-where f is Coriolis and damping force of the nominal vessel. Then z_1' = -r S z_1 - K_p z_1 + z_2 -
-K_i zeta and M z_2' = -z_1 - K_d M z_2 without loads.
-
-Proved there: without loads and limits, the origin of (z_1, z_2) is globally exponentially stable
-(K_i = 0). Anti-windup: the integral holds while the loads are not what was asked for.
+Proved, with the nominal hull and without limits: without loads and integral all errors vanish
+exponentially, with any gain of the integral they vanish; constant loads on a heading that stays
+leave none. Not proved: another hull, other loads, limits. Anti-windup: back-calculation.
+docs/laws/pose_backstepping.md has equations and proof.
 """
 
 from __future__ import annotations
 
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+
 from podusv_cli.components.controllers.base import Controller, Slots, each
+from podusv_cli.components.controllers.pose_pid import ALONE, ERRORS
+from podusv_cli.components.controllers.velocity_loop import Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -26,7 +27,6 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.signal import PSI_D, Signal
 
-LIKE = 1e-9  # of a demand; loads that differ by more were limited
 INTEGRALS = (
     Signal("zeta_u", "m s", "integral of the error along the bow", r"\zeta_u"),
     Signal("zeta_v", "m s", "integral of the error across the bow", r"\zeta_v"),
@@ -40,11 +40,7 @@ class PoseBackstepping(Controller):
     kind: Literal["pose_backstepping"] = "pose_backstepping"
     asks_sway: ClassVar[bool] = True
     wants_heading: ClassVar[bool] = True
-    signals = (
-        Signal("z_1u", "m", "error along the bow"),
-        Signal("z_1v", "m", "error across the bow"),
-        Signal("psi_t", "rad", "heading error", r"\tilde\psi"),
-    )
+    signals: ClassVar[tuple[Signal, ...]] = ERRORS
     k_p: float = value(0.1, "1/s", "gain of the position error", gt=0)
     k_psi: float = value(0.2, "1/s", "gain of the heading error", gt=0)
     k_i: float = value(0.0, "1/s2", "gain of the integral of errors", ge=0)
@@ -58,23 +54,41 @@ class PoseBackstepping(Controller):
         """For anti-windup."""
         return self.k_i > 0.0
 
+    def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
+        """m nu' = -(k_d + gain of the position) m nu in surge and yaw: damping is cancelled."""
+        gains = (("k_d", self.k_d + self.k_p), ("k_d", self.k_d + self.k_psi))
+        return [
+            Loop(
+                axis.name,
+                key,
+                axis.damping,
+                np.array([axis.damping - gain * axis.told / axis.inertia]),
+                ALONE,
+            )
+            for axis, (key, gain) in zip(axes, gains, strict=True)
+        ]
+
+    # Changes rate (3,).
     @staticmethod
     @kernel
-    def after_saturation(demand: Vector, tau: Vector, rate: Vector) -> None:
-        """Hold the integrals of those axes that are limited."""
-        if abs(tau[0] - demand[0]) > LIKE * abs(demand[0]):
-            rate[0] = 0.0
-        if abs(tau[1] - demand[2]) > LIKE * abs(demand[2]):
-            rate[1] = 0.0
-        if abs(tau[2] - demand[1]) > LIKE * abs(demand[1]):
-            rate[2] = 0.0
+    def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
+        """Back-calculation over the gain of each error, 1 + m k_d k_p."""
+        rate[0] -= (tau[0] - demand[0]) / (1.0 + k.m11 * k.k_d * k.k_p)
+        rate[1] -= (tau[1] - demand[2]) / (1.0 + k.m22 * k.k_d * k.k_p)
+        rate[2] -= (tau[2] - demand[1]) / (1.0 + k.m33 * k.k_d * k.k_psi)
 
+    # x (6,), memory (3,), target (10,); writes tau (3,), rate (3,) and signals (3,).
     @staticmethod
     @kernel
     def law(
-        x: Vector, memory: Vector, target: Vector, k: Any, tau: Vector, rate: Vector,
+        x: Vector,
+        memory: Vector,
+        target: Vector,
+        k: Any,
+        tau: Vector,
+        rate: Vector,
         signals: Vector,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """tau = M alpha' - f(nu) - z_1 - K_d M z_2."""
         c, s = cos_sin(x[2])
         u, v, r = x[3], x[4], x[5]

@@ -42,6 +42,20 @@ def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
     return path.passed_by(share) if path.follows and law.aims() else {}
 
 
+def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, str]]:
+    """What a law wants of a path and an actuator that they have not: the part, and a sentence."""
+    texts = []
+    if law.asks_sway and not actuator.takes_sway:
+        text = "surge force and yaw moment alone; take ideal_full or saturated_full"
+        texts += [
+            ("actuator", f"{law.label} asks for a sway force, and {actuator.label} takes {text}")
+        ]
+    if law.wants_heading and not path.heads:
+        text = f"{law.label} wants a heading, and {path.label} has none; take poses"
+        texts += [("path", text)]
+    return texts
+
+
 @dataclass(frozen=True)
 class Probe:
     """A kernel `watch(t, weight, s, row, k, seen)` that sees every instant of a run.
@@ -162,16 +176,8 @@ class ClosedLoop:
             "measurement": self.measurement.conflicts(step),
         }
         texts = [f"{part}.{key}: {text}" for part, faults in parts.items() for key, text in faults]
-        if self.controller.asks_sway and not self.actuator.takes_sway:
-            texts.append(
-                f"actuator: {self.controller.label} asks for a sway force, and "
-                f"{self.actuator.label} takes surge force and yaw moment alone; take "
-                "`kind: ideal_full`"
-            )
-        if self.controller.wants_heading and not self.path.heads:
-            texts.append(
-                f"path: {self.controller.label} wants a heading, and {self.path.label} has none"
-            )
+        wanted = unmet(self.controller, self.path, self.actuator)
+        texts += [f"{part}: {text}" for part, text in wanted]
         if lacking := self.estimator.lacking(self.measurement.measured()):
             texts.append(f"estimator: {lacking}")
         if texts:

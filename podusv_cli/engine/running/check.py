@@ -134,6 +134,7 @@ def _ask(plan: Plan) -> None:
         call(
             law.after_saturation,
             t=0.0,
+            x=np.array(plan.loop.start),
             memory=plan.first_memory.copy(),
             demand=tau,
             tau=np.zeros(3),

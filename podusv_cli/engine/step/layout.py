@@ -25,7 +25,7 @@ class Parts(NamedTuple):
     law: Annotated[Function, "t x memory target k table tau rate signals work"]
     sample: Annotated[Function, "t x memory target k table"]
     actuator: Annotated[Function, "t x state demand k table tau rate signals"]
-    after_saturation: Annotated[Function, "t memory demand tau k table rate"]
+    after_saturation: Annotated[Function, "t x memory demand tau k table rate"]
     measurement: Annotated[Function, "t instant x b k table seen"]
     correct: Annotated[Function, "t seen state k table"]
     follow: Annotated[Function, "t seen tau state k table rate"]

@@ -134,7 +134,10 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
         wanted = tail(c.delay_line, GIVEN)
     drive(t, s, ds, wanted, p, c, n)
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
-        p.after_saturation(t, memory, demand, tau, k, table, memory_rate)
+        seen = given
+        if n.hold_every > 0:
+            seen = tail(c.held, HELD_X)
+        p.after_saturation(t, seen, memory, demand, tau, k, table, memory_rate)
     if n.measured > 0:
         p.follow(t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate))
     plant(s, tau, b, coefficients(c.vessel), ds)
