@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.metrics.metric import Accumulator, Measured, Metric, Result, add, gathered, ratio
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gathered, ratio
 from podusv_cli.metrics.spans import ANEW, WITHIN
 
-TIME, EFFORT, USE_U, USE_V, USE_R, INTEGRALS = range(6)
+TIME, EFFORT, INTEGRALS = range(3)
+USE_U, USE_V, USE_R, USES = range(1, 5)
 PEAK, TV, LAST, SETTLED = range(2 * INTEGRALS, 2 * INTEGRALS + 4)
 SIZE = SETTLED + 1
 SWAY = 2  # where a demand has the sway force
@@ -18,13 +21,10 @@ SWAY = 2  # where a demand has the sway force
 # Arguments as those of `spans.all_kernels`; changes `seen`.
 @kernel
 def watch(weight: float, steady: float, row: Vector, k: Any, seen: Vector) -> None:
-    """Gather the largest demand, the sum of its changes, the squared force, and parts of limits."""
+    """Gather the largest demand, the sum of its changes, and the squared force."""
     demand, force = row[int(k.demand) + SWAY], row[int(k.tau) + 1]
     add(seen, INTEGRALS, TIME, weight)
     add(seen, INTEGRALS, EFFORT, weight * force * force)
-    add(seen, INTEGRALS, USE_U, weight * abs(row[int(k.tau)]) / k.limit_u)
-    add(seen, INTEGRALS, USE_V, weight * abs(force) / k.limit_v)
-    add(seen, INTEGRALS, USE_R, weight * abs(row[int(k.tau) + 2]) / k.limit_r)
     seen[PEAK] = max(seen[PEAK], abs(demand))
     if steady == ANEW:
         seen[SETTLED] = seen[TV] = 0.0
@@ -35,15 +35,35 @@ def watch(weight: float, steady: float, row: Vector, k: Any, seen: Vector) -> No
     seen[LAST] = demand
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
+@kernel
+def watch_use(weight: float, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather the parts of limits that loads take."""
+    tau = int(k.tau)
+    add(seen, USES, TIME, weight)
+    add(seen, USES, USE_U, weight * abs(row[tau]) / k.limit_u)
+    add(seen, USES, USE_V, weight * abs(row[tau + 1]) / k.limit_v)
+    add(seen, USES, USE_R, weight * abs(row[tau + 2]) / k.limit_r)
+
+
 def _size(layout: Measured) -> int:
     return SIZE if layout.loop.actuator.takes_sway else 0
 
 
 def _constants(layout: Measured) -> dict[str, float]:
-    """Columns of demand and loads, and the actuator's limits, infinite without any."""
-    u, r, v = layout.loop.actuator.limits()
-    columns = {"demand": float(layout.plan.demand), "tau": float(layout.plan.tau)}
-    return columns | {"limit_u": u, "limit_v": v, "limit_r": r}
+    return {"demand": float(layout.plan.demand), "tau": float(layout.plan.tau)}
+
+
+def _size_of_use(layout: Measured) -> int:
+    """None where the actuator has no constant limit of a load."""
+    limited = np.isfinite(layout.loop.actuator.limits()).all()
+    return 2 * USES if layout.loop.actuator.takes_sway and limited else 0
+
+
+def _limits(layout: Measured) -> dict[str, float]:
+    """The column of the loads, and the actuator's limits; 1 of one that has no sway force."""
+    u, r, v = (*layout.loop.actuator.limits(), 1.0)[:3]
+    return {"tau": float(layout.plan.tau), "limit_u": u, "limit_v": v, "limit_r": r}
 
 
 def _variation(seen: Vector, step: float) -> float:
@@ -51,13 +71,10 @@ def _variation(seen: Vector, step: float) -> float:
     return float(seen[TV]) if seen[SETTLED] > 1.0 else math.nan
 
 
-def _use(position: int) -> Result:
-    """The mean part of a limit that a load takes; NaN without a limit."""
-    mean = ratio(position, TIME)
-    return lambda seen, step: mean(seen, step) or math.nan
-
-
-OF = Accumulator(watch, _size, _constants, INTEGRALS, ("limit_u", "limit_v", "limit_r"))
+OF = Accumulator(watch, _size, _constants, INTEGRALS)
+OF_USE = Accumulator(
+    watch_use, _size_of_use, _limits, USES, differing=("limit_u", "limit_v", "limit_r")
+)
 peak_v = Metric(
     "peak_tau_v",
     "N",
@@ -92,8 +109,8 @@ use_u = Metric(
     "thrust_use_u",
     "1",
     "mean |tau_u| over the actuator's limit of it",
-    OF,
-    _use(USE_U),
+    OF_USE,
+    ratio(USE_U, TIME),
     place=5,
     words="use of the surge force, mean part of its limit",
 )
@@ -101,8 +118,8 @@ use_v = Metric(
     "thrust_use_v",
     "1",
     "mean |tau_v| over the actuator's limit of it",
-    OF,
-    _use(USE_V),
+    OF_USE,
+    ratio(USE_V, TIME),
     place=5,
     words="use of the sway force, mean part of its limit",
 )
@@ -110,8 +127,8 @@ use_r = Metric(
     "thrust_use_r",
     "1",
     "mean |tau_r| over the actuator's limit of it",
-    OF,
-    _use(USE_R),
+    OF_USE,
+    ratio(USE_R, TIME),
     place=5,
     words="use of the yaw moment, mean part of its limit",
 )

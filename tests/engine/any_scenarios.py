@@ -70,6 +70,12 @@ KINDS: dict[str, dict[str, Any]] = {
         },
         "vessel": {"preset": "cybership2"},
     },
+    "pods for a pose": {
+        "controller": {"kind": "pose_pid"},
+        "path": {"kind": "poses", "poses": POSES, "travel": 0.7, "dwell": 0.3},
+        "actuator": {"kind": "pod", "preset": "milliampere", "sway_weight": 1.0},
+        "vessel": {"preset": "milliampere"},
+    },
     "a trial": {"controller": {"kind": "zigzag"}},
     "a difference of headings": {
         "controller": {"kind": "adaptive_neural", "rate": "difference", "hold_below": 0.1}

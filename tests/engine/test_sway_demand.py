@@ -31,8 +31,9 @@ def test_limits_cut_each_load_by_itself():
 
 REFUSED = {
     "actuator.kind=saturated": "asks for a sway force, and saturated takes surge force and yaw "
-    "moment alone; take ideal_full or saturated_full",
-    "path={kind: circle}": "wants a heading, and circle has none; take poses",
+    "moment alone; take ideal_full, saturated_full, or pods that push every way with sway_weight "
+    "above 0",
+    "path={kind: circle}": "wants a heading, and circle has none; take poses, hold or ellipse",
 }
 
 

@@ -10,9 +10,9 @@ from conftest import NONLINEAR, POD, Constant, adrift, corrected, example, targe
 from loop_samples import gathered
 
 from podusv_cli.comparison.parsing import parse_claims
-from podusv_cli.components.actuators.ideal_full import IdealFull
 from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.actuators.saturated_full import SaturatedFull
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.pid import Pid
@@ -332,7 +332,7 @@ def test_every_metric_is_computed_and_documented(limited):
     seeing = corrected(measurement=Sensors(), estimator=ExtendedKalmanFilter())
     of_estimates = set(gathered(seeing, steps=10)[1])
     of_path = set(gathered(corrected(path=example(Legs)), steps=10)[1])
-    posed = corrected(actuator=IdealFull(), path=example(Poses))
+    posed = corrected(actuator=SaturatedFull(), path=example(Poses))
     of_poses = set(gathered(posed, steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in (*OF_OPTIMUM.values(), *OF_LOG)} | set(OF_LOOP)

@@ -50,6 +50,11 @@ def pass_loads(demand: Vector, tau: Vector) -> None:
         tau[i] = demand[i]
 
 
+def whole_demand(demand: Vector) -> Vector:
+    """A demand (3,) from its first two numbers, with a sway force of 0, or from all of it."""
+    return np.concatenate([demand, np.zeros(DEMAND_SIZE - len(demand))])
+
+
 class Actuator(KernelPart):
     """What turns a demand (tau_u, tau_r), or (tau_u, tau_r, tau_v), into loads on the hull.
 
@@ -85,11 +90,15 @@ class Actuator(KernelPart):
 
     feels_motion: ClassVar[bool] = True  # False: `drive` does not look at x, nor in a subclass
     cuts: ClassVar[bool] = False  # True: loads are the demand cut at `limits()`, in a subclass, too
-    takes_sway: ClassVar[bool] = False  # True: the demand has a sway force behind the yaw moment
     command: Command | None = value(
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )
     failure: EffectivenessLoss | None = value(None, "", "loss of effectiveness at a time")
+
+    @property
+    def takes_sway(self) -> bool:
+        """Whether the demand has a sway force behind the yaw moment."""
+        return False
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -242,7 +251,7 @@ class Actuator(KernelPart):
     def _drive_once(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
         """Loads (3,) [N, N, N m] and rate of the state (states,) for x (6,), demand (2 or 3,)."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
-        demand = np.concatenate([demand, np.zeros(DEMAND_SIZE - len(demand))])
+        demand = whole_demand(demand)
         call(
             self.drive,
             t=0.0,

@@ -17,7 +17,11 @@ class FullActuator(Actuator):
 
     feels_motion: ClassVar[bool] = False
     cuts: ClassVar[bool] = True
-    takes_sway: ClassVar[bool] = True
     command: FullCommand | None = value(
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )
+
+    @property
+    def takes_sway(self) -> bool:
+        """Always."""
+        return True

@@ -29,6 +29,19 @@ def test_backstepping_stays_at_rounding_level_on_a_path_that_it_begins_on():
     np.testing.assert_array_equal(log["tau_v"], log["tau_v_cmd"])
 
 
+def test_backstepping_goes_round_an_ellipse_that_it_begins_on():
+    """Three rounds of pi a b: a heading that grows by whole turns, with Coriolis forces."""
+    rate, a, b = 2 * math.pi / 60.0, 3.0, 2.0
+    path = "path: {kind: ellipse, length: 6.0, breadth: 4.0, period: 60.0}\n"
+    start = f"start={{x: 3.0, psi: {math.pi / 2!r}, u: {b * rate!r}, r: {rate * a / b!r}}}"
+    log = marched(BOAT + path + HELD, start, "simulation.duration=180")
+    assert log["z_e"].max() < 1e-6
+    assert log["psi"][-1] == pytest.approx(math.pi / 2 + 6 * math.pi, abs=1e-6)
+    x, y = log["x"][:3001], log["y"][:3001]
+    area = 0.5 * np.abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+    assert area == pytest.approx(math.pi * a * b, rel=1e-5)
+
+
 def test_a_lyapunov_function_falls_as_the_proof_says():
     """V = |z_1|^2 / 2 + z_2' M z_2 / 2 falls by z_1' K_p z_1 + z_2' K_d M z_2, off the path.
 
