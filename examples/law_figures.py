@@ -36,6 +36,7 @@ SHOWN = {
     "mss": ("laws/autopilots", ("mss_alos", "mss_ilos")),
     "pose_pid": ("dp/four_corners", ("pid", "pd")),
     "pose_backstepping": ("dp/four_corners", ("backstepping", "backstepping_plain")),
+    "pose_sliding_mode": ("dp/four_corners", ("sliding_mode", "backstepping_plain")),
     "policy": ("laws/learned", ("policy", "velocity_vector")),
 }
 LEAST = 1e-4  # m, the lower end of the axis of errors

@@ -150,7 +150,7 @@ class Answer(NamedTuple):
 
 def ask(law: Controller, x: Vector, memory: Vector, target: Vector, nominal: Vessel) -> Answer:
     """Evaluate a law once, as plain Python; what it does not write stays NaN."""
-    tau, rate = np.full(2 + law.asks_sway, np.nan), np.full(len(memory), np.nan)
+    tau, rate = np.full(2 + law.asks_sway(), np.nan), np.full(len(memory), np.nan)
     signals, work = np.full(len(law.signals), np.nan), np.full(law.workspace(), np.nan)
     k = bundle(law.constants_with(nominal))
     call(
@@ -185,7 +185,7 @@ def situations(law: Controller, count: int, seed: int = 1) -> Iterator[Situation
         bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1, 20)
         ahead = [x[0] + distance * np.cos(bearing), x[1] + distance * np.sin(bearing)]
         target = np.concatenate([ahead, random.uniform(-1, 1, 4) * [0.7, 0.7, 0.1, 0.1]])
-        if law.wants_heading:
+        if law.wants_heading():
             target = np.append(target, [0.0, *random.uniform(-1, 1, 3) * [3, 0.1, 0.01]])
         memory = law.start(x, target, NONLINEAR)
         yield Situation(x, memory + random.normal(0, 0.3, len(memory)), target)
@@ -205,9 +205,9 @@ def corrected(**parts: Any) -> ClosedLoop:
         "start": PRINTED_START,
     }
     law = parts.get("controller")
-    if law is not None and law.asks_sway:
+    if law is not None and law.asks_sway():
         defaults["actuator"] = IdealFull()
-    if law is not None and law.wants_heading:
+    if law is not None and law.wants_heading():
         defaults["path"] = example(Poses)
     chosen = defaults | parts
     return ClosedLoop(**{"nominal": chosen["vessel"]} | chosen)

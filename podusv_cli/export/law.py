@@ -108,7 +108,7 @@ class ExportedLaw:
             raise UsageError(f"{scenario.name}: {NO_LAW}")
         if not plan.grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
-        if scenario.controller.asks_sway or scenario.controller.wants_heading:
+        if scenario.controller.asks_sway() or scenario.controller.wants_heading():
             raise UsageError(f"{scenario.name}: {NO_POSE}")
         whole, signals = plan.layout, len(plan.loop.controller.signals)
         memory = whole.states - whole.memory

@@ -89,7 +89,7 @@ def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
     envelope = scenario.vessel.envelope
     if envelope is None or not len(log["u"]):
         return
-    sideways = scenario.controller.asks_sway  # on purpose, at any drift angle
+    sideways = scenario.controller.asks_sway()  # on purpose, at any drift angle
     remedy = "" if sideways else "ask for less speed or turn, or "
     parts = [envelope.shares(*_through_water(log.part(rows))) for rows in blocks(len(log["u"]))]
     for name, (word, unit) in PLACES.items():

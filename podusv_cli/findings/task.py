@@ -101,10 +101,10 @@ def opposite_start(case: Case) -> Sentences:
     target = case.scenario.path.whole_targets([0.0])[0].tolist()
     _, _, x_dot, y_dot, *_ = target
     what, wanted = "course", math.atan2(y_dot, x_dot)
-    if law.wants_heading:
+    if law.wants_heading():
         what, wanted = "heading", target[PSI_D]
     half = abs(abs(math.remainder(start.psi - wanted, 2.0 * math.pi)) - math.pi) < OPPOSITE
-    known = law.wants_heading or math.hypot(x_dot, y_dot) > STANDING
+    known = law.wants_heading() or math.hypot(x_dot, y_dot) > STANDING
     if half and not start.r and known and law.aims():
         yield (
             f"{start.psi:.6g} rad is opposite to the target's {what}, so rounding decides to which "
@@ -141,7 +141,7 @@ def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
     lost = np.isnan(seen.nu[:, 1])
-    pushes = case.scenario.controller.asks_sway  # then the hull is held, whatever its heading
+    pushes = case.scenario.controller.asks_sway()  # then the hull is held, whatever its heading
     if lost.any() and case.scenario.controller.aims() and not pushes:
         load = float(seen.load[:, 1].mean())
         speed = abs(drift(case.scenario, load))

@@ -67,7 +67,7 @@ def median(values: Vector) -> float:
 def reference(scenario: Scenario) -> Reference:
     """Sample a scenario's target and loads, and balance the hull's loads at each sample."""
     time = np.linspace(0.0, scenario.simulation.duration, SAMPLES)
-    if scenario.controller.asks_sway and scenario.path.heads:
+    if scenario.controller.asks_sway() and scenario.path.heads:
         return _posed(scenario, time)
     target = scenario.path.targets(time.tolist())
     speed, turn, along = _motion(target)

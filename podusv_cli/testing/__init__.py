@@ -235,9 +235,9 @@ def loop_with(component: Component) -> ClosedLoop:
         "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
     }
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
-    if isinstance(component, Controller) and component.asks_sway:
+    if isinstance(component, Controller) and component.asks_sway():
         parts["actuator"] = IdealFull()
-    if isinstance(component, Controller) and component.wants_heading:
+    if isinstance(component, Controller) and component.wants_heading():
         parts["path"] = Poses(poses=((0.0, 0.0, 0.0), (5.0, 2.0, 0.5)))
     return ClosedLoop(
         vessel=usual_vessel(),
@@ -261,7 +261,7 @@ def evaluate_component(component: Component, seed: int) -> list[Vector]:
     place = x[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
     motion = random.uniform(-1.0, 1.0, 4) * [0.7, 0.7, 0.1, 0.1]
     heading = np.zeros(TARGET_SIZE - len(TARGET))
-    if getattr(component, "wants_heading", False):
+    if isinstance(component, Controller) and component.wants_heading():
         heading[1:] = random.uniform(-1.0, 1.0, 3) * [3.0, 0.1, 0.01]
     target = np.concatenate([place, motion, heading])
     x, target = _to_read(x), _to_read(target)
@@ -282,7 +282,7 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
     """All that a law's kernels write at time t [s] and state x (6,): demand, rates, signals."""
     memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
-    demands = len(DEMAND) + law.asks_sway
+    demands = len(DEMAND) + law.asks_sway()
     outputs = [np.full(size, np.nan) for size in (demands, len(memory), len(law.signals))]
     if law.takes_samples():
         call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())

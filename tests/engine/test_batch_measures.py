@@ -58,9 +58,9 @@ SENSORS = {"measurement": example(kinds("measurements")["sensors"])}
 def with_part(section: str, kind: Any) -> Scenario:
     """The task with this part; an estimator gets sensors, and a law of poses what it needs."""
     beside = SENSORS if section == "estimator" else {}
-    if getattr(kind, "asks_sway", False):
-        beside = {"path": example(Poses), "actuator": SaturatedFull()}
     fields = TRIALS.get(kind.model_fields["kind"].default, {})
+    if section == "controller" and example(kind, **fields).asks_sway():
+        beside = {"path": example(Poses), "actuator": SaturatedFull()}
     return TASK.model_copy(update={**beside, section: example(kind, **fields)})
 
 

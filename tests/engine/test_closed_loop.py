@@ -23,7 +23,7 @@ CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).ta
 MIRRORED = {
     name: kind
     for name, kind in kinds("controllers").items()
-    if name != "schedule" and not kind.wants_heading
+    if name != "schedule" and not example(kind).wants_heading()
 }
 # Without the kink at the edge of the boundary layer, which no order survives.
 WITHIN_LAYER = {"sliding_mode": {"phi": 10.0}}
@@ -45,7 +45,7 @@ def test_the_loop_is_integrated_at_fourth_order(kind):
     # no second derivative where sway changes its sign.
     name = kind.model_fields["kind"].default
     law, step = example(kind, **WITHIN_LAYER.get(name, {})), FAST.get(name, 0.04)
-    path = {} if law.wants_heading else {"path": Line()}
+    path = {} if law.wants_heading() else {"path": Line()}
     loop = corrected(controller=law, vessel=PAPER, start=SMOOTH_START, **path)
     ends = [end(loop, step / 2**i) for i in range(4)]
     assert order(ends) == pytest.approx(4.0, abs=0.2)

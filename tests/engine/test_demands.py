@@ -18,7 +18,10 @@ class Sideways(Controller):
     """A law for tests: each demand is another function of time."""
 
     kind: Literal["sideways"] = "sideways"
-    asks_sway = True
+
+    def asks_sway(self) -> bool:
+        """Always."""
+        return True
 
     @staticmethod
     @kernel

@@ -234,7 +234,7 @@ def exported_law(drawn: Drawn, place: Path) -> None:
     """A sampled law in the run, by itself, as C and as an FMU."""
     drawn.held = max(drawn.held, 1)
     scenario = drawn.scenario()
-    if scenario.controller.asks_sway:
+    if scenario.controller.asks_sway():
         with pytest.raises(UsageError, match="asks for a sway force"):
             ExportedLaw.of(scenario)
         return

@@ -42,7 +42,7 @@ from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
 KINDS = registry.kinds("podusv_cli.components.controllers", Controller)
-LAWS = sorted(name for name, kind in KINDS.items() if not kind.asks_sway)
+LAWS = sorted(name for name, kind in KINDS.items() if not example(kind).asks_sway())
 POSES = (
     "controller={kind: pose_pid}",
     "path={kind: poses, poses: [[0, 0, 0]]}",

@@ -84,14 +84,17 @@ class Controller(KernelPart):
     # What a finding advises where a saturated actuator winds the law's memory up
     against_windup: ClassVar[str] = "tell it the loads that act (wants_loads, after_saturation)"
 
-    # True: the demand is (tau_u [N], tau_r [N m], tau_v [N]), for an actuator that `takes_sway`
-    asks_sway: ClassVar[bool] = False
-    # True: reads a heading behind the target's distance, from a path that `heads`
-    wants_heading: ClassVar[bool] = False
-
     law: ClassVar[Callable[..., None]] = staticmethod(absent("law"))
     sample: ClassVar[Callable[..., None]] = staticmethod(absent("sample"))
     after_saturation: ClassVar[Callable[..., None]] = staticmethod(absent("after_saturation"))
+
+    def asks_sway(self) -> bool:
+        """Whether its demand has a sway force [N] behind the yaw moment."""
+        return False
+
+    def wants_heading(self) -> bool:
+        """Whether it reads a heading behind the target's distance, from a path that `heads`."""
+        return False
 
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""

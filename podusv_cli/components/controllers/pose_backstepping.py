@@ -18,14 +18,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from podusv_cli.components.controllers.base import Controller, Slots, each
-from podusv_cli.components.controllers.pose_pid import ALONE, ERRORS
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.pose_errors import ERRORS, pose_errors
+from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.core.component import value
-from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.kinematics import wrap
-from podusv_cli.core.signal import PSI_D, Signal
+from podusv_cli.core.signal import Signal
 
 INTEGRALS = (
     Signal("zeta_u", "m s", "integral of the error along the bow", r"\zeta_u"),
@@ -38,13 +36,19 @@ class PoseBackstepping(Controller):
     """Vectorial backstepping for position and heading."""
 
     kind: Literal["pose_backstepping"] = "pose_backstepping"
-    asks_sway: ClassVar[bool] = True
-    wants_heading: ClassVar[bool] = True
     signals: ClassVar[tuple[Signal, ...]] = ERRORS
     k_p: float = value(0.1, "1/s", "gain of the position error", gt=0)
     k_psi: float = value(0.2, "1/s", "gain of the heading error", gt=0)
     k_i: float = value(0.0, "1/s2", "gain of the integral of errors", ge=0)
     k_d: float = value(0.5, "1/s", "gain of the velocity errors, times the inertia", gt=0)
+
+    def asks_sway(self) -> bool:
+        """Always."""
+        return True
+
+    def wants_heading(self) -> bool:
+        """Always."""
+        return True
 
     def slots(self) -> Slots:
         """The integrals."""
@@ -90,26 +94,20 @@ class PoseBackstepping(Controller):
         signals: Vector,
     ) -> None:
         """tau = M alpha' - f(nu) - z_1 - K_d M z_2."""
-        c, s = cos_sin(x[2])
         u, v, r = x[3], x[4], x[5]
-        ex, ey = x[0] - target[0], x[1] - target[1]
-        a, b, psi = c * ex + s * ey, c * ey - s * ex, wrap(x[2] - target[PSI_D])
-        du, dv = c * target[2] + s * target[3], c * target[3] - s * target[2]
-        au, av = c * target[4] + s * target[5], c * target[5] - s * target[4]
-        # rates of the errors in the body frame
-        a_t, b_t, psi_t = u - du + r * b, v - dv - r * a, r - target[PSI_D + 1]
+        e = pose_errors(x, target)
         i_a, i_b, i_psi = memory[0], memory[1], memory[2]
-        rate[0], rate[1], rate[2] = a + r * i_b, b - r * i_a, psi
-        alpha_u = du - k.k_p * a - k.k_i * i_a
-        alpha_v = dv - k.k_p * b - k.k_i * i_b
-        alpha_r = target[PSI_D + 1] - k.k_psi * psi - k.k_i * i_psi
-        rate_u = au + r * dv - k.k_p * a_t - k.k_i * rate[0]
-        rate_v = av - r * du - k.k_p * b_t - k.k_i * rate[1]
-        rate_r = target[PSI_D + 2] - k.k_psi * psi_t - k.k_i * rate[2]
+        rate[0], rate[1], rate[2] = e.a + r * i_b, e.b - r * i_a, e.psi
+        alpha_u = e.u_d - k.k_p * e.a - k.k_i * i_a
+        alpha_v = e.v_d - k.k_p * e.b - k.k_i * i_b
+        alpha_r = e.r_d - k.k_psi * e.psi - k.k_i * i_psi
+        rate_u = e.u_d_rate - k.k_p * e.a_rate - k.k_i * rate[0]
+        rate_v = e.v_d_rate - k.k_p * e.b_rate - k.k_i * rate[1]
+        rate_r = e.r_d_rate - k.k_psi * e.psi_rate - k.k_i * rate[2]
         p = rate_u - k.k_d * (u - alpha_u)
         q = rate_v - k.k_d * (v - alpha_v)
         w = rate_r - k.k_d * (r - alpha_r)
-        tau[0] = k.m11 * p - surge_force(u, v, r, k) - a
-        tau[2] = k.m22 * q + k.m23 * w - sway_force(u, v, r, k) - b
-        tau[1] = k.m32 * q + k.m33 * w - yaw_moment(u, v, r, k) - psi
-        signals[0], signals[1], signals[2] = a, b, psi
+        tau[0] = k.m11 * p - surge_force(u, v, r, k) - e.a
+        tau[2] = k.m22 * q + k.m23 * w - sway_force(u, v, r, k) - e.b
+        tau[1] = k.m32 * q + k.m33 * w - yaw_moment(u, v, r, k) - e.psi
+        signals[0], signals[1], signals[2] = e.a, e.b, e.psi

@@ -16,24 +16,18 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from podusv_cli.components.controllers.base import Controller, Slots, each
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.pose_errors import ERRORS, pose_errors
+from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.kinematics import wrap
-from podusv_cli.core.signal import PSI_D, Signal
+from podusv_cli.core.signal import Signal
 
 SLOW = 0.1  # of the frequency of an axis: that of its integral
-ALONE = np.zeros((0, 1))  # of a loop without memory
 INTEGRALS = (
     Signal("int_x", "m s", "integral of the position error, north", r"\int\tilde x"),
     Signal("int_y", "m s", "integral of the position error, east", r"\int\tilde y"),
     Signal("int_psi", "rad s", "integral of the heading error", r"\int\tilde\psi"),
-)
-ERRORS = (
-    Signal("z_1u", "m", "position error along the bow"),
-    Signal("z_1v", "m", "position error across the bow, to starboard"),
-    Signal("psi_t", "rad", "heading error", r"\tilde\psi"),
 )
 
 
@@ -41,14 +35,20 @@ class PosePid(Controller):
     """PID on position and heading, with feedforward of the motion that is asked for."""
 
     kind: Literal["pose_pid"] = "pose_pid"
-    asks_sway: ClassVar[bool] = True
-    wants_heading: ClassVar[bool] = True
     signals: ClassVar[tuple[Signal, ...]] = ERRORS
     w_x: float = value(0.5, "rad/s", "natural frequency of the position, north", gt=0)
     w_y: float = value(0.5, "rad/s", "natural frequency of the position, east", gt=0)
     w_r: float = value(1.0, "rad/s", "natural frequency of the heading", gt=0)
     zeta: float = value(1.0, "1", "damping ratio of the three axes", gt=0)
     integral: float = value(SLOW, "1", "frequency of the integrals over that of the axis", ge=0)
+
+    def asks_sway(self) -> bool:
+        """Always."""
+        return True
+
+    def wants_heading(self) -> bool:
+        """Always."""
+        return True
 
     def slots(self) -> Slots:
         """The integrals."""
@@ -96,22 +96,22 @@ class PosePid(Controller):
         signals: Vector,
     ) -> None:
         """PID in the body frame, and feedforward."""
-        c, s = cos_sin(x[2])
-        ex, ey, psi = x[0] - target[0], x[1] - target[1], wrap(x[2] - target[PSI_D])
-        a, b = c * ex + s * ey, c * ey - s * ex
-        rate[0], rate[1], rate[2] = ex, ey, psi
-        # velocity and acceleration that are asked for, along and across the bow
-        ud, vd, rd = c * target[2] + s * target[3], c * target[3] - s * target[2], target[PSI_D + 1]
-        au, av, ar = c * target[4] + s * target[5], c * target[5] - s * target[4], target[PSI_D + 2]
+        ex, ey = x[0] - target[0], x[1] - target[1]
+        e = pose_errors(x, target)
+        c, s = e.cos, e.sin
+        rate[0], rate[1], rate[2] = ex, ey, e.psi
+        # acceleration that is asked for, in axes of the hull without their turning
+        au, av = c * target[4] + s * target[5], c * target[5] - s * target[4]
+        ud, vd, rd, ar = e.u_d, e.v_d, e.r_d, e.r_d_rate
         # K_p e + K_i int(e), north, east and in yaw
         slow, damped = k.integral, 2.0 * k.zeta
         north = k.m11 * k.w_x * k.w_x * (ex + slow * k.w_x * memory[0])
         east = k.m22 * k.w_y * k.w_y * (ey + slow * k.w_y * memory[1])
-        turn = k.m33 * k.w_r * k.w_r * (psi + slow * k.w_r * memory[2])
+        turn = k.m33 * k.w_r * k.w_r * (e.psi + slow * k.w_r * memory[2])
         u, v, r = x[3] - ud, x[4] - vd, x[5] - rd
         # X_u, Y_v, ... are negative damping: D nu_d is fed forward
         drag_v, drag_r = k.Y_v * vd + k.Y_r * rd, k.N_v * vd + k.N_r * rd
         tau[0] = k.m11 * (au - damped * k.w_x * u) - k.X_u * ud - c * north - s * east
         tau[2] = k.m22 * (av - damped * k.w_y * v) + k.m23 * ar - drag_v + s * north - c * east
         tau[1] = k.m33 * (ar - damped * k.w_r * r) + k.m32 * av - drag_r - turn
-        signals[0], signals[1], signals[2] = a, b, psi
+        signals[0], signals[1], signals[2] = e.a, e.b, e.psi

@@ -45,7 +45,7 @@ def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
 def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, str]]:
     """What a law wants of a path and an actuator that they have not: the part, and a sentence."""
     texts = []
-    if law.asks_sway and not actuator.takes_sway:
+    if law.asks_sway() and not actuator.takes_sway:
         text = (
             "surge force and yaw moment alone; take ideal_full, saturated_full, or pods that push "
             "every way with sway_weight above 0"
@@ -53,7 +53,7 @@ def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, st
         texts += [
             ("actuator", f"{law.label} asks for a sway force, and {actuator.label} takes {text}")
         ]
-    if law.wants_heading and not path.heads:
+    if law.wants_heading() and not path.heads:
         text = (
             f"{law.label} wants a heading, and {path.label} has none; take poses, hold or ellipse"
         )

@@ -104,7 +104,7 @@ def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     """
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
-    demands = len(DEMAND) + law.asks_sway
+    demands = len(DEMAND) + law.asks_sway()
     tau, rate, signals = (np.full(n, before) for n in (demands, len(memory), len(law.signals)))
     read = {"x": x, "memory": memory, "target": target, "table": table}
     if law.takes_samples():
@@ -125,7 +125,7 @@ def _ask(plan: Plan) -> None:
     """Raises LawError for an output that the law does not write at the first instant."""
     law, (tau, rate, signals) = plan.loop.controller, evaluate_law(plan, UNWRITTEN)
     slots = [f"the rate of {name}" for name in plan.states["law"]]
-    sway = [SWAY_DEMAND.name] if law.asks_sway else []
+    sway = [SWAY_DEMAND.name] if law.asks_sway() else []
     names = (*DEMAND, *sway, *(part.name for part in law.signals), *slots)
     outputs = zip(names, (*tau, *signals, *rate), strict=True)
     if left := next((name for name, number in outputs if number == UNWRITTEN), ""):

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from conftest import REQUIRED, corrected, run, vessel
 from pose_samples import BOAT, HELD, POSES, marched, quintic
+from scipy.optimize import fsolve
 
 from podusv_cli.components.actuators.saturated_full import SaturatedFull
 from podusv_cli.components.controllers.pose_backstepping import PoseBackstepping
 from podusv_cli.components.controllers.pose_pid import PosePid
+from podusv_cli.components.controllers.pose_sliding_mode import PoseSlidingMode
 from podusv_cli.components.disturbances.calm import Calm
 from podusv_cli.components.paths.poses import Poses
 from podusv_cli.core.kernel import bundle, call
@@ -286,7 +288,48 @@ def test_what_is_learnt_does_not_grow_behind_a_limit_that_the_load_exceeds(law):
     assert np.hypot(*(log[name] for name in learnt)).max() < 0.2 * wound_up
 
 
-@pytest.mark.parametrize("kind", [PosePid, PoseBackstepping])
+SLIDING = (
+    "controller: {kind: pose_sliding_mode, k_p: 0.3, k_psi: 0.4, k_d: 0.5, load_u: 0.6, "
+    "load_v: 0.8, load_r: 0.4, phi: 0.03, phi_r: 0.04}\n"
+)
+STAY = "path: {kind: hold, psi: 0.2}\n"
+
+
+def test_a_sliding_mode_leaves_the_error_that_its_layer_gives():
+    """At rest K tanh(s/phi) + k_d M s = b with s = K_p z_1, solved by bisection with scipy."""
+    load = "disturbance={kind: step, b_u: 0.35, b_v: -0.6, b_r: 0.2}"
+    log = marched(BOAT + STAY + SLIDING, load, "simulation.duration=120")
+    bounds, layers = np.array([0.6, 0.8, 0.4]), np.array([0.03, 0.03, 0.04])
+    loads, gains = np.array([0.35, -0.6, 0.2]), np.array([0.3, 0.3, 0.4])
+    s = fsolve(lambda s: bounds * np.tanh(s / layers) + 0.5 * M @ s - loads, loads / 40.0)
+    found = [log[name][-1] for name in ("z_1u", "z_1v", "psi_t")]
+    np.testing.assert_allclose(found, s / gains, rtol=1e-6)
+    np.testing.assert_allclose([log[name][-1] for name in ("s_u", "s_v", "s_r")], s, rtol=1e-6)
+
+
+def test_the_missing_velocity_falls_as_the_proof_says_under_loads_within_the_bounds():
+    """V = s' M s / 2 falls by k_d s' M s + sum K |s tanh(s/phi)| - s' b, off the path too."""
+    step, load = 0.002, np.array([0.3, -0.4, 0.1])
+    sea = "disturbance={kind: step, b_u: 0.3, b_v: -0.4, b_r: 0.1}"
+    over = (f"simulation.step={step}", "simulation.duration=4")
+    log = marched(BOAT + POSES + SLIDING, AWAY, sea, *over)
+    s = np.stack([log["s_u"], log["s_v"], log["s_r"]])
+    bounds = np.array([0.6, 0.8, 0.4])[:, None] * np.tanh(s / np.array([0.03, 0.03, 0.04])[:, None])
+    V = 0.5 * (s * (M @ s)).sum(0)
+    fall = (0.5 * s * (M @ s) + s * bounds - s * load[:, None]).sum(0)
+    inner = slice(5, -5)
+    np.testing.assert_allclose(np.gradient(V, step)[inner], -fall[inner], rtol=1e-3, atol=1e-5)
+    # So V' <= -2 k_d V + c, where c is the most that the loads can win within the layers.
+    width = np.linspace(0.0, 0.2, 20_001)
+    c = sum(
+        (abs(b) * width - K * width * np.tanh(width / phi)).max()
+        for b, K, phi in zip(load, (0.6, 0.8, 0.4), (0.03, 0.03, 0.04), strict=True)
+    )
+    assert (V[0] * np.exp(-log["time"]) + c >= V).all()
+    assert c < 0.01 * V[0]
+
+
+@pytest.mark.parametrize("kind", [PosePid, PoseBackstepping, PoseSlidingMode])
 def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard_for_poses(kind):
     poses = np.array(REQUIRED["poses"]["poses"])
     limits = SaturatedFull(surge_limit=50.0, yaw_limit=5.0, sway_limit=50.0)
