@@ -14,7 +14,7 @@ import numpy.typing as npt
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import TARGET_SIZE
+from podusv_cli.core.signal import PSI_D, TARGET_SIZE
 from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -108,6 +108,11 @@ class SteppedRun:
         """The target (6,) at the next instant, as `TARGET`."""
         self._aim(self.time)
         return self._target[: len(TARGET)].copy()
+
+    def heading(self) -> Vector:
+        """The heading (3,) that the path asks for at the next instant, with its rates; or zeros."""
+        self._aim(self.time)
+        return self._target[PSI_D:].copy()
 
     def _path(self, part: tuple[Any, ...], compiled: bool) -> Callable[[float], None]:
         """What writes the target at a time [s], as the loop calls it."""
