@@ -34,6 +34,9 @@ SHOWN = {
     "los_backstepping": ("fossen_2003/course", ("paper", "one_length")),
     "ardupilot": ("laws/autopilots", ("ardupilot", "px4")),
     "mss": ("laws/autopilots", ("mss_alos", "mss_ilos")),
+    "pose_pid": ("dp/four_corners", ("pid", "pd")),
+    "pose_backstepping": ("dp/four_corners", ("backstepping", "backstepping_plain")),
+    "pose_sliding_mode": ("dp/four_corners", ("sliding_mode", "backstepping_plain")),
     "policy": ("laws/learned", ("policy", "velocity_vector")),
 }
 LEAST = 1e-4  # m, the lower end of the axis of errors

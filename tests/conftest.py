@@ -19,6 +19,7 @@ from policy_samples import content, symmetric
 import podusv_cli
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.ideal_full import IdealFull
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.base import Controller, Slots
 from podusv_cli.components.disturbances.base import Disturbance
@@ -29,11 +30,13 @@ from podusv_cli.components.measurements.base import Measurement
 from podusv_cli.components.paths.base import TARGET, Path
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.paths.line_circle import LineCircle
+from podusv_cli.components.paths.poses import Poses
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core import registry
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import TARGET_SIZE
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.engine.running.simulate import simulate
 from podusv_cli.engine.step.grid import TimeGrid
@@ -64,6 +67,7 @@ POD: dict[str, float] = {
 REQUIRED: dict[str, dict[str, Any]] = {
     "legs": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
     "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
+    "poses": {"poses": ((0.0, 0.0, 0.0), (10.0, 1.0, 0.5), (18.0, 6.0, -0.5))},
     "pod": {"pods": (POD,)},
     "wind": {"speed": 8.0},
     "waves": {"height": 0.1, "period": 1.5},
@@ -117,10 +121,10 @@ def example(kind: type[Component], **fields: Any) -> Any:
 
 def target_at(path: Path, t: float) -> Vector:
     """Position, velocity and acceleration of the target at time t [s]."""
-    target = np.full(len(TARGET), np.nan)
+    target = np.full(TARGET_SIZE, np.nan)
     k, table = _numbers(path)
     call(path.evaluate, t=t, k=k, table=table, target=target)
-    return target
+    return target[: len(TARGET)]
 
 
 @cache
@@ -148,7 +152,7 @@ class Answer(NamedTuple):
 
 def ask(law: Controller, x: Vector, memory: Vector, target: Vector, nominal: Vessel) -> Answer:
     """Evaluate a law once, as plain Python; what it does not write stays NaN."""
-    tau, rate = np.full(2, np.nan), np.full(len(memory), np.nan)
+    tau, rate = np.full(2 + law.asks_sway(), np.nan), np.full(len(memory), np.nan)
     signals, work = np.full(len(law.signals), np.nan), np.full(law.workspace(), np.nan)
     k = bundle(law.constants_with(nominal))
     call(
@@ -168,7 +172,7 @@ def ask(law: Controller, x: Vector, memory: Vector, target: Vector, nominal: Ves
 
 
 class Situation(NamedTuple):
-    """Arguments of one evaluation of a law."""
+    """Arguments of one evaluation of a law; the target has a heading where the law wants one."""
 
     x: Vector
     memory: Vector
@@ -183,12 +187,17 @@ def situations(law: Controller, count: int, seed: int = 1) -> Iterator[Situation
         bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1, 20)
         ahead = [x[0] + distance * np.cos(bearing), x[1] + distance * np.sin(bearing)]
         target = np.concatenate([ahead, random.uniform(-1, 1, 4) * [0.7, 0.7, 0.1, 0.1]])
+        if law.wants_heading():
+            target = np.append(target, [0.0, *random.uniform(-1, 1, 3) * [3, 0.1, 0.01]])
         memory = law.start(x, target, NONLINEAR)
         yield Situation(x, memory + random.normal(0, 0.3, len(memory)), target)
 
 
 def corrected(**parts: Any) -> ClosedLoop:
-    """The corrected closed loop without limits, from the printed start, with parts replaced."""
+    """The corrected closed loop without limits, from the printed start, with parts replaced.
+
+    A law that asks for a sway force, or reads a heading, gets the actuator and path that it needs.
+    """
     defaults: dict[str, Any] = {
         "vessel": NONLINEAR,
         "path": LineCircle(),
@@ -197,6 +206,11 @@ def corrected(**parts: Any) -> ClosedLoop:
         "controller": AdaptiveNeural(),
         "start": PRINTED_START,
     }
+    law = parts.get("controller")
+    if law is not None and law.asks_sway():
+        defaults["actuator"] = IdealFull()
+    if law is not None and law.wants_heading():
+        defaults["path"] = example(Poses)
     chosen = defaults | parts
     return ClosedLoop(**{"nominal": chosen["vessel"]} | chosen)
 

@@ -21,6 +21,7 @@ def line_rates(law: Any, s: Vector, vessel: Vessel, V: float, share: float) -> V
     call(
         law.after_saturation,
         t=1.0,
+        x=x,
         memory=memory,
         demand=found.tau,
         tau=tau,

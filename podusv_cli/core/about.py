@@ -217,12 +217,13 @@ class RunAbout(_PlainJson):
     `values` is the scenario as plain data. `path_end` is where a followed path is over, and
     `path_steady` where its steady window begins, see `Recording.row_at`; empty without an end.
     `metrics` are those that podusv has only with the scenario's plug-ins, windows and radii.
-    `limits` are the largest surge force [N] and yaw moment [N m], None where there is no constant
-    one. `outages` are times without samples of each of x, y, psi, u, v, r. `polar` says that the
-    law is of the first paper's family, `optimum_of` which metric the motion minimises, if it is no
-    law's. `said` is what each part says of itself, by the key of its section; `settings` are what
-    the scenario sets itself, `law` all keys of the law. `log_columns` and `log_frame` are
-    what a log beside the run calls its quantities, as under `identify`.
+    `limits` are the largest surge force [N], yaw moment [N m] and, of an actuator that takes
+    one, sway force [N]; None where none is constant. `outages` are times without samples of
+    each of x, y, psi, u, v, r. `polar` says that the law is of the first paper's family,
+    `optimum_of` which metric the motion minimises, if it is no law's. `said` is what each part
+    says of itself, by the key of its section; `settings` are what the scenario sets itself,
+    `law` all keys of the law. `log_columns` and `log_frame` are what a log beside the run calls
+    its quantities, as under `identify`.
     """
 
     values: dict[str, Any]
@@ -234,7 +235,7 @@ class RunAbout(_PlainJson):
     circles: tuple[tuple[float, float, float], ...]  # m, of the waypoints: centre and radius
     trial: bool  # whether nothing aims at the target: a manoeuvring trial, or recorded commands
     standoff: float  # m, that the law keeps on purpose
-    limits: tuple[float | None, float | None]
+    limits: tuple[float | None, ...]
     underactuated: bool
     outages: tuple[Spans, Spans, Spans, Spans, Spans, Spans]  # s
     duration: float  # s

@@ -69,6 +69,22 @@ DEMAND = (
     Signal("tau_u_cmd", "N", "surge force that the law asked for", r"\tau_{u,\mathrm{cmd}}"),
     Signal("tau_r_cmd", "N m", "yaw moment that the law asked for", r"\tau_{r,\mathrm{cmd}}"),
 )
+# What a law of a fully actuated vessel asks for as well. It stands behind the others, so that laws
+# of both kinds write the same places.
+SWAY_DEMAND = Signal(
+    "tau_v_cmd", "N", "sway force that the law asked for", r"\tau_{v,\mathrm{cmd}}"
+)
+DEMAND_SIZE = len(DEMAND) + 1  # numbers that the loop keeps for a demand
+# What a path may ask of a vessel that can push sideways.
+HEADING = (
+    Signal("heading_d", "rad", "heading that the path asks for, not wrapped", r"\psi_d"),
+    Signal("heading_d_dot", "rad/s", "rate of the heading that the path asks for", r"\dot\psi_d"),
+    Signal("heading_d_ddot", "rad/s2", "acceleration of that heading", r"\ddot\psi_d"),
+)
+# Numbers of a target: position, velocity and acceleration (x, y each), the vessel's distance to it,
+# and from PSI_D on a heading, 0 of a path that has none.
+PSI_D = 7
+TARGET_SIZE = PSI_D + len(HEADING)
 # What the actuator does to the hull.
 TAU = (
     Signal("tau_u", "N", "surge force on the hull", r"\tau_u"),

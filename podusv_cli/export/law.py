@@ -18,7 +18,7 @@ from podusv_cli.components.paths.fillet import round_corner
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import LOOP, STATE, Signal
+from podusv_cli.core.signal import LOOP, STATE, TARGET_SIZE, Signal
 from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop, nothing
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -47,6 +47,10 @@ PROTOTYPE = CFUNCTYPE(
 NOT_SAMPLED = (
     "the law acts continuously in this scenario, and a computer on a boat takes samples; set "
     "control.period to the time between two of them, as --set control.period=0.1 [s]"
+)
+NO_POSE = (
+    "the law asks for a sway force, or reads a heading of its target, and what is exported takes a "
+    "position and gives surge force and yaw moment; export another law"
 )
 NO_LAW = "the controller gives recorded commands to propellers, which is no law; export a law"
 
@@ -104,6 +108,8 @@ class ExportedLaw:
             raise UsageError(f"{scenario.name}: {NO_LAW}")
         if not plan.grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
+        if scenario.controller.asks_sway() or scenario.controller.wants_heading():
+            raise UsageError(f"{scenario.name}: {NO_POSE}")
         whole, signals = plan.layout, len(plan.loop.controller.signals)
         memory = whole.states - whole.memory
         first = len(TARGET) + 1
@@ -112,6 +118,7 @@ class ExportedLaw:
             states=len(STATE) + memory,
             memory=len(STATE),
             place=len(STATE) + memory,
+            target=len(TARGET),
             signals=first,
             demand=first + signals,
             tau=first + signals + len(DEMAND),
@@ -172,7 +179,8 @@ class ExportedLaw:
     @property
     def limits(self) -> tuple[float, float]:
         """Force [N] and moment [N m] at which the scenario's actuator cuts the demand."""
-        return self.loop.actuator.limits()
+        force, moment, *_ = self.loop.actuator.limits()
+        return force, moment
 
     @cached_property
     def signals(self) -> tuple[ExportedNumber, ...]:
@@ -267,7 +275,7 @@ class ExportedLaw:
 
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
         """The target (rows, 6) at these rows of a log; on a followed path, beside the vessel."""
-        path, out = self.loop.path, np.zeros((len(rows), len(TARGET)))
+        path, out = self.loop.path, np.zeros((len(rows), TARGET_SIZE))
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
             x = np.array([log[number.name][row] for number in self._given_state])
@@ -275,4 +283,4 @@ class ExportedLaw:
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target
             )
-        return out
+        return out[:, : len(TARGET)]

@@ -19,7 +19,9 @@ from podusv_cli.figures.style import legend, new_figure
 
 EARLY = 0.005  # of the run: where the peaks are
 EARLY_ROWS = 20  # at least
-LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))  # on the hull, and what the law demands
+# On the hull, and what the law demands; in the order of a demand.
+LOADS = (("tau_u", "tau_u_cmd"), ("tau_r", "tau_r_cmd"))
+SWAY = ("tau_v", "tau_v_cmd")  # of vessels that can be asked for it
 LIMIT: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": (0, (6, 2, 1, 2))}
 CLAIMED: dict[str, Any] = {"color": "#444444", "linewidth": 0.8, "linestyle": (0, (1, 1))}
 HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in columns
@@ -37,25 +39,31 @@ HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in column
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
     """Surge force and yaw moment on the hull, and what the law demands where this differs."""
     spans = _spans(runs)
-    kinds = 2 if any(differ(run, *names) for run in runs for names in LOADS) else 1
-    rows = kinds * (len(LOADS) if columns == 2 else len(spans))
+    loads = (*LOADS, SWAY) if any(run.has(SWAY[1]) for run in runs) else LOADS
+    kinds = 2 if any(differ(run, *names) for run in runs for names in loads) else 1
+    rows = kinds * (len(loads) if columns == 2 else len(spans))
     figure = new_figure(columns, 0.7 + HEIGHTS[columns] * rows)
-    cells = _cells(figure, kinds, list(spans), columns)
+    cells = _cells(figure, (len(loads), kinds), list(spans), columns)
     for (load, kind, part), axes in np.ndenumerate(cells):
         _panel(axes, runs, (load, kind), list(spans.values())[part])
         if kind == kinds - 1 and part == 0:
-            _draw_claimed_peak(axes, runs, LOADS[load][1])
+            _draw_claimed_peak(axes, runs, loads[load][1])
         if columns == 1 or part == 0:
-            axes.set_ylabel(axis_label(runs, LOADS[load][kind]))
+            axes.set_ylabel(axis_label(runs, loads[load][kind]))
     for axes in cells[-1, -1] if columns == 2 else cells[:, -1, -1]:
         axes.set_xlabel(TIME)
     legend(figure)
     return figure
 
 
-def _cells(figure: Figure, kinds: int, parts: Sequence[str], columns: int) -> NDArray[Any]:
-    """Panels by load, kind and part of the run, the parts side by side or above each other."""
-    loads, count = len(LOADS), len(parts)
+def _cells(
+    figure: Figure, shape: tuple[int, int], parts: Sequence[str], columns: int
+) -> NDArray[Any]:
+    """Panels by load, kind and part of the run, the parts side by side or above each other.
+
+    `shape` is how many loads and kinds there are.
+    """
+    (loads, kinds), count = shape, len(parts)
     if columns == 2:
         cells = figure.subplots(loads * kinds, count, sharex="col").reshape(loads, kinds, count)
     else:
@@ -82,7 +90,7 @@ def _spans(runs: Sequence[Shown]) -> dict[str, Span]:
 def _panel(axes: Axes, runs: Sequence[Shown], shown: tuple[int, int], span: Span) -> None:
     """One load during a part of the run: on the hull (kind 0) or as the law demands it (kind 1)."""
     load, kind = shown
-    name = LOADS[load][kind]
+    name = (*LOADS, SWAY)[load][kind]
     draw_signal(axes, runs, name, span=span)
     axes.set_xlim(*span)
     axes.update_datalim([(span[0], 0.0)])  # forces mean something beside none at all
@@ -103,7 +111,7 @@ def _draw_claimed_peak(axes: Axes, runs: Sequence[Shown], name: str) -> None:
 
 def _limits(axes: Axes, runs: Sequence[Shown], load: int, span: Span) -> None:
     """Lines at the actuators' constant limits, seen where the loads come near them."""
-    limits = {run.about.limits[load] for run in runs}
+    limits = {limit for run in runs for limit in run.about.limits[load : load + 1]}
     for limit in sorted(limit for limit in limits if limit is not None):
         for side in (limit, -limit):
             line = np.array(span), np.array([side, side])

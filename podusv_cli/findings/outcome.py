@@ -89,6 +89,8 @@ def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
     envelope = scenario.vessel.envelope
     if envelope is None or not len(log["u"]):
         return
+    sideways = scenario.controller.asks_sway()  # on purpose, at any drift angle
+    remedy = "" if sideways else "ask for less speed or turn, or "
     parts = [envelope.shares(*_through_water(log.part(rows))) for rows in blocks(len(log["u"]))]
     for name, (word, unit) in PLACES.items():
         share, limit = np.concatenate([part[name] for part in parts]), getattr(envelope, name)
@@ -97,8 +99,7 @@ def outside_envelope(scenario: Scenario, log: Recording) -> Sentences:
             yield (
                 f"the hull's numbers hold for a {word} of up to {limit:g} {unit}, and this run has "
                 f"{np.nanmax(share) * limit:.3g} {unit}, beyond the limit "
-                f"{times_of(log, outside)}; ask for less speed or turn, or take a vessel that was "
-                "measured there"
+                f"{times_of(log, outside)}; {remedy}take a vessel that was measured there"
             )
 
 

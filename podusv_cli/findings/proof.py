@@ -17,11 +17,14 @@ def argument(scenario: Scenario) -> str:
     matrix = scenario.actuator.input_matrix()
     rank = scenario.actuator.input_rank()
     rows = ", ".join("[" + ", ".join(f"{x + 0.0:.4g}" for x in row) + "]" for row in matrix)
+    demands = ", ".join(("tau_u", "tau_r", "tau_v")[: matrix.shape[1]])
     sway = "its sway row is zero (Y_p = 0)" if not matrix[1].any() else "sway comes with the others"
+    if scenario.actuator.takes_sway:
+        sway = "sway is asked for by itself"
     verdict = "underactuated" if rank < len(matrix) else "fully actuated"
     kind = type(scenario.actuator).model_fields["kind"].default
     return (
-        f"{verdict}: the map from demands (tau_u, tau_r) to loads (tau_u, tau_v, tau_r) of "
+        f"{verdict}: the map from demands ({demands}) to loads (tau_u, tau_v, tau_r) of "
         f"{kind} on {scenario.vessel.preset or 'the vessel'} is [{rows}], "
         f"rank {rank} of {len(matrix)}; {sway}"
     )

@@ -86,6 +86,7 @@ def dead_zone(case: Case) -> Sentences:
     if not actuator.command:
         return
     zones = {"dead_zone_u": "N", "dead_zone_r": "N m"}
+    zones |= {"dead_zone_v": "N"} if actuator.takes_sway else {}
     for (name, unit), limit in zip(zones.items(), actuator.limits(), strict=True):
         zone = getattr(actuator.command, name)
         if zone >= limit:

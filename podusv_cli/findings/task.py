@@ -12,6 +12,7 @@ from podusv_cli.components.controllers.base import Approach
 from podusv_cli.components.vessels.plant import sway_force
 from podusv_cli.core.finding import FindingKind, Sentences, warn_before_run
 from podusv_cli.core.kernel import bundle
+from podusv_cli.core.signal import PSI_D
 from podusv_cli.scenario.case import Case
 from podusv_cli.scenario.reference import FASTEST, STANDING, drift, median
 
@@ -23,6 +24,8 @@ AHEAD = 0.5  # excess surge force, as a fraction of the largest one needed
 ROUNDING = 1e-9  # of the largest load: a moment of 1e-13 N m on a straight leg is none
 DELIVERED = 0.999  # fraction of the demand that counts as all of it
 ROUNDED = 0.99  # of N_m, which has few digits
+# What is demanded, in its order: in words, unit, place among the loads.
+DEMANDED = (("surge force", "N", 0), ("yaw moment", "N m", 2), ("sway force", "N", 1))
 BREAKS = {  # what jumps: offset in TARGET, unit
     "position": (0, "m"),
     "velocity": (2, "m/s"),
@@ -88,18 +91,23 @@ path_bend = _path_break(
     "opposite-start",
     about="start.psi",
     meaning="rounding decides to which side the vessel turns",
-    condition=f"the start's heading is opposite to the target's course to {OPPOSITE:g} rad",
+    condition="the start's heading is opposite to the target's course, or to the heading that a "
+    f"law of poses wants, to {OPPOSITE:g} rad",
     remedy="start a thousandth of a radian to one side",
 )
 def opposite_start(case: Case) -> Sentences:
     """Half a turn lies ahead, to either side alike, of a vessel that does not turn yet."""
     start, law = case.scenario.start, case.scenario.controller
-    _, _, x_dot, y_dot, *_ = case.scenario.path.targets([0.0])[0].tolist()
-    off = start.psi - math.atan2(y_dot, x_dot)
-    half = abs(abs(math.remainder(off, 2.0 * math.pi)) - math.pi) < OPPOSITE
-    if half and not start.r and math.hypot(x_dot, y_dot) > STANDING and law.aims():
+    target = case.scenario.path.whole_targets([0.0])[0].tolist()
+    _, _, x_dot, y_dot, *_ = target
+    what, wanted = "course", math.atan2(y_dot, x_dot)
+    if law.wants_heading():
+        what, wanted = "heading", target[PSI_D]
+    half = abs(abs(math.remainder(start.psi - wanted, 2.0 * math.pi)) - math.pi) < OPPOSITE
+    known = law.wants_heading() or math.hypot(x_dot, y_dot) > STANDING
+    if half and not start.r and known and law.aims():
         yield (
-            f"{start.psi:.6g} rad is opposite to the target's course, so rounding decides to which "
+            f"{start.psi:.6g} rad is opposite to the target's {what}, so rounding decides to which "
             "side the vessel turns, and what follows from that; start a thousandth of a radian to "
             f"one side: {start.psi - 1e-3:.6g}"
         )
@@ -133,7 +141,8 @@ def sway_drift(case: Case) -> Sentences:
     """The mean sway load pushes the hull sideways faster than the target moves."""
     seen = case.reference
     lost = np.isnan(seen.nu[:, 1])
-    if lost.any() and case.scenario.controller.aims():
+    pushes = case.scenario.controller.asks_sway()  # then the hull is held, whatever its heading
+    if lost.any() and case.scenario.controller.aims() and not pushes:
         load = float(seen.load[:, 1].mean())
         speed = abs(drift(case.scenario, load))
         shown = f"at {speed:.2g} m/s" if np.isfinite(speed) else "without limit"
@@ -217,16 +226,16 @@ def _damping(case: Case, drive: float) -> tuple[float, float]:
     remedy="raise the actuator's limit, or slow the target down",
 )
 def thrust_short(case: Case) -> Sentences:
-    """Following takes more surge force or yaw moment than the actuator delivers."""
+    """Following takes more of a force or of the yaw moment than the actuator delivers."""
     if not case.scenario.controller.aims():
         return
     seen = case.reference
     worst = np.abs(seen.demand).argmax(axis=0)
     actuator, rounding = case.scenario.actuator, ROUNDING * float(np.abs(seen.demand).max())
-    for axis, (what, unit) in enumerate((("surge force", "N"), ("yaw moment", "N m"))):
+    for axis, (what, unit, load) in enumerate(DEMANDED[: len(worst)]):
         demand = seen.demand[worst[axis]]
         x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[worst[axis]])])
-        needed, got = float(demand[axis]), float(actuator.settled(x, demand)[2 * axis])
+        needed, got = float(demand[axis]), float(actuator.settled(x, demand)[load])
         if got * np.sign(needed) < DELIVERED * abs(needed) - rounding:
             mean = float(seen.demand[:, axis].mean())
             yield (
@@ -241,7 +250,7 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
     """The largest yaw moment comes with more surge force than following takes."""
     seen = case.reference
     x = np.concatenate([np.zeros(3), np.nan_to_num(seen.nu[row])])
-    needed, moment = seen.demand[row].tolist()
+    needed, moment, *_ = seen.demand[row].tolist()
     got = float(case.scenario.actuator.settled(x, seen.demand[row])[0])
     if got - needed > AHEAD * float(np.abs(seen.demand[:, 0]).max()):
         yield (

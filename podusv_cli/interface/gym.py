@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.components.controllers.policy import OUTPUTS
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.engine.loop.plan import Plan
@@ -30,7 +29,7 @@ from podusv_cli.interface.gym_task import (
     write_moment,
 )
 from podusv_cli.interface.scenarios import Changes, Source
-from podusv_cli.interface.session import DEMAND, Session
+from podusv_cli.interface.session import DEMANDED, FIRST, Session, wanted_numbers
 
 try:
     import gymnasium
@@ -47,7 +46,7 @@ Observe = Callable[[Moment], Any]
 
 
 def demands(task: EpisodeTask) -> Any:
-    """Demands (tau_u [N], tau_r [N m]) within the actuator's limits."""
+    """Demands (tau_u [N], tau_r [N m]), maybe tau_v [N], within the actuator's limits."""
     return Box(-task.limits, task.limits, dtype=np.float64)
 
 
@@ -60,8 +59,9 @@ def observations(task: EpisodeTask) -> Any:
 class Env(gymnasium.Env[Vector, Vector], EzPickle):
     """A scenario as an environment of Gymnasium: an agent in place of its controller.
 
-    An action is a demand (tau_u [N], tau_r [N m]) that holds for `period` [s], by default
-    `control.period`; `limits` are its largest numbers, by default the actuator's. An observation
+    An action is a demand (tau_u [N], tau_r [N m]), of an actuator that takes a sway force
+    (tau_u, tau_r, tau_v [N]), that holds for `period` [s], by default `control.period`; `limits`
+    are its largest numbers, by default the actuator's. An observation
     has eight numbers in the vessel's own frame: the target ahead and to starboard [m], u, v [m/s],
     r [rad/s], the target's velocity ahead and to starboard [m/s], and the heading error [rad]. A
     reward is what the metric `reward` grew by, from the instant of an action to that of the next,
@@ -124,14 +124,15 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         super().reset(seed=seed)
         scenario = self._task.draw_scenario(seed, self.np_random)
         self._session = session = Session(scenario, self._task.period, scenario.plan(), self._march)
-        self._now, self._gathered = self._task.moment_of(session, np.zeros(OUTPUTS)), 0.0
+        self._now, self._gathered = self._task.moment_of(session, np.zeros(self._task.demands)), 0.0
         return self._task.observation(self._now), {"time": 0.0}
 
     @with_short_traceback
     def step(self, action: Vector) -> tuple[Vector, float, bool, bool, Info]:
         """Hold a demand for a period: observation, reward, terminated, truncated, and the time [s].
 
-        Raises UsageError for a demand that is not two finite numbers, and after an episode's end.
+        Raises UsageError for a demand that is not so many finite numbers, and after an episode's
+        end.
         """
         session, task = self.session, self._task
         if session.status != "running":
@@ -201,7 +202,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         self._plan, self._sorter = plan, LaneSorter(0, True)
         self._sorter.choose(plan)
         self._marches: list[SteppedBatch] = []
-        self._parts, self._demands = np.zeros((PARTS, count)), np.zeros((OUTPUTS, count))
+        self._parts, self._demands = np.zeros((PARTS, count)), np.zeros((task.demands, count))
         # A terminated run's moment is the last one that was, and earlier than where it ended.
         self._times, self._ends, self._gathered = np.zeros((3, count))
 
@@ -219,7 +220,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
     def step(self, actions: Vector) -> tuple[Vector, Vector, Flags, Flags, Info]:
         """As `Env.step`, for all environments: arrays with a row, or an entry, for each of them.
 
-        Raises UsageError for demands that are not two finite numbers each; no run goes on then.
+        Raises UsageError for demands that are not so many finite numbers each; no run goes on then.
         """
         given, ended = (
             self._check_actions(actions).T,
@@ -229,7 +230,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)
         for march in self._marches:
-            march.law_table[DEMAND] = given[:, march.places]
+            march.law_table[FIRST : FIRST + len(given)] = given[:, march.places]
             march.advance(march.grid.hold_every)
             going = np.array(march.places)[march.alive]
             self._demands[:, going] = given[:, going]
@@ -290,20 +291,20 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return self._task.observation(now).T.copy(), info
 
     def _check_actions(self, actions: Vector) -> Vector:
-        """Actions as numbers (environments, 2) [N, N m]. Raises UsageError."""
+        """Actions as numbers (environments, 2 or 3) [N, N m, N]. Raises UsageError."""
         if not self._marches:
             raise UsageError("podusv.gym: no episode has begun; call reset first")
         given = numbers(actions)
-        if given.shape != (self.num_envs, OUTPUTS):
+        wanted = wanted_numbers(DEMANDED[: self._task.demands])
+        if given.shape != (self.num_envs, self._task.demands):
             raise UsageError(
                 f"podusv.gym: the actions have shape {given.shape}; give {self.num_envs} rows of "
-                "two finite numbers, tau_u [N] and tau_r [N m]"
+                f"{wanted}"
             )
         if (wrong := np.flatnonzero(~np.isfinite(given).all(axis=1))).size:
             raise UsageError(
                 f"podusv.gym: the action of environment {wrong[0]} is "
-                f"{tuple(given[wrong[0]].tolist())}; give two finite numbers, tau_u [N] and "
-                "tau_r [N m]"
+                f"{tuple(given[wrong[0]].tolist())}; give {wanted}"
             )
         return given
 

@@ -14,6 +14,7 @@ from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.phrases import unknown_word
+from podusv_cli.core.signal import HEADING, PSI_D, TARGET_SIZE
 from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.running.simulate import marcher
 from podusv_cli.interface.scenarios import CHECKS, Changes, Source, load_scenario
@@ -25,7 +26,7 @@ from podusv_cli.studies.making.draws import SOBOL_BITS, SWEEP, draw_scenario, dr
 
 LEARNING = "learning"  # the stream of draws that no study has
 Flags = npt.NDArray[np.bool_]
-Limits = tuple[float, float]
+Limits = tuple[float, ...]
 
 
 class Moment(NamedTuple):
@@ -33,8 +34,10 @@ class Moment(NamedTuple):
 
     `time` [s]; `seen` has the eight numbers of the usual observation; `state` is (x, y, psi, u, v,
     r) as a law is given it, `target` position, velocity and acceleration, north and east, both in
-    m, rad and s; `demand` is what held before, (tau_u [N], tau_r [N m]), and zeros at the begin. In
-    a `VectorEnv` each number is an array with an entry for every environment.
+    m, rad and s; `demand` is what held before, (tau_u [N], tau_r [N m]) with a sway force [N] where
+    the actuator takes one, and zeros at the begin; `heading` is what the path asks for, with its
+    rates, and zeros of one without. In a `VectorEnv` each number is an array with an entry for
+    every environment.
     """
 
     time: Any
@@ -42,6 +45,7 @@ class Moment(NamedTuple):
     state: Vector
     target: Vector
     demand: Vector
+    heading: Vector
 
 
 class Terms(NamedTuple):
@@ -53,24 +57,27 @@ class Terms(NamedTuple):
     limits: Limits | None
 
 
-PARTS = INPUTS + len(STATE) + len(TARGET)  # numbers of `write_moment`
+ENDS = (INPUTS, INPUTS + len(STATE), INPUTS + len(STATE) + len(TARGET))
+PARTS = INPUTS + len(STATE) + len(TARGET) + len(HEADING)  # numbers of `write_moment`
 
 
-# x (6), target (6); writes signals (20).
+# x (6), target (10); writes signals (23).
 @kernel
 def write_moment(x: Vector, target: Vector, signals: Vector) -> None:
-    """Write `seen`, `state` and `target` of a moment into `signals`, one after the other."""
+    """Write `seen`, `state`, `target` and `heading` of a moment into `signals`, in this order."""
     observe(x, target, signals)
     for i in range(6):
         signals[8 + i] = x[i]
         signals[14 + i] = target[i]
+    for i in range(3):
+        signals[20 + i] = target[PSI_D + i]
 
 
 def moment(time: Any, parts: Vector, demand: Vector) -> Moment:
-    """A moment of what `write_moment` has written, `parts` (20,) or (20, runs); all are copies."""
-    own, target = parts.copy(), INPUTS + len(STATE)  # where the target begins
+    """A moment of what `write_moment` has written, `parts` (23,) or (23, runs); all are copies."""
+    seen, state, target, heading = np.split(parts.copy(), ENDS)
     # One number, too, is numpy's: over no time a rate is NaN then, and no ZeroDivisionError.
-    return Moment(np.float64(time), own[:INPUTS], own[INPUTS:target], own[target:], demand.copy())
+    return Moment(np.float64(time), seen, state, target, demand.copy(), heading)
 
 
 class EpisodeTask:
@@ -82,6 +89,7 @@ class EpisodeTask:
         self.whole, self.sweep = whole, whole.sweep or Sweep(draws=1)
         self._check_sweep()
         self.scenario, self.period = waiting(whole, terms.period)
+        self.demands = len(self.scenario.actuator.limits())  # numbers of an action
         self.limits = self._limits(terms.limits)
         self.own = terms.reward if callable(terms.reward) else None
         self.metric = "" if self.own else self._check_reward(str(terms.reward))
@@ -98,18 +106,21 @@ class EpisodeTask:
         scenario = self.scenario.model_copy(update={"simulation": plain})
         plan = scenario.plan()
         session = Session(scenario, self.period, plan, marcher(plan, compiled=False))
-        first = self.moment_of(session, np.zeros(OUTPUTS))
-        after = session.step(np.zeros(OUTPUTS))
+        none = np.zeros(self.demands)
+        first = self.moment_of(session, none)
+        after = session.step(none)
         if self.own is None:
             self.check_reward(session.metric(self.metric), after.status != "diverged", after.time)
         else:
-            self.reward_gained(first, self.moment_of(session, np.zeros(OUTPUTS)))
+            self.reward_gained(first, self.moment_of(session, none))
         return len(self.observation(first))
 
     def moment_of(self, session: Session, demand: Vector) -> Moment:
-        """The next instant of a session, after this demand (2,) [N, N m]."""
+        """The next instant of a session, after this demand (2,) or (3,) [N, N m, N]."""
         now, parts = session.observe(), np.zeros(PARTS)
-        write_moment(now.state, now.target, parts)
+        target = np.zeros(TARGET_SIZE)
+        target[: len(TARGET)], target[PSI_D:] = now.target, now.heading
+        write_moment(now.state, target, parts)
         return moment(now.time, parts, demand)
 
     def reward_gained(self, before: Moment, now: Moment) -> Vector:
@@ -153,17 +164,22 @@ class EpisodeTask:
         return reward
 
     def _limits(self, given: Limits | None) -> Vector:
-        """Largest surge force [N] and yaw moment [N m], (2,). Raises UsageError."""
+        """Largest surge force [N], yaw moment [N m] and, of an actuator with one, sway force [N].
+
+        Shape (2,) or (3,). Raises UsageError.
+        """
         limits = numbers(self.scenario.actuator.limits() if given is None else given)
-        if limits.shape != (OUTPUTS,) or not (limits >= 0.0).all():
+        most, example = ("yaw moment", "limits=(8.0, 2.5) [N, N m]")
+        if self.demands > OUTPUTS:
+            most, example = ("yaw moment and sway force", "limits=(8.0, 2.5, 4.0) [N, N m, N]")
+        if limits.shape != (self.demands,) or not (limits >= 0.0).all():
             raise UsageError(
-                f"podusv.gym: the limits are {given!r}; give the largest surge force and yaw "
-                "moment, as in limits=(8.0, 2.5) [N, N m]"
+                f"podusv.gym: the limits are {given!r}; give the largest surge force and {most}, "
+                f"as in {example}"
             )
         if not np.isfinite(limits).all():
             raise UsageError(
-                "podusv.gym: the actuator does not say how large a demand may be; give "
-                "limits=(8.0, 2.5) [N, N m]"
+                f"podusv.gym: the actuator does not say how large a demand may be; give {example}"
             )
         return limits
 

@@ -28,8 +28,9 @@ from podusv_cli.workflows import run as running
 
 Status = Literal["running", "finished", "diverged"]
 MOST = 15_000  # demands of a session: a scenario with more is too long to be read back
-# Where a schedule of two rows has the demand of the first, which holds up to the second
-DEMAND = slice(2, 4)
+FIRST = 2  # where a schedule of two rows has the demand of the first, which holds up to the second
+COUNTS = {2: "two", 3: "three"}
+DEMANDED = ("tau_u [N]", "tau_r [N m]", "tau_v [N]")
 
 
 class Observation(NamedTuple):
@@ -40,7 +41,8 @@ class Observation(NamedTuple):
     is position, velocity and acceleration, north and east, in m, m/s and m/s2. `status` is
     "running" until the duration is over or a number is not finite. `loads` are (tau_u, tau_v,
     tau_r) in N and N m, which the actuator made of the demand as the period before ended; zeros at
-    the begin. A law against windup asks for them.
+    the begin. A law against windup asks for them. `heading` is what the path asks for, with its
+    rates, in rad, rad/s and rad/s2; zeros of a path without one.
     """
 
     time: float
@@ -48,6 +50,7 @@ class Observation(NamedTuple):
     target: Vector
     status: Status
     loads: Vector
+    heading: Vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class Bookmark:
 
     session: Session
     mark: MarchMark
-    demands: tuple[tuple[float, float], ...]
+    demands: tuple[tuple[float, ...], ...]
     status: Status
 
 
@@ -96,7 +99,8 @@ def waiting(scenario: Scenario, period: float | None) -> tuple[Scenario, float]:
         )
     if not math.isfinite(period):
         raise UsageError(f"period is {period}; give a finite time [s], as in period=0.1")
-    ends = f"0.0, 0, 0\n{2.0 * single.simulation.duration!r}, 0, 0"
+    still = ", 0" * len(single.actuator.limits())
+    ends = f"0.0{still}\n{2.0 * single.simulation.duration!r}{still}"
     held = single.model_copy(update={"controller": Schedule(between="hold", rows=ends)})
     try:
         return with_values(held, {("control", "period"): period}), period
@@ -116,7 +120,7 @@ class Session:
         self.scenario, self.period = scenario, period
         grid = plan.grid
         self._status: Status = "running"
-        self._every, self._demands = grid.hold_every, list[tuple[float, float]]()
+        self._every, self._demands = grid.hold_every, list[tuple[float, ...]]()
         if grid.steps > MOST * self._every:
             longest = MOST * period
             raise UsageError(
@@ -126,7 +130,8 @@ class Session:
             )
         self._metrics = scenario.metrics_of(plan)
         self._march = SteppedRun(plan, march, compiled=scenario.simulation.compiled)
-        self._demand = self._march.vectors.law_table[DEMAND]
+        self._named = DEMANDED[: len(scenario.actuator.limits())]
+        self._demand = self._march.vectors.law_table[FIRST : FIRST + len(self._named)]
 
     @property
     def status(self) -> Status:
@@ -149,19 +154,21 @@ class Session:
     def observe(self) -> Observation:
         """The instant at which the next demand begins to act."""
         march = self._march
-        return Observation(march.time, march.state(), march.target(), self._status, march.loads())
+        target, heading = march.target(), march.heading()
+        return Observation(march.time, march.state(), target, self._status, march.loads(), heading)
 
     @with_short_traceback
     def step(self, demand: Sequence[float] | Vector) -> Observation:
         """Hold a demand (tau_u [N], tau_r [N m]) for a period; the instant after it.
 
-        Raises UsageError for a demand that is not two finite numbers and for a session that is
-        over; the session stays where it is.
+        Of an actuator that takes a sway force the demand is (tau_u, tau_r, tau_v [N]). Raises
+        UsageError for a demand that is not so many finite numbers and for a session that is over;
+        the session stays where it is.
         """
-        tau_u, tau_r = self._check_demand(demand)
+        given = self._check_demand(demand)
         grid, march = self._march.grid, self._march
-        self._demand[0], self._demand[1] = tau_u, tau_r
-        self._demands.append((tau_u, tau_r))
+        self._demand[:] = given
+        self._demands.append(given)
         reach = len(self._demands) * self._every
         last = reach >= grid.steps
         with np.errstate(all="ignore"):
@@ -169,8 +176,8 @@ class Session:
         self._status = ("finished" if last else "running") if fine else "diverged"
         return self.observe()
 
-    def _check_demand(self, demand: Sequence[float] | Vector) -> tuple[float, float]:
-        """Surge force [N] and yaw moment [N m].
+    def _check_demand(self, demand: Sequence[float] | Vector) -> tuple[float, ...]:
+        """Surge force [N], yaw moment [N m] and, where there is one, sway force [N].
 
         Raises UsageError, also after the end of the run.
         """
@@ -180,15 +187,15 @@ class Session:
                 "more demands; close it, or go back with restore"
             )
         try:
-            tau_u, tau_r = (float(number) for number in demand)
+            given = tuple(float(number) for number in demand)
         except (TypeError, ValueError):
-            tau_u = tau_r = math.nan
-        if not (math.isfinite(tau_u) and math.isfinite(tau_r)):
+            given = ()
+        if len(given) != len(self._named) or not all(map(math.isfinite, given)):
             raise UsageError(
-                f"session, t = {self._march.time:g} s: the demand is {demand!r}; give two finite "
-                "numbers, tau_u [N] and tau_r [N m]"
+                f"session, t = {self._march.time:g} s: the demand is {demand!r}; give "
+                f"{wanted_numbers(self._named)}"
             )
-        return tau_u, tau_r
+        return given
 
     def state(self) -> Bookmark:
         """The place in the run, for `restore`."""
@@ -235,8 +242,14 @@ class Session:
         return open_run(running.run_loaded(given, request(out, force, figures)).folder)
 
 
+def wanted_numbers(named: Sequence[str]) -> str:
+    """What a demand is to be: `two finite numbers, tau_u [N] and tau_r [N m]`."""
+    *first, last = named
+    return f"{COUNTS[len(named)]} finite numbers, {', '.join(first)} and {last}"
+
+
 def schedule_demands(
-    scenario: Scenario, period: float, demands: Sequence[tuple[float, float]]
+    scenario: Scenario, period: float, demands: Sequence[tuple[float, ...]]
 ) -> Loaded:
     """The scenario with a law that holds each of these demands for a period, and then ends."""
     run, every = scenario.simulation, scenario.time_grid().hold_every
@@ -244,7 +257,7 @@ def schedule_demands(
     # The last demand has rows at the end and after it, so that the end is no end of the schedule.
     held = [*demands, demands[-1], demands[-1]]
     times = [k * every * run.step for k in range(len(held))]
-    rows = [f"{t!r}, {tau_u!r}, {tau_r!r}" for t, (tau_u, tau_r) in zip(times, held, strict=True)]
+    rows = [", ".join(map(repr, (t, *demand))) for t, demand in zip(times, held, strict=True)]
     changes = {
         "control.period": period,
         "simulation.duration": min(len(demands) * every * run.step, run.duration),

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.elementary import arctangent
 from podusv_cli.core.kernel import bundle, call, scratch, transplant
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
+from podusv_cli.core.signal import DEMAND_SIZE, TARGET_SIZE
+from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import logged_rows
 from podusv_cli.metrics.metric import Metric
 
 # where the target, the vessel's state and the law's memory begin in a logged row
-ENDS = (1, 1 + len(TARGET), 1 + len(TARGET) + len(STATE))
+ENDS = (1, 1 + TARGET_SIZE, 1 + TARGET_SIZE + len(STATE))
 
 law_operations = Metric(
     "law_operations",
@@ -132,7 +132,7 @@ def operations(plan: Plan, recording: Recording) -> dict[str, float]:
         "memory": memory,
         "target": target,
         "table": plan.law_table,
-        "tau": np.zeros(len(DEMAND)),
+        "tau": np.zeros(DEMAND_SIZE),
         "rate": np.zeros(len(memory)),
         "signals": np.zeros(len(law.signals)),
         "work": np.zeros(law.workspace()),

@@ -10,6 +10,7 @@ from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit, nearest_hint, whole_steps
 from podusv_cli.core.system import name_refused
+from podusv_cli.engine.loop.closed_loop import unmet
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.scenario.sections import CLAIM, CLAIM_IN_WORDS, LABEL, LABEL_IN_WORDS
@@ -25,6 +26,7 @@ def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
     parts = [*_defaults(scenario), *_conflicts_of_laws(scenario), *_summands(scenario)]
     return parts or [
         *_conflicts_of_commands(scenario),
+        *_unmet(scenario),
         *of_numbers(scenario),
         *_names(scenario),
         *scenario.metrics.conflicts(),
@@ -150,6 +152,13 @@ def _seeing(scenario: Scenario) -> Conflicts:
         yield "estimator", f"{text}; add `measurement: {{kind: sensors}}`"
     if lacking := scenario.estimator.lacking(scenario.measurement.measured()):
         yield "estimator", lacking
+
+
+def _unmet(scenario: Scenario) -> Conflicts:
+    """What laws want of path and actuator that these have not, each once."""
+    laws = scenario.laws().values()
+    found = (text for law in laws for text in unmet(law, scenario.path, scenario.actuator))
+    yield from dict.fromkeys(found)
 
 
 def _names(scenario: Scenario) -> Conflicts:

@@ -4,6 +4,8 @@ A hull that follows moves at the target's speed over ground U. Its sway v balanc
 Y(u, v, r) + b_v + tau_v = 0 with u^2 + v^2 = U^2. r is the turn rate of the target's course, b_v
 the mean load, and tau_v the sway force that the actuator produces with the yaw moment
 -(N(u, v, r) + b_r).
+
+A hull that is asked for a heading and can push sideways has no choice: velocities are the path's.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import numpy as np
 
 from podusv_cli.components.vessels.plant import lacking, surge_force, sway_force, yaw_moment
 from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.signal import PSI_D
 from podusv_cli.scenario.model import Scenario
 
 SAMPLES = 60  # times of a run, evenly spread
@@ -32,7 +35,7 @@ class Reference:
 
     `nu` (n, 3) is the hull's velocity, with NaN for surge and sway where no heading can follow;
     `load` (n, 3) the disturbance; `demand` (n, 2) the surge force [N] and yaw moment [N m] that
-    keep this velocity.
+    keep this velocity, (n, 3) with a sway force [N] where the law asks for one.
     """
 
     time: Vector
@@ -64,6 +67,8 @@ def median(values: Vector) -> float:
 def reference(scenario: Scenario) -> Reference:
     """Sample a scenario's target and loads, and balance the hull's loads at each sample."""
     time = np.linspace(0.0, scenario.simulation.duration, SAMPLES)
+    if scenario.controller.asks_sway() and scenario.path.heads:
+        return _posed(scenario, time)
     target = scenario.path.targets(time.tolist())
     speed, turn, along = _motion(target)
     load = _loads(scenario, time, target, turn)
@@ -78,6 +83,34 @@ def reference(scenario: Scenario) -> Reference:
     demand -= less[:, [0, 2]]
     demand[:, 0] += scenario.vessel.m11 * along
     return Reference(time, speed, nu, load, demand - load[:, [0, 2]])
+
+
+def _posed(scenario: Scenario, time: Vector) -> Reference:
+    """The same where the path has a heading, and the law pushes sideways: tau = M nu' - f(nu) - b.
+
+    nu = R^T p_d' with the rate of the heading; nu' = R^T p_d'' - r S nu.
+    """
+    rows, vessel = scenario.path.whole_targets(time.tolist()), scenario.vessel
+    psi, r, r_dot = rows[:, PSI_D:].T
+    c, s = np.cos(psi), np.sin(psi)
+    u, a = (c * rows[:, at] + s * rows[:, at + 1] for at in (2, 4))
+    v, b = (c * rows[:, at + 1] - s * rows[:, at] for at in (2, 4))
+    nu = np.column_stack([u, v, r])
+    load = scenario.sea.loads(vessel, time.tolist(), np.column_stack([rows[:, :2], psi, nu]))
+    k = bundle(vessel.constants())
+    forces = np.array(
+        [
+            (surge_force(u, v, r, k), sway_force(u, v, r, k), yaw_moment(u, v, r, k))
+            for u, v, r in nu.tolist()
+        ]
+    )
+    less = np.array([lacking(u, v, r, k) for u, v, r in nu.tolist()])
+    inertia = np.array(
+        [[vessel.m11, 0.0, 0.0], [0.0, vessel.m22, vessel.m23], [0.0, vessel.m32, vessel.m33]]
+    )
+    growth = np.column_stack([a + r * v, b - r * u, r_dot])
+    tau = growth @ inertia.T - forces - less - load
+    return Reference(time, np.hypot(u, v), nu, load, tau[:, [0, 2, 1]])
 
 
 def _motion(target: Vector) -> tuple[Vector, Vector, Vector]:

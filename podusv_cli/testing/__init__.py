@@ -21,6 +21,7 @@ import numpy as np
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.ideal_full import IdealFull
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.disturbances.base import Disturbance
@@ -32,6 +33,7 @@ from podusv_cli.components.measurements.sensors import Sensors
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.components.paths.base import Path as AnyPath
 from podusv_cli.components.paths.line import Line
+from podusv_cli.components.paths.poses import Poses
 from podusv_cli.core import derived_signals as derived
 from podusv_cli.core import plugins, registry
 from podusv_cli.core.component import Component
@@ -39,7 +41,7 @@ from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.past_run import PastRun
 from podusv_cli.core.plugins import Plugin
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import DEMAND, DEMAND_SIZE, PSI_D, TARGET_SIZE, Signal
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.check import check_law
@@ -233,6 +235,10 @@ def loop_with(component: Component) -> ClosedLoop:
         "measurement": Sensors() if isinstance(component, Estimator) else Exact(),
     }
     place = next(name for name, base in ROOMS.values() if isinstance(component, base))
+    if isinstance(component, Controller) and component.asks_sway():
+        parts["actuator"] = IdealFull()
+    if isinstance(component, Controller) and component.wants_heading():
+        parts["path"] = Poses(poses=((0.0, 0.0, 0.0), (5.0, 2.0, 0.5)))
     return ClosedLoop(
         vessel=usual_vessel(),
         nominal=usual_vessel(),
@@ -253,7 +259,11 @@ def evaluate_component(component: Component, seed: int) -> list[Vector]:
     x = random.uniform(-1.0, 1.0, 6) * [20.0, 20.0, 3.0, 1.5, 0.5, 0.8]
     bearing, distance = random.uniform(-np.pi, np.pi), random.uniform(1.0, 20.0)
     place = x[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
-    target = np.concatenate([place, random.uniform(-1.0, 1.0, 4) * [0.7, 0.7, 0.1, 0.1]])
+    motion = random.uniform(-1.0, 1.0, 4) * [0.7, 0.7, 0.1, 0.1]
+    heading = np.zeros(TARGET_SIZE - len(TARGET))
+    if isinstance(component, Controller) and component.wants_heading():
+        heading[1:] = random.uniform(-1.0, 1.0, 3) * [3.0, 0.1, 0.01]
+    target = np.concatenate([place, motion, heading])
     x, target = _to_read(x), _to_read(target)
     for base, ask in CALLS:
         if isinstance(component, base):
@@ -272,7 +282,8 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
     """All that a law's kernels write at time t [s] and state x (6,): demand, rates, signals."""
     memory, k = law.start(x, target, usual_vessel()), bundle(law.constants_with(usual_vessel()))
     memory = memory + random.normal(0.0, 0.1, len(memory))
-    outputs = [np.full(size, np.nan) for size in (2, len(memory), len(law.signals))]
+    demands = len(DEMAND) + law.asks_sway()
+    outputs = [np.full(size, np.nan) for size in (demands, len(memory), len(law.signals))]
     if law.takes_samples():
         call(law.sample, t=t, x=x, memory=memory, target=target, k=k, table=law.table())
     tau, rate, signals = outputs
@@ -294,7 +305,8 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     """All that a path's kernels write at time t [s]: target and place."""
-    out, place = np.full(len(TARGET), np.nan), np.zeros(len(path.places))
+    out, place = np.full(TARGET_SIZE, np.nan), np.zeros(len(path.places))
+    out[len(TARGET) : PSI_D if path.heads else TARGET_SIZE] = 0.0  # what no path writes
     k, table = bundle(path.constants_with(0.0)), path.table()
     if path.follows:
         call(path.locate, t=t, x=x, s=x, place=place, k=k, table=table)
@@ -320,7 +332,7 @@ def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
     """All that an actuator's kernel writes at time t [s]: force, rates, signals."""
-    state, demand = _to_read(actuator.rest()), _to_read(random.normal(0.0, 5.0, 2))
+    state, demand = _to_read(actuator.rest()), _to_read(random.normal(0.0, 5.0, DEMAND_SIZE))
     outputs = [np.full(size, np.nan) for size in (3, len(state), len(actuator.signals))]
     k = bundle(actuator.constants())
     tau, rate, signals = outputs

@@ -79,6 +79,11 @@ def loop_margins(
             "continuously; set controller.rate=analytic and controller.hold_below=0 where it has "
             "these keys, or choose another law"
         )
+    if law.asks_sway():
+        raise LawError(
+            f"{law.noun} {law.label}: it asks for a sway force, too, and margins are those of two "
+            "loops, surge and yaw; choose a law of surge force and yaw moment"
+        )
     if loop.path.follows:
         raise LawError(
             f"{loop.path.noun} {loop.path.label}: its target moves with the vessel, and margins "

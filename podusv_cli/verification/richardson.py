@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,17 +29,19 @@ class StepEstimate:
     """A number at three steps, its order of convergence (NaN: none), and its error at the first.
 
     `scale` is the reference of the relative error: the number itself, or a length for a position.
+    An error up to `floor` is none.
     """
 
     values: tuple[float, float, float]
     order: float
     error: float
     scale: float
+    floor: float = FLOOR
 
     @property
     def relative(self) -> float:
-        """The error over the scale; 0 where the error is within `FLOOR`."""
-        if self.error <= FLOOR:
+        """The error over the scale; 0 where the error is within the floor."""
+        if self.error <= self.floor:
             return 0.0
         return self.error / self.scale if self.scale else math.inf
 
@@ -62,12 +64,15 @@ class StepEstimate:
         return all(math.isnan(value) for value in self.values)
 
 
-def estimate(values: Sequence[float]) -> StepEstimate:
-    """Order and error of a number from its values at the three steps; all may be NaN."""
+def estimate(values: Sequence[float], floor: float = FLOOR) -> StepEstimate:
+    """Order and error of a number from its values at the three steps; all may be NaN.
+
+    An error up to `floor`, in the number's unit, is none.
+    """
     a, b, c = values
     if all(math.isnan(value) for value in values):
         return StepEstimate((a, b, c), math.nan, 0.0, 0.0)
-    return _estimate((a, b, c), abs(a - b), abs(b - c), abs(a))
+    return replace(_estimate((a, b, c), abs(a - b), abs(b - c), abs(a)), floor=floor)
 
 
 def estimate_position(positions: Sequence[np.ndarray], length: float) -> StepEstimate:

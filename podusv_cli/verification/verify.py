@@ -10,11 +10,15 @@ from typing import Any
 
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.ranking import Ranking, ranking
-from podusv_cli.verification.richardson import StepEstimate, estimate, estimate_position
+from podusv_cli.verification.richardson import FLOOR, StepEstimate, estimate, estimate_position
 from podusv_cli.verification.step_halving import Level, Progress, run_level
 
 LEVELS = 3  # steps h, h/2, h/4: the least that tell order and error
 POSITION = "end_position"  # verified like a metric
+# A distance below this part of the vessel's length is none: laws that are exact on their path leave
+# nothing but the integrator's own error, all of which is relative to nothing.
+NO_DISTANCE = 1e-9
+DISTANCES = {"m": (1, 0), "m s": (1, 1), "m2 s": (2, 1), "m s2": (1, 2)}  # powers of m and s
 
 
 @dataclass(frozen=True)
@@ -128,9 +132,17 @@ def check(scenario: Scenario, progress: Progress | None = None) -> RunVerificati
     positions = [level.position for level in levels]
     estimates = {POSITION: estimate_position(positions, scenario.vessel.length)}
     names = dict.fromkeys(name for level in levels for name in level.metrics)
+    known = scenario.known_metrics()
     for name in names:
-        estimates[name] = estimate([level.metrics.get(name, math.nan) for level in levels])
+        floor = floor_of(known[name].unit, scenario.vessel.length, scenario.simulation.duration)
+        estimates[name] = estimate([level.metrics.get(name, math.nan) for level in levels], floor)
     return RunVerification(levels, estimates)
+
+
+def floor_of(unit: str, length: float, duration: float) -> float:
+    """Up to which an error in this unit is none, of a vessel's length [m] and a run's time [s]."""
+    metres, seconds = DISTANCES.get(unit, (0, 0))
+    return max((NO_DISTANCE * length) ** metres * duration**seconds, FLOOR) if metres else FLOOR
 
 
 def _part(progress: Progress | None, begin: float, size: float, whole: float) -> Progress | None:

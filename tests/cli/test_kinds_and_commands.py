@@ -18,6 +18,7 @@ OTTER = "vessel: {preset: otter}\nactuator: {kind: pod, preset: otter}\n"
 PID = "controller: {kind: pid}\n"
 STILL = "start: {u: 1.0}\npath: {kind: line, speed: 0.0}\ndisturbance: {kind: none}\n"
 LEGS = "path: {kind: legs, points: [[0, 0], [6, 0], [6, 6]]}\n"
+POSES = "path: {kind: poses, poses: [[0, 0, 0], [1, 0.5, 0.5]], travel: 9.0, dwell: 0.5}\n"
 # What a scenario of each kind has.
 KINDS = {
     "trial": OTTER
@@ -34,6 +35,11 @@ KINDS = {
     + f"controller: {{kind: policy, content: '{content(symmetric())}'}}\n",
     "pods": OTTER + STILL.replace("speed: 0.0", "speed: 1.0") + SHORT + PID,
     "sensors": HULL + TASK + SHORT + PID + "measurement: {kind: sensors}\nestimator: {kind: ekf}\n",
+    "poses": "vessel: {preset: cybership2}\nstart: {x: 0.1}\n"
+    + POSES
+    + "disturbance: {kind: none}\nactuator: {kind: saturated_full}\n"
+    + SHORT
+    + "controller: {kind: pose_pid}\n",
     "plug-in": HULL + TASK + SHORT + "plugins: [law.py]\ncontroller: {kind: cross_track}\n",
 }
 STUDY = (
@@ -132,12 +138,16 @@ COMMANDS: dict[str, Callable[[Command, str], Said]] = {
     "rerun": of_run("rerun", "r", "--trust"),
     "diff": of_run("diff", "r", "r"),
 }
+FULL = "actuator.kind: saturated_full does not fit"
 POD, LEG = "actuator.kind: pod does not fit", "path.kind: legs does not fit"
 REFUSED = {
     ("trial", "margins"): "it takes samples, and margins are those of a law that acts continuously",
     ("trial", "optimum"): POD,
     ("legs", "margins"): "its target moves with the vessel, and margins are those of a law that",
     ("legs", "optimum"): LEG,
+    ("poses", "margins"): "it asks for a sway force, too, and margins are those of two loops",
+    ("poses", "optimum"): FULL,
+    ("poses", "export"): "the law asks for a sway force, or reads a heading of its target",
     ("policy", "tune"): "no number of policy is a gain that changes a run",
     ("policy", "margins"): "no steady motion was found",
     ("pods", "optimum"): POD,

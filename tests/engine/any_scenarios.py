@@ -35,6 +35,7 @@ TABLES = [
     {"x": -0.8, "y": y, "table": ROWS, "n_rate": 4, "n_lag": 0.1, "angle_limit": 0}
     for y in (-0.4, 0.4)
 ]
+POSES = [[0, 0, 0.2], [0.3, -0.2, 1.1], [0.1, 0.4, -0.6]]
 COMMANDED = {"command": {"resolution_u": 0.1, "dead_zone_r": 0.02}}
 SENSORS = {"measurement": {"kind": "sensors"}, "estimator": {"kind": "ekf"}}
 # Parts that are put together in another way, with a metric that is gathered at every instant
@@ -59,6 +60,21 @@ KINDS: dict[str, dict[str, Any]] = {
             {"kind": "wind", "speed": 5.0},
             {"kind": "waves", "height": 0.1, "period": 1.5, "components": 9},
         ],
+    },
+    "three loads for a pose": {
+        "controller": {"kind": "pose_backstepping", "k_i": 0.05},
+        "path": {"kind": "poses", "poses": POSES, "travel": 0.7, "dwell": 0.3},
+        "actuator": {
+            "kind": "saturated_full",
+            "command": {"resolution_v": 0.1, "dead_zone_r": 0.02},
+        },
+        "vessel": {"preset": "cybership2"},
+    },
+    "pods for a pose": {
+        "controller": {"kind": "pose_pid"},
+        "path": {"kind": "poses", "poses": POSES, "travel": 0.7, "dwell": 0.3},
+        "actuator": {"kind": "pod", "preset": "milliampere", "sway_weight": 1.0},
+        "vessel": {"preset": "milliampere"},
     },
     "a trial": {"controller": {"kind": "zigzag"}},
     "a difference of headings": {
@@ -116,8 +132,9 @@ class Drawn:
             "start.u": self.between(-0.3, 1.0),
             "start.v": self.between(-0.1, 0.1),
             "start.r": self.between(-0.2, 0.2),
-            "path.speed": self.between(0.2, 0.8),
         }
+        if KINDS[self.kind].get("path", LEGS)["kind"] != "poses":  # which are timed
+            numbers["path.speed"] = self.between(0.2, 0.8)
         if "actuator" in KINDS[self.kind]:
             numbers["actuator.command.delay"] = self.seconds(self.whole(0, 9))
         return numbers

@@ -18,8 +18,13 @@ from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.step.grid import TimeGrid
 
 # A trial takes samples, so it is no differential equation; a schedule does not look at the target.
+# Laws of poses have their mirror image in controllers/test_pose_laws.py.
 CONTINUOUS = {n: k for n, k in kinds("controllers").items() if not example(k).takes_samples()}
-MIRRORED = {name: kind for name, kind in kinds("controllers").items() if name != "schedule"}
+MIRRORED = {
+    name: kind
+    for name, kind in kinds("controllers").items()
+    if name != "schedule" and not example(kind).wants_heading()
+}
 # Without the kink at the edge of the boundary layer, which no order survives.
 WITHIN_LAYER = {"sliding_mode": {"phi": 10.0}}
 FAST = dict.fromkeys(("adaptive_neural", "dsc", "full_backstepping", "pid"), 0.002)  # s
@@ -40,7 +45,8 @@ def test_the_loop_is_integrated_at_fourth_order(kind):
     # no second derivative where sway changes its sign.
     name = kind.model_fields["kind"].default
     law, step = example(kind, **WITHIN_LAYER.get(name, {})), FAST.get(name, 0.04)
-    loop = corrected(controller=law, vessel=PAPER, path=Line(), start=SMOOTH_START)
+    path = {} if law.wants_heading() else {"path": Line()}
+    loop = corrected(controller=law, vessel=PAPER, start=SMOOTH_START, **path)
     ends = [end(loop, step / 2**i) for i in range(4)]
     assert order(ends) == pytest.approx(4.0, abs=0.2)
 

@@ -20,7 +20,7 @@ from any_scenarios import KINDS, STEPS, Drawn
 from exported_laws import Unit
 
 import podusv
-from podusv_cli.core.errors import ScenarioError
+from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.core.kernel import LANES
 from podusv_cli.export import link
 from podusv_cli.export.check import check
@@ -234,6 +234,10 @@ def exported_law(drawn: Drawn, place: Path) -> None:
     """A sampled law in the run, by itself, as C and as an FMU."""
     drawn.held = max(drawn.held, 1)
     scenario = drawn.scenario()
+    if scenario.controller.asks_sway():
+        with pytest.raises(UsageError, match="asks for a sway force"):
+            ExportedLaw.of(scenario)
+        return
     law = ExportedLaw.of(scenario)
     rows = law.samples(podusv.simulate(law.scenario).recording)
     by_itself = law.by_itself(rows)

@@ -41,7 +41,13 @@ from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
-LAWS = sorted(registry.kinds("podusv_cli.components.controllers", Controller))
+KINDS = registry.kinds("podusv_cli.components.controllers", Controller)
+LAWS = sorted(name for name, kind in KINDS.items() if not example(kind).asks_sway())
+POSES = (
+    "controller={kind: pose_pid}",
+    "path={kind: poses, poses: [[0, 0, 0]]}",
+    "actuator={kind: ideal_full}",
+)
 PODS = {"actuator": {"kind": "pod", "preset": "otter"}, "vessel": {"preset": "otter"}}
 
 
@@ -256,10 +262,11 @@ def table(folder: Path) -> Any:
 def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
     actuator, random = example(kind), np.random.default_rng(3)
     for _ in range(20):
-        demand, limits = random.normal(0.0, 10.0, 2), actuator.limits()
-        cut = np.clip(demand, np.negative(limits), limits)
+        limits = actuator.limits()
+        demand = random.normal(0.0, 10.0, len(limits))
+        u, r, *v = np.clip(demand, np.negative(limits), limits)
         loads = actuator._drive_once(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
-        assert np.array_equal(loads, [cut[0], 0.0, cut[1]]) == actuator.only_cuts
+        assert np.array_equal(loads, [u, *(v or [0.0]), r]) == actuator.only_cuts
     for around in ({"command": Command()}, {"failure": EffectivenessLoss(time=1e9)}):
         assert not actuator.model_copy(update=around).only_cuts
 
@@ -313,6 +320,10 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     (
         {"overrides": ["control.period=0.1", "simulation.duration=700000", "log.every=10000"]},
         r"logs every step, too many of them in 700000 s; simulate less",
+    ),
+    (
+        {"overrides": ["control.period=0.1", "simulation.duration=1", *POSES]},
+        "asks for a sway force, or reads a heading of its target.*export another law",
     ),
     ({"platforms": ["linux"]}, r"unknown platform 'linux'; did you mean 'linux64'\? \(allowed: "),
     ({"platforms": ["thumbv7em"], "fmu": True}, "thumbv7em has no shared libraries.*--no-fmu"),

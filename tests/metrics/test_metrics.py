@@ -12,6 +12,7 @@ from loop_samples import gathered
 from podusv_cli.comparison.parsing import parse_claims
 from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.actuators.saturated_full import SaturatedFull
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.controllers.pid import Pid
@@ -23,6 +24,7 @@ from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.sensors import Sensor, Sensors
 from podusv_cli.components.paths.legs import Legs
 from podusv_cli.components.paths.line_circle import LineCircle
+from podusv_cli.components.paths.poses import Poses
 from podusv_cli.core.component import value
 from podusv_cli.core.errors import ScenarioError
 from podusv_cli.core.kernel import Vector, bundle, kernel
@@ -330,10 +332,16 @@ def test_every_metric_is_computed_and_documented(limited):
     seeing = corrected(measurement=Sensors(), estimator=ExtendedKalmanFilter())
     of_estimates = set(gathered(seeing, steps=10)[1])
     of_path = set(gathered(corrected(path=example(Legs)), steps=10)[1])
+    posed = corrected(actuator=SaturatedFull(), path=example(Poses))
+    of_poses = set(gathered(posed, steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in (*OF_OPTIMUM.values(), *OF_LOG)} | set(OF_LOOP)
     simulated = (
-        set(got | cost | operations(plan, log) | of_pods) | of_estimates | of_trials | of_path
+        set(got | cost | operations(plan, log) | of_pods)
+        | of_estimates
+        | of_trials
+        | of_path
+        | of_poses
     )
     assert always == simulated | compared
     assert set(of_pods) > set(got)

@@ -9,8 +9,11 @@ from podusv_cli.scenario.model import Scenario
 
 KEYS = ", ".join(Scenario.model_fields)
 VESSEL_KEYS = ", ".join(Vessel.model_fields)
-PATHS, LAWS, SEAS = ([*kinds(room)] for room in ("paths", "controllers", "disturbances"))
-A_PATH, A_LAW, A_SEA = (f"{', '.join(known[:-1])} or {known[-1]}" for known in (PATHS, LAWS, SEAS))
+ROOMS = ("paths", "controllers", "disturbances", "actuators")
+PATHS, LAWS, SEAS, ACTUATORS = ([*kinds(room)] for room in ROOMS)
+A_PATH, A_LAW, A_SEA, AN_ACTUATOR = (
+    f"{', '.join(known[:-1])} or {known[-1]}" for known in (PATHS, LAWS, SEAS, ACTUATORS)
+)
 NUMBER = "step: must be a number above 0 [s], found"
 TRUTH = "compiled: must be true or false, found"
 CENTER = "must be a list of 3 numbers [m/s, m/s, rad/s]"
@@ -277,7 +280,7 @@ def test_what_is_missing_is_told_at_the_file():
         f"a.yaml: path: missing; must be a mapping of keys with kind {A_PATH}",
         f"a.yaml: disturbance: missing; must be a mapping of keys with kind {A_SEA} or a list of "
         "these",
-        "a.yaml: actuator: missing; must be a mapping of keys with kind ideal, pod or saturated",
+        f"a.yaml: actuator: missing; must be a mapping of keys with kind {AN_ACTUATOR}",
         f"a.yaml: controller: missing; must be a mapping of keys with kind {A_LAW}",
     ]
 

@@ -27,7 +27,7 @@ GIVEN = {
 LAWS = {f"{kind} {period}": (kind, period) for kind in kinds("controllers") for period in (0, 0.05)}
 SCENARIO = """
 vessel: {{preset: paper_nonlinear}}
-path: {{kind: line_circle}}
+path: {path}
 disturbance: {{kind: harmonic}}
 actuator: {actuator}
 controller: {{kind: {law}}}
@@ -35,6 +35,13 @@ start: {{x: -5.0, y: -2.0, u: 0.3}}
 simulation: {{duration: 0.4, compiled: {compiled}}}
 control: {{period: {period}}}
 """
+
+
+def scenario(compiled: str = "false", path: str = "{kind: line_circle}", **parts: Any) -> str:
+    """A short scenario with these parts."""
+    return SCENARIO.format(compiled=compiled, path=path, **parts)
+
+
 POD = "{kind: pod, preset: cybership2_pod}"
 DATED = {"provenance.json", "manifest.json", "metrics.json", "metrics.csv"}  # times, law_ns
 
@@ -60,26 +67,27 @@ def same_files(place: Path, text: str, **options: Any) -> None:
 def test_every_law_leaves_the_same_files(tmp_path, law):
     kind, period = LAWS[law]
     law = kind + GIVEN.get(kind, "")
-    text = SCENARIO.format(actuator="{kind: saturated}", law=law, period=period, compiled="false")
-    same_files(tmp_path, text)
+    parts = {"actuator": "{kind: saturated}"}
+    if kind.startswith("pose"):
+        poses = "[[0, 0, 0], [2, 1, 0.5]]"
+        parts = {"actuator": "{kind: saturated_full}", "path": f"{{kind: poses, poses: {poses}}}"}
+    same_files(tmp_path, scenario(law=law, period=period, **parts))
 
 
 @pytest.mark.slow
 def test_pods_leave_the_same_files(tmp_path):
-    same_files(tmp_path, SCENARIO.format(actuator=POD, law="pid", period=0, compiled="false"))
+    same_files(tmp_path, scenario(actuator=POD, law="pid", period=0))
 
 
 def test_machine_code_leaves_the_same_files_and_figures(tmp_path):
-    text = SCENARIO.format(actuator="{kind: saturated}", law="pid", period=0, compiled="true")
+    text = scenario(actuator="{kind: saturated}", law="pid", period=0, compiled="true")
     same_files(tmp_path, text.replace("duration: 0.4", "duration: 60.0"), figures=True)
 
 
 @pytest.mark.parametrize("law", ["adaptive_neural", "pid"])
 def test_runs_that_diverge_leave_the_same_files(tmp_path, law):
     gain = {"pid": "K_Pu: 2e+4", "adaptive_neural": "k_ue: 1e+7"}[law]
-    text = SCENARIO.format(
-        actuator="{kind: ideal}", law=f"{law}, {gain}", period=0, compiled="false"
-    )
+    text = scenario(actuator="{kind: ideal}", law=f"{law}, {gain}", period=0)
     same_files(tmp_path, text)
     assert "diverged" in (tmp_path / "held/run/manifest.json").read_text()
 
@@ -182,7 +190,7 @@ FULL = {
 @pytest.mark.parametrize("case", FULL)
 def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path, case):
     limit, held, says = FULL[case]
-    text = SCENARIO.format(actuator="{kind: ideal}", law="pid", period=0, compiled="false")
+    text = scenario(actuator="{kind: ideal}", law="pid", period=0)
     text = text.replace("duration: 0.4", "duration: 3.0")
     done = under_limit(tmp_path, text, "RLIMIT_FSIZE", limit, held)
     assert (done.returncode, done.stdout) == (5, "")
@@ -196,7 +204,7 @@ def test_what_cannot_be_written_is_an_error_in_one_line(tmp_path, case):
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere memory cannot be limited so")
 def test_a_run_takes_far_less_memory_than_its_log(tmp_path):
     law = {"law": "adaptive_neural", "period": 0, "compiled": "true"}
-    text = SCENARIO.format(actuator="{kind: saturated}", **law)
+    text = scenario(actuator="{kind: saturated}", **law)
     text = text.replace("duration: 0.4", "duration: 2500.0")
     held = under_limit(tmp_path, text, "RLIMIT_DATA", FREE, HELD)
     assert "MemoryError" in held.stderr

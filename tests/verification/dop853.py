@@ -15,8 +15,8 @@ import numpy as np
 from continuous import Slope, continuous
 from scipy.integrate import DOP853
 
-from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector, bundle, call
+from podusv_cli.core.signal import TARGET_SIZE
 from podusv_cli.scenario.model import Scenario
 
 TOLERANCE = 1e-10  # relative and absolute, of every state
@@ -53,7 +53,7 @@ def _pieces(scenario: Scenario, duration: float) -> Iterator[tuple[float, float]
 
 
 def _with_iae(scenario: Scenario, slope: Slope) -> Slope:
-    path, target = scenario.path, np.zeros(len(TARGET))
+    path, target = scenario.path, np.zeros(TARGET_SIZE)
     k, table = bundle(path.constants()), path.table()
 
     def f(t: float, s: Vector) -> Vector:

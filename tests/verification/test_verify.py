@@ -11,15 +11,16 @@ from conftest import corrected, run
 from continuous import continuous
 from dop853 import integrate
 from findings_samples import CONFIGS, scene
+from pose_samples import BOAT, HELD, POSES
 
 from podusv_cli.cli.verify import _in_order
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
-from podusv_cli.scenario.load import load
+from podusv_cli.scenario.load import load, load_text
 from podusv_cli.scenario.model import Scenario
 from podusv_cli.verification.ranking import ranking
 from podusv_cli.verification.richardson import estimate, estimate_position
 from podusv_cli.verification.step_halving import refine_grid, run_level
-from podusv_cli.verification.verify import POSITION, check, verify
+from podusv_cli.verification.verify import POSITION, check, floor_of, verify
 from podusv_cli.workflows import verify as verifying
 
 # Behind the target, facing it and moving; a step at which the adaptation is well resolved.
@@ -315,3 +316,20 @@ def test_what_is_within_a_picometre_of_nothing_has_converged(size):
     assert found.converged(0.01)
     assert found.sufficient(0.01) == 1.0
     assert not estimate([1e10 * size, -0.5e10 * size, 0.9e10 * size]).converged(0.01)
+
+
+def test_a_law_that_is_exact_on_its_path_has_converged():
+    """Its distances of 1e-12 m are the integrator's own errors, all of them of fourth order."""
+    text = BOAT + POSES + HELD
+    found = verify(load_text(text, "s.yaml").scenario, 0.01)
+    (run,) = found.runs.values()
+    errors = run.estimates["iae"]
+    assert errors.order == pytest.approx(4.0, abs=0.2)
+    assert 1e-12 < errors.error < floor_of("m s", 1.255, 12.0)
+    assert not found.unconverged_by_run
+
+
+def test_a_distance_is_none_of_a_billionth_of_the_hull_and_a_force_of_a_piconewton():
+    assert floor_of("m", 10.0, 100.0) == pytest.approx(1e-8)
+    assert floor_of("m s", 10.0, 100.0) == pytest.approx(1e-6)
+    assert floor_of("m2 s", 1.0, 100.0) == floor_of("N", 10.0, 100.0) == 1e-12

@@ -1,4 +1,4 @@
-"""From a demand (tau_u, tau_r) to a thrust and an angle for every pod."""
+"""From a demand (tau_u, tau_r), and maybe tau_v, to a thrust and an angle for every pod."""
 
 from __future__ import annotations
 
@@ -68,8 +68,9 @@ def reach(n: float, delta: float, flow: float, pod: Vector, k: Any) -> Reach:
     return Reach(low, high, max(0.0, astern), max(0.0, ahead))
 
 
-# Reads state (2 count: speeds [1/s], then angles [rad]), demand (2) [N, N m], a row of `table` for
-# each pod. Writes thrusts T (count) and angles delta (count); True where they make the demand.
+# Reads state (2 count: speeds [1/s], then angles [rad]), demand (2, or 3 where `k.takes_sway`)
+# [N, N m, N], a row of `table` for each pod. Writes thrusts T (count) and angles delta (count);
+# True where they make the demand.
 @kernel
 def allocate(
     state: Vector, demand: Vector, flows: Vector, k: Any, table: Vector, T: Vector, delta: Vector
@@ -125,6 +126,8 @@ def by_least_squares(
         c[5] = weight_r * pod[X] * most[i] / all_r
     tau[0] = weight_u * within(demand[0] / all_u, -1.0, 1.0)
     tau[1] = 0.0
+    if k.takes_sway > 0.0:
+        tau[1] = weight_v * within(demand[2] / all_u, -1.0, 1.0)
     tau[2] = weight_r * within(demand[1] / all_r, -1.0, 1.0)
     several_pods(count, C, tau, sectors, EFFORT, g)
     for i in range(count):
@@ -148,22 +151,26 @@ def shape(at: Reach, pod: Vector, most: float, sector: Vector) -> None:
     sector[FIXED] = 1.0 if at.high <= at.low else 0.0
 
 
-# demand (2) [N, N m]; T (count) [N], delta (count) [rad]. `all_u` [N] and `all_r` [N m] are what
-# all pods together could give, and set what counts as equal.
+# demand (2, or 3 where `k.takes_sway`) [N, N m, N]; T (count) [N], delta (count) [rad]. `all_u` [N]
+# and `all_r` [N m] are what all pods together could give, and set what counts as equal.
 @kernel
 def meets_demand(
     demand: Vector, all_u: float, all_r: float, k: Any, table: Vector, T: Vector, delta: Vector
 ) -> bool:
     """Whether these thrusts and angles make the demand."""
-    tau_u, tau_r = 0.0, 0.0
+    tau_u, tau_v, tau_r = 0.0, 0.0, 0.0
     for i in range(int(k.count)):
         pod = tail(table, i * WIDTH)
         along, across = force(T[i], delta[i])
         tau_u += along
+        tau_v += across
         tau_r += pod[X] * across - pod[Y] * along
     met_u = abs(tau_u - demand[0]) <= MET * abs(demand[0]) + MET_OF_ALL * all_u
     met_r = abs(tau_r - demand[1]) <= MET * abs(demand[1]) + MET_OF_ALL * all_r
-    return bool(met_u and met_r)
+    met_v = True
+    if k.takes_sway > 0.0:
+        met_v = abs(tau_v - demand[2]) <= MET * abs(demand[2]) + MET_OF_ALL * all_u
+    return bool(met_u and met_v and met_r)
 
 
 # Reads T (count) [N], flows (count) [m/s] and the angles that `command` has behind its first

@@ -10,6 +10,7 @@ import numpy as np
 
 from podusv_cli.components.actuators.command import (
     GIVEN,
+    GIVEN_SWAY,
     Command,
     Drive,
     EffectivenessLoss,
@@ -25,7 +26,7 @@ from podusv_cli.components.actuators.recorded import (
 )
 from podusv_cli.core.component import KernelPart, value
 from podusv_cli.core.kernel import Vector, absent, bundle, call, kernel
-from podusv_cli.core.signal import DEMAND, TAU, Signal
+from podusv_cli.core.signal import DEMAND, DEMAND_SIZE, TAU, Signal
 from podusv_cli.core.units import Scales
 
 SMALL = 1e-3  # of a demand or a state, for finite differences
@@ -49,8 +50,13 @@ def pass_loads(demand: Vector, tau: Vector) -> None:
         tau[i] = demand[i]
 
 
+def whole_demand(demand: Vector) -> Vector:
+    """A demand (3,) from its first two numbers, with a sway force of 0, or from all of it."""
+    return np.concatenate([demand, np.zeros(DEMAND_SIZE - len(demand))])
+
+
 class Actuator(KernelPart):
-    """What turns a demand (tau_u, tau_r) into loads on the hull.
+    """What turns a demand (tau_u, tau_r), or (tau_u, tau_r, tau_v), into loads on the hull.
 
     `drive(t, x, state, demand, k, table, tau, rate, signals)` is a kernel: from the vessel's state
     x, whose u and v are relative to the water, the actuator's own `state` and the `demand` (tau_u
@@ -88,6 +94,11 @@ class Actuator(KernelPart):
         None, "", "how the law's demand reaches the actuator; at once and as it is by default"
     )
     failure: EffectivenessLoss | None = value(None, "", "loss of effectiveness at a time")
+
+    @property
+    def takes_sway(self) -> bool:
+        """Whether the demand has a sway force behind the yaw moment."""
+        return False
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -177,12 +188,14 @@ class Actuator(KernelPart):
         drive: Drive = obeying(self.obey) if recorded and self.obey else self.drive
         if self.failure:
             drive = failing(drive, self.lose)
-        return with_command_path(drive) if self.command else drive
+        return with_command_path(drive, sway=self.takes_sway) if self.command else drive
 
     @property
     def signals_with(self) -> tuple[Signal, ...]:
         """What `drive_with` writes into `signals`."""
-        return (*GIVEN, *self.signals) if self.command else self.signals
+        if not self.command:
+            return self.signals
+        return (*GIVEN, *((GIVEN_SWAY,) if self.takes_sway else ()), *self.signals)
 
     @property
     def by_delay_line(self) -> bool:
@@ -202,9 +215,12 @@ class Actuator(KernelPart):
         """The state at the start of a run."""
         return np.zeros(len(self.states))
 
-    def limits(self) -> tuple[float, float]:
-        """Largest surge force [N] and yaw moment [N m], both ways; infinite where not constant."""
-        return math.inf, math.inf
+    def limits(self) -> tuple[float, ...]:
+        """Largest loads both ways, in the order of a demand; infinite where not constant.
+
+        Surge force [N] and yaw moment [N m], then the sway force [N] of one that `takes_sway`.
+        """
+        return (math.inf,) * (DEMAND_SIZE if self.takes_sway else len(DEMAND))
 
     def shortest_lag(self) -> float:
         """The smallest time constant of its states [s]; infinite without states."""
@@ -218,8 +234,9 @@ class Actuator(KernelPart):
     def settled(self, x: Vector, demand: Vector) -> Vector:
         """Loads (tau_u, tau_v, tau_r) once the actuator has followed a constant demand.
 
-        `x` is the vessel's state, which is held; `demand` is (tau_u [N], tau_r [N m]). By Newton's
-        method from rest, for the state that does not change any more.
+        `x` is the vessel's state, which is held; `demand` is (tau_u [N], tau_r [N m]), with a sway
+        force [N] behind them where it `takes_sway`. By Newton's method from rest, for the state
+        that does not change any more.
         """
         state = self.rest()
         for _ in range(ROUNDS):
@@ -232,8 +249,9 @@ class Actuator(KernelPart):
         return tau
 
     def _drive_once(self, x: Vector, state: Vector, demand: Vector) -> tuple[Vector, Vector]:
-        """Loads (3,) [N, N, N m] and rate of the state (states,) for x (6,) and demand (2,)."""
+        """Loads (3,) [N, N, N m] and rate of the state (states,) for x (6,), demand (2 or 3,)."""
         tau, rate, signals = np.zeros(3), np.zeros(len(state)), np.zeros(len(self.signals))
+        demand = whole_demand(demand)
         call(
             self.drive,
             t=0.0,
@@ -249,14 +267,14 @@ class Actuator(KernelPart):
         return tau, rate
 
     def input_matrix(self) -> Vector:
-        """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2).
+        """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2) or (3, 3).
 
         By central differences, of what has settled. A rank below 3 is what the paper's section 2
         calls underactuated.
         """
         columns = [
             (self.settled(np.zeros(6), demand) - self.settled(np.zeros(6), -demand)) / (2.0 * SMALL)
-            for demand in SMALL * np.eye(len(DEMAND))
+            for demand in SMALL * np.eye(DEMAND_SIZE if self.takes_sway else len(DEMAND))
         ]
         return np.array(columns).T
 

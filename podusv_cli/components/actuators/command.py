@@ -14,7 +14,7 @@ from typing import Any
 from podusv_cli.core.component import Component, value
 from podusv_cli.core.finding import Sentences, warn_before_run
 from podusv_cli.core.kernel import Vector, kernel, scratch, specialise, tail, taking
-from podusv_cli.core.signal import DEMAND, Signal
+from podusv_cli.core.signal import DEMAND_SIZE, Signal
 
 Drive = Callable[..., None]
 DRIVE = ("t", "x", "state", "demand", "k", "table", "tau", "rate", "signals")  # its arguments
@@ -24,9 +24,13 @@ GIVEN = (
     Signal("tau_u_in", "N", "surge force that the actuator is given", r"\tau_{u,\mathrm{in}}"),
     Signal("tau_r_in", "N m", "yaw moment that the actuator is given", r"\tau_{r,\mathrm{in}}"),
 )
-BEGAN = len(DEMAND)  # behind the demand there is when the present step began [s]
+GIVEN_SWAY = Signal(
+    "tau_v_in", "N", "sway force that the actuator is given", r"\tau_{v,\mathrm{in}}"
+)
+BEGAN = DEMAND_SIZE  # behind the demand there is when the present step began [s]
 DRIVEN = BEGAN + 1  # numbers of both
 LOGGED = len(GIVEN)
+SWAY = LOGGED  # where a demand and the signals have the sway force
 WHOLE = 1.5 * 2.0**52  # a number below 2^51 that is added to it, and taken off, is rounded
 LARGEST = 2.0**51  # a count beyond it has no fraction worth rounding
 
@@ -55,6 +59,17 @@ class Command(Component):
     )
     dead_zone_r: float = value(
         0.0, "N m", "a yaw moment up to this gives nothing, a larger one what is above it", ge=0
+    )
+
+
+class FullCommand(Command):
+    """The same for a demand with a sway force."""
+
+    resolution_v: float = value(
+        0.0, "N", "the sway force is rounded to the nearest multiple of this; 0: not rounded", ge=0
+    )
+    dead_zone_v: float = value(
+        0.0, "N", "a sway force up to this gives nothing, a larger one what is above it", ge=0
     )
 
 
@@ -131,6 +146,29 @@ def _drive_commanded(
 
 
 # Arguments as those of `Actuator.drive`; `demand` has one more number, when the step began [s].
+def _drive_fully_commanded(
+    t: float,
+    x: Vector,
+    state: Vector,
+    demand: Vector,
+    k: Any,
+    table: Vector,
+    tau: Vector,
+    rate: Vector,
+    signals: Vector,
+) -> None:
+    """The same with a sway force."""
+    given = scratch(DRIVEN)
+    for i in range(DRIVEN):
+        given[i] = demand[i]
+    given[0] = beyond(round_to(demand[0], k.command_resolution_u), k.command_dead_zone_u)
+    given[1] = beyond(round_to(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+    given[SWAY] = beyond(round_to(demand[SWAY], k.command_resolution_v), k.command_dead_zone_v)
+    signals[0], signals[1], signals[SWAY] = given[0], given[1], given[SWAY]
+    _inner(t, x, state, given, k, table, tau, rate, tail(signals, SWAY + 1))
+
+
+# Arguments as those of `Actuator.drive`; `demand` has one more number, when the step began [s].
 def _failing(
     t: float,
     x: Vector,
@@ -149,10 +187,13 @@ def _failing(
 
 
 @cache
-def with_command_path(drive: Drive) -> Drive:
-    """A kernel with the command path before `drive`; the same one for the same kernel."""
-    inner = taking(drive, DRIVE)
-    made: Drive = specialise(_drive_commanded, f"{drive.__qualname__}_commanded", _inner=inner)
+def with_command_path(drive: Drive, *, sway: bool = False) -> Drive:
+    """A kernel with the command path before `drive`; the same one for the same arguments.
+
+    `sway` says whether the demand has a sway force.
+    """
+    inner, outer = taking(drive, DRIVE), _drive_fully_commanded if sway else _drive_commanded
+    made: Drive = specialise(outer, f"{drive.__qualname__}_commanded", _inner=inner)
     return made
 
 

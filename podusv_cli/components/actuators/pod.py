@@ -12,7 +12,8 @@ from pydantic import model_validator
 from podusv_cli.components.actuators.allocation import allocate, settings
 from podusv_cli.components.actuators.allocation_qp import MOST_PODS
 from podusv_cli.components.actuators.allocation_single import within
-from podusv_cli.components.actuators.base import SATURATION, Actuator
+from podusv_cli.components.actuators.base import SATURATION, Actuator, whole_demand
+from podusv_cli.components.actuators.command import FullCommand
 from podusv_cli.components.actuators.one_pod import Pod, PodFailure
 from podusv_cli.components.actuators.propeller import (
     ANGLE,
@@ -41,7 +42,7 @@ from podusv_cli.components.actuators.propeller import (
 from podusv_cli.components.actuators.rudder import loads
 from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import DEMAND_SIZE, Signal
 from podusv_cli.core.units import Scale, Scales
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
@@ -120,7 +121,7 @@ def pursue(state: Vector, k: Any, table: Vector, rate: Vector, signals: Vector) 
 
 
 class Pods(Actuator):
-    """Pods that turn surge force and yaw moment into propeller speeds and propulsion angles.
+    """Pods that turn force and yaw moment into propeller speeds and propulsion angles.
 
     Raises a validation error where the pods cannot make a yaw moment and a surge force.
     """
@@ -141,6 +142,9 @@ class Pods(Actuator):
         "what n counts: turns a second, logged as n, or parts of full speed, "
         "logged as n_part; units of the pods' numbers with s for n then go without",
     )
+    command: FullCommand | None = value(
+        None, "", "how the law's demand reaches the actuator; at once and as it is by default"
+    )
     failure: PodFailure | None = value(None, "", "a pod's loss of thrust at a time")
     pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
@@ -151,7 +155,11 @@ class Pods(Actuator):
     )
     neglect_sway_force: bool = value(False, "", "leave out the sway force, the paper's Y_p = 0")
     sway_weight: float = value(
-        0.0, "", "several pods: what sway force counts in the squares beside 1 for surge", ge=0
+        0.0,
+        "",
+        "several pods: what sway force counts in the squares beside 1 for surge; above 0, pods "
+        "that can make one by itself take it from the law",
+        ge=0,
     )
     horizon: float = value(
         0.0,
@@ -211,6 +219,18 @@ class Pods(Actuator):
         return self
 
     @model_validator(mode="after")
+    def _commanded(self) -> Self:
+        """Raises ValueError for a command path of a sway force that is not taken."""
+        path = self.command
+        if path and not self.takes_sway and (path.resolution_v or path.dead_zone_v):
+            raise ValueError(
+                "has a resolution or a dead zone of a sway force, and takes none; leave "
+                "command.resolution_v and command.dead_zone_v out, or set sway_weight above 0 with "
+                "pods that can push every way"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _computable(self) -> Self:
         """Raises ValueError for thrust or moment beyond `STRONGEST`."""
         most = [max(pod.most_thrust) for pod in self.pods]
@@ -223,6 +243,15 @@ class Pods(Actuator):
                 "n_max, n_max_astern, table, x or y"
             )
         return self
+
+    @property
+    def takes_sway(self) -> bool:
+        """With a weight of it, where forces of the pods span surge, sway and yaw."""
+        if self.sway_weight == 0.0 or self.neglect_sway_force:
+            return False
+        along = [(1.0, 0.0, -pod.y) for pod in self.pods]
+        across = [(0.0, 1.0, pod.x) for pod in self.pods if pod.angle_limit > 0.0]
+        return bool(np.linalg.matrix_rank(np.array(along + across)) == DEMAND_SIZE)
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -243,6 +272,7 @@ class Pods(Actuator):
         return super().constants() | {
             "count": float(len(self.pods)),
             "power_known": float(known),
+            "takes_sway": float(self.takes_sway),
             "closed_form": float(len(self.pods) == 1 and self.pods[0].y == 0.0),
         }
 
@@ -267,7 +297,7 @@ class Pods(Actuator):
         return lag, lag + TURNING * turning
 
     def settled(self, x: Vector, demand: Vector) -> Vector:
-        """Loads (3,) where the pods' state is what is commanded: x (6,), demand (2,).
+        """Loads (3,) where the pods' state is what is commanded: x (6,), demand (2,) or (3,).
 
         The advance speed hangs on the angle. A horizon only takes longer to get there, so it is
         left out.
@@ -278,7 +308,7 @@ class Pods(Actuator):
             len(self.states),
         )
         tau, rate, state = np.zeros(3), np.zeros(count), self.rest()
-        signals = np.zeros(len(self.signals))
+        signals, demand = np.zeros(len(self.signals)), whole_demand(demand)
         for _ in range(ROUNDS):
             call(
                 self.drive,
@@ -303,12 +333,13 @@ class Pods(Actuator):
         At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
         """
         force = sum(pod.most_thrust[0] for pod in self.pods) / 3.0
-        at, still, small = np.array([force, 0.0]), np.zeros(6), SMALL * force
+        demands, small = len(self.limits()), SMALL * force
         if not small:
-            return np.zeros((3, 2))
+            return np.zeros((3, demands))
+        at, still = force * np.eye(demands)[0], np.zeros(6)
         columns = [
             (self.settled(still, at + change) - self.settled(still, at - change)) / (2.0 * small)
-            for change in small * np.eye(2)
+            for change in small * np.eye(demands)
         ]
         return np.array(columns).T
 
@@ -406,6 +437,8 @@ class Pods(Actuator):
         met = settings(count, T, flows, k, table, command) and met
         # What is no number must not get lost between limits.
         lost = 0.0 * (demand[0] + demand[1])
+        if k.takes_sway > 0.0:
+            lost += 0.0 * demand[2]
         for i in range(2 * count):
             command[i] += lost
         signals[SATURATED] = 0.0 if met else 1.0

@@ -24,7 +24,7 @@ class Saturated(Actuator):
         """The flag."""
         return (SATURATION,)
 
-    def limits(self) -> tuple[float, float]:
+    def limits(self) -> tuple[float, ...]:
         """As they are given."""
         return self.surge_limit, self.yaw_limit
 

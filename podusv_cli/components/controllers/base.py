@@ -63,9 +63,9 @@ class Controller(KernelPart):
     every multiple of `sample_period()`, before anything else sees that instant; where this is 0 and
     `takes_samples()`, at every step.
 
-    `after_saturation(t, memory, demand, tau, k, table, rate)` is a kernel that may change the
-    `rate` that `law` wrote, once the actuator has made loads `tau` of the `demand`; it is called
-    where `wants_loads()`.
+    `after_saturation(t, x, memory, demand, tau, k, table, rate)` is a kernel that may change the
+    `rate` that `law` wrote from the state x, once the actuator has made loads `tau` of the
+    `demand`; it is called where `wants_loads()`.
 
     A law declares what it logs: `signals`, the parts of its memory in `slots()`, and
     `fixed_signals()`. `explain` finds a signal that is in `signals` or a constant of the module.
@@ -87,6 +87,14 @@ class Controller(KernelPart):
     law: ClassVar[Callable[..., None]] = staticmethod(absent("law"))
     sample: ClassVar[Callable[..., None]] = staticmethod(absent("sample"))
     after_saturation: ClassVar[Callable[..., None]] = staticmethod(absent("after_saturation"))
+
+    def asks_sway(self) -> bool:
+        """Whether its demand has a sway force [N] behind the yaw moment."""
+        return False
+
+    def wants_heading(self) -> bool:
+        """Whether it reads a heading behind the target's distance, from a path that `heads`."""
+        return False
 
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""

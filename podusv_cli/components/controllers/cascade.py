@@ -20,7 +20,7 @@ import numpy as np
 
 from podusv_cli.components.controllers.base import Controller, Slots, each
 from podusv_cli.components.controllers.constant_bearing import Moving, turn_rate
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
@@ -32,7 +32,6 @@ from podusv_cli.core.signal import Signal
 SLOWEST = 1e-3  # m/s; a slower target has no course
 CONSTANT = 1.0  # the place of "constant" among the choices of `cross`
 HALVINGS = 60  # of the speed, until the drift of the virtual ship is a float's last digit
-ALONE = np.zeros((0, 1))  # of a loop without memory
 V_R = Signal("v_ref", "m/s", "sway velocity of the virtual ship", "v_r")
 
 

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from podusv_cli.components.controllers.base import Controller, Slots, each
-from podusv_cli.components.controllers.velocity_loop import Axis, Loop
+from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import arctangent, cos_sin
@@ -28,7 +28,6 @@ from podusv_cli.core.kinematics import direction, wrap
 from podusv_cli.core.signal import Signal
 
 LEFT_OUT = 1.0  # the place of "left_out" among the choices of `sway`
-ALONE = np.zeros((0, 1))  # of a loop without memory
 MEMORY = (
     Signal("alpha_2", "m/s", "sway velocity that the law wants, by its own dynamics", r"\alpha_2"),
     Signal("psi_f", "rad", "filtered angle of the line of sight", r"\psi_f"),

@@ -20,11 +20,17 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.core.timed_rows import lines_of, named_rows, timed_rows
 
 TIMED, STATES = 3, 6  # numbers of a row: time and demand; then the state, then the gains
+WITH_SWAY = TIMED + 1  # or time and a demand with a sway force
 WITH_MOTION = TIMED + STATES + 2 * STATES
 DEMAND = ("t [s]", "tau_u [N]", "tau_r [N m]")
 MOTION = ("x [m]", "y [m]", "psi [rad]", "u [m/s]", "v [m/s]", "r [rad/s]")
-LAYOUTS = {TIMED: DEMAND, WITH_MOTION: (*DEMAND, *MOTION, "then the gains of tau_u and tau_r")}
+LAYOUTS = {
+    TIMED: DEMAND,
+    WITH_SWAY: (*DEMAND, "tau_v [N]"),
+    WITH_MOTION: (*DEMAND, *MOTION, "then the gains of tau_u and tau_r"),
+}
 NUMBERED = re.compile(r".*_[0-9]+( *\[.*\])?")  # a column of one propeller or pod
+FULL = 3  # demands of a row with a sway force
 HOLD = 1.0  # the place of "hold" among the choices of `between`, as kernels know it
 # Where a row of the table has these, behind the demand: state and its rate, gains (surge, yaw).
 STATE, GAINS = 2, 2 + 2 * STATES
@@ -61,7 +67,8 @@ class Schedule(Controller):
 
     tau(t) = tau_s(t) + K(t) (x_s(t) - x), of which the rows give tau_s, x_s and K.
 
-    Rows of three numbers (t, tau_u, tau_r) have no x_s: then there is no feedback. A hull that does
+    Rows of three numbers (t, tau_u, tau_r) have no x_s: then there is no feedback. Nor have rows of
+    four, which ask for a sway force, too: (t, tau_u, tau_r, tau_v). A hull that does
     not keep its course by itself needs feedback to repeat a motion: every rounding error grows.
     Demand and gains are straight lines between rows, x_s a cubic. Before the first and after the
     last row the nearest row holds.
@@ -79,7 +86,8 @@ class Schedule(Controller):
     rows: str = value(
         "",
         "",
-        "lines of t [s], tau_u [N], tau_r [N m]; or of these, the state x, y, psi, u, v, r "
+        "lines of t [s], tau_u [N], tau_r [N m]; or of these and tau_v [N], of an actuator that "
+        "takes a sway force; or of the first three, the state x, y, psi, u, v, r "
         "and the gains from its errors, six of tau_u and six of tau_r; or of t and the commands "
         "of every pod, such as n_1 [1/s] and delta_1 [rad] of the first",
     )
@@ -103,6 +111,10 @@ class Schedule(Controller):
             raise ValueError("file is missing; name a CSV file with columns t, tau_u, tau_r")
         return self
 
+    def asks_sway(self) -> bool:
+        """Where rows have one."""
+        return bool(_rows(self.rows).shape[1] == WITH_SWAY)
+
     def commands(self) -> Recorded | None:
         """The rows, where their columns are commands to propellers."""
         return _read_recorded(self.rows, held=self.between == "hold")
@@ -114,14 +126,15 @@ class Schedule(Controller):
     def constants(self) -> dict[str, float]:
         """The fields' choices, how many rows there are, and how many numbers in each of them."""
         rows, columns = _rows(self.rows).shape
-        width = GAINS + 2 * STATES if columns == WITH_MOTION else 2
+        width = GAINS + 2 * STATES if columns == WITH_MOTION else columns - 1
         return super().constants() | {"rows_count": float(rows), "row_width": float(width)}
 
     def table(self) -> Vector:
         """The times, then the rows: demand; of those with a motion also state, rate, gains."""
-        times, demand, motion = np.split(_rows(self.rows), [1, TIMED], axis=1)
-        if not motion.size:
-            return np.concatenate([times.ravel(), demand.ravel()])
+        times, given = np.split(_rows(self.rows), [1], axis=1)
+        if given.shape[1] < WITH_MOTION - 1:
+            return np.concatenate([times.ravel(), given.ravel()])
+        demand, motion = np.split(given, [TIMED - 1], axis=1)
         state, gains = np.split(motion, [STATES], axis=1)
         rates = np.gradient(state, times.ravel(), axis=0)
         return np.concatenate([times.ravel(), np.hstack([demand, state, rates, gains]).ravel()])
@@ -137,6 +150,8 @@ class Schedule(Controller):
         a, b = tail(table, count + width * i), tail(table, count + width * (i + 1))
         held = math.floor(s) if k.between == HOLD else s
         tau[0], tau[1] = linear(held, a[0], b[0]), linear(held, a[1], b[1])
+        if width == FULL:
+            tau[2] = linear(held, a[2], b[2])
         signals[0] = signals[1] = 0.0
         if width > GAINS:
             for j in range(STATES):

@@ -17,6 +17,7 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 
+ALONE = np.zeros((0, 1))  # `memory` of a loop without any
 Cause = Literal["adaptation", "derivative", "loop"]
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from podusv_cli.components.paths.fillet import Fillet
 from podusv_cli.core.component import KernelPart
 from podusv_cli.core.kernel import Vector, absent, bundle, call
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import TARGET_SIZE, Signal
 
 Point = tuple[float, float]
 
@@ -49,18 +49,23 @@ class Path(KernelPart):
     noun: ClassVar[str] = "path"
     follows: ClassVar[bool] = False
     places: ClassVar[tuple[Signal, ...]] = ()
+    heads: ClassVar[bool] = False  # True: `evaluate` writes a heading behind the distance, too
 
     evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
     evaluate_shown: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate_shown"))
     locate: ClassVar[Callable[..., None]] = staticmethod(absent("locate"))
 
     def targets(self, times: Iterable[float]) -> Vector:
-        """The target at each of these times [s], a row of `TARGET` each.
+        """The target (n, 6) at each of these times [s], a row of `TARGET` each.
 
         Of a path that is followed, for a vessel that is on it and as fast as it asks for.
         """
+        return self.whole_targets(times)[:, : len(TARGET)]
+
+    def whole_targets(self, times: Iterable[float]) -> Vector:
+        """The same (n, 10) with a place for the distance and with a heading, 0 where none is."""
         times = list(times)
-        rows, k, table = np.zeros((len(times), len(TARGET))), bundle(self.constants()), self.table()
+        rows, k, table = np.zeros((len(times), TARGET_SIZE)), bundle(self.constants()), self.table()
         for t, row in zip(times, rows, strict=True):
             call(self.evaluate, t=t, k=k, table=table, target=row)
         return rows

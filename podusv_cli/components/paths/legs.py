@@ -14,6 +14,7 @@ the active leg at the wanted speed, so that they follow legs, too.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -88,9 +89,9 @@ class Legs(Path):
         """The points as they are given."""
         return self.points
 
-    def targets(self, times: Any) -> Vector:
+    def whole_targets(self, times: Iterable[float]) -> Vector:
         """A traveller on the legs, as fast as wanted, round every waypoint without a detour."""
-        return self._traveller().targets(times)
+        return self._traveller().whole_targets(times)
 
     def circles(self) -> tuple[tuple[float, float, float], ...]:
         """Every waypoint but the first, with the acceptance radius."""

@@ -22,7 +22,7 @@ from podusv_cli.core import signal
 from podusv_cli.core.component import Component, describe
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
-from podusv_cli.core.signal import LOOP, Signal
+from podusv_cli.core.signal import HEADING, LOOP, SWAY_DEMAND, Signal
 
 STATE = tuple(state.name for state in signal.STATE)
 DEMAND = tuple(part.name for part in signal.DEMAND)
@@ -40,6 +40,25 @@ def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
     Empty where the path has no end, or nobody follows it.
     """
     return path.passed_by(share) if path.follows and law.aims() else {}
+
+
+def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, str]]:
+    """What a law wants of a path and an actuator that they have not: the part, and a sentence."""
+    texts = []
+    if law.asks_sway() and not actuator.takes_sway:
+        text = (
+            "surge force and yaw moment alone; take ideal_full, saturated_full, or pods that push "
+            "every way with sway_weight above 0"
+        )
+        texts += [
+            ("actuator", f"{law.label} asks for a sway force, and {actuator.label} takes {text}")
+        ]
+    if law.wants_heading() and not path.heads:
+        text = (
+            f"{law.label} wants a heading, and {path.label} has none; take poses, hold or ellipse"
+        )
+        texts += [("path", text)]
+    return texts
 
 
 @dataclass(frozen=True)
@@ -106,6 +125,16 @@ class ClosedLoop:
         return not self.measured and self.actuator.delay() == 0.0
 
     @property
+    def sway_demand(self) -> tuple[Signal, ...]:
+        """The demand behind surge and yaw; none for an actuator that makes no sway force."""
+        return (SWAY_DEMAND,) if self.actuator.takes_sway else ()
+
+    @property
+    def headings(self) -> tuple[Signal, ...]:
+        """The heading that the path asks for, with its rates; none of a path without one."""
+        return HEADING if self.path.heads else ()
+
+    @property
     def has_target(self) -> bool:
         """Whether the distance to the target says how good the law is."""
         return self.controller.aims() and not self.path.follows
@@ -152,6 +181,8 @@ class ClosedLoop:
             "measurement": self.measurement.conflicts(step),
         }
         texts = [f"{part}.{key}: {text}" for part, faults in parts.items() for key, text in faults]
+        wanted = unmet(self.controller, self.path, self.actuator)
+        texts += [f"{part}: {text}" for part, text in wanted]
         if lacking := self.estimator.lacking(self.measurement.measured()):
             texts.append(f"estimator: {lacking}")
         if texts:
@@ -166,9 +197,9 @@ class ClosedLoop:
         self.check_seeing()
         law, actuator = self.controller, self.actuator
         own = (partial(describe, actuator), (*actuator.states, *actuator.signals_with))
-        path = (partial(describe, self.path), self.path.places)
+        path = (partial(describe, self.path), (*self.path.places, *self.headings))
         common = [logged for logged in LOOP if self.has_target or logged.name != "z_e"]
-        loop = (lambda: "the closed loop", common)
+        loop = (lambda: "the closed loop", [*common, *self.sway_demand])
         others = (
             *((partial(describe, part), signals) for part, signals in self.disturbance.told()),
             (partial(describe, self.measurement), self.measurement.signals),

@@ -16,7 +16,7 @@ from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.kernel import call as call_kernel
 from podusv_cli.core.recording import Allocate
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import TARGET_SIZE, Signal
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.loop.closed_loop import DEMAND, LOADS, STATE, ClosedLoop, Probe, nothing
 from podusv_cli.engine.loop.recent import Recent
@@ -127,9 +127,9 @@ class Plan:
         """Names of what is computed at every instant, by part in the order of the row."""
         loop = self.loop
         return {
-            "target": [*TARGET, "z_e"],
+            "target": [*TARGET, "z_e", *_names(loop.headings)],
             "law": _names(loop.controller.signals),
-            "demand": [*DEMAND],
+            "demand": [*DEMAND, *_names(loop.sway_demand)],
             "forces": [*FORCES],
             "sea": [*SEA, *_names(loop.disturbance.signals)],
             "actuator": _names(loop.actuator.signals_with),
@@ -153,6 +153,7 @@ class Plan:
             estimate=s["estimator"] if loop.measured else 0,
             place=s["path"],
             memory=s["law"],
+            target=TARGET_SIZE if loop.path.heads else len(TARGET),
             shown=row["shown"] if self.row["shown"] else 0,
             signals=row["law"],
             demand=row["demand"],
@@ -263,12 +264,12 @@ class Plan:
 
     @cached_property
     def first_target(self) -> Vector:
-        """The target (6,) at t = 0."""
+        """The target (10,) at t = 0, with places for the distance and a heading."""
         path = self.loop.path
         if not path.follows:
-            return np.asarray(self.recall(path.targets, AT_START)[0])
+            return np.asarray(self.recall(path.whole_targets, AT_START)[0])
         x, place = np.array(self.loop.start), np.zeros(len(path.places))
-        target = np.zeros(len(TARGET))
+        target = np.zeros(TARGET_SIZE)
         k, table = bundle(self.path_constants), self.path_table
         call_kernel(path.evaluate, t=0.0, x=x, place=place, k=k, table=table, target=target)
         return target

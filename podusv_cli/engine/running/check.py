@@ -16,7 +16,7 @@ from podusv_cli.components.vessels.vessel import COEFFICIENTS
 from podusv_cli.core.component import describe
 from podusv_cli.core.errors import LawError, in_a_line
 from podusv_cli.core.kernel import NoKernel, Vector, bundle, call
-from podusv_cli.core.signal import NAME, Signal
+from podusv_cli.core.signal import NAME, SWAY_DEMAND, Signal
 from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine.kernel_faults import check_arguments, check_kernel
@@ -104,7 +104,8 @@ def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     """
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
-    tau, rate, signals = (np.full(n, before) for n in (len(DEMAND), len(memory), len(law.signals)))
+    demands = len(DEMAND) + law.asks_sway()
+    tau, rate, signals = (np.full(n, before) for n in (demands, len(memory), len(law.signals)))
     read = {"x": x, "memory": memory, "target": target, "table": table}
     if law.takes_samples():
         call(law.sample, t=0.0, k=k, **read)
@@ -124,7 +125,8 @@ def _ask(plan: Plan) -> None:
     """Raises LawError for an output that the law does not write at the first instant."""
     law, (tau, rate, signals) = plan.loop.controller, evaluate_law(plan, UNWRITTEN)
     slots = [f"the rate of {name}" for name in plan.states["law"]]
-    names = (*DEMAND, *(part.name for part in law.signals), *slots)
+    sway = [SWAY_DEMAND.name] if law.asks_sway() else []
+    names = (*DEMAND, *sway, *(part.name for part in law.signals), *slots)
     outputs = zip(names, (*tau, *signals, *rate), strict=True)
     if left := next((name for name, number in outputs if number == UNWRITTEN), ""):
         raise LawError(f"{describe(law)}: it leaves {left} unwritten")
@@ -132,6 +134,7 @@ def _ask(plan: Plan) -> None:
         call(
             law.after_saturation,
             t=0.0,
+            x=np.array(plan.loop.start),
             memory=plan.first_memory.copy(),
             demand=tau,
             tau=np.zeros(3),

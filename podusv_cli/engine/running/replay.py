@@ -10,7 +10,8 @@ import numpy as np
 
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
-from podusv_cli.engine.loop.closed_loop import DEMAND, STATE
+from podusv_cli.core.signal import DEMAND_SIZE
+from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.columns import by_name
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -22,13 +23,14 @@ from podusv_cli.engine.step.layout import Layout, Vectors
 def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
     """At most `most` rows of a log, evenly spread: time, target, vessel's state, law's memory.
 
-    Shape (rows, 1 + 6 + 6 + slots), as `rk4.evaluate_all` reads them.
+    Shape (rows, 1 + 10 + 6 + slots), as `rk4.evaluate_all` reads them.
     """
     times = recording["time"]
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)
     names = [*STATE, *dict.fromkeys(plan.states["law"])]
     logged = np.column_stack([recording[name][chosen] for name in names])
-    return np.column_stack([times[chosen], plan.loop.path.targets(times[chosen].tolist()), logged])
+    targets = plan.loop.path.whole_targets(times[chosen].tolist())
+    return np.column_stack([times[chosen], targets, logged])
 
 
 def replayer(
@@ -46,7 +48,7 @@ def replayer(
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
     constants = plan.law_constants
     p = np.array(list(constants.values()))
-    buffers = (rows.ravel(), p, plan.law_table, np.zeros(len(DEMAND)), np.zeros(room))
+    buffers = (rows.ravel(), p, plan.law_table, np.zeros(DEMAND_SIZE), np.zeros(room))
     vectors = [signatures.pointer(buffer) for buffer in buffers]
     replay: Callable[..., None] = compile.routine(
         compile.Piece(rk4.evaluate_all, signatures.EVALUATE_ALL)
@@ -89,11 +91,14 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     def at(rows: Vector, given: Vector | None = None) -> Vector:
         """Rates and signals (rows, states + columns) at each state in `rows` (rows, states).
 
-        `given` (rows, 2) are demands that act instead of those of the law.
+        `given` (rows, 2), or (rows, 3) with a sway force, are demands that act instead of those of
+        the law.
         """
         out, there, sizes = np.zeros((len(rows), layout.states + layout.columns)), vectors, layout
         if given is not None:  # as if they had been on their way to the actuator
-            line = np.concatenate([np.zeros(DEMANDS), given.ravel()])
+            whole = np.zeros((len(rows), DEMAND_SIZE))
+            whole[:, : given.shape[1]] = given
+            line = np.concatenate([np.zeros(DEMANDS), whole.ravel()])
             line[COUNT] = len(rows)
             there, sizes = vectors._replace(delay_line=line), layout._replace(by_delay_line=1)
         run(len(rows), rows.ravel(), out.reshape(-1), there, sizes)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import LANES, Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import PSI_D, TARGET_SIZE
 from podusv_cli.engine.loop.closed_loop import STATE
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -65,7 +66,7 @@ class SteppedRun:
         self._layout = plan.layout
         self.vectors = plan.vectors(self.grid.rows)
         self._given = self.vectors.s[self._layout.estimate :]
-        self._target = np.zeros(len(TARGET))
+        self._target = np.zeros(TARGET_SIZE)
         self._unchanged = Unchanged([getattr(self.vectors, name) for name in CHANGING])
         self._advance = march(self.vectors, self._layout, self.grid.step)
         self._aim = self._path(plan.functions[0], compiled)
@@ -106,12 +107,17 @@ class SteppedRun:
     def target(self) -> Vector:
         """The target (6,) at the next instant, as `TARGET`."""
         self._aim(self.time)
-        return self._target.copy()
+        return self._target[: len(TARGET)].copy()
+
+    def heading(self) -> Vector:
+        """The heading (3,) that the path asks for at the next instant, with its rates; or zeros."""
+        self._aim(self.time)
+        return self._target[PSI_D:].copy()
 
     def _path(self, part: tuple[Any, ...], compiled: bool) -> Callable[[float], None]:
         """What writes the target at a time [s], as the loop calls it."""
         c, place = self.vectors, self.vectors.s[self._layout.place :]
-        shown = np.zeros(len(TARGET))
+        shown = np.zeros(TARGET_SIZE)
         vectors = (self._given, place, c.path, c.path_table, self._target, shown)
         if not compiled:
             path = signatures.bind(*part)
@@ -180,7 +186,7 @@ class SteppedBatch:
         self.grid, self.reached, self.alive = grid, 0, np.ones(len(runs), bool)
         self._lanes = Lanes.of([run.vectors for run in runs], layout)
         self._march = advance(self._lanes, grid.step)
-        c, target = Vectors(*self._lanes.vectors), room(len(TARGET) * LANES)
+        c, target = Vectors(*self._lanes.vectors), room(TARGET_SIZE * LANES)
         view = room(size * LANES)
         given = c.s[layout.estimate * LANES :]
         _, path, names = plan.functions[0]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from podusv_cli.core.kernel import Vector, kernel, shared, tail
-from podusv_cli.core.signal import DEMAND
+from podusv_cli.core.signal import DEMAND_SIZE
 from podusv_cli.core.steps import whole_steps
 from podusv_cli.engine.step.grid import TimeGrid
 
@@ -19,8 +19,7 @@ STAGES = 4  # of a step of RK4
 # In the vector: the place of the next demand, how many are under way, what the actuator is given
 # (a demand, when the step began [s]), then the demands under way.
 NEXT, COUNT, GIVEN = 0, 1, 2
-SIZE = len(DEMAND)
-BEGAN = GIVEN + SIZE
+BEGAN = GIVEN + DEMAND_SIZE
 DEMANDS = BEGAN + 1
 
 
@@ -36,7 +35,7 @@ def delay_line(delay: float, grid: TimeGrid) -> Vector:
             f"{grid.step:g} s"
         )
     count = STAGES * min(steps, grid.steps + 1)  # of a later command nothing is seen
-    numbers = np.zeros(DEMANDS + SIZE * count)
+    numbers = np.zeros(DEMANDS + DEMAND_SIZE * count)
     numbers[COUNT] = count
     return numbers
 
@@ -55,12 +54,12 @@ def begin_step(k: int, t: float, line: Vector) -> None:
 @kernel
 def pass_on(demand: Vector, line: Vector) -> None:
     """Take this stage's demand, and give the actuator that of the same stage a delay before."""
-    for i in range(SIZE):
+    for i in range(DEMAND_SIZE):
         line[GIVEN + i] = demand[i]
     if shared(line[COUNT]) > 0.0:
         at = int(shared(line[NEXT]))
-        place = tail(line, DEMANDS + SIZE * at)
-        for i in range(SIZE):
+        place = tail(line, DEMANDS + DEMAND_SIZE * at)
+        for i in range(DEMAND_SIZE):
             line[GIVEN + i] = place[i]
             place[i] = demand[i]
         line[NEXT] = at + 1

@@ -7,7 +7,7 @@ from typing import Annotated, Any, NamedTuple, get_type_hints
 
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.plugins import TEXT
-from podusv_cli.core.signal import DEMAND
+from podusv_cli.core.signal import DEMAND_SIZE, TARGET_SIZE
 
 Function = Callable[..., None]
 
@@ -25,7 +25,7 @@ class Parts(NamedTuple):
     law: Annotated[Function, "t x memory target k table tau rate signals work"]
     sample: Annotated[Function, "t x memory target k table"]
     actuator: Annotated[Function, "t x state demand k table tau rate signals"]
-    after_saturation: Annotated[Function, "t memory demand tau k table rate"]
+    after_saturation: Annotated[Function, "t x memory demand tau k table rate"]
     measurement: Annotated[Function, "t instant x b k table seen"]
     correct: Annotated[Function, "t seen state k table"]
     follow: Annotated[Function, "t seen tau state k table rate"]
@@ -58,6 +58,7 @@ class Layout(NamedTuple):
     estimate: int  # offset in s of the state that the law is given; 0: the true state
     place: int  # offset in s of where on its path the vessel is, see `paths.base`
     memory: int  # offset of the law's memory in s
+    target: int  # numbers of the target that the law is given; more where it has a heading
     shown: int  # offsets in the row; of the target that the law is given, 0: the target itself
     signals: int
     demand: int
@@ -118,8 +119,9 @@ class Vectors(NamedTuple):
 
 DISTANCE = 6  # where the row has z_e (18), behind the target
 BEFORE = 6  # numbers behind the logged row: the estimate before what an instant delivers
-HELD_X, HELD_TARGET, HELD_DEMAND = 1, 7, 13  # in `held`, behind the time of the sample
-HELD_SIGNALS = HELD_DEMAND + len(DEMAND)
+HELD_X, HELD_TARGET = 1, 7  # in `held`, behind the time of the sample
+HELD_DEMAND = HELD_TARGET + TARGET_SIZE
+HELD_SIGNALS = HELD_DEMAND + DEMAND_SIZE
 STOP = 1  # in `under_way`
 
 

@@ -16,6 +16,7 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.components.vessels.vessel import COEFFICIENTS
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, shared, tail, unpacker
+from podusv_cli.core.signal import TARGET_SIZE
 from podusv_cli.engine.step.delay_line import BEGAN, GIVEN, begin_step, pass_on
 from podusv_cli.engine.step.layout import (
     DISTANCE,
@@ -133,7 +134,10 @@ def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, agai
         wanted = tail(c.delay_line, GIVEN)
     drive(t, s, ds, wanted, p, c, n)
     if n.wants_loads > 0 and not (n.hold_every > 0 and n.update_first > 0):
-        p.after_saturation(t, memory, demand, tau, k, table, memory_rate)
+        seen = given
+        if n.hold_every > 0:
+            seen = tail(c.held, HELD_X)
+        p.after_saturation(t, seen, memory, demand, tau, k, table, memory_rate)
     if n.measured > 0:
         p.follow(t, c.sensed, tau, given, c.estimator, c.estimator_table, tail(ds, n.estimate))
     plant(s, tau, b, coefficients(c.vessel), ds)
@@ -286,8 +290,8 @@ def evaluate_all(
             row = tail(rows, i * width)
             law(
                 row[0],
-                tail(row, 7),
-                tail(row, 13),
+                tail(row, 1 + TARGET_SIZE),
+                tail(row, 7 + TARGET_SIZE),
                 tail(row, 1),
                 p,
                 table,

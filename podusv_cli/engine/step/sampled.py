@@ -37,7 +37,8 @@ def held_rates(
         c.work,
     )
     if n.wants_loads > 0:
-        after(t, memory, tail(row, n.demand), tail(row, n.tau), c.law, c.law_table, rate)
+        x, demand, tau = tail(held, HELD_X), tail(row, n.demand), tail(row, n.tau)
+        after(t, x, memory, demand, tau, c.law, c.law_table, rate)
 
 
 # Changes the law's memory in c.s. h and `passing` [s] differ where the law's own time stands still.
@@ -85,6 +86,7 @@ def sample_and_hold(
         held[0] = t
         for i in range(6):
             held[HELD_X + i] = given[i]
+        for i in range(n.target):
             held[HELD_TARGET + i] = aim[i]
         if n.update_first > 0 and k > 0:
             for _ in range(n.hold_every):  # the period that ends, with its loads

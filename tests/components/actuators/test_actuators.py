@@ -11,18 +11,22 @@ from hypothesis import strategies as st
 
 from podusv_cli.components.actuators.base import Actuator
 from podusv_cli.components.actuators.ideal import Ideal
+from podusv_cli.components.actuators.ideal_full import IdealFull
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.actuators.saturated_full import SaturatedFull
 from podusv_cli.core.kernel import Vector, bundle, call, kernel
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
 
 
-def drive(actuator: Actuator, surge: float, yaw: float) -> tuple[Vector, Vector, Vector]:
+def drive(
+    actuator: Actuator, surge: float, yaw: float, sway: float = 0.0
+) -> tuple[Vector, Vector, Vector]:
     """(tau_u, tau_v, tau_r), signals and rate of the state for a demand."""
     tau, signals = np.full(3, np.nan), np.full(len(actuator.signals), np.nan)
     state, rate = actuator.rest(), np.full(len(actuator.states), np.nan)
     x, k = np.array([0, 0, 0, 0.5, 0, 0]), bundle(actuator.constants())
-    demand = np.array([surge, yaw])
+    demand = np.array([surge, yaw, sway])
     call(
         actuator.drive,
         t=1.0,
@@ -52,6 +56,20 @@ def test_a_demand_at_the_limit_is_not_saturated():
 @given(surge=st.floats(allow_nan=False), yaw=st.floats(allow_nan=False))
 def test_the_ideal_actuator_does_what_it_is_told(surge, yaw):
     np.testing.assert_array_equal(drive(Ideal(), surge, yaw)[0], [surge, 0.0, yaw])
+
+
+@given(surge=st.floats(-1e6, 1e6), yaw=st.floats(-1e6, 1e6), sway=st.floats(-1e6, 1e6))
+def test_three_limits_hold_each_by_itself(surge, yaw, sway):
+    limits = SaturatedFull(surge_limit=2.0, yaw_limit=1.5, sway_limit=0.7)
+    tau, (flag,), _ = drive(limits, surge, yaw, sway)
+    expected = [np.clip(surge, -2, 2), np.clip(sway, -0.7, 0.7), np.clip(yaw, -1.5, 1.5)]
+    np.testing.assert_array_equal(tau, expected)
+    assert flag == (1.0 if abs(surge) > 2 or abs(yaw) > 1.5 or abs(sway) > 0.7 else 0.0)
+
+
+def test_who_pushes_sideways_has_rank_three_and_who_does_not_has_two():
+    np.testing.assert_array_equal(IdealFull().input_matrix(), [[1, 0, 0], [0, 0, 1], [0, 1, 0]])
+    assert [kind().input_rank() for kind in (IdealFull, SaturatedFull, Ideal)] == [3, 3, 2]
 
 
 @every_kind

@@ -6,13 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import POD
+import yaml
+from conftest import PACKAGE, POD
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pose_samples import marched
+from pydantic import ValidationError
 from scipy.optimize import lsq_linear, minimize
 
 from podusv_cli.components.actuators.allocation import EFFORT, PREFERENCE, allocate
 from podusv_cli.components.actuators.allocation_single import one_pod
+from podusv_cli.components.actuators.base import whole_demand
 from podusv_cli.components.actuators.pod import Pod, Pods
 from podusv_cli.core.kernel import Vector, bundle
 
@@ -95,7 +99,8 @@ def several(places: Any, **options: Any) -> Pods:
 
 
 def allocated(pods: Pods, demand: Vector, state: Vector | None = None) -> tuple[Vector, Vector]:
-    """Thrusts and angles for a demand, at rest."""
+    """Thrusts and angles for a demand of two or three, at rest."""
+    demand = whole_demand(demand)
     count = len(pods.pods)
     T, delta, at = np.zeros(count), np.zeros(count), state if state is not None else pods.rest()
     k, table = bundle(pods.constants()), pods.table()
@@ -120,7 +125,8 @@ class Problem:
         rows = np.sqrt(weight) / size
         self.B_X = rows[:, None] * np.array([np.ones_like(x), np.zeros_like(x), -y])
         self.B_Y = rows[:, None] * np.array([np.zeros_like(x), np.ones_like(x), x])
-        self.tau = rows * np.clip([demand[0], 0.0, demand[1]], -size, size)
+        u, r, v = whole_demand(demand)
+        self.tau = rows * np.clip([u, v, r], -size, size)
 
     def cost(self, q: Vector) -> float:
         """Of (thrusts, angles)."""
@@ -180,6 +186,12 @@ def test_a_search_along_a_step_ends_where_the_step_is_level():
 def assert_no_other_costs_less(layout, surge, yaw, size, sway, priority):
     pods = several(LAYOUTS[layout], sway_weight=sway, priority=priority)
     demand = np.array([surge * size * 8, yaw * size * 3])
+    assert_best(pods, demand)
+    if pods.takes_sway:
+        assert_best(pods, np.append(demand, (surge - yaw) * size * 3))
+
+
+def assert_best(pods, demand):
     problem = Problem(pods, demand)
     mine = problem.cost(np.concatenate(allocated(pods, demand)))
     assert mine <= problem.best(np.random.default_rng(1)) * (1 + 1e-6) + 1e-11
@@ -199,6 +211,65 @@ def test_differential_thrust_is_bounded_least_squares(surge, yaw, size):
     T, delta = allocated(pods, demand)
     np.testing.assert_allclose(T, best.x, atol=1e-4 * problem.most.max())
     assert not delta.any()
+
+
+@given(surge=unit, yaw=unit, sway=unit)
+def test_a_ferry_shares_three_demands_between_bow_and_stern_by_halves_and_lever(surge, yaw, sway):
+    """X_i = X/2, Y_1 + Y_2 = Y, x (Y_1 - Y_2) = N: of two pods that turn every way."""
+    ferry = Pods.model_validate(ferry_pods() | {"sway_weight": 1.0}, strict=False)
+    X, N, Y = surge * 400.0, yaw * 600.0, sway * 400.0
+    T, delta = allocated(ferry, np.array([X, N, Y]))
+    bow, stern = 0.5 * Y + N / 3.6, 0.5 * Y - N / 3.6
+    np.testing.assert_allclose(T * np.cos(delta), [0.5 * X] * 2, atol=0.01)
+    np.testing.assert_allclose(T * np.sin(delta), [bow, stern], atol=0.01)
+
+
+def ferry_pods():
+    """What the preset milliampere has."""
+    return yaml.safe_load((PACKAGE / "components/actuators/milliampere.yaml").read_text())
+
+
+def test_pods_take_a_sway_force_with_a_weight_of_it_where_they_can_push_every_way():
+    weighed, ferry = {"sway_weight": 1.0}, ferry_pods()
+    every_way = Pods.model_validate(ferry | weighed, strict=False)
+    assert every_way.takes_sway
+    assert every_way.input_rank() == 3
+    np.testing.assert_allclose(every_way.input_matrix(), np.eye(3)[[0, 2, 1]], atol=1e-3)
+    assert not Pods.model_validate(ferry, strict=False).takes_sway
+    fixed = several([(-0.5, -0.4, 0.0), (-0.5, 0.4, 0.0)], **weighed)
+    assert not fixed.takes_sway
+    assert not several(LAYOUTS["one aside"], **weighed).takes_sway
+    with pytest.raises(ValidationError, match="a dead zone of a sway force, and takes none"):
+        several([(-0.5, -0.4, 0.0), (-0.5, 0.4, 0.0)], command={"dead_zone_v": 1.0})
+
+
+def test_a_sway_force_that_is_no_number_is_not_lost_between_limits_of_pods():
+    ferry = Pods.model_validate(ferry_pods() | {"sway_weight": 1.0}, strict=False)
+    _, rate = ferry._drive_once(np.zeros(6), ferry.rest(), np.array([0.0, 0.0, math.nan]))
+    assert not np.isfinite(rate).all()
+
+
+FERRY = """
+vessel: {preset: milliampere}
+actuator: {kind: pod, preset: milliampere, sway_weight: 1.0}
+path: {kind: poses, poses: [[0, 0, 0.4]]}
+disturbance: {kind: step, b_u: 50.0, b_v: -120.0, b_r: 60.0}
+controller: {kind: pose_pid, w_x: 0.3, w_y: 0.3, w_r: 0.4}
+start: {x: 0.5, psi: 0.4}
+simulation: {step: 0.05, duration: 400.0}
+"""
+
+
+def test_a_ferry_in_a_load_comes_to_its_pose_with_the_thrusts_of_halves_and_lever():
+    """T = 500 n |n|; X = -50 N, Y = 120 N, N = -60 N m."""
+    log = marched(FERRY)
+    assert log["z_e"][-1] < 1e-4
+    assert abs(log["psi"][-1] - 0.4) < 1e-5
+    bow, stern = 60.0 - 60.0 / 3.6, 60.0 + 60.0 / 3.6
+    n, delta = log["n_part"][-1], log["delta"][-1]
+    T = 500.0 * n * abs(n)
+    np.testing.assert_allclose(T * np.cos(delta), [-25.0, -25.0], atol=0.05)
+    np.testing.assert_allclose(T * np.sin(delta), [bow, stern], atol=0.05)
 
 
 @given(surge=unit, yaw=unit)

@@ -8,7 +8,6 @@ import pytest
 from conftest import SMOOTH_START, corrected, example, kinds, run
 
 from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.components.actuators.command import Command
 from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.components.controllers.pid import Pid
 from podusv_cli.components.paths.line import Line
@@ -16,7 +15,13 @@ from podusv_cli.core.component import value
 from podusv_cli.core.kernel import Vector, bundle, is_kernel, kernel
 
 every_kind = pytest.mark.parametrize("kind", kinds("actuators").values(), ids=kinds("actuators"))
-PATH = Command(delay=0.2, dead_zone_u=0.3, dead_zone_r=0.05, resolution_u=0.1, resolution_r=0.02)
+PATH = {
+    "delay": 0.2,
+    "dead_zone_u": 0.3,
+    "dead_zone_r": 0.05,
+    "resolution_u": 0.1,
+    "resolution_r": 0.02,
+}
 
 
 class Half(Actuator):
@@ -102,7 +107,7 @@ def test_a_demand_that_is_no_number_is_not_hidden(kind, demand):
     actuator = staged(kind, BOTH)
     tau, signals = np.full(3, np.nan), np.full(len(actuator.signals_with), np.nan)
     rate, k = np.full(len(actuator.states), np.nan), bundle(actuator.constants())
-    asked = np.array([*demand, 0.0])
+    asked = np.array([*demand, 0.0, 0.0])
     with np.errstate(invalid="ignore"):
         actuator.drive_with()(
             0.0, np.zeros(6), actuator.rest(), asked, k, actuator.table(), tau, rate, signals

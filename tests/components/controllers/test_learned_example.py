@@ -80,7 +80,7 @@ def test_limits_of_the_task_are_those_of_the_law() -> None:
 def test_the_reward_is_the_distance_and_little_else() -> None:
     """3 m ahead and 4 m aside, at 0.5 rad/s, after half the limits: 0.2*5 + 0.2*0.25 + 0.01*0.5."""
     seen = np.array([3.0, 4.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0])
-    before = podusv.gym.Moment(0.0, seen, np.zeros(6), np.zeros(6), np.zeros(2))
+    before = podusv.gym.Moment(0.0, seen, np.zeros(6), np.zeros(6), np.zeros(2), np.zeros(3))
     now = before._replace(time=0.2, demand=np.array([4.0, -1.25]))
     assert ppo.reward(before, now) == pytest.approx(-1.055)
 

@@ -13,11 +13,13 @@ from scipy.interpolate import CubicSpline
 
 from podusv_cli.components.paths.base import Path
 from podusv_cli.components.paths.circle import Circle
+from podusv_cli.components.paths.ellipse import Ellipse
 from podusv_cli.components.paths.figure_eight import FigureEight
 from podusv_cli.components.paths.line import Line
 from podusv_cli.components.paths.line_circle import LineCircle
 from podusv_cli.components.paths.sinusoid import Sinusoid
 from podusv_cli.components.paths.waypoints import Waypoints
+from podusv_cli.core.signal import PSI_D
 
 POINTS = ((0.0, 0.0), (5.0, 1.0), (8.0, 6.0), (8.0, 12.0), (3.0, 15.0))
 ORDERS = ("position", "velocity", "acceleration")
@@ -34,6 +36,7 @@ PATHS: dict[str, Any] = {n: example(kind) for n, kind in kinds("paths").items() 
     "a point on a straight leg": Waypoints(points=((0, 0), (5, 0), (9, 0)), legs="straight"),
     "corners and a stop": Waypoints(points=POINTS, legs="straight", after="stop"),
     "oblique sine": Sinusoid(course=2.0, x=1.0, y=-4.0),
+    "oblique ellipse to port": Ellipse(x=2.0, angle=0.7, length=4.0, breadth=9.0, turn="port"),
     "two points": Waypoints(points=POINTS[:2]),
     "a stop": Waypoints(points=POINTS, after="stop"),
     "a loop": Waypoints(points=POINTS, after="loop"),
@@ -76,6 +79,21 @@ def test_velocity_and_acceleration_are_derivatives(path):
             continue
         before, now, after = (target_at(path, t + shift) for shift in (-h, 0.0, h))
         np.testing.assert_allclose(now[2:], (after - before)[:4] / (2 * h), atol=2e-6)
+
+
+@every_path
+def test_the_heading_s_rates_are_derivatives_and_a_course_is_its_heading(path):
+    h, times = 1e-3, np.random.default_rng(4).uniform(0.01, 150.0, 100)
+    rows = [path.whole_targets(times + shift)[:, PSI_D:] for shift in (-h, 0.0, h)]
+    if not path.heads:
+        assert not np.any(rows)
+        return
+    slopes = (rows[2] - rows[0])[:, :2] / (2 * h)
+    np.testing.assert_allclose(rows[1][:, 1:], slopes, atol=2e-6)
+    if isinstance(path, Ellipse):
+        x, y = path.whole_targets(times)[:, 2:4].T
+        np.testing.assert_allclose(np.cos(rows[1][:, 0]), x / np.hypot(x, y), atol=1e-12)
+        np.testing.assert_allclose(np.sin(rows[1][:, 0]), y / np.hypot(x, y), atol=1e-12)
 
 
 def test_the_straight_part_is_the_first_line_of_53():

@@ -1,0 +1,134 @@
+"""Metrics of the sway force of vessels that can be asked for one."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from podusv_cli.core.kernel import Vector, kernel
+from podusv_cli.metrics.metric import Accumulator, Measured, Metric, add, gathered, ratio
+from podusv_cli.metrics.spans import ANEW, WITHIN
+
+TIME, EFFORT, INTEGRALS = range(3)
+USE_U, USE_V, USE_R, USES = range(1, 5)
+PEAK, TV, LAST, SETTLED = range(2 * INTEGRALS, 2 * INTEGRALS + 4)
+SIZE = SETTLED + 1
+SWAY = 2  # where a demand has the sway force
+
+
+# Arguments as those of `spans.all_kernels`; changes `seen`.
+@kernel
+def watch(weight: float, steady: float, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather the largest demand, the sum of its changes, and the squared force."""
+    demand, force = row[int(k.demand) + SWAY], row[int(k.tau) + 1]
+    add(seen, INTEGRALS, TIME, weight)
+    add(seen, INTEGRALS, EFFORT, weight * force * force)
+    seen[PEAK] = max(seen[PEAK], abs(demand))
+    if steady == ANEW:
+        seen[SETTLED] = seen[TV] = 0.0
+    if steady >= WITHIN:
+        if seen[SETTLED] > 0.0:
+            seen[TV] += abs(demand - seen[LAST])
+        seen[SETTLED] += 1.0
+    seen[LAST] = demand
+
+
+# Arguments as those of `spans.all_kernels`; changes `seen`.
+@kernel
+def watch_use(weight: float, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather the parts of limits that loads take."""
+    tau = int(k.tau)
+    add(seen, USES, TIME, weight)
+    add(seen, USES, USE_U, weight * abs(row[tau]) / k.limit_u)
+    add(seen, USES, USE_V, weight * abs(row[tau + 1]) / k.limit_v)
+    add(seen, USES, USE_R, weight * abs(row[tau + 2]) / k.limit_r)
+
+
+def _size(layout: Measured) -> int:
+    return SIZE if layout.loop.actuator.takes_sway else 0
+
+
+def _constants(layout: Measured) -> dict[str, float]:
+    return {"demand": float(layout.plan.demand), "tau": float(layout.plan.tau)}
+
+
+def _size_of_use(layout: Measured) -> int:
+    """None where the actuator has no constant limit of a load."""
+    limited = np.isfinite(layout.loop.actuator.limits()).all()
+    return 2 * USES if layout.loop.actuator.takes_sway and limited else 0
+
+
+def _limits(layout: Measured) -> dict[str, float]:
+    """The column of the loads, and the actuator's limits; 1 of one that has no sway force."""
+    u, r, v = (*layout.loop.actuator.limits(), 1.0)[:3]
+    return {"tau": float(layout.plan.tau), "limit_u": u, "limit_v": v, "limit_r": r}
+
+
+def _variation(seen: Vector, step: float) -> float:
+    """The total variation; NaN with fewer than two steady instants."""
+    return float(seen[TV]) if seen[SETTLED] > 1.0 else math.nan
+
+
+OF = Accumulator(watch, _size, _constants, INTEGRALS)
+OF_USE = Accumulator(
+    watch_use, _size_of_use, _limits, USES, differing=("limit_u", "limit_v", "limit_r")
+)
+peak_v = Metric(
+    "peak_tau_v",
+    "N",
+    "largest |tau_v| that the law demanded",
+    OF,
+    gathered(PEAK),
+    place=2,
+    symbol=r"\max|\tau_{v,\mathrm{cmd}}|",
+    words="largest sway force demanded",
+)
+effort_v = Metric(
+    "effort_v",
+    "N2 s",
+    "integral of tau_v^2 on the hull",
+    OF,
+    gathered(EFFORT),
+    place=3,
+    symbol=r"\int\tau_v^2\,\mathrm{d}t",
+    words="squared sway force, integrated",
+)
+tv_v = Metric(
+    "tv_tau_v",
+    "N",
+    "total variation of the demanded tau_v in the steady window",
+    OF,
+    _variation,
+    place=4,
+    symbol=r"\mathrm{TV}(\tau_{v,\mathrm{cmd}})",
+    words="variation of the sway demand, steady",
+)
+use_u = Metric(
+    "thrust_use_u",
+    "1",
+    "mean |tau_u| over the actuator's limit of it",
+    OF_USE,
+    ratio(USE_U, TIME),
+    place=5,
+    words="use of the surge force, mean part of its limit",
+)
+use_v = Metric(
+    "thrust_use_v",
+    "1",
+    "mean |tau_v| over the actuator's limit of it",
+    OF_USE,
+    ratio(USE_V, TIME),
+    place=5,
+    words="use of the sway force, mean part of its limit",
+)
+use_r = Metric(
+    "thrust_use_r",
+    "1",
+    "mean |tau_r| over the actuator's limit of it",
+    OF_USE,
+    ratio(USE_R, TIME),
+    place=5,
+    words="use of the yaw moment, mean part of its limit",
+)

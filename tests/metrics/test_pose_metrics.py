@@ -1,0 +1,69 @@
+"""Metrics of poses and of a sway force, by plain loops over a log."""
+
+import math
+
+import numpy as np
+import pytest
+from pose_samples import BOAT, loaded_pose
+
+import podusv
+
+LIMITS = "actuator={kind: saturated_full, surge_limit: 3.0, yaw_limit: 2.0, sway_limit: 1.5}"
+LAW = "controller: {kind: pose_pid, w_x: 0.4, w_y: 0.5, w_r: 0.9}\n"
+WAY = "path: {kind: poses, poses: [[0, 0, 0.2], [1, 2, 3.4], [0, 1, 2.5]], travel: 9, dwell: 5.5}\n"
+SET = ("metrics.settling_radius=0.28", "simulation.duration=47")
+
+
+@pytest.fixture(scope="module")
+def run():
+    """A run from beside the first of three poses."""
+    return podusv.simulate(loaded_pose(BOAT + WAY + LAW, LIMITS, "start.x=0.3", *SET))
+
+
+def test_metrics_of_poses_are_those_of_a_plain_loop(run):
+    square = largest = circle = 0.0
+    corners, inside = [], None
+    arrived = {0.0: 5.5, 14.5: 20.0, 29.0: 1e9}  # s, and until when the target stays
+    time, step = run["time"], 0.02
+    for i in range(len(time)):
+        off = run["psi"][i] - run["heading_d"][i]
+        off -= 2.0 * math.pi * round(off / (2.0 * math.pi))
+        square += off * off * step * (0.5 if i in (0, len(time) - 1) else 1.0)
+        largest = max(largest, abs(off))
+    for begin, end in arrived.items():
+        inside = None
+        for i, t in enumerate(time):
+            if begin - 1e-9 <= t <= end + 1e-9:
+                z = math.hypot(run["x"][i] - run["x_d"][i], run["y"][i] - run["y_d"][i])
+                circle = max(circle, z)
+                inside = (t if inside is None else inside) if z <= 0.28 else None
+        corners.append(inside - begin)
+    assert run.metrics["heading_rms"] == pytest.approx(math.sqrt(square / time[-1]), rel=1e-9)
+    assert run.metrics["heading_max"] == pytest.approx(largest, rel=1e-12)
+    assert run.metrics["watch_circle"] == pytest.approx(circle, rel=1e-9)
+    assert run.metrics["corner_time"] == pytest.approx(max(corners), abs=1e-9)
+    assert max(corners) > 1.0
+
+
+def test_metrics_of_the_sway_force_are_those_of_a_plain_loop(run):
+    weights = np.full(len(run["time"]), 0.02)
+    weights[[0, -1]] *= 0.5
+    assert run.metrics["peak_tau_v"] == np.abs(run["tau_v_cmd"]).max()
+    assert run.metrics["effort_v"] == pytest.approx((weights * run["tau_v"] ** 2).sum(), rel=1e-9)
+    late = run["time"] >= 0.8 * 47 - 1e-9
+    moved = np.abs(np.diff(run["tau_v_cmd"][late])).sum()
+    assert run.metrics["tv_tau_v"] == pytest.approx(moved, rel=1e-9)
+    for axis, limit in (("u", 3.0), ("v", 1.5), ("r", 2.0)):
+        used = (weights * np.abs(run[f"tau_{axis}"])).sum() / limit / 47.0
+        assert run.metrics[f"thrust_use_{axis}"] == pytest.approx(used, rel=1e-9)
+
+
+def test_a_pose_that_is_left_outside_the_radius_was_never_reached():
+    far = loaded_pose(BOAT + WAY + LAW, LIMITS, "start.x=3.0", *SET)
+    assert math.isnan(podusv.simulate(far).metrics["corner_time"])
+
+
+def test_without_limits_there_is_no_part_of_them():
+    run = podusv.simulate(loaded_pose(BOAT + WAY + LAW))
+    assert "thrust_use_u" not in run.metrics
+    assert run.metrics["watch_circle"] == 0.0
