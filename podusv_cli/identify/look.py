@@ -16,6 +16,7 @@ from podusv_cli.core import escaping
 from podusv_cli.core.earth import Plane
 from podusv_cli.core.kernel import Vector
 from podusv_cli.figures.curves import thin_curve
+from podusv_cli.figures.page import PlainNumbers
 from podusv_cli.figures.sketch import COLUMNS, Sketch
 from podusv_cli.figures.style import new_figure
 from podusv_cli.identify.logs.contents import Contents, list_names
@@ -108,7 +109,7 @@ def _signals(contents: Contents, found: Listing, part: Sequence[Listed]) -> Figu
         axes.plot(*thin_curve(times[there], values[there]), lw=0.7, marker=alone)
         guess = f" = {own.guess}" if own.guess else ""
         axes.set_title(escaping.figure(f"{own.name[-ENDING:]}{guess}"), fontsize="x-small")
-        axes.ticklabel_format(axis="y", useOffset=False)  # it would stand in the title
+        axes.yaxis.set_major_formatter(PlainNumbers(useOffset=False))  # it would cross the title
         axes.set_xlabel(label, fontsize="x-small")
     for axes in panels[len(part) :]:
         axes.set_axis_off()
