@@ -340,14 +340,16 @@ FASTER = ("rate[0] = x[3] * cos_psi", "rate[0] = 2.0 * x[3] * cos_psi")
 
 
 class Copy:
-    """A copy of the package with its own cache, run in processes of its own."""
+    """A copy of the package with its own cache and no shipped kernels, run in its own processes."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.kinematics = folder / "podusv_cli/core/kinematics.py"
         self.cache = folder / "cache"
         shutil.copytree(
-            PACKAGE, folder / "podusv_cli", ignore=shutil.ignore_patterns("__pycache__")
+            PACKAGE,
+            folder / "podusv_cli",
+            ignore=shutil.ignore_patterns("__pycache__", "kernels.xz"),
         )
 
     def simulate(self, *edits: str) -> dict[str, Any]:
