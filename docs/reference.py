@@ -47,6 +47,30 @@ GALLERY = {
     "podusv:laws/legs.yaml": ("los_pid", "velocity_vector"),
     "podusv:trials/zigzag_20.yaml": (),
 }
+# What podusv does in pictures: title, sentence, scenario, laws that are drawn, figure.
+SHORT = (
+    (
+        "Laws follow a target",
+        "Every law gets the same hull, target and sea. The map shows who stays near the target.",
+        ("podusv:demo.yaml", (), "trajectory"),
+    ),
+    (
+        "What a law demands",
+        "The log has every signal: what the law demands, and what the actuator delivers.",
+        ("podusv:mu_2017/corrected_compare.yaml", (), "controls"),
+    ),
+    (
+        "A sea",
+        "Waves, wind and a current act on the hull. The same seed gives the same sea.",
+        ("podusv:sea/state_4.yaml", ("velocity_vector",), "sea"),
+    ),
+    (
+        "What a law sees",
+        "Sensors have noise, rates and delays. The law gets the estimate of a filter.",
+        ("podusv:sea/sensors.yaml", ("velocity_vector",), "estimates"),
+    ),
+)
+STUDY = "results/studies/learned/figures/ratios-iae.png"  # the last picture: of 1000 draws
 EDITOR_LINE = re.compile(r"^# yaml-language-server: .*\n", re.MULTILINE)
 DRAWN = "figures"  # the folder of their pictures
 
@@ -58,7 +82,7 @@ def write(folder: Path) -> None:
     pages |= {f"{section}s": kinds_page(section) for section in KINDS}
     for name, text in pages.items():
         _write(folder / f"{name}.md", text.encode())
-    for name, picture in (*pictures(), *gallery_pictures()):
+    for name, picture in (*pictures(), *gallery_pictures(), *short_pictures()):
         _write(folder / DRAWN / name, picture)
 
 
@@ -98,6 +122,39 @@ def gallery_pictures() -> Iterable[tuple[str, bytes]]:
         ]
         for _, picture in draw(dress_runs(runs), [FIGURES["trajectory"]], ["png"]):
             yield f"{_picture(shown)}.png", picture
+
+
+def short_pictures() -> Iterable[tuple[str, bytes]]:
+    """The pictures of the page that shows what podusv does."""
+    for _, _, (shown, laws, figure) in SHORT:
+        singles = podusv.load(shown).singles()
+        runs = [
+            past_run_of(name, one) for name, one in singles.items() if name in (laws or singles)
+        ]
+        for _, picture in draw(dress_runs(runs), [FIGURES[figure]], ["png"]):
+            yield f"short-{figure}.png", picture
+
+
+def short_page() -> str:
+    """What podusv does in five pictures, each with the command that draws it."""
+    parts = ["# podusv in five pictures"]
+    for title, sentence, (shown, laws, figure) in SHORT:
+        several = len(podusv.load(shown).controllers) > 1
+        made = "compare" if several and len(laws) != 1 else "run"
+        chosen = f" --controller {laws[0]}" if several and made == "run" else ""
+        parts += [
+            f"## {title}",
+            sentence,
+            f"![{title}]({DRAWN}/short-{figure}.png)",
+            f"    podusv {made} {shown}{chosen} --figure {figure}",
+        ]
+    parts += [
+        "## Which law is better, over 1000 hulls, seas and starts",
+        "One run cannot say. Laws meet the same draws; intervals show what the draws prove.",
+        f"![Ratios of laws over draws](../../{STUDY})",
+        "    podusv sweep run podusv:studies/learned.yaml",
+    ]
+    return page(parts)
 
 
 def _picture(shown: str) -> str:
@@ -276,6 +333,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "exit_codes": exit_codes_page,
     "python": python_page,
     "gallery": gallery_page,
+    "five_pictures": short_page,
 }
 
 

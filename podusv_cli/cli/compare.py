@@ -68,7 +68,8 @@ def compare(
         ),
     ] = "",
     doubt: Annotated[
-        bool, typer.Option("--doubt", help="Say what each verdict hangs on, as podusv doubt does.")
+        bool,
+        typer.Option("--doubt", help="Say what each verdict depends on, as podusv doubt does."),
     ] = False,
     workers: options.Workers = 0,
     as_json: options.AsJson = False,

@@ -92,4 +92,4 @@ def start(
     echo(f"wrote {written}")
     echo(f"next: podusv compare {written}")
     if not preset:
-        echo(f"then: podusv sweep run {written} (how much hangs on what was estimated)")
+        echo(f"then: podusv sweep run {written} (how much depends on the estimates)")

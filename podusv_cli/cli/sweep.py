@@ -47,9 +47,7 @@ def run(
     draws: Annotated[
         int, typer.Option(min=0, help="How many draws.", show_default="the scenario's")
     ] = 0,
-    until: Annotated[
-        str, typer.Option(help="Time after which no more runs are begun, as 90s, 30min, 8h.")
-    ] = "",
+    until: Annotated[str, typer.Option(help="Begin no run after this time: 90s, 30min, 8h.")] = "",
     workers: options.Workers = 0,
     shard: Annotated[
         str, typer.Option(help="A part of the study, as 3/20: for `podusv sweep merge`.")

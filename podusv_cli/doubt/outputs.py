@@ -176,7 +176,7 @@ def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, 
         environment("podusv_cli.doubt")
         .get_template("doubt.html.j2")
         .render(
-            title=f"What the verdicts of {report.scenario.name} hang on",
+            title=f"What the verdicts of {report.scenario.name} depend on",
             scenario=report.scenario,
             answers=report.answers,
             head=HEAD,

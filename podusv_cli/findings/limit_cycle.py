@@ -48,9 +48,9 @@ def limit_cycle(scenario: Scenario, log: Recording) -> Sentences:
         period = 2.0 * (crossings[-1] - crossings[0]) / (len(crossings) - 1)
         yield (
             f"the vessel swings {name} the target's course with an amplitude of {size:.3g} m and a "
-            f"period of {period:.3g} s over the whole steady window, and no load that could drive "
-            "it has that period: a limit cycle; take smaller gains, and see whether a delay, a "
-            "limit or the hull's sway drives it"
+            f"period of {period:.3g} s over the whole steady window; no load has that period, so "
+            "this is a limit cycle; take smaller gains, and see whether a delay, a limit or the "
+            "hull's sway drives it"
         )
 
 

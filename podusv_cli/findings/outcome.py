@@ -60,7 +60,7 @@ def _windup(scenario: Scenario) -> str:
         return "the law has no memory that could wind up; take smaller gains or a stronger actuator"
     if law.wants_loads():
         return (
-            "the law is told the loads that act, so its memory does not wind up; take smaller "
+            "the law knows the loads that act, so its memory does not wind up; take smaller "
             "gains or a stronger actuator"
         )
     return f"while limited, the law's adaptation and integrators wind up; {law.against_windup}"
@@ -141,8 +141,8 @@ def inconsistent_filter(scenario: Scenario, log: Recording) -> Sentences:
         if nis > DOUBTFUL and chdtrc(count, square) < CHANCE:
             yield (
                 f"{told}: noise is larger than its sigma, which has to count waves too, or the "
-                "hull moves otherwise than it predicts; give it a larger sigma first, larger q "
-                "only for a hull that is not the one it is told"
+                "hull moves otherwise than it predicts; give it a larger sigma first, and a larger "
+                "q only where the filter knows another hull"
             )
         if nis < TIMID and chdtr(count, square) < CHANCE:
             yield (
@@ -169,8 +169,8 @@ def moves_away(scenario: Scenario, log: Recording) -> Sentences:
         yield (
             f"the vessel starts {start:.3g} m from the target and is {end:.3g} m away from it at "
             f"the end (mean over the steady window): {scenario.controller.label} does not track; "
-            "check signs and units of the law, of what it is told about the vessel, and its own "
-            "limits (U and N_m), or take larger gains"
+            "check signs and units of the law and of its nominal vessel, and its own limits (U and "
+            "N_m), or take larger gains"
         )
 
 
@@ -196,9 +196,9 @@ def never_settles(scenario: Scenario, log: Recording) -> Sentences:
         nearing = _arrives(errors, scenario.metrics.steady_fraction, radius)
         remedy = "simulate longer" if nearing else "take larger gains, or add integral action"
         yield (
-            f"the vessel is {error:.3g} m away from {place} over the steady window, more than the "
-            f"settling radius of {radius:g} m, and {'still comes' if nearing else 'does not come'} "
-            f"nearer in it, so no table ranks the run; {remedy}"
+            f"no table ranks this run: over the steady window the vessel is {error:.3g} m away "
+            f"from {place}, more than the settling radius of {radius:g} m; it "
+            f"{'still comes' if nearing else 'does not come'} nearer; {remedy}"
         )
 
 

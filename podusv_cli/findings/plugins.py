@@ -28,8 +28,8 @@ def unkept_module(case: Case) -> Sentences:
             file = getattr(sys.modules.get(name), "__file__", None)
             if file and _is_beside(Path(file).resolve(), folder):
                 yield (
-                    f"{plugin.name} imports {name}, whose file a run folder does not keep: rerun, "
-                    f"and whoever gets the folder, lack it; write what it has into {plugin.name}"
+                    f"{plugin.name} imports {name}, and a run folder does not keep that file, "
+                    f"so `podusv rerun` lacks it; write what it has into {plugin.name}"
                 )
 
 

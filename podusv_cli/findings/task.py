@@ -255,8 +255,8 @@ def _driven_ahead(case: Case, row: int) -> Sentences:
     if got - needed > AHEAD * float(np.abs(seen.demand[:, 0]).max()):
         yield (
             f"the yaw moment of {moment:.3g} N m at t = {seen.time[row]:.0f} s comes with a surge "
-            f"force of {got:.3g} N where {needed:.3g} N keeps up, and the hull runs ahead; let the "
-            "pods turn further, or take priority: surge"
+            f"force of {got:.3g} N; the hull runs ahead, since {needed:.3g} N would keep up; let "
+            "the pods turn further, or take priority: surge"
         )
 
 

@@ -46,9 +46,10 @@ def refusal(answer: Identification) -> str:
     s, prior = max(answer.refused_by, key=lambda pair: pair[0].position / pair[1].position)
     after = "along it" if math.isinf(s.horizon) else f"after {s.horizon:g} s"
     return (
-        f"{s.log}: {after} the rms position error is {s.position:.2g} m with the hull from the "
-        f"logs and {prior.position:.2g} m with the vessel as it was given, so the hull is no "
-        "improvement. It is kept as refused.yaml; --force writes it as identified.yaml."
+        f"{s.log}: the hull is no improvement. {after[0].upper()}{after[1:]} the rms position "
+        f"error is {s.position:.2g} m with the hull from the logs and {prior.position:.2g} m with "
+        "the vessel as it was given. It is kept as refused.yaml; --force writes it as "
+        "identified.yaml."
     )
 
 
@@ -101,9 +102,9 @@ def thrust_words(answer: Identification) -> list[str]:
     """A sentence where thrust was looked for, since a hull has no place for it."""
     return [
         f"thrust is {p.value:.4g} ({p.low:.4g} to {p.high:.4g}) times what the actuator's numbers "
-        "give. The hull holds with that thrust alone: multiply the actuator's thrust (of pods "
-        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} wherever this hull is used, or a draw of "
-        "posterior.csv: draws of another thrust are scaled so that they move as under their own."
+        "give. The hull is right with that thrust alone. Multiply the actuator's thrust (of pods "
+        f"T_nn, T_nn_astern, T_nV) by {p.value:.4g} where you use this hull or a draw of "
+        "posterior.csv; draws with another thrust are scaled to move as they would under it."
         for p in answer.parameters
         if p.name == THRUST
     ]

@@ -76,7 +76,9 @@ def _with_ends(p: Parameter, unit: str, factor: float = 1.0) -> str:
 def _judge_in_words(answer: Identification) -> list[str]:
     """How well the hull predicts the logs that were not fitted."""
     if all(log.role == "fit" for log in answer.problem.wanted.logs):
-        return ["No log was kept for judging (role: judge): how well it predicts is not known."]
+        return [
+            "No log was kept for judging (role: judge), so nothing says how well the hull predicts."
+        ]
     judged = [s for s in answer.scores if s.role == "judge" and s.horizon == SHOWN]
     if not judged:
         return [f"No log for judging holds a free run of {SHOWN:g} s: judge with a longer one."]
@@ -103,9 +105,9 @@ def _forces(answer: Identification) -> list[str]:
             )
     if any(f.width <= OPEN for f in answer.forces):
         lines.append(
-            "The percentages hold if thrust and form of the model are right, and in calm air: the "
-            "filter knows no wind. With logs of an Otter in 2, 4 and 8 m/s of wind X_u comes 0.6, "
-            "1.2 and 4.6 % off, and in 8 m/s Y_v by two thirds."
+            "The percentages hold where thrust and form of the model are right and no wind blows: "
+            "the filter knows no wind. With logs of an Otter in 2, 4 and 8 m/s of wind X_u is 0.6, "
+            "1.2 and 4.6 % off; in 8 m/s Y_v is two thirds off."
         )
     return lines
 

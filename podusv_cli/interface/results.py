@@ -289,7 +289,7 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
     if len(names) == 1 and names[0] in figures:
         sheet = figures[names[0]]
         if not shown or not sheet.fits(shown):
-            logged = f"{', '.join(runs)} logged none of it"
+            logged = f"{', '.join(runs)} logged none of these"
             raise UsageError(f"figure {names[0]!r} shows {', '.join(sheet.signals)}, and {logged}")
         return sheet.family
     signals = [signal for run in runs.values() for signal in run.recording.signals]

@@ -30,7 +30,7 @@ def about_of(scenario: Scenario, identify: Identify | None = None) -> RunAbout:
         return _told_by(scenario, identify or Identify())
     except Exception as error:  # a plug-in's method may raise anything
         what = f"what {scenario.name} says about itself (hull, path, limits, standoff)"
-        raise LawError(f"{what} cannot be had: {in_a_line(error)}") from error
+        raise LawError(f"{what} cannot be computed: {in_a_line(error)}") from error
 
 
 def identify_of(about: RunAbout | None) -> Identify | None:

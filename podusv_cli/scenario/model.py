@@ -96,7 +96,7 @@ class Scenario(Component):
     description: str = value("", "", "what the scenario is for, in a sentence")
     vessel: Vessel = value(..., "", "the vessel that is simulated")
     nominal: Vessel = value(
-        ..., "", "the vessel that the controller is told about; the same by default"
+        ..., "", "the vessel that the controller knows; by default the true one"
     )
     start: Start = value(Start(), "", "state at t = 0")
     origin: Origin | None = value(

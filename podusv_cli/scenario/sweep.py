@@ -135,7 +135,7 @@ class Sweep(Component):
         "finished", "", "when a run counts as a success; all others are the worst of all"
     )
     level: float = value(0.95, "", "confidence of all intervals", gt=0.5, lt=1)
-    keep: Keep = value(Keep(), "", "runs of which a full run folder is wanted")
+    keep: Keep = value(Keep(), "", "runs that get a full run folder")
     claims: dict[str, StudyClaim] = value({}, "", "what the study is to judge, by name")
 
     @property

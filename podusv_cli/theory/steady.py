@@ -248,10 +248,9 @@ class _Frame:
         pace = abs(self.row(left.q)[: len(left.q)]) / _size(left.q)
         return (
             f"no steady motion was found: the run is {math.hypot(*self.start[:2]):.3g} m from the "
-            f"target at t = {self.course.time:g} s, and {left.nearest:.3g} m to "
-            f"{left.farthest:.3g} m when it goes on for {left.seconds:.3g} s with the load of that "
-            f"time; {self.labels[1 + pace.argmax()]} changes most there, and Newton's method finds "
-            f"no state that stays; {WHAT_IT_TAKES}"
+            f"target at t = {self.course.time:g} s; with the load of that time held for "
+            f"{left.seconds:.3g} s it is between {left.nearest:.3g} m and {left.farthest:.3g} m "
+            f"from it; {self.labels[1 + pace.argmax()]} changes most; {WHAT_IT_TAKES}"
         )
 
     def _central(self, q: Vector, relative: float) -> Vector:

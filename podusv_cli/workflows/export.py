@@ -103,9 +103,9 @@ def _notes(law: ExportedLaw, run: Recording, of_run: bool) -> Iterator[str]:
         )
     if not of_run:
         yield (
-            "in the run the law was given loads between its samples, and the exported law has them "
-            f"at its samples alone, so its demands differ from those in log.h5; {SAMPLES} has what "
-            "the exported law answers: check your code by that, not by log.h5"
+            "the demands of the exported law differ from those in log.h5: it gets loads at its "
+            f"samples alone, in the run also between them; check your code by {SAMPLES}, which has "
+            "what the exported law answers"
         )
 
 

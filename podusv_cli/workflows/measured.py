@@ -66,10 +66,9 @@ def track(
     log = table(path, STATE, named)
     if lacking := [name for name in PLANE if name not in log.columns]:
         raise UsageError(
-            f"{path}: nothing is known of {', '.join(lacking)}; call its columns time, x, y (or "
-            "lat, lon), psi, with units in brackets where these are not s, m, rad, as "
-            f"`podusv identify --columns {path}` proposes, or write that under identify.columns in "
-            "a scenario beside it"
+            f"{path}: the log has no column for {', '.join(lacking)}; call its columns time, x, y "
+            "(or lat, lon), psi, with other units than s, m, rad in brackets; "
+            f"`podusv identify --columns {path}` proposes lines for identify.columns of a scenario"
         )
     new = delivered_each(log.columns)
     rows = new["x"] & new["y"]

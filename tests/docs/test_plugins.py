@@ -458,6 +458,6 @@ def test_a_module_beside_a_plug_in_is_noticed_and_one_that_is_installed_is_not(p
         said[name] = podusv("validate", f"{name}.yaml").out
     monkeypatch.delitem(sys.modules, "pushing_helper")
     assert "unkept-module" not in said["alone"]
-    assert "beside.py imports pushing_helper, whose file a run folder does not keep" in (
+    assert "beside.py imports pushing_helper, and a run folder does not keep that file" in (
         " ".join(said["beside"].split())
     )

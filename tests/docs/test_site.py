@@ -30,6 +30,7 @@ from podusv_cli.scenario.shipped import file_of
 
 LOOKED_AT = (
     "docs/index",
+    "docs/reference/five_pictures",
     "docs/reference/gallery",
     "README",
     "docs/tutorial",

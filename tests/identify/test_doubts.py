@@ -54,7 +54,7 @@ def test_a_hull_that_predicts_worse_than_the_vessel_is_written_with_force_alone(
     code, _, err = podusv(*call)
     assert code == 3
     last = err.splitlines()[-1]
-    assert last.startswith("own.csv: after 30 s the rms position error is ")
+    assert last.startswith("own.csv: the hull is no improvement. After 30 s the rms position")
     assert last.endswith("It is kept as refused.yaml; --force writes it as identified.yaml.")
     assert not (hull / "identified.yaml").exists()
     assert not (hull / "posterior.csv").exists()
@@ -84,11 +84,11 @@ def test_a_refused_hull_says_so_in_json_and_in_python(boats, tmp_path, podusv):
     out = podusv(
         "identify", boats / "boat.yaml", "--out", tmp_path / "a", "--json", "--no-figures"
     )[1]
-    assert json.loads(out)["refused"].startswith("own.csv: after 30 s")
+    assert json.loads(out)["refused"].startswith("own.csv: the hull is no improvement. After 30 s")
     import podusv as library
 
     hull = library.identify(boats / "boat.yaml", out=tmp_path / "b", figures=False)
-    assert hull.refusal.startswith("own.csv: after 30 s")
+    assert hull.refusal.startswith("own.csv: the hull is no improvement. After 30 s")
     assert ", refused, " in repr(hull)
 
 

@@ -271,7 +271,7 @@ def test_a_log_that_is_too_short_or_lacks_its_commands(sailed):
     with pytest.raises(LogFault, match="has 10 values of the pose, at least 20"):
         log_of(sailed.part(0.0, 2.0), Ideal(), 0.05)
     bare = {n: c for n, c in sailed.columns.items() if n != "tau_r"}
-    with pytest.raises(LogFault, match="nothing is known of tau_r"):
+    with pytest.raises(LogFault, match="the log has no column for tau_r"):
         log_of(replace(sailed, columns=bare), Ideal(), 0.05)
 
 

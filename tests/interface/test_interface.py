@@ -236,7 +236,7 @@ def test_a_figure_shows_in_a_notebook(kept):
     assert png.startswith(b"\x89PNG")
     with pytest.raises(UsageError, match=r"'error'.*'errors'"):
         kept.plot("error")
-    with pytest.raises(UsageError, match=r"figure 'pods' shows .* and pid logged none of it"):
+    with pytest.raises(UsageError, match=r"figure 'pods' shows .* and pid logged none of these"):
         kept.plot("pods")
 
 

@@ -148,7 +148,7 @@ class Pods(Actuator):
     failure: PodFailure | None = value(None, "", "a pod's loss of thrust at a time")
     pods: tuple[Pod, ...] = value(..., "", "every pod; in place of the preset's", strict=False)
     priority: Literal["yaw", "surge"] = value(
-        "yaw", "", "what is met first when surge force and yaw moment cannot both be had"
+        "yaw", "", "which demand comes first when the pods cannot meet both"
     )
     thrust_form: Literal["physical", "printed"] = value(
         "physical", "", "T_nV takes thrust away with the advance speed, or adds as printed in (8)"

@@ -20,7 +20,9 @@ from podusv_cli.core.signal import Signal
 
 MORE, PHI, LAG = 7, 8, 9  # positions in the memory
 LEARNT = (
-    Signal("dP", "m/s", "how much more sway answers yaw than told, per yaw rate", r"\Delta\hat P"),
+    Signal(
+        "dP", "m/s", "how much more sway answers yaw than nominal, per yaw rate", r"\Delta\hat P"
+    ),
     Signal("phi", "rad", "yaw rate as it is seen in the observed sway", r"\phi"),
     Signal("phi_lag", "rad s", "integral of phi", r"\int\phi"),
 )

@@ -76,7 +76,7 @@ class Mss(LineOfSight):
     def _damps(self) -> Self:
         """Raises ValueError for gains with which the yaw rate is not damped."""
         if self.damping() <= 0.0:
-            raise ValueError("2 zeta wn has to be above 1/T, or the yaw rate would be driven on")
+            raise ValueError("2 zeta wn has to be above 1/T, else the yaw rate grows")
         return self
 
     def damping(self) -> float:

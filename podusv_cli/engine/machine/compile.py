@@ -27,9 +27,9 @@ NO_NUMBA = (
 )
 SHARE = 40_000  # size of what a process of its own compiles at least: about 3 s
 RULES = (
-    "a kernel is marked with @kernel, reads and writes numbers of vectors one by one (x[2], "
-    "tau[0] = ...), calls math.sin and the like and other kernels, and allocates, prints and "
-    "raises nothing"
+    "a kernel is marked with @kernel and reads and writes numbers of vectors one by one (x[2], "
+    "tau[0] = ...); it calls functions of math and other kernels; it allocates, prints and raises "
+    "nothing"
 )
 
 

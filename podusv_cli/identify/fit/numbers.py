@@ -92,8 +92,8 @@ def _members(name: str, constants: Mapping[str, float]) -> list[str]:
         return ["m23"]
     if constants.get(name, 1.0) == 0.0:
         raise UsageError(
-            f"identify.free: {name} of the vessel is 0, and what is known of it is relative to "
-            "that, so it would stay 0; give vessel a first guess of it"
+            f"identify.free: {name} of the vessel is 0 in `vessel`, and its prior is relative to "
+            "that value; give a first guess other than 0"
         )
     return [name]
 

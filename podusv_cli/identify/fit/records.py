@@ -82,8 +82,8 @@ def complete(table: LogTable, actuator: Actuator) -> None:
     needed = {s.name for s in (*STATE[:POSE], *actuator.replayed)} - {*actuator.zero_where_missing}
     if lacking := sorted(needed - table.columns.keys()):
         raise LogFault(
-            f"{table.name}: nothing is known of {', '.join(lacking)}; name the columns that have "
-            "them under identify.columns, or choose the actuator whose commands the log has"
+            f"{table.name}: the log has no column for {', '.join(lacking)}; name the columns that "
+            "have them under identify.columns, or choose the actuator whose commands the log has"
         )
     marks = delivered_each(table.columns)
     fewest = min(int(marks[signal.name].sum()) for signal in STATE[:POSE])

@@ -169,7 +169,7 @@ def _whole_rows(
         return rows, []
     first = broken[0]
     cells = "1 cell" if len(first.cells) == 1 else f"{len(first.cells)} cells"
-    found = cells if first.cells else "no cells that can be told apart"
+    found = cells if first.cells else "no separate cells"
     what = f"line {first.number} has {found}, and there are {count} names"
     if len(broken) > max(1.0, SELDOM * len(body)):
         names_listed = ", ".join(names[:6]) + (", ..." if count > 6 else "")

@@ -76,7 +76,7 @@ def contents_of_sentences(text: str, parse: Any) -> Contents:
     odd = [_has_pieces(line, own) for line, own in zip(lines, found, strict=True)]
     if lost := sum(odd):
         warnings.append(
-            f"no whole sentences, of which parts are left out: {lost} of {len(lines)} lines"
+            f"{lost} of {len(lines)} lines are no whole sentences; parts of them are left out"
         )
     sentences = [_sentence(parse, matches[i]) for i in rows]
     kept = [(i, s) for i, s in zip(rows, sentences, strict=True) if s]

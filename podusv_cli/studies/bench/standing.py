@@ -141,9 +141,9 @@ BOARD = (
         lambda rows: int((rows.status != "finished").sum()),
         "failed",
         lambda law: f"{law.failed:.0f} of {law.cases:.0f}",
-        "A run has failed where it does not reach its end, or is further off its standoff than "
-        "metrics.settling_radius on average over the last part of the run, half of the hull's "
-        "length and a fifth in podusv's own bench.",
+        "A run has failed where it does not reach its end, or ends further off its standoff than "
+        "metrics.settling_radius, on average over the last part of the run. In podusv's own bench "
+        "these are half of the hull's length, and a fifth.",
     ),
     Column(
         "median_ratio",

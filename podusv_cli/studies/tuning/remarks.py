@@ -111,7 +111,7 @@ def _idle(results: SearchResults) -> Iterator[str]:
     """Gains that no run depends on."""
     for law, keys in results.plan.idle.items():
         if keys:
-            yield f"{law}: not searched, as no run depends on it: {', '.join(keys)}"
+            yield f"{law}: not searched, since no run depends on them: {', '.join(keys)}"
 
 
 def _unsound(results: SearchResults) -> Iterator[str]:

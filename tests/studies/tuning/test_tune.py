@@ -237,7 +237,7 @@ def test_the_command_prints_before_and_after(optuna, podusv, tmp_path):
     told = json.loads((tmp_path / "out" / "tune.json").read_text())
     assert told["gains"] == {"toy": ["gain", "other"], "bare": []}
     assert told["idle"] == {"toy": ["unread"]}
-    assert "toy: not searched, as no run depends on it: unread" in out
+    assert "toy: not searched, since no run depends on them: unread" in out
 
 
 def test_without_optuna_the_command_says_how_to_get_it(podusv, tmp_path, monkeypatch):
