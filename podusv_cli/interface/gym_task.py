@@ -169,13 +169,13 @@ class EpisodeTask:
         Shape (2,) or (3,). Raises UsageError.
         """
         limits = numbers(self.scenario.actuator.limits() if given is None else given)
-        most, example = ("yaw moment", "limits=(8.0, 2.5) [N, N m]")
+        most, example = "surge force and yaw moment", "limits=(8.0, 2.5) [N, N m]"
         if self.demands > OUTPUTS:
-            most, example = ("yaw moment and sway force", "limits=(8.0, 2.5, 4.0) [N, N m, N]")
+            most = "surge force, yaw moment and sway force"
+            example = "limits=(8.0, 2.5, 4.0) [N, N m, N]"
         if limits.shape != (self.demands,) or not (limits >= 0.0).all():
             raise UsageError(
-                f"podusv.gym: the limits are {given!r}; give the largest surge force and {most}, "
-                f"as in {example}"
+                f"podusv.gym: the limits are {given!r}; give the largest {most}, as in {example}"
             )
         if not np.isfinite(limits).all():
             raise UsageError(

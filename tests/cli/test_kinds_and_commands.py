@@ -85,9 +85,11 @@ def gym(podusv: Command, kind: str) -> Said:
     from podusv_cli.core.errors import PodusvError
 
     try:
-        env = podusv.gym.Env("a.yaml", period=0.1, reward="effort_u", limits=(8.0, 2.5))
+        count = 3 if kind == "poses" else 2
+        limits, action = (8.0, 2.5, 8.0)[:count], (1.0, 0.1, 0.2)[:count]
+        env = podusv.gym.Env("a.yaml", period=0.1, reward="effort_u", limits=limits)
         env.reset(seed=0)
-        gained = [env.step((1.0, 0.1))[1] for _ in range(2)]
+        gained = [env.step(action)[1] for _ in range(2)]
     except PodusvError as error:
         return Said(error.exit_code, "", "\n".join(error.lines()))
     return Said(0, str(gained), "")

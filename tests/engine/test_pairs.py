@@ -173,14 +173,15 @@ def columns(drawn: Drawn, count: int) -> dict[str, list[Any]]:
 def session_and_run(drawn: Drawn, place: Path) -> None:
     """A run step by step, that goes back at times, and the run that it leaves."""
     scenario = drawn.scenario()
+    demands = len(scenario.actuator.limits())
     session = podusv.open_session(scenario, period=drawn.seconds(drawn.whole(1, 9)))
     left = drawn.whole(1, 60)
     while session.status == "running" and left:
         before = session.state()
-        session.step(drawn.random.normal(0.0, 3.0, 2))
+        session.step(drawn.random.normal(0.0, 3.0, demands))
         if drawn.whole(0, 4) == 0:
             session.restore(before)
-            session.step(drawn.random.normal(0.0, 3.0, 2))
+            session.step(drawn.random.normal(0.0, 3.0, demands))
         left -= 1
     run, log = session.close(place / "run", figures=False), session.log
     rows = {name: values[: len(log["time"])] for name, values in signals(run).items()}
@@ -203,12 +204,13 @@ def rewards_and_metric(drawn: Drawn, place: Path) -> None:
     gym = pytest.importorskip("podusv.gym", reason="Gymnasium is not installed: podusv[gym]")
     scenario = drawn.scenario(sweep={"draws": 50, "vary": drawn.vary()})
     once = podusv.open_session(scenario, period=drawn.step)
-    once.step((1.0, 0.1))
+    demands = len(scenario.actuator.limits())
+    once.step((1.0, 0.1, -0.3)[:demands])
     known = [name for name in REWARDS if math.isfinite(once.metric(name))]
     reward = str(drawn.random.choice(known))
     given: dict[str, Any] = {
         "reward": reward,
-        "limits": (9.0, 3.0),
+        "limits": (9.0, 3.0, 5.0)[:demands],
         "period": drawn.seconds(drawn.whole(1, 9)),
     }
     count, seed = drawn.whole(3, LANES + 1), drawn.whole(0, 40)
@@ -218,7 +220,7 @@ def rewards_and_metric(drawn: Drawn, place: Path) -> None:
     same(seen, [env.reset(seed=seed + i)[0] for i, env in enumerate(ones)], "first")
     gained, over = np.zeros(count), False
     while not over:
-        actions = drawn.random.normal(0.0, 4.0, (count, 2))
+        actions = drawn.random.normal(0.0, 4.0, (count, demands))
         seen, rewards, dead, cut, _ = many.step(actions)
         alone = [env.step(action) for env, action in zip(ones, actions, strict=True)]
         for at, together in enumerate((seen, rewards, dead, cut)):
