@@ -132,14 +132,22 @@ def serve(
     `page` makes it, with the path under which it asks. Raises OSError where the port is taken.
     """
     with _Server(port, page) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
-        started(f"http://{HOST}:{server.server_port}{server.base}")
-        while True:
-            try:
-                name, asked, waiting = server.jobs.get(timeout=GLANCE)
-            except Empty:  # a signal that comes as the wait begins would else wait for a question
-                continue
-            waiting.put(_encode_answer(answer(name, asked)))
+        Thread(target=server.serve_forever, args=(GLANCE,), daemon=True).start()
+        try:
+            started(f"http://{HOST}:{server.server_port}{server.base}")
+            _answer_questions(server, answer)
+        finally:
+            server.shutdown()  # or its thread would spin on a socket that is closed
+
+
+def _answer_questions(server: _Server, answer: Answer) -> None:
+    """Answer what is asked, one question after the other, until Ctrl-C."""
+    while True:
+        try:
+            name, asked, waiting = server.jobs.get(timeout=GLANCE)
+        except Empty:  # a signal that comes as the wait begins would else wait for a question
+            continue
+        waiting.put(_encode_answer(answer(name, asked)))
 
 
 def _parse_question(question: bytes) -> Any:

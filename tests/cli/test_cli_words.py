@@ -138,7 +138,7 @@ def test_explain_shows_the_sections_without_a_key(podusv):
         "doubt",
         "identify",
     ]
-    assert f"    kinds: {', '.join(kinds('paths'))}\n" in out
+    assert f" kinds: {', '.join(kinds('paths'))} disturbance " in " ".join(out.split())
 
 
 @pytest.mark.parametrize("columns", ["20", "40", "300"])

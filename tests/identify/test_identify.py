@@ -351,7 +351,7 @@ def test_thrust_that_is_found_is_said_since_the_hull_has_no_place_for_it(boat):
         lines = thrust_words(Identification(given, found, directions(np.eye(size), 2), (), ()))
         assert len(lines) == count
     assert lines[0].startswith("thrust is 0.8 (")
-    assert "multiply the actuator's thrust" in lines[0]
+    assert "Multiply the actuator's thrust" in lines[0]
 
 
 @pytest.mark.parametrize(("off", "count"), [(-1.5, 1), (-0.1, 0), (0.0, 0), (1.5, 0)])

@@ -13,6 +13,7 @@ from podusv_cli.core import json_text
 from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import SizingError
+from podusv_cli.engine.loop.closed_loop import unmet
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.identify import Identify
 from podusv_cli.scenario.keys import limits, members, sections
@@ -154,7 +155,9 @@ def possible(data: dict[str, Any]) -> Scenario:
     except (ValidationError, SizingError):
         return reject()
     seas, step = made.disturbances().values(), made.simulation.step
-    return reject() if any(any(sea.conflicts(made.vessel, step)) for sea in seas) else made
+    refused = any(any(sea.conflicts(made.vessel, step)) for sea in seas)
+    missing = any(any(unmet(law, made.path, made.actuator)) for law in made.laws().values())
+    return reject() if refused or missing else made
 
 
 # podusv refuses most mixtures of values, as it should; in place of the checks of conftest.py.

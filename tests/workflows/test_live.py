@@ -250,6 +250,8 @@ def served(capfd: pytest.CaptureFixture[str]) -> Iterator[tuple[str, str]]:
         answered(host, "POST", f"/{base}end", None, b"{}", patience=0.1)
     page.join(10)
     assert not page.is_alive()
+    left = [thread.name for thread in threading.enumerate() if "serve_forever" in thread.name]
+    assert not left, "it spins on a socket that is closed"
     assert capfd.readouterr() == ("", "")
 
 
