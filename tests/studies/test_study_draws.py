@@ -16,7 +16,6 @@ from scipy.stats import qmc
 
 import podusv
 from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.components.actuators.command import Command
 from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.sensors import Sensors
@@ -229,11 +228,12 @@ FAILED = {"time": 3.0, "pod": 0}
 
 def with_kind(folder: str, kind: type[Component]) -> Scenario:
     """The paper's task with this component, behind whatever it needs and may have."""
-    part = example(kind)
-    if isinstance(part, Actuator):
-        failure = type(part).model_fields["failure"].annotation.__args__[0]
+    around: dict[str, Any] = {}
+    if issubclass(kind, Actuator):
+        failure = kind.model_fields["failure"].annotation.__args__[0]
         own = {k: v for k, v in FAILED.items() if k in failure.model_fields}
-        part = part.model_copy(update={"command": Command(delay=0.1), "failure": failure(**own)})
+        around = {"command": {"delay": 0.1}, "failure": own}
+    part = example(kind, **around)
     estimates = isinstance(part, Estimator) and not isinstance(part, NoEstimator)
     seen = {"measurement": Sensors()} if estimates else {}
     task = podusv.load("podusv:mu_2017/corrected.yaml").alone()
