@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOMS, corrected, example, kinds
+from conftest import ROOMS, corrected, example, kinds, needed_by
 from scenario_samples import SOUND
 
 from podusv_cli.comparison.log_difference import compare
@@ -105,8 +105,8 @@ def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
 @pytest.mark.parametrize("part", PARTS)
 def test_machine_code_and_plain_python_agree_to_the_last_bit(part):
     law = PARTS[part].get("controller", AdaptiveNeural())
-    limits = SaturatedFull() if law.asks_sway() else Saturated()
-    loop = corrected(**{"actuator": limits, **PARTS[part]})
+    needed = needed_by(law, SaturatedFull())
+    loop = corrected(**{"actuator": Saturated(), **needed, **PARTS[part]})
     for hold_every in (0, 5) if "controller" in PARTS[part] else (0,):
         compiled, plain = both(loop, hold_every)
         assert compiled.status == "finished"
