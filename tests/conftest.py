@@ -6,7 +6,7 @@ import signal
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path as File
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import pytest
@@ -193,6 +193,19 @@ def situations(law: Controller, count: int, seed: int = 1) -> Iterator[Situation
         yield Situation(x, memory + random.normal(0, 0.3, len(memory)), target)
 
 
+def needed_by(law: Controller, full: Actuator) -> dict[str, Any]:
+    """The path with a heading that a law reads, and `full` where it asks for a sway force."""
+    path = {"path": example(Poses)} if law.wants_heading() else {}
+    return {**path, "actuator": full} if law.asks_sway() else path
+
+
+def failure_of(kind: type[Actuator], time: float) -> dict[str, Any]:
+    """What fails at a time [s] of an actuator of this class; of pods, the first."""
+    (failure, _) = get_args(kind.model_fields["failure"].annotation)
+    named = {"time": time, "pod": 0}
+    return {name: number for name, number in named.items() if name in failure.model_fields}
+
+
 def corrected(**parts: Any) -> ClosedLoop:
     """The corrected closed loop without limits, from the printed start, with parts replaced.
 
@@ -206,12 +219,8 @@ def corrected(**parts: Any) -> ClosedLoop:
         "controller": AdaptiveNeural(),
         "start": PRINTED_START,
     }
-    law = parts.get("controller")
-    if law is not None and law.asks_sway():
-        defaults["actuator"] = IdealFull()
-    if law is not None and law.wants_heading():
-        defaults["path"] = example(Poses)
-    chosen = defaults | parts
+    law = parts.get("controller", defaults["controller"])
+    chosen = defaults | needed_by(law, IdealFull()) | parts
     return ClosedLoop(**{"nominal": chosen["vessel"]} | chosen)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import NONLINEAR, ROOMS, corrected, example, kinds
+from conftest import NONLINEAR, ROOMS, corrected, example, kinds, needed_by
 from scenario_samples import loaded
 
 import podusv
@@ -17,7 +17,6 @@ from benchmarks.variants import variants
 from podusv_cli.components.actuators.saturated_full import SaturatedFull
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.network import Network
-from podusv_cli.components.paths.poses import Poses
 from podusv_cli.core.errors import LawError
 from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.engine.loop.closed_loop import ClosedLoop
@@ -59,9 +58,10 @@ def with_part(section: str, kind: Any) -> Scenario:
     """The task with this part; an estimator gets sensors, and a law of poses what it needs."""
     beside = SENSORS if section == "estimator" else {}
     fields = TRIALS.get(kind.model_fields["kind"].default, {})
-    if section == "controller" and example(kind, **fields).asks_sway():
-        beside = {"path": example(Poses), "actuator": SaturatedFull()}
-    return TASK.model_copy(update={**beside, section: example(kind, **fields)})
+    part = example(kind, **fields)
+    if section == "controller":
+        beside = needed_by(part, SaturatedFull())
+    return TASK.model_copy(update={**beside, section: part})
 
 
 def changed(scenario: Scenario, key: str, old: float) -> Scenario | None:

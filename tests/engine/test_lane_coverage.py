@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import REQUIRED
+from conftest import REQUIRED, needed_by
 from test_lanes import COUNT, ROOT, both, loop, same, scattered
 
 from benchmarks.variants import variants
 from podusv_cli.components.actuators.base import Actuator
+from podusv_cli.components.actuators.ideal_full import IdealFull
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.disturbances.base import Disturbance
 from podusv_cli.components.paths.base import Path
@@ -66,7 +67,9 @@ def spread(base: ClosedLoop) -> list[ClosedLoop]:
 @pytest.mark.parametrize("law", but_quick(sorted(set(LAWS) - set(TESTED)), QUICK))
 def test_every_law_marches_side_by_side(law: str) -> None:
     """With the paper's task; also those that diverge, at different instants."""
-    base = replace(loop("pid"), controller=made(LAWS[law]))
+    controller = made(LAWS[law])
+    needed = needed_by(controller, IdealFull())
+    base = replace(loop("pid"), controller=controller, **needed)
     together, alone = both(scattered(base, 7), GRID)
     same(together, alone)
     assert why_alone(Plan.with_probe(base, GRID, Probe())) == ""

@@ -19,14 +19,13 @@ import cortex_m7
 import numpy as np
 import pytest
 from command_samples import one_line
-from conftest import example, kinds
+from conftest import example, failure_of, kinds
 from export_samples import HARDWARE, SOURCE, export_law, exported, law, needs_cc, scenario, task
 from exported_laws import Unit
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import podusv
-from podusv_cli.components.actuators.command import Command, EffectivenessLoss
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.core import registry
 from podusv_cli.core.errors import StorageError, UsageError
@@ -116,7 +115,9 @@ def test_a_law_that_loads_between_samples_change_is_held_against_itself(tmp_path
         "vessel={preset: otter}",
     ]
     folder = export_law(Path(SOURCE), tmp_path / "law", changes, fmu=False, say=said.append)
-    assert any("check your code by that, not by log.h5" in text for text in said)
+    (note,) = [text for text in said if "log.h5" in text]
+    assert note.startswith("the demands of the exported law differ from those in log.h5: ")
+    assert "check your code by check.csv, which has what the exported law answers" in note
     assert not any("the run" in text and "samples before" in text for text in said)
     assert not json.loads((folder / "law.json").read_text())["of_run"]
     if shutil.which("cc"):
@@ -267,8 +268,8 @@ def test_an_actuator_cuts_the_demand_and_nothing_else_where_it_says_so(kind):
         u, r, *v = np.clip(demand, np.negative(limits), limits)
         loads = actuator._drive_once(random.normal(0.0, 1.0, 6), actuator.rest(), demand)[0]
         assert np.array_equal(loads, [u, *(v or [0.0]), r]) == actuator.only_cuts
-    for around in ({"command": Command()}, {"failure": EffectivenessLoss(time=1e9)}):
-        assert not actuator.model_copy(update=around).only_cuts
+    for around in ({"command": {}}, {"failure": failure_of(kind, 1e9)}):
+        assert not example(kind, **around).only_cuts
 
 
 def test_an_fmu_is_for_this_machine_or_for_those_asked_for_each_said_before_it(monkeypatch):

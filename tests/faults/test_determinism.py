@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOMS, corrected, example, kinds
+from conftest import ROOMS, corrected, example, kinds, needed_by
 from scenario_samples import SOUND
 
 from podusv_cli.comparison.log_difference import compare
 from podusv_cli.comparison.run_difference import CLOCKED
 from podusv_cli.components.actuators.saturated import Saturated
+from podusv_cli.components.actuators.saturated_full import SaturatedFull
 from podusv_cli.components.controllers.adaptive_neural import AdaptiveNeural
 from podusv_cli.components.controllers.full_backstepping import FullBackstepping
 from podusv_cli.components.paths.line_circle import LineCircle
@@ -103,7 +104,9 @@ def both(loop: ClosedLoop, hold_every: int) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("part", PARTS)
 def test_machine_code_and_plain_python_agree_to_the_last_bit(part):
-    loop = corrected(**{"actuator": Saturated(), **PARTS[part]})
+    law = PARTS[part].get("controller", AdaptiveNeural())
+    needed = needed_by(law, SaturatedFull())
+    loop = corrected(**{"actuator": Saturated(), **needed, **PARTS[part]})
     for hold_every in (0, 5) if "controller" in PARTS[part] else (0,):
         compiled, plain = both(loop, hold_every)
         assert compiled.status == "finished"

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import example, kinds
+from conftest import example, failure_of, kinds, needed_by
 from counting import counted
 from scenario_samples import loaded
 from scipy.stats import qmc
 
 import podusv
 from podusv_cli.components.actuators.base import Actuator
-from podusv_cli.components.actuators.command import Command
+from podusv_cli.components.actuators.ideal_full import IdealFull
+from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.estimators.base import Estimator
 from podusv_cli.components.estimators.none import NoEstimator
 from podusv_cli.components.measurements.sensors import Sensors
@@ -224,20 +225,19 @@ AROUND = {
     "paths": "path",
     "controllers": "controller",
 }
-FAILED = {"time": 3.0, "pod": 0}
 
 
 def with_kind(folder: str, kind: type[Component]) -> Scenario:
     """The paper's task with this component, behind whatever it needs and may have."""
-    part = example(kind)
-    if isinstance(part, Actuator):
-        failure = type(part).model_fields["failure"].annotation.__args__[0]
-        own = {k: v for k, v in FAILED.items() if k in failure.model_fields}
-        part = part.model_copy(update={"command": Command(delay=0.1), "failure": failure(**own)})
+    around = {}
+    if issubclass(kind, Actuator):
+        around = {"command": {"delay": 0.1}, "failure": failure_of(kind, 3.0)}
+    part = example(kind, **around)
     estimates = isinstance(part, Estimator) and not isinstance(part, NoEstimator)
     seen = {"measurement": Sensors()} if estimates else {}
+    needed = needed_by(part, IdealFull()) if isinstance(part, Controller) else {}
     task = podusv.load("podusv:mu_2017/corrected.yaml").alone()
-    return task.model_copy(update={**seen, AROUND[folder]: part})
+    return task.model_copy(update={**seen, **needed, AROUND[folder]: part})
 
 
 def awkward(own: float) -> list[float]:
