@@ -141,6 +141,8 @@ def check(scenario: Scenario, progress: Progress | None = None) -> RunVerificati
 
 def floor_of(unit: str, length: float, duration: float) -> float:
     """Up to which an error in this unit is none, of a vessel's length [m] and a run's time [s]."""
+    if unit == "rad":
+        return NO_DISTANCE  # times the length it is how far the bow is off
     metres, seconds = DISTANCES.get(unit, (0, 0))
     return max((NO_DISTANCE * length) ** metres * duration**seconds, FLOOR) if metres else FLOOR
 

@@ -332,4 +332,5 @@ def test_a_law_that_is_exact_on_its_path_has_converged():
 def test_a_distance_is_none_of_a_billionth_of_the_hull_and_a_force_of_a_piconewton():
     assert floor_of("m", 10.0, 100.0) == pytest.approx(1e-8)
     assert floor_of("m s", 10.0, 100.0) == pytest.approx(1e-6)
+    assert floor_of("rad", 10.0, 100.0) == pytest.approx(1e-9)
     assert floor_of("m2 s", 1.0, 100.0) == floor_of("N", 10.0, 100.0) == 1e-12

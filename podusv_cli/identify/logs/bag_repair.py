@@ -15,6 +15,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from podusv_cli.core.escaping import visible
 from podusv_cli.identify.logs.contents import LogFault
 
 MCAP, ROS1 = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n"  # what a file begins with
@@ -260,7 +261,8 @@ def _copy_rows(path: Path, copy: Path) -> Path:
                     new.execute(making)
                     _copy_table(old, new, name)
         except sqlite3.DatabaseError as error:
-            raise LogFault(f"{path}: cannot be read: it is damaged ({error})") from error
+            what = visible(" ".join(str(error).split()))
+            raise LogFault(f"{path}: cannot be read: it is damaged ({what})") from error
         new.commit()
     return copy
 

@@ -200,7 +200,7 @@ def passed(path: Command, demand: float) -> float:
     """What an ideal actuator is given of a surge demand."""
     tau, signals = np.zeros(3), np.zeros(2)
     actuator = Ideal(command=path)
-    asked = np.array([demand, 0.0, 0.0])
+    asked = np.array([demand, 0.0, 0.0, 0.0])  # the last is when the step began
     k = bundle(actuator.constants())
     actuator.drive_with()(
         0.0, np.zeros(6), np.zeros(0), asked, k, np.zeros(1), tau, np.zeros(0), signals
