@@ -144,7 +144,8 @@ def test_one_of_several_laws_may_have_a_schedule():
         (
             "0,1,1\n1,2\n",
             "line 2 of the schedule has 2; every line must have 3 (t, tau_u, tau_r) "
-            "or 4 (t, tau_u, tau_r, tau_v) or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r)",
+            "or 4 (t, tau_u, tau_r, tau_v) "
+            "or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r)",
         ),
         ("t,tau_u,tau_r\n0,1,1\n1,s3cret,2\n", "line 3, column 2 of the schedule is no number"),
         ("0,1,1\n1,nan,2\n", "line 2, column 2 of the schedule is not a finite number"),
