@@ -17,7 +17,8 @@ from podusv_cli.figures.shown import Shown, about, unit
 from podusv_cli.figures.style import legend, new_figure, remark
 
 DEMANDS = {"tau_u_cmd": "b_u", "tau_r_cmd": "b_r"}  # what the law demands, and what disturbs it
-AXES = {"tau_u_cmd": "surge", "tau_r_cmd": "yaw"}
+SWAY = {"tau_v_cmd": "b_v"}  # of actuators that take it
+AXES = {"tau_u_cmd": "surge", "tau_r_cmd": "yaw", "tau_v_cmd": "sway"}
 SEA: dict[str, Any] = {"color": "#444444", "linestyle": (0, (1, 1)), "label": "disturbance"}
 DECADES = 6  # shown below the largest harmonic
 HEIGHT = 2.4  # inches
@@ -32,11 +33,13 @@ HEIGHT = 2.4  # inches
     "disturbance and the path do not have comes from the law",
 )
 def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
-    """Demands in surge and yaw over angular frequency, of runs that got to their settled part."""
+    """Demands over angular frequency, of runs that got to their settled part."""
     whole = [run for run in runs if run.counts_to > run.steady_from]
-    figure = new_figure(columns, HEIGHT if columns == 2 else 2 * HEIGHT)
-    panels = figure.subplots(1, 2) if columns == 2 else figure.subplots(2, 1)
-    for axes, (demand, load) in zip(panels, DEMANDS.items(), strict=True):
+    demands = DEMANDS | {d: b for d, b in SWAY.items() if any(run.has(d) for run in runs)}
+    count = len(demands)
+    figure = new_figure(columns, HEIGHT if columns == 2 else count * HEIGHT)
+    panels = figure.subplots(1, count) if columns == 2 else figure.subplots(count, 1)
+    for axes, (demand, load) in zip(panels, demands.items(), strict=True):
         for run in (run for run in whole[:1] if run.has(load)):
             _draw(axes, run, load, **SEA)
         for run in (run for run in whole if run.has(demand)):

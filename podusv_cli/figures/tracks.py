@@ -70,17 +70,17 @@ def _target(group: Sequence[Shown], *, only: bool) -> Target:
     return Target(group, style, longest)
 
 
-def bounds(runs: Sequence[Shown]) -> tuple[Span, Span]:
+def bounds(runs: Sequence[Shown], room: float = 0.0) -> tuple[Span, Span]:
     """Limits east and north [m] of a map of the targets and of the runs that finished, if any.
 
-    Where none finished, targets alone.
+    Where none finished, targets alone. At least `room` [m] is left around them.
     """
     pairs = [target.track() for target in targets(runs)]
     pairs += [(run.recording["y"], run.recording["x"]) for run in runs if run.whole]
     pairs += [(run.recording["y"][:1], run.recording["x"][:1]) for run in runs]
     corners = ([(part.min(), part.max()) for part in parts] for parts in zip(*pairs, strict=True))
     east, north = (np.ravel(extremes) for extremes in corners)
-    margin = 0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0)
+    margin = max(0.06 * max(float(np.ptp(east)), float(np.ptp(north)), 1.0), room)
     return (
         (float(east.min()) - margin, float(east.max()) + margin),
         (float(north.min()) - margin, float(north.max()) + margin),

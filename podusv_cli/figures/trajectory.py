@@ -35,6 +35,7 @@ WIDE_MAP = 1.6  # times as wide as high, from where a map stands above the close
 NAME = 36  # letters of a run's name in a title
 DEVIATION, LEG = "e_ct", "leg"  # from a path that is followed, and how much of it is done
 FRAME: dict[str, Any] = {"fill": False, "edgecolor": "#444444", "linewidth": 0.5}
+LARGEST_FRAME = 0.7  # of the map: a close-up of more is not framed on it
 LEAST_DISTANCE = 1e-4  # m, on a logarithmic axis
 NEAREST, FARTHEST = 2.0, 20.0  # lengths from the middle of the close-up to its edges
 MARK: dict[str, Any] = {"color": "#444444", "linestyle": "none"}
@@ -81,7 +82,8 @@ def hull_of(run: Shown, t: float, scale: float) -> Vector:
 )
 def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     """Tracks and target on a map, hulls enlarged to show the heading; close-ups and distances."""
-    east, north = bounds(runs)
+    longest = enlargement(runs) * max(run.length for run in runs)
+    east, north = bounds(runs, room=0.5 * longest)
     seen = views(runs)
     compared = [run for run in runs if run in seen[-1].target.runs]
     shape = float(np.ptp(east) / np.ptp(north))
@@ -94,6 +96,8 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
     for axes, view, letter in zip(asides, seen, "bc", strict=False):
         close_up(axes, view, runs)
         (left, low), width = view.middle - view.reach, 2.0 * view.reach
+        if width > LARGEST_FRAME * max(np.ptp(east), np.ptp(north)):
+            continue  # its edges would be lines across the map
         whole.add_patch(Rectangle((left, low), width, width, **FRAME))
         whole.annotate(letter, (left + width, low), (1, 0), textcoords="offset points", fontsize=7)
     if below:

@@ -68,7 +68,7 @@ def reference(scenario: Scenario) -> Reference:
     """Sample a scenario's target and loads, and balance the hull's loads at each sample."""
     time = np.linspace(0.0, scenario.simulation.duration, SAMPLES)
     if scenario.controller.asks_sway() and scenario.path.heads:
-        return _posed(scenario, time)
+        return _reference_of_poses(scenario, time)
     target = scenario.path.targets(time.tolist())
     speed, turn, along = _motion(target)
     load = _loads(scenario, time, target, turn)
@@ -85,7 +85,7 @@ def reference(scenario: Scenario) -> Reference:
     return Reference(time, speed, nu, load, demand - load[:, [0, 2]])
 
 
-def _posed(scenario: Scenario, time: Vector) -> Reference:
+def _reference_of_poses(scenario: Scenario, time: Vector) -> Reference:
     """The same where the path has a heading, and the law pushes sideways: tau = M nu' - f(nu) - b.
 
     nu = R^T p_d' with the rate of the heading; nu' = R^T p_d'' - r S nu.

@@ -10,6 +10,7 @@ from drawn_samples import CENTER, WIDTH, drawn, line, looked_at, panels, recordi
 from known_signals import ABOUT
 from matplotlib.cbook import is_math_text
 from matplotlib.text import Text
+from pose_samples import BOAT, HELD, POSES, loaded_pose, marched
 from rerun_samples import made
 from scenario_samples import SOUND
 
@@ -437,3 +438,17 @@ def test_the_spectrum_shows_a_cycle_of_the_settled_demand():
     assert peaks_at["cycling"] == pytest.approx((70.0, 50.0 / math.sqrt(2.0)), rel=0.3)
     assert peaks_at["calm"][0] < 1.0
     assert [line.get_label() for line in yaw.lines] == ["disturbance", "calm", "cycling"]
+
+
+def test_a_sway_force_that_is_asked_for_has_panels_of_its_own():
+    text = BOAT + POSES + HELD
+    runs = shown(("a", marched(text), loaded_pose(text)))
+    surge, yaw, sway = drawn("spectrum", runs).axes
+    assert [axes.get_title() for axes in (surge, yaw, sway)] == ["surge", "yaw", "sway"]
+    settled = runs[0].during("tau_v_cmd", (runs[0].steady_from, runs[0].counts_to))
+    rates, power = periodogram(*settled)
+    (curve,) = (line for line in sway.lines if line.get_label() == "a")
+    np.testing.assert_array_equal(curve.get_ydata(), np.sqrt(power[1:]))
+    np.testing.assert_array_equal(curve.get_xdata(), rates[1:])
+    rows = [axes.get_ylabel() for axes in drawn("controls", runs).axes[::3]]
+    assert rows == [r"$\tau_u$ [N]", r"$\tau_r$ [N m]", r"$\tau_v$ [N]"]

@@ -145,6 +145,27 @@ def test_a_close_up_shows_where_the_runs_are_farthest_apart():
     assert [text.get_text() for text in whole.texts] == ["b", "c"]
 
 
+def test_a_close_up_of_nearly_the_whole_map_has_no_frame_and_hulls_lie_on_the_map():
+    """A boat on a path of four of its lengths, as in the four-corner test."""
+    size = 4.0 * LENGTH
+    short = {
+        "x": lambda t: size * t / 100.0,
+        "y": lambda t: size * t / 100.0,
+        "x_d": lambda t: size * t / 100.0,
+        "y_d": lambda t: size * t / 100.0,
+        "psi": lambda t: np.full_like(t, np.pi / 2.0),
+    }
+    whole, *_ = drawn("trajectory", shown(("a", recording(**short)))).axes
+    assert title(whole) == "(a) hulls to scale"
+    assert not [patch for patch in whole.patches if isinstance(patch, Rectangle)]
+    whole.apply_aspect()
+    (west, east), (south, north) = whole.get_xlim(), whole.get_ylim()
+    for points in (hulls(whole)[-1][:2], hulls(whole)[0][:2]):
+        for y, x in points:
+            assert west <= y <= east
+            assert south <= x <= north
+
+
 def test_the_close_up_shows_the_last_twentieth_to_scale(two):
     whole, *_, end, _ = drawn("trajectory", two).axes
     for run in two:

@@ -123,6 +123,16 @@ def _lose(state: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) ->
     """Stands for an actuator's `lose`."""
 
 
+# demand (DRIVEN,), the last number when the step began [s]; writes given (DRIVEN,).
+@kernel
+def shape_demand(demand: Vector, k: Any, given: Vector) -> None:
+    """The demand with surge and yaw rounded and the dead zone taken off, the rest as it is."""
+    for i in range(DRIVEN):
+        given[i] = demand[i]
+    given[0] = beyond(round_to(demand[0], k.command_resolution_u), k.command_dead_zone_u)
+    given[1] = beyond(round_to(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+
+
 # Arguments as those of `Actuator.drive`; `demand` has one more number, when the step began [s].
 def _drive_commanded(
     t: float,
@@ -137,10 +147,7 @@ def _drive_commanded(
 ) -> None:
     """`drive` with the demand rounded and the dead zone taken off; its signals come first."""
     given = scratch(DRIVEN)
-    for i in range(DRIVEN):
-        given[i] = demand[i]
-    given[0] = beyond(round_to(demand[0], k.command_resolution_u), k.command_dead_zone_u)
-    given[1] = beyond(round_to(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+    shape_demand(demand, k, given)
     signals[0], signals[1] = given[0], given[1]
     _inner(t, x, state, given, k, table, tau, rate, tail(signals, LOGGED))
 
@@ -159,10 +166,7 @@ def _drive_fully_commanded(
 ) -> None:
     """The same with a sway force."""
     given = scratch(DRIVEN)
-    for i in range(DRIVEN):
-        given[i] = demand[i]
-    given[0] = beyond(round_to(demand[0], k.command_resolution_u), k.command_dead_zone_u)
-    given[1] = beyond(round_to(demand[1], k.command_resolution_r), k.command_dead_zone_r)
+    shape_demand(demand, k, given)
     given[SWAY] = beyond(round_to(demand[SWAY], k.command_resolution_v), k.command_dead_zone_v)
     signals[0], signals[1], signals[SWAY] = given[0], given[1], given[SWAY]
     _inner(t, x, state, given, k, table, tau, rate, tail(signals, SWAY + 1))

@@ -219,7 +219,7 @@ class Pods(Actuator):
         return self
 
     @model_validator(mode="after")
-    def _commanded(self) -> Self:
+    def _check_command(self) -> Self:
         """Raises ValueError for a command path of a sway force that is not taken."""
         path = self.command
         if path and not self.takes_sway and (path.resolution_v or path.dead_zone_v):
