@@ -150,10 +150,14 @@ def _in_order(rows: Vector, order: list[int], header: TextLine, noun: str) -> Ve
 def _in_own_units(
     header: TextLine, names: Sequence[str], scales: ScaledUnits
 ) -> tuple[TextLine, list[Scale]]:
-    """The header with the units that columns of these names have, and the scale to each."""
+    """The header with the units that columns of these names have, and the scale to each.
+
+    `time`, as logs call it, is `t`.
+    """
     own = dict(map(_split_unit, names))
-    cells, units = list(header.cells), [Scale(0.0, 1.0)] * len(header.cells)
-    for i, cell in enumerate(header.cells):
+    cells = [re.sub(r"^time(?= \[|$)", "t", " ".join(cell.split())) for cell in header.cells]
+    units = [Scale(0.0, 1.0)] * len(cells)
+    for i, cell in enumerate(list(cells)):
         name, unit = _split_unit(cell)
         factor = units_allowed_for(own[name]).get(spell_unit(unit)) if own.get(name) else None
         scale = Scale(0.0, float(factor)) if factor else scales.get((name, spell_unit(unit)))
@@ -164,7 +168,7 @@ def _in_own_units(
 
 def _split_unit(cell: str) -> tuple[str, str]:
     """Name and unit of "b_u [N]"; without a unit, none."""
-    name, _, unit = " ".join(cell.split()).partition(" [")
+    name, _, unit = cell.partition(" [")
     return name, unit.removesuffix("]")
 
 

@@ -345,3 +345,35 @@ def test_a_run_to_port_is_the_mirror_image_of_one_to_starboard_for_poses(kind):
     for name in ("x", "y", "psi", "u", "v", "r", "tau_u", "tau_v", "tau_r", "heading_d"):
         side = 1.0 if name in ("x", "u", "tau_u") else -1.0
         np.testing.assert_allclose(runs[0][name], side * runs[1][name], atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        "{kind: pose_backstepping, k_i: 0.02}",
+        "{kind: pose_sliding_mode}",
+        # K_p is of north and east, as in its source.
+        pytest.param("{kind: pose_pid}", marks=pytest.mark.xfail(strict=True)),
+    ],
+)
+def test_a_task_that_is_turned_is_done_alike(law):
+    """North has no part in the equations: errors and demands, with a sampled and delayed law."""
+    logs = []
+    for turn in (0.0, 2.1):
+        c, s = math.cos(turn), math.sin(turn)
+        poses = [
+            [c * x - s * y, s * x + c * y, psi + turn] for x, y, psi in ((0, 0, 0.2), (2, 1, 1))
+        ]
+        logs.append(
+            marched(
+                BOAT + POSES + f"controller: {law}\n",
+                f"path.poses={poses}",
+                f"start={{x: {0.3 * c}, y: {0.3 * s}, psi: {0.3 + turn}}}",
+                f"disturbance={{kind: current, speed: 0.05, direction: {0.6 + turn}}}",
+                "control.period=0.14",
+                "actuator.command={delay: 0.1}",
+                "simulation.duration=12.04",
+            )
+        )
+    for name in ("z_1u", "z_1v", "psi_t", "tau_u_cmd", "tau_v_cmd", "tau_r_cmd"):
+        np.testing.assert_allclose(logs[1][name], logs[0][name], rtol=0.0, atol=1e-11)

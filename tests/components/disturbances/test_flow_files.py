@@ -54,6 +54,17 @@ def test_a_flow_is_straight_between_its_rows_and_held_beyond_them(t):
     np.testing.assert_allclose(air[3:], [share * speed * 1852 / 3600, direction], atol=1e-14)
 
 
+@pytest.mark.parametrize("time", ["time", "time [s]", "t [s]"])
+def test_times_have_the_name_that_logs_have(time):
+    """Rows at 5 Hz, with columns in another order."""
+    rows = [f"{i % 360},{0.2 * i:.1f},{1.0 + 0.01 * i:.2f}" for i in range(100)]
+    sea = CurrentFile(rows="\n".join([f"direction [deg],{time},speed", *rows]))
+    direction = math.radians(0.5 * (61.0 + 62.0))
+    np.testing.assert_allclose(written(sea, 12.3)[3:], [1.615, direction], atol=1e-12)
+    with pytest.raises(ValidationError, match="column 1 is none of these"):
+        CurrentFile(rows="timestamp,speed,direction\n0,1,0\n1,1,0\n")
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_from_359_to_1_degree_the_way_leads_through_north(kind):
     sea = kind(rows="t,speed,direction [deg]\n0, 0.2, 359\n10, 0.2, 1\n")
