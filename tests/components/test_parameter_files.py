@@ -47,7 +47,7 @@ def test_files_of_every_ground_station_have_the_same_numbers(line):
         "pos_P": 0.3,
         "speed_FF": pytest.approx(0.3),  # 0.05 + 0.4/1.6, as AR_AttitudeControl adds them
     }
-    assert remarks == ["no key have ATC_STR_RAT_D, SERVO1_FUNCTION"]
+    assert remarks == ["these parameters have no key: ATC_STR_RAT_D, SERVO1_FUNCTION"]
 
 
 def test_a_file_of_old_rovers_asks_for_l1():
@@ -82,7 +82,7 @@ def test_px4_names_full_throttle_and_a_wheel_track():
     }
     assert remarks == [
         "RO_YAW_RATE_LIM sets no limit; podusv's own stands",
-        "no key have RO_JERK_LIM",
+        "these parameters have no key: RO_JERK_LIM",
     ]
 
 
@@ -102,7 +102,7 @@ def test_a_scenario_takes_them_and_its_own_keys_go_before(tmp_path):
     loaded = load(tmp_path / "a.yaml")
     law = loaded.scenario.controller
     assert (law.pos_P, law.speed_P, law.speed_FF, law.file) == (0.25, 0.4, 0.3, None)
-    assert "no key have ATC_STR_RAT_D" in loaded.remarks[0]
+    assert "these parameters have no key: ATC_STR_RAT_D" in loaded.remarks[0]
     assert loaded.origins["controller.speed_P"].endswith("boat.param")
 
 

@@ -51,7 +51,7 @@ def untaken(given: Parameters, taken: set[str], groups: re.Pattern[str]) -> str:
     """Which parameters of these groups have no key, in words; "" where all have one."""
     names = [name for name in given if groups.match(name) and name not in taken]
     more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
-    return f"no key have {', '.join(names[:MOST_LISTED])}{more}" if names else ""
+    return f"these parameters have no key: {', '.join(names[:MOST_LISTED])}{more}" if names else ""
 
 
 ARDUPILOT = {  # parameter: key of the law, and what one of it is in the key's unit

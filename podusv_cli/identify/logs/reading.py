@@ -209,8 +209,9 @@ def _series(
     if not series:
         raise LogFault(
             f"{name}: it has none of x, y (or lat, lon) and psi, which are needed; write "
-            "identify.columns in a scenario beside it, as {x: north, y: east, "
-            f"psi: 'heading [deg]'}} (columns: {list_names(columns)})"
+            "identify.columns in a scenario beside it, as {x: north, y: east, psi: 'heading "
+            f"[deg]'}}, or have podusv identify --columns propose them (columns: "
+            f"{list_names(columns)})"
         )
     return series, [*_doubts(contents, used, name), *words]
 
