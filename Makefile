@@ -103,6 +103,7 @@ bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench
 	    cp results/.bench/figures/profiles.png results/bench/figures
 	@$(BIN)/podusv bench configs/bench_boats --force --out results/.bench_boats && \
 	    cp results/.bench_boats/runs.csv results/bench/boats.csv
+	@$(BIN)/python examples/reproduce/bench.py > results/.table && mv results/.table docs/bench.md
 	@echo "what was found: docs/bench.md; the page: results/.bench/report.html"
 
 docs: $(VENV)/dev.done ## the documentation as a site, into site/index.html
@@ -117,6 +118,7 @@ sweep: $(VENV)/run.done ## the committed studies at full size, about half an hou
 	    (cd results/.studies/$$name && cp summary.csv pairs.csv sensitivity.csv claims.json ../../studies/$$name && \
 	        cp figures/*-iae.png ../../studies/$$name/figures) || exit 1; \
 	done
+	@$(BIN)/python examples/reproduce/studies.py > results/.table && mv results/.table docs/studies.md
 	@echo "what was found: docs/studies.md; every table and figure: results/.studies/*/report.html"
 
 tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour on two cores
@@ -130,6 +132,7 @@ tune: $(VENV)/dev.done ## the committed searches for gains, about half an hour o
 	    $(BIN)/python examples/reproduce/judge.py configs/studies/judge_$$name.yaml results/tuning/hull/gains.csv \
 	        results/tuning/judged/$$name || exit 1; \
 	done
+	@$(BIN)/python examples/reproduce/tuning.py > results/.table && mv results/.table docs/tuning.md
 	@echo "what was found: docs/tuning.md; every table and figure: results/.tuning/*/report.html"
 
 quick: $(VENV)/dev.done ## the test files nearest to what has changed since main

@@ -4,14 +4,13 @@ python examples/reproduce/tuning.py > results/.table && mv results/.table docs/t
 """
 
 import math
-import re
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from fill_page import ratio, with_numbers, with_rows
 
 from podusv_cli.studies.tuning.searches import compare_laws
 
@@ -21,7 +20,6 @@ PAGE = ROOT / "docs" / "tuning.md"
 FOUND = "## What the committed searches found\n"  # where the numbers begin
 LEVEL = 0.95  # of intervals that hold together
 SEEDS = 21  # of resampling; a pair near the limit is apart with some of them
-NUMBER = r"([^\s,;.]+(?:\.\d+)?)"
 PAPERS = ["adaptive_crab", "full_backstepping", "dsc", "adaptive_neural", "los_pid", "pid"]
 
 
@@ -65,10 +63,12 @@ def _ratio(row: Any) -> str:
 
 def sentences() -> Iterator[tuple[Any, ...]]:
     """Sentences with places for numbers, and the numbers."""
+    page = " ".join(PAGE.read_text().split())
     for case in ("hull", "network"):
         for row in table(case, "searches").itertuples():
-            ends = [f"{x:.3f}" for x in (row.ratio, row.ratio_low, row.ratio_high)]
-            yield f"`{row.a}` / `{row.b}`: {{}} [{{}}, {{}}]", *ends
+            pair = f"`{row.a}` / `{row.b}`: "
+            if pair in page:  # not all are named
+                yield f"{pair}{{}} [{{}}, {{}}]", *ratio(row)
     yield (
         "Given these 500 draws {} of 91 pairs are apart, {} of them without `pid`",
         *_apart_given_draws("hull"),
@@ -127,22 +127,7 @@ def _apart_given_draws(case: str) -> tuple[int, int]:
 def filled(page: str) -> str:
     """The page with its table and numbers anew; where lines break stays."""
     before, title, text = page.partition(FOUND)
-    shown = "".join(f"| {' | '.join(row)} |\n" for row in rows())
-    text = re.sub(r"(?m)(^\|---.*\n)(?:\|.*\n)+", lambda match: match[1] + shown, text, count=1)
-    for sentence, *numbers in sentences():
-        words = r"\s+".join(map(re.escape, sentence.split())).replace(r"\{\}", NUMBER)
-        text, found = re.subn(words, partial(_with, numbers=numbers), text)
-        if not (found or " / " in sentence):  # not all pairs are named
-            raise SystemExit(f"docs/tuning.md has no sentence like: {sentence}")
-    return before + title + text
-
-
-def _with(match: re.Match[str], numbers: list[Any]) -> str:
-    text, start = match[0], match.start()
-    for group, number in reversed([*enumerate(numbers, 1)]):
-        first, last = (at - start for at in match.span(group))
-        text = f"{text[:first]}{number}{text[last:]}"
-    return text
+    return before + title + with_numbers(with_rows(text, "| law | place |", rows()), sentences())
 
 
 if __name__ == "__main__":

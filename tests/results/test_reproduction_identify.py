@@ -1,17 +1,10 @@
-"""results/identify.md has the table that its recipe makes of the committed sets."""
-
-import runpy
+"""The recipe of results/identify.md counts sets as the page says."""
 
 import pandas as pd
 import pytest
-from command_samples import ROOT
+from recipe_samples import load_recipe
 
-RECIPE = runpy.run_path(str(ROOT / "examples/reproduce/identify_coverage.py"))
-
-
-def test_the_page_is_as_its_recipe_fills_it():
-    page = (ROOT / "results/identify.md").read_text()
-    assert RECIPE["filled"](page) == page
+RECIPE = load_recipe("identify_coverage")
 
 
 def test_sets_without_a_hull_and_those_that_did_not_settle_count():
