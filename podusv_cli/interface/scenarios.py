@@ -108,7 +108,7 @@ def assignments(changes: Changes | None) -> list[str]:
 def _load_source(
     source: Any, overrides: list[str], checks: Sequence[Check], plugged: Plugged
 ) -> Loaded:
-    return load_file(os.fspath(source), overrides, checks, plugged=plugged)
+    return load_file(source, overrides, checks, plugged=plugged)
 
 
 @_load_source.register

@@ -25,6 +25,7 @@ from podusv_cli.scenario.model import Scenario, scenario_class
 from podusv_cli.scenario.named_files import fill_sections, with_contents, without_files
 from podusv_cli.scenario.presets import complete, stands_in
 from podusv_cli.scenario.resolved import plain_data, yaml_text
+from podusv_cli.scenario.shipped import name_of
 from podusv_cli.scenario.yaml_text import MAX_NODES, read_text
 from podusv_cli.scenario.yaml_tree import (
     Fault,
@@ -162,7 +163,7 @@ def load(
     read.
     """
     faults: list[Fault] = []
-    source = os.fspath(path)
+    source = name_of(path)
     text = read_text(source, Mark(source), "", faults)
     if text is None:
         raise ScenarioError(_order_faults(faults, source))

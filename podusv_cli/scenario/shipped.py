@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import posixpath
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import podusv_cli
 from podusv_cli.core.phrases import did_you_mean
@@ -49,6 +49,12 @@ def present(name: str) -> str:
     """A shipped scenario's present name."""
     first, slash, rest = name.removeprefix(PREFIX).partition("/")
     return f"{PREFIX}{renamed_folders().get(first, first)}{slash}{rest}"
+
+
+def name_of(path: str | os.PathLike[str]) -> str:
+    """A scenario's name as text; that of a shipped one has no backslashes, also on Windows."""
+    name = os.fspath(path)
+    return path.as_posix() if isinstance(path, PurePath) and is_shipped(name) else name
 
 
 def is_shipped(name: str) -> bool:

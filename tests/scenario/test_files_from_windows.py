@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import PureWindowsPath
 from types import SimpleNamespace
 
 import pytest
@@ -122,3 +123,10 @@ def run():
     assert done.returncode == 0, done.stderr
     shown = done.stdout.decode(encoding)
     assert ("Süd→.yaml" if encoding == "utf-8" else "Süd\\u2192.yaml") in shown
+
+
+def test_a_shipped_scenario_in_a_folder_is_found_from_a_path_of_windows():
+    """Such a path turns the slash of the name."""
+    name = "podusv:mu_2017/corrected.yaml"
+    assert load(PureWindowsPath(name)).scenario == load(name).scenario
+    assert shipped.name_of(PureWindowsPath("boats/a.yaml")) == "boats\\a.yaml"
