@@ -8,6 +8,9 @@ is computed after a march, depend on no machine.
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Iterable
+from functools import reduce
 
 import numpy as np
 
@@ -55,6 +58,11 @@ CENTRAL, TAIL, FAR_TAIL = (
 
 
 WITHIN = (-746.0, 710.0)  # beyond, e^x is 0 or infinite
+
+
+def add_up(numbers: Iterable[float]) -> float:
+    """Their sum, rounded after each; from Python 3.12 on `sum` rounds floats otherwise."""
+    return reduce(operator.add, numbers, 0.0)
 
 
 def _polynomial(x: Vector, coefficients: tuple[float, ...]) -> Vector:

@@ -15,6 +15,7 @@ import numpy as np
 from podusv_cli.components.controllers.polar_backstepping import PolarBackstepping
 from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.portable import add_up
 from podusv_cli.core.recording import Recording
 from podusv_cli.engine.running.replay import Replayed
 
@@ -236,7 +237,7 @@ def _best(
     if largest <= 0.0:
         return Bound(largest, math.nan, math.inf, candidates, terms)
     y_u, y_r = _half_square(drift.u) / rooms[0], _half_square(drift.r) / rooms[1]
-    Delta = sum(terms.values()) + y_u + y_r
+    Delta = add_up(terms.values()) + y_u + y_r
     bounds = Delta / (2.0 * rates)
     best = int(np.argmin(bounds))
     terms = terms | {"y_u": float(y_u[best]), "y_r": float(y_r[best])}

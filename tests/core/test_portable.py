@@ -68,3 +68,10 @@ def test_the_least_eigenvalue_is_that_of_lapack(size):
             eigenvalues[0], abs=1e-13 * np.abs(eigenvalues).max()
         )
     assert least_eigenvalue(np.diag([3.0, -1.0, 2.0])) == -1.0
+
+
+def test_floats_are_added_one_by_one_on_every_python():
+    """The `sum` of Python 3.12 and later carries what rounding took."""
+    numbers = [1.0, 1e-16, 1e-16, 1e-16]
+    assert portable.add_up(numbers) == 1.0 != math.fsum(numbers)
+    assert portable.add_up([]) == 0.0

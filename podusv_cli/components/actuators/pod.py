@@ -42,6 +42,7 @@ from podusv_cli.components.actuators.propeller import (
 from podusv_cli.components.actuators.rudder import loads
 from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
+from podusv_cli.core.portable import add_up
 from podusv_cli.core.signal import DEMAND_SIZE, Signal
 from podusv_cli.core.units import Scale, Scales
 
@@ -332,7 +333,7 @@ class Pods(Actuator):
 
         At rest with no demand an angle has no effect yet, and loads follow the demand with a lag.
         """
-        force = sum(pod.most_thrust[0] for pod in self.pods) / 3.0
+        force = add_up(pod.most_thrust[0] for pod in self.pods) / 3.0
         demands, small = len(self.limits()), SMALL * force
         if not small:
             return np.zeros((3, demands))

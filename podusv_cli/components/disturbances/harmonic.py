@@ -13,6 +13,7 @@ from podusv_cli.components.vessels.vessel import Vessel
 from podusv_cli.core.component import OF_SECTION, Component, value
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import LANES, Vector, kernel, padded_rounds, scratch, whole_lanes
+from podusv_cli.core.portable import add_up
 
 WAVES = 6  # a sine and a cosine on every axis
 
@@ -55,9 +56,9 @@ class Harmonic(Component):
         sine, cosine = waves = self.waves()
         if sine.rate == cosine.rate:
             waves = (Wave(sine.rate, sine.cos + cosine.cos, sine.sin + cosine.sin),)
-        mean = self.mean + sum(wave.cos for wave in waves if wave.rate == 0.0)
+        mean = self.mean + add_up(wave.cos for wave in waves if wave.rate == 0.0)
         moving = (math.hypot(wave.sin, wave.cos) for wave in waves if wave.rate > 0.0)
-        return sum(moving, abs(mean))
+        return add_up((abs(mean), *moving))
 
 
 # Reads table (3 count): frequencies [rad/s], then factors of cosine and of sine. Writes b (3) [N,

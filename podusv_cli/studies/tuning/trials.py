@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
 from podusv_cli.core import json_text
+from podusv_cli.core.portable import add_up
 from podusv_cli.storage import files, json_files
 
 FOLDER = "trials"
@@ -40,7 +41,7 @@ class GainTrial:
     @property
     def excess(self) -> float:
         """By how much inequalities do not hold, together."""
-        return sum(max(0.0, over) for over in self.excesses)
+        return add_up(max(0.0, over) for over in self.excesses)
 
 
 def write(folder: Path, name: str, trials: Sequence[GainTrial]) -> None:
