@@ -12,7 +12,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import inf, nan
+from math import inf, nan, sqrt
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -237,28 +237,27 @@ def ranks(values: Vector) -> Vector:
     return np.asarray((np.cumsum(counts) - (counts - 1) / 2.0)[places])
 
 
-def standard(values: Vector) -> Vector:
-    """Ranks (n,), shifted and scaled so that the sum of products of two is their correlation.
-
-    NaN where the values (n,) do not vary.
-    """
-    centred = ranks(values) - (len(values) + 1) / 2.0
-    length = np.sqrt(centred @ centred)
-    return centred / length if length > 0.0 else np.full(len(values), nan)
+def centre_ranks(values: Vector) -> Vector:
+    """Ranks (n,) less their mean: whole numbers of halves, whose sums of products are exact."""
+    return ranks(values) - (len(values) + 1) / 2.0
 
 
 def rank_correlations(quantities: Mapping[str, Vector], metric: Vector) -> dict[str, float]:
     """Spearman's rank correlation of a metric (draws,) with every quantity, by name.
 
-    A quantity (draws,) is given as `standard` makes it. Of the draws where the metric is known; NaN
-    where one of the two does not vary.
+    A quantity (draws,) is given as `centre_ranks` makes it. Of the draws where the metric is known;
+    NaN where one of the two does not vary.
     """
     known = ~np.isnan(metric)
-    y, whole = standard(metric[known]), bool(known.all())
+    y, whole = centre_ranks(metric[known]), bool(known.all())
     return {
-        name: float((x if whole else standard(x[known])) @ y) if len(y) else nan
-        for name, x in quantities.items()
+        name: _cosine(x if whole else centre_ranks(x[known]), y) for name, x in quantities.items()
     }
+
+
+def _cosine(x: Vector, y: Vector) -> float:
+    square = float(x @ x) * float(y @ y)
+    return float(x @ y) / sqrt(square) if square > 0.0 else nan
 
 
 def by_chance(n: int, level: float) -> float:

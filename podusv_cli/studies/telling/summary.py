@@ -89,7 +89,7 @@ def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics
         for law in runs.laws
         for cell in range(len(runs.cells))
         for done in [runs.done(law)[cell]]
-        for ranked in [{q: statistics.standard(values[done]) for q, values in numbers.items()}]
+        for ranked in [{q: statistics.centre_ranks(values[done]) for q, values in numbers.items()}]
         for name, values in _columns(runs, law, cell, metrics)
         for known in [int(np.sum(~np.isnan(values)))]
         for quantity, correlation in statistics.rank_correlations(ranked, values).items()
