@@ -55,7 +55,7 @@ def test_rank_correlation_of_known_rows() -> None:
     assert math.isnan(rank_correlation(x, np.ones(5)))
     y = np.array([2.0, 1.0, nan, 5.0, 4.0])
     assert rank_correlation(x, y) == pytest.approx(0.6)
-    # Exact: 3 - 1 + 1 - 3 over the rest, and not what rounding leaves
+    # Ranks less their mean: -1.5 + 0.5 - 0.5 + 1.5, and nothing that rounding leaves
     assert rank_correlation(np.arange(4.0), np.array([7.0, 3.0, 3.0, 7.0])) == 0.0
 
 
