@@ -607,6 +607,12 @@ TABLE: dict[str, list[Row]] = {
 "theory": [
     ("gain_reduction=max((gain for", "gain_reduction=min((gain for",
      "test_of_several_gains_that_the_loop_needs_the_nearest_to_its_own_is_told"),
+    ("return LOADS[:3] if plan.loop", "return LOADS[2::-1] if plan.loop",
+     "test_a_pose_pid_at_rest_has_the_loops_of_its_formula"),
+    ("        out[:, self._idle] = 0.0\n", "",
+     "test_a_pose_pid_at_rest_has_the_loops_of_its_formula"),
+    ("if path.heads and abs(rows[:, PSI_D + 1 :]", "if False and abs(rows[:, PSI_D + 1 :]",
+     "test_a_pose_that_is_held_is_steady_and_a_turn_on_the_spot_is_not"),
     ("0.5 * weight * square for", "weight * square for",
      "test_rate_integrates_to_the_change_of_V_to_fourth_order"),
     ("swing = (alpha_u * sin_e - v * cos_e) * spin", "swing = (alpha_u * sin_e + v * cos_e) * spin",
