@@ -870,6 +870,12 @@ TABLE: dict[str, list[Row]] = {
      "test_an_impossible_vessel_is_refused"),
 ],
 "paths": [
+    ("                place[SINCE] = AWAY\n", "                pass\n",
+     "test_a_station_is_left_once_it_was_kept_for_the_time_asked_for"),
+    ("max(station - 1, 0), min(station, last)", "min(station, last), min(station, last)",
+     "test_a_station_is_left_once_it_was_kept_for_the_time_asked_for"),
+    ("        for i in range(2 * SETTLED):\n            seen[i] = 0.0\n", "        pass\n",
+     "test_metrics_end_with_the_last_station"),
     ("segment(lap + 0.5 * k.fillet, count", "segment(lap + 0.75 * k.fillet, count",
      "test_each_corner_is_its_own_where_legs_last_hardly_longer_than_the_fillet"),
     ("(3.0 * table[c] * s + 2.0 * table[c + 1]) * s",

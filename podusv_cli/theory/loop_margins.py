@@ -83,7 +83,7 @@ def loop_margins(
         raise LawError(
             f"{loop.path.noun} {loop.path.label}: its target moves with the vessel, and margins "
             "are those of a law that follows a target with a timetable; take one, as with "
-            "--set path.kind=line"
+            f"--set path.kind={'hold' if loop.path.heads else 'line'}"
         )
     along = course(loop.path, grid.steps * grid.step, at)
     if along.turn and law.wants_heading():

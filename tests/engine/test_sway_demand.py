@@ -33,7 +33,8 @@ REFUSED = {
     "actuator.kind=saturated": "asks for a sway force, and saturated takes surge force and yaw "
     "moment alone; take ideal_full, saturated_full, or pods that push every way with sway_weight "
     "above 0",
-    "path={kind: circle}": "wants a heading, and circle has none; take poses, hold or ellipse",
+    "path={kind: circle}": "wants a heading, and circle has none; take poses, stations, hold or "
+    "ellipse",
 }
 
 

@@ -55,7 +55,8 @@ def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, st
         ]
     if law.wants_heading() and not path.heads:
         text = (
-            f"{law.label} wants a heading, and {path.label} has none; take poses, hold or ellipse"
+            f"{law.label} wants a heading, and {path.label} has none; take poses, stations, hold "
+            "or ellipse"
         )
         texts += [("path", text)]
     return texts
@@ -137,7 +138,7 @@ class ClosedLoop:
     @property
     def has_target(self) -> bool:
         """Whether the distance to the target says how good the law is."""
-        return self.controller.aims() and not self.path.follows
+        return self.controller.aims() and not self.path.goes_beside
 
     def passed_by(self, share: float) -> dict[str, float]:
         """Where this share of the path lies behind the vessel, see `passed_by`."""
