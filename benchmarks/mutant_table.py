@@ -746,6 +746,10 @@ TABLE: dict[str, list[Row]] = {
      "test_the_place_is_bracketed_however_near"),
 ],
 "controllers": [
+    ("tau[2] -= c * east - s * north", "tau[2] -= c * east + s * north",
+     "test_a_constant_load_is_cancelled_without_an_integral"),
+    ("return len(ESTIMATE) if self.bias else 0", "return len(ESTIMATE)",
+     "test_without_an_estimated_load_the_law_is_refused"),
     (", ROUTH_SHARE * routh_gain(p, at.d, eta, k))", ")",
      "test_its_gain_leaves_routh_s_third_condition_a_margin_where_it_binds"),
     ("MOST * k.U and learns * more > 0.0", "MOST * k.U",

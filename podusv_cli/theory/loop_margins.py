@@ -107,6 +107,8 @@ def _left_out(loop: ClosedLoop, grid: TimeGrid, linear: Linear) -> Iterator[str]
     """What of the loop its linear model has not."""
     if loop.measured:
         yield "measurement and estimator"
+    if loop.controller.wants_load_estimate():
+        yield "the feedforward of the estimated load"
     if grid.hold_every:
         yield f"the sampling of the law every {grid.hold_every * grid.step:g} s"
     if loop.actuator.delay():

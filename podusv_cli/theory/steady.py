@@ -87,7 +87,13 @@ def idealise(loop: ClosedLoop) -> ClosedLoop:
     if actuator.command:
         command = actuator.command.model_copy(update={"delay": 0.0})
         actuator = actuator.model_copy(update={"command": command})
-    return replace(loop, actuator=actuator, measurement=Exact(), estimator=NoEstimator())
+    return replace(
+        loop,
+        actuator=actuator,
+        controller=loop.controller.without_load_estimate(),
+        measurement=Exact(),
+        estimator=NoEstimator(),
+    )
 
 
 def linearise(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = True) -> Linear:
