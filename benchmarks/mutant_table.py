@@ -575,6 +575,10 @@ TABLE: dict[str, list[Row]] = {
      "test_shares_are_those_of_one_bisection_after_another"),
 ],
 "export": [
+    ("            c.row[PSI_D : PSI_D + len(heading)] = heading\n", "",
+     "test_a_law_by_itself_has_the_bits_of_its_run and pose_pid"),
+    ('return [*cut, "0.0"][:DEMAND_SIZE]', 'return [*cut[:2], "0.0"]',
+     "test_a_program_without_loads_has_the_bits_behind_limits"),
     ("            target=len(TARGET),\n", "",
      "test_a_law_by_itself_has_the_bits_of_its_run and pid"),
     ('for i, variable in enumerate(shown, 1) if variable.causality == "output"',
