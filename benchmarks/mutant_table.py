@@ -878,6 +878,10 @@ TABLE: dict[str, list[Row]] = {
      "test_an_impossible_vessel_is_refused"),
 ],
 "paths": [
+    ("min(k.gain * (away - k.radius), k.speed)", "min(k.gain * away, k.speed)",
+     "test_beyond_the_radius_the_speed_back_grows_with_the_distance"),
+    ("            place[COURSE] = direction(at[0], at[1])\n", "            pass\n",
+     "test_the_course_is_that_of_the_last_leg_and_then_back_from_beyond_the_radius"),
     ("                place[SINCE] = AWAY\n", "                pass\n",
      "test_a_station_is_left_once_it_was_kept_for_the_time_asked_for"),
     ("max(station - 1, 0), min(station, last)", "min(station, last), min(station, last)",

@@ -69,7 +69,8 @@ def _rms(seen: Vector, step: float) -> float:
 
 def _size(layout: Measured) -> int:
     """What does not aim at a target leaves the path aside."""
-    follows = layout.loop.path.places == PLACES and layout.loop.controller.aims()
+    places = layout.loop.path.places[: len(PLACES)]
+    follows = places == PLACES and layout.loop.controller.aims()
     return SIZE if follows else 0
 
 
