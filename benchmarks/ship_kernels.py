@@ -46,6 +46,7 @@ TASKS: Sequence[Mapping[str, Any]] = [
 # What a kind cannot do without.
 NEEDS: Mapping[str, Mapping[str, Any]] = {
     "legs": {"points": POINTS},
+    "legs_hold": {"points": POINTS},
     "waypoints": {"points": POINTS},
     "waves": {"height": 0.1, "period": 2.0},
     "wind": {"speed": 5.0},

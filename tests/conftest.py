@@ -66,8 +66,10 @@ POD: dict[str, float] = {
 # What a component needs that has no default; a new kind without an entry fails its contract test.
 REQUIRED: dict[str, dict[str, Any]] = {
     "legs": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
+    "legs_hold": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
     "waypoints": {"points": ((0.0, 0.0), (10.0, 1.0), (18.0, 6.0), (20.0, 15.0))},
     "poses": {"poses": ((0.0, 0.0, 0.0), (10.0, 1.0, 0.5), (18.0, 6.0, -0.5))},
+    "stations": {"poses": ((0.0, 0.0, 0.0), (10.0, 1.0, 0.5), (18.0, 6.0, -0.5))},
     "pod": {"pods": (POD,)},
     "wind": {"speed": 8.0},
     "waves": {"height": 0.1, "period": 1.5},

@@ -63,8 +63,8 @@ def margins(
     """Tell how much phase, gain and delay the loops of a scenario's laws can take.
 
     The closed loop is linearised about its steady motion on the path, and opened at the plant's
-    input in surge and in yaw. Exit code 3 when some laws have no margins, or none of one has a
-    steady motion.
+    input in surge, in sway where the law asks for a force there, and in yaw. Exit code 3 when some
+    laws have no margins, or none of one has a steady motion.
     """
     from podusv_cli.workflows import margins as workflow  # heavy imports only when needed
     from podusv_cli.workflows.request import Request
@@ -106,8 +106,9 @@ def _motion(law: LoopMargins) -> str:
     u, v, r = (x if abs(x) > STILL else 0.0 for x in linear.motion)
     b_u, b_v, b_r = linear.load
     way = f"turning at {course.turn:.4g} rad/s" if course.turn else "straight on"
+    going = f"{way} at {course.speed:.4g} m/s" if course.speed else "staying"
     return (
-        f"{way} at {course.speed:.4g} m/s from t = {course.time:.4g} s on; u {u:.4g} m/s, "
+        f"{going} from t = {course.time:.4g} s on; u {u:.4g} m/s, "
         f"v {v:.4g} m/s, r {r:.4g} rad/s, z_e {linear.distance:.4g} m; held load {b_u:.4g} N, "
         f"{b_v:.4g} N, {b_r:.4g} N m"
     )
@@ -148,7 +149,8 @@ def _rows(label: str, law: LoopMargins) -> list[list[str]]:
         known = phase if math.isfinite(loop.phase_margin) else _format_margin(loop.phase_margin)
         numbers = [_format_margin(getattr(loop, name)) for name in NUMBERS[1:]]
         rows.append([label, f"{axis} load", crossed, known, *numbers])
-    together = {"both demands": law.delay_margin, "both loads": law.delay_margin_loads}
+    every = "both" if len(law.loops) == 2 else "all"
+    together = {f"{every} demands": law.delay_margin, f"{every} loads": law.delay_margin_loads}
     more = [
         [label, what, *[""] * 4, _format_margin(delay), "", ""] for what, delay in together.items()
     ]

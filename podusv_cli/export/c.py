@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from podusv_cli import __version__
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import DEMAND_SIZE
 from podusv_cli.export.law import (
-    DEMAND_NUMBERS,
     LOAD_NUMBERS,
     PARTS,
     STATE_NUMBERS,
     STEP,
-    TARGET_NUMBERS,
     ExportedLaw,
     ExportedNumber,
 )
@@ -35,8 +34,8 @@ VECTORS = {
     "work": "law->work",
 }
 ASSUMED = {
-    "saturated": "the demand before, cut at {0} N and {1} N m, acts",
-    "demand": "the demand before acts",
+    2: "the demand before, cut at {0} N and {1} N m, acts",
+    3: "the demand before, cut at {0} N, {1} N m and {2} N, acts",
 }
 
 
@@ -86,6 +85,9 @@ def template_values(law: ExportedLaw) -> dict[str, Any]:
         "every": layout.hold_every,
         "tau": layout.tau,
         "demand": layout.demand,
+        "first_signal": layout.signals,
+        "targets": len(law.targets),
+        "demands": len(law.demands),
         "assumed": _assumed_loads(law),
         "sizes": {name: len(getattr(vectors, name)) for name in ("stages", "held", "work")},
         "vectors": [VECTORS.get(name, shown.get(name, "&unused")) for name in vectors._fields],
@@ -112,25 +114,29 @@ def _lines(numbers: Vector) -> list[list[str]]:
 
 
 def _assumed_loads(law: ExportedLaw) -> list[str]:
-    """The loads that act where nobody knows them: the demand, cut where the actuator cuts it."""
-    demands = [f"row[{law.layout.demand + i}]" for i in range(len(DEMAND_NUMBERS))]
-    return [
+    """The loads that act where nobody knows them: the demand, cut where the actuator cuts it.
+
+    Surge force, yaw moment, sway force, which is 0 where the law asks for none.
+    """
+    demands = [f"row[{law.layout.demand + i}]" for i in range(len(law.demands))]
+    cut = [
         demand
         if math.isinf(limit)
         else f"fmin(fmax({demand}, -{literal(limit)}), {literal(limit)})"
         for demand, limit in zip(demands, law.limits, strict=True)
     ]
+    return [*cut, "0.0"][:DEMAND_SIZE]
 
 
 def _texts(law: ExportedLaw) -> Mapping[str, str]:
     """What the header says of each vector."""
     cut = any(map(math.isfinite, law.limits))
-    assumed = ASSUMED["saturated" if cut else "demand"]
+    assumed = ASSUMED[len(law.demands)] if cut else "the demand before acts"
     return {
         "state": _list(STATE_NUMBERS),
-        "target": _list(TARGET_NUMBERS),
+        "target": _list(law.targets),
         "loads": _list(LOAD_NUMBERS),
-        "demand": _list(DEMAND_NUMBERS),
+        "demand": _list(law.demands),
         "signals": f"What the law says beside: {_list(law.signals) or 'nothing'}",
         "memory": f"What it remembers: {_list(law.memory) or 'nothing'}",
         "assumed": assumed.format(*(f"{x:g}" for x in law.limits)),

@@ -24,7 +24,7 @@ from podusv_cli.storage import json_files, manifest
 
 SAMPLES, ABOUT, FMU = "check.csv", "law.json", "law.fmu"
 STATE, TARGET, LOADS, DEMAND = 6, 6, 3, len(signal.DEMAND)
-INPUTS = STATE + TARGET + LOADS
+INPUTS = STATE + TARGET + LOADS  # and a heading, of laws that read one
 Step = Callable[[Vector], Sequence[float]]  # from time and inputs of a sample to what comes out
 
 
@@ -52,8 +52,8 @@ class About(BaseModel):
     """What is read of law.json; there is more."""
 
     model_config = ConfigDict(strict=True, frozen=True)
-    inputs: list[NumberEntry] = Field(min_length=INPUTS, max_length=INPUTS)
-    demand: list[NumberEntry] = Field(min_length=DEMAND, max_length=DEMAND)
+    inputs: list[NumberEntry] = Field(min_length=INPUTS, max_length=INPUTS + len(signal.HEADING))
+    demand: list[NumberEntry] = Field(min_length=DEMAND, max_length=signal.DEMAND_SIZE)
     signals: list[NumberEntry]
     memory: list[NumberEntry]
     period: PositiveFloat
@@ -129,7 +129,7 @@ def _samples(folder: Path, about: About) -> Vector:
 
 def _compare_samples(what: str, samples: Vector, about: About, step: Step) -> Checked:
     """Compare an exported law with its samples (n, columns) by bits, to the first difference."""
-    given, names = 1 + INPUTS, about.columns
+    given, names = 1 + len(about.inputs), about.columns
     whose = "the run" if about.of_run else "the law by itself in podusv"
     for row in samples:
         out = step(row[:given])
@@ -159,8 +159,8 @@ def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -
 
     def step(row: Vector) -> list[float]:
         """Demand, signals and memory that the C library gives for a sample's row (columns,)."""
-        state, target, loads = np.split(row[1:], [STATE, STATE + TARGET])
-        demand = (ctypes.c_double * DEMAND)()
+        state, target, loads = np.split(row[1:], [STATE, len(about.inputs) - LOADS])
+        demand = (ctypes.c_double * len(about.demand))()
         library.podusv_law_step(law, *map(_vector, (state, target, loads)), demand)
         signals = library.podusv_law_signals(law)[: len(about.signals)]
         return [*demand, *signals, *library.podusv_law_memory(law)[: len(about.memory)]]

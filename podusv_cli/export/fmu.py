@@ -9,13 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from podusv_cli.export import c, objects
-from podusv_cli.export.law import (
-    DEMAND_NUMBERS,
-    LOAD_NUMBERS,
-    STATE_NUMBERS,
-    TARGET_NUMBERS,
-    ExportedLaw,
-)
+from podusv_cli.export.law import LOAD_NUMBERS, STATE_NUMBERS, ExportedLaw
 from podusv_cli.export.link import shared_library, waiting
 
 STAMP = (1980, 1, 1, 0, 0, 0)  # of files in the archive: the same law gives the same bytes
@@ -37,12 +31,12 @@ def variables(law: ExportedLaw, first: Sequence[float]) -> list[Variable]:
 
     `first` are the inputs of the run's first sample, at which they begin.
     """
-    numbers = [*STATE_NUMBERS, *TARGET_NUMBERS, *(LOAD_NUMBERS if law.needs_loads else ())]
+    numbers = [*STATE_NUMBERS, *law.targets, *(LOAD_NUMBERS if law.needs_loads else ())]
     given = [
         Variable(*number, "input", repr(float(start)))
         for number, start in zip(numbers, first, strict=False)
     ]
-    said = [Variable(*number, "output") for number in (*DEMAND_NUMBERS, *law.signals)]
+    said = [Variable(*number, "output") for number in (*law.demands, *law.signals)]
     return [*given, *said, *(Variable(*number, "local") for number in law.memory)]
 
 

@@ -18,7 +18,7 @@ from podusv_cli.components.paths.fillet import round_corner
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector, bundle, call
 from podusv_cli.core.recording import Recording
-from podusv_cli.core.signal import LOOP, STATE, TARGET_SIZE, Signal
+from podusv_cli.core.signal import HEADING, LOOP, PSI_D, STATE, SWAY_DEMAND, TARGET_SIZE, Signal
 from podusv_cli.engine.loop.closed_loop import DEMAND, ClosedLoop, nothing
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.machine import signatures
@@ -48,9 +48,9 @@ NOT_SAMPLED = (
     "the law acts continuously in this scenario, and a computer on a boat takes samples; set "
     "control.period to the time between two of them, as --set control.period=0.1 [s]"
 )
-NO_POSE = (
-    "the law asks for a sway force, or reads a heading of its target, and what is exported takes a "
-    "position and gives surge force and yaw moment; export another law"
+NO_LOAD = (
+    "the law takes the load that an estimator finds, and what is exported has no input for it; "
+    "set its `load` to unknown"
 )
 NO_LAW = "the controller gives recorded commands to propellers, which is no law; export a law"
 
@@ -69,11 +69,12 @@ def _number(signal: Signal) -> ExportedNumber:
 
 _LOGGED = {signal.name: _number(signal) for signal in LOOP}
 _MOTION = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s2"))
-TARGET_NUMBERS = tuple(
+POSITION_NUMBERS = tuple(
     ExportedNumber(name, unit, f"{what} of the target, {way}")
     for name, ((what, unit), way) in zip(TARGET, product(_MOTION, ("north", "east")), strict=True)
 )
 STATE_NUMBERS = tuple(map(_number, STATE))
+HEADING_NUMBERS = tuple(map(_number, HEADING))
 DEMAND_NUMBERS = tuple(_LOGGED[name] for name in DEMAND)
 LOAD_NUMBERS = tuple(
     ExportedNumber(name, unit, f"{what} that acted since the sample before")
@@ -86,11 +87,18 @@ LOAD_NUMBERS = tuple(
 )
 
 
+def demand_numbers(loop: ClosedLoop) -> tuple[ExportedNumber, ...]:
+    """What the loop's law asks for, in the order in which it writes it."""
+    sway = (_number(SWAY_DEMAND),) if loop.controller.asks_sway() else ()
+    return (*DEMAND_NUMBERS, *sway)
+
+
 @dataclass(frozen=True, eq=False)
 class ExportedLaw:
     """A sampled law as values: a state (x, memory), a row (target, distance, signals, demand, tau).
 
-    `vectors` are at the start of the scenario's run, which logs every step.
+    Behind the distance is the target's heading, for a law that reads one. `vectors` are at the
+    start of the scenario's run, which logs every step.
     """
 
     scenario: Scenario
@@ -108,20 +116,21 @@ class ExportedLaw:
             raise UsageError(f"{scenario.name}: {NO_LAW}")
         if not plan.grid.hold_every:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
-        if scenario.controller.asks_sway() or scenario.controller.wants_heading():
-            raise UsageError(f"{scenario.name}: {NO_POSE}")
+        if scenario.controller.wants_load_estimate():
+            raise UsageError(f"{scenario.name}: {NO_LOAD}")
         whole, signals = plan.layout, len(plan.loop.controller.signals)
-        memory = whole.states - whole.memory
-        first = len(TARGET) + 1
-        end = first + signals + len(DEMAND) + len(LOAD_NUMBERS)
+        memory, demands = whole.states - whole.memory, len(demand_numbers(plan.loop))
+        target = TARGET_SIZE if plan.loop.controller.wants_heading() else len(TARGET)
+        first = max(target, PSI_D)
+        end = first + signals + demands + len(LOAD_NUMBERS)
         layout = Layout(**dict.fromkeys(Layout._fields, 0))._replace(
             states=len(STATE) + memory,
             memory=len(STATE),
             place=len(STATE) + memory,
-            target=len(TARGET),
+            target=target,
             signals=first,
             demand=first + signals,
-            tau=first + signals + len(DEMAND),
+            tau=first + signals + demands,
             columns=end + len(plan.row["shown"]),
             shown=end if whole.shown else 0,
             hold_every=whole.hold_every,
@@ -177,10 +186,20 @@ class ExportedLaw:
         return self.loop.controller.slots()
 
     @property
-    def limits(self) -> tuple[float, float]:
-        """Force [N] and moment [N m] at which the scenario's actuator cuts the demand."""
-        force, moment, *_ = self.loop.actuator.limits()
-        return force, moment
+    def limits(self) -> tuple[float, ...]:
+        """At which the scenario's actuator cuts each number of the demand [N, N m, N]."""
+        return self.loop.actuator.limits()[: len(self.demands)]
+
+    @property
+    def targets(self) -> tuple[ExportedNumber, ...]:
+        """What the law is given of its target: its motion, and its heading where it reads one."""
+        heading = HEADING_NUMBERS if self.loop.controller.wants_heading() else ()
+        return (*POSITION_NUMBERS, *heading)
+
+    @property
+    def demands(self) -> tuple[ExportedNumber, ...]:
+        """What the law asks for: surge force, yaw moment, and sway force where it asks for one."""
+        return demand_numbers(self.loop)
 
     @cached_property
     def signals(self) -> tuple[ExportedNumber, ...]:
@@ -201,8 +220,8 @@ class ExportedLaw:
     @property
     def columns(self) -> list[str]:
         """What a row of `samples` has."""
-        given = (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS)
-        said = (*DEMAND_NUMBERS, *self.signals, *self.memory)
+        given = (*STATE_NUMBERS, *self.targets, *LOAD_NUMBERS)
+        said = (*self.demands, *self.signals, *self.memory)
         return ["time", *(number.name for number in (*given, *said))]
 
     @property
@@ -213,8 +232,8 @@ class ExportedLaw:
     def as_json(self, platforms: Sequence[str], library: Sequence[str]) -> dict[str, Any]:
         """What law.json says; `library` are functions that the law calls of another library."""
         about = {
-            "inputs": (*STATE_NUMBERS, *TARGET_NUMBERS, *LOAD_NUMBERS),
-            "demand": DEMAND_NUMBERS,
+            "inputs": (*STATE_NUMBERS, *self.targets, *LOAD_NUMBERS),
+            "demand": self.demands,
             "signals": self.signals,
             "memory": self.memory,
         }
@@ -238,7 +257,7 @@ class ExportedLaw:
         before = np.maximum(rows - 1, 0)
         state = [log[number.name][rows] for number in self._given_state]
         loads = [np.where(rows > 0, log[number.name][before], 0.0) for number in LOAD_NUMBERS]
-        said = [log[number.name][rows] for number in (*DEMAND_NUMBERS, *self.signals)]
+        said = [log[number.name][rows] for number in (*self.demands, *self.signals)]
         memory = [log[number.name][rows].reshape(len(rows), -1) for number, _ in self._slots]
         time = log["time"][rows]
         return np.column_stack([time, *state, self._targets(log, rows), *loads, *said, *memory])
@@ -250,13 +269,16 @@ class ExportedLaw:
         """
         c, n = Vectors(*(vector.copy() for vector in self.vectors)), self.layout
         parts = [routine(self.pieces[name]) for name in PARTS.values()]
-        step, given = routine(self.pieces[STEP]), len(STATE) + len(TARGET)
+        step = routine(self.pieces[STEP])
+        splits = np.cumsum([len(STATE), len(TARGET), len(self.targets) - len(TARGET)])
         pointers, sizes = signatures.pointers(c), signatures.whole_numbers(n)
 
         def step_law(sample: int, inputs: Vector) -> list[float]:
             """Demand, signals and memory after sample number `sample`; `inputs` are (inputs,)."""
-            c.s[: len(STATE)], c.row[: len(TARGET)] = np.split(inputs[:given], [len(STATE)])
-            c.row[n.tau : n.tau + len(LOAD_NUMBERS)] = inputs[given:]
+            state, motion, heading, loads = np.split(inputs, splits)
+            c.s[: len(state)], c.row[: len(motion)] = state, motion
+            c.row[PSI_D : PSI_D + len(heading)] = heading
+            c.row[n.tau : n.tau + len(loads)] = loads
             step(*parts, sample * n.hold_every, self.grid.step, pointers, sizes)
             return [*c.row[n.demand : n.tau], *c.row[n.signals : n.demand], *c.s[n.memory :]]
 
@@ -271,10 +293,10 @@ class ExportedLaw:
 
     def inputs(self, samples: Vector) -> Vector:
         """What the law is given in each of these samples."""
-        return samples[:, 1 : 1 + len(STATE) + len(TARGET) + len(LOAD_NUMBERS)]
+        return samples[:, 1 : 1 + len(STATE) + len(self.targets) + len(LOAD_NUMBERS)]
 
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
-        """The target (rows, 6) at these rows of a log; on a followed path, beside the vessel."""
+        """The target (rows, 6 or 9) at these rows of a log; on a followed path where that is."""
         path, out = self.loop.path, np.zeros((len(rows), TARGET_SIZE))
         k, table = bundle(self.plan.path_constants), self.plan.path_table
         for row, target in zip(rows, out, strict=True):
@@ -283,4 +305,4 @@ class ExportedLaw:
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target
             )
-        return out[:, : len(TARGET)]
+        return np.delete(out, len(TARGET), axis=1)[:, : len(self.targets)]

@@ -17,12 +17,15 @@ CURVES = {"S": "sensitivity |S|", "T": "complementary sensitivity |T|"}
 
 
 def sensitivities(laws: Mapping[str, LoopMargins], columns: int = 2) -> Figure:
-    """|S| and |T| of the surge and of the yaw loop, a curve for each law by label."""
+    """|S| and |T| of the loops, side by side, a curve for each law by label that has the loop."""
     figure = new_figure(columns, HEIGHT)
-    panels = figure.subplots(2, 2, sharex="col", sharey=True)
+    loops = [axis for axis in AXES if any(axis in law.loops for law in laws.values())]
+    panels = figure.subplots(2, len(loops), sharex="col", sharey=True)
     for row, (name, title) in zip(panels, CURVES.items(), strict=True):
-        for axes, axis in zip(row, AXES, strict=True):
+        for axes, axis in zip(row, loops, strict=True):
             for place, (label, law) in enumerate(laws.items()):
+                if axis not in law.loops:
+                    continue
                 color, linestyle, _ = nth_style(place)
                 loop = law.loops[axis]
                 axes.plot(

@@ -11,6 +11,7 @@ from podusv_cli.components.paths.base import Path
 from podusv_cli.core.errors import SizingError
 from podusv_cli.core.finding import Sentences, warn_after_run, warn_before_run
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.kinematics import wrap
 from podusv_cli.core.recording import Recording
 from podusv_cli.findings.sizing import other_numbers
 from podusv_cli.scenario.case import Case
@@ -94,6 +95,27 @@ def never_arrives(scenario: Scenario, log: Recording) -> Sentences:
     yield (
         f"{leg} of {len(lengths)} legs are done at the end, {beside}; "
         f"{'; '.join(_unable(scenario)) or _late(log['along_leg'][-1] > lengths[leg])}"
+    )
+
+
+@warn_after_run(
+    "station-not-kept",
+    about="path",
+    meaning="stations are left at the end",
+    condition="not all stations have been kept by the end of the run",
+    remedy="simulate longer, take larger tolerances, or a law that holds the pose better",
+    needs=("station", "z_e", "heading_d"),
+)
+def station_not_kept(scenario: Scenario, log: Recording) -> Sentences:
+    """A run ends on the way to a station, or beside one that it did not keep."""
+    count, done = int(scenario.passed_by(1.0).get("station", 0)), int(log["station"][-1])
+    if log.status != "finished" or done >= count:
+        return
+    off = abs(wrap(float(log["psi"][-1] - log["heading_d"][-1])))
+    yield (
+        f"{done} of {count} stations have been kept at the end, {log['z_e'][-1]:.3g} m and "
+        f"{off:.3g} rad beside the target; simulate longer, take larger path.radius and "
+        "path.angle, or a law that holds the pose better"
     )
 
 

@@ -114,7 +114,7 @@ def _margin(case: Case) -> float:
     "delayed-loop",
     about="actuator.command",
     meaning="a velocity loop too fast for the delay",
-    condition="the delay exceeds the delay margin of both demands (podusv margins); without a "
+    condition="the delay exceeds the delay margin of all demands (podusv margins); without a "
     "steady motion, a velocity loop that is stable without the delay grows with it",
     remedy="take a shorter delay, or smaller gains",
 )

@@ -18,7 +18,7 @@ from podusv_cli.metrics.metric import (
     ratio,
     standoff_of,
 )
-from podusv_cli.metrics.spans import WITHIN
+from podusv_cli.metrics.spans import ANEW, WITHIN
 from podusv_cli.metrics.windows import CROSSED, SETTLING, settle, settled_from
 
 # Positions of the gathered numbers: integrals over the run, and over the steady window.
@@ -50,6 +50,9 @@ def watch_settled(
     The window's first instant has half a weight. Across is positive to the right of the target's
     course, along ahead of it. While the target stands still both count as zero.
     """
+    if steady == ANEW:
+        for i in range(2 * SETTLED):
+            seen[i] = 0.0
     if steady >= WITHIN:
         opens = seen[TIME] == 0.0 and t > 0.0
         share = 0.5 * weight if opens else weight

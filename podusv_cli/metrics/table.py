@@ -219,13 +219,13 @@ def metrics_probe(
     """
     since = plan.grid.last_part(steady_fraction)
     layout = Measured(plan.loop, plan.layout, since, settling_radius, steady_fraction)
+    has_end = "over_at" in _asked_span(layout)
     sizes = {
         part: _ask_accumulator(part, metric, layout)[0]
         for part, metric in _accumulators(known).items()
     }
     parts = tuple((part, size) for part, size in sizes.items() if size)
     differing = frozenset(name for part, _ in parts for name in part.differing)
-    has_end = "over_at" in _asked_span(layout)
     ahead = spans.AHEAD if has_end else 0
     metrics = Metrics(
         _within_span(parts, has_end),

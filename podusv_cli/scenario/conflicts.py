@@ -155,9 +155,10 @@ def _seeing(scenario: Scenario) -> Conflicts:
 
 
 def _unmet(scenario: Scenario) -> Conflicts:
-    """What laws want of path and actuator that these have not, each once."""
-    laws = scenario.laws().values()
-    found = (text for law in laws for text in unmet(law, scenario.path, scenario.actuator))
+    """What laws want of other parts that these have not, each once."""
+    laws, path, actuator = scenario.laws().values(), scenario.path, scenario.actuator
+    load_at = 0 if scenario.measurement.is_exact else scenario.estimator.load_at
+    found = (text for law in laws for text in unmet(law, path, actuator, load_at))
     yield from dict.fromkeys(found)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from podusv_cli.components.paths.base import Path
 from podusv_cli.core.errors import NotConvergedError
 from podusv_cli.core.kernel import Vector
+from podusv_cli.core.signal import PSI_D
 
 INSTANTS = 1000  # of a run, among which a steady motion of the target is looked for
 NEAR = 1.0  # s before and after an instant, over which the target's motion is compared
@@ -19,7 +20,10 @@ STRAIGHT = 1e-9  # rad/s
 
 @dataclass(frozen=True)
 class Course:
-    """A target's steady motion at a time [s]: position, velocity, rate of turn [rad/s]."""
+    """A target's steady motion at a time [s]: position, velocity, rate of turn [rad/s].
+
+    A target with a heading turns it as its course does, and one that stays does not turn.
+    """
 
     time: float
     position: Vector
@@ -45,7 +49,7 @@ def course(path: Path, duration: float, at: float | None = None) -> Course:
         raise NotConvergedError(
             f"the target moves steadily (straight on or in a circle, at constant speed) {when}, "
             "and margins are those of a steady motion; choose another time with --at SECONDS, or "
-            "another path, as with --set path.kind=line"
+            f"another path, as with --set path.kind={'hold' if path.heads else 'line'}"
         )
     return (straight or steady)[0]
 
@@ -54,9 +58,11 @@ def _course(path: Path, t: float) -> Course | None:
     """The motion at t, where it is steady from NEAR before it to NEAR after it, as laws see it."""
     fillet = path.fillet_for_law()
     near = NEAR + (0.5 * fillet.time if fillet else 0.0)
-    now, *around = path.targets([t, max(t - near, 0.0), t + near])
+    now, *around = rows = path.whole_targets([t, max(t - near, 0.0), t + near])
     (x, y), (ahead, across) = now[2:4], now[4:6]
     turn = (x * across - y * ahead) / max(x * x + y * y, 1e-300)
+    if path.heads and abs(rows[:, PSI_D + 1 :] - (turn, 0.0)).max() > STRAIGHT:
+        return None
     for sign, other in zip((-min(t, near), near), around, strict=True):
         angle = turn * sign
         cosine, sine = math.cos(angle), math.sin(angle)

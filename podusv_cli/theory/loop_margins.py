@@ -1,4 +1,4 @@
-"""Margins of a closed loop at the plant's input, in surge, in yaw and with both delayed."""
+"""Margins of a closed loop at the plant's input: of surge, sway and yaw, and of all together."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from podusv_cli.theory.course import course
 from podusv_cli.theory.margins import Complex, Cut, Margins, delay_margin, margins, poles, stable
 from podusv_cli.theory.steady import Linear, linearise
 
-AXES = {"surge": "u", "yaw": "r"}  # the loops, with the letters that their numbers end in
+AXES = {"surge": "u", "sway": "v", "yaw": "r"}  # with the letters that their numbers end in
 NUMBERS = ("phase_margin", "gain_margin", "gain_reduction", "delay_margin", "peak_S", "peak_T")
 
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins of the surge and of the yaw loop, and what they hold for.
+    """Margins of the loops of surge, of sway where the law asks for a force there, and of yaw.
 
-    Each loop is opened at the plant's input while the other is closed. `delay_margin` [s] is for
-    one delay of both of the law's demands, as `actuator.command.delay` is, `delay_margin_loads` [s]
-    for one of both loads, behind the actuator. `left_out` says what of the scenario the loop is
+    Each loop is opened at the plant's input while the others are closed. `delay_margin` [s] is for
+    one delay of all of the law's demands, as `actuator.command.delay` is, `delay_margin_loads` [s]
+    for one of all loads, behind the actuator. `left_out` says what of the scenario the loop is
     without.
     """
 
@@ -50,7 +50,7 @@ class LoopMargins:
     @property
     def open(self) -> tuple[str, ...]:
         """The loops that are open: what acts on the hull does not answer its motion."""
-        rows = zip(AXES, self.linear.C, strict=True)
+        rows = zip(self.loops, self.linear.C, strict=True)
         return tuple(axis for axis, row in rows if not row.any())
 
     def numbers(self) -> dict[str, float]:
@@ -79,21 +79,21 @@ def loop_margins(
             "continuously; set controller.rate=analytic and controller.hold_below=0 where it has "
             "these keys, or choose another law"
         )
-    if law.asks_sway():
-        raise LawError(
-            f"{law.noun} {law.label}: it asks for a sway force, too, and margins are those of two "
-            "loops, surge and yaw; choose a law of surge force and yaw moment"
-        )
     if loop.path.follows:
         raise LawError(
             f"{loop.path.noun} {loop.path.label}: its target moves with the vessel, and margins "
             "are those of a law that follows a target with a timetable; take one, as with "
-            "--set path.kind=line"
+            f"--set path.kind={'hold' if loop.path.heads else 'line'}"
         )
-    linear = linearise(
-        loop, course(loop.path, grid.steps * grid.step, at), grid.step, compiled=compiled
-    )
-    cuts = {axis: Cut(linear.A, linear.B[:, [i]], linear.C[[i]]) for i, axis in enumerate(AXES)}
+    along = course(loop.path, grid.steps * grid.step, at)
+    if along.turn and law.wants_heading():
+        raise LawError(
+            f"{law.noun} {law.label}: its target goes in a circle, and margins of a law that wants "
+            "a heading are those of a pose that stays; take one, as with --set path.kind=hold"
+        )
+    linear = linearise(loop, along, grid.step, compiled=compiled)
+    axes = [axis for axis, letter in AXES.items() if f"tau_{letter}" in linear.loads]
+    cuts = {axis: Cut(linear.A, linear.B[:, [i]], linear.C[[i]]) for i, axis in enumerate(axes)}
     return LoopMargins(
         linear,
         {axis: margins(cut) for axis, cut in cuts.items()},
@@ -107,6 +107,8 @@ def _left_out(loop: ClosedLoop, grid: TimeGrid, linear: Linear) -> Iterator[str]
     """What of the loop its linear model has not."""
     if loop.measured:
         yield "measurement and estimator"
+    if loop.controller.wants_load_estimate():
+        yield "the feedforward of the estimated load"
     if grid.hold_every:
         yield f"the sampling of the law every {grid.hold_every * grid.step:g} s"
     if loop.actuator.delay():

@@ -22,7 +22,7 @@ from podusv_cli.components.measurements.exact import Exact
 from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.errors import NotConvergedError
 from podusv_cli.core.kernel import Vector, bundle
-from podusv_cli.core.signal import Signal
+from podusv_cli.core.signal import SWAY_DEMAND, Signal
 from podusv_cli.engine.loop.closed_loop import DEMAND, LOADS, ClosedLoop
 from podusv_cli.engine.loop.plan import Plan
 from podusv_cli.engine.running.replay import rates_at
@@ -35,6 +35,7 @@ MOST_EVALUATIONS = 20_000  # of the right-hand side while it settles
 ROUNDS = 30  # of Newton's method
 SETTLED = 1e-8  # of every state, or of 1: how far Newton's last step may go
 STEPS = (1e-4, 1e-5, 1e-6)  # of every state, or of 1: steps of differences, the first that will do
+ASIDE = 0.03  # of every state, or of 1: where it is looked what reads a state
 CLOSE = 1e-2  # m; nearer to the target its direction may be singular
 NOTHING = 1e-12  # of the largest derivative: up to this a rate answers nothing but by rounding
 ROUNDED = 1e-14  # of the largest derivative: up to this a rate may be rounding
@@ -52,9 +53,10 @@ class Linear:
 
     q are those of the loop's states that change by more than rounding, relative to the target, as
     `states` names them (m, rad, m/s, rad/s, units of the law's memory). d and the loads are (tau_u
-    [N], tau_r [N m]) at the plant's input. `B_command` and `C_command` are the same at the
-    actuator's: what reaches it, and what the law demands. A law that is told the loads sees what
-    happens between the two, as a delay, but not what happens behind the actuator.
+    [N], tau_r [N m]) at the plant's input, or (tau_u, tau_v, tau_r) where the law asks for a sway
+    force; `loads` has their names. `B_command` and `C_command` are the same at the actuator's: what
+    reaches it, and what the law demands, tau_v last. A law that is told the loads sees what happens
+    between the two, as a delay, but not what happens behind the actuator.
 
     `distance` is that to the target in the steady motion [m], `load` what is held (b_u, b_v, b_r),
     `motion` the steady (u, v, r), `reach` how far the loop is linear, in units of each state.
@@ -66,6 +68,7 @@ class Linear:
     B_command: Vector
     C_command: Vector
     states: tuple[str, ...]
+    loads: tuple[str, ...]
     course: Course
     distance: float
     load: Vector
@@ -84,7 +87,13 @@ def idealise(loop: ClosedLoop) -> ClosedLoop:
     if actuator.command:
         command = actuator.command.model_copy(update={"delay": 0.0})
         actuator = actuator.model_copy(update={"command": command})
-    return replace(loop, actuator=actuator, measurement=Exact(), estimator=NoEstimator())
+    return replace(
+        loop,
+        actuator=actuator,
+        controller=loop.controller.without_load_estimate(),
+        measurement=Exact(),
+        estimator=NoEstimator(),
+    )
 
 
 def linearise(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = True) -> Linear:
@@ -98,9 +107,10 @@ def linearise(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = 
     loop = idealise(loop)
     steps = max(round(along.time / step), 1)
     plan = Plan(loop, TimeGrid(step, steps, log_every=steps))
-    frame = _Frame(plan, along, _arrive(plan, compiled), compiled)
+    arrived = _arrive(plan, compiled)
     try:
         with np.errstate(all="ignore"):
+            frame = _Frame(plan, along, arrived, compiled)
             return _about(plan, frame, frame.steady(frame.settle(frame.start)))
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         raise NotConvergedError(f"no steady motion was found: {error}; {WHAT_IT_TAKES}") from error
@@ -112,14 +122,15 @@ def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
     states = len(q)
     heights = (abs(jacobian[:states]) * _size(q)).max(axis=1)
     moving = np.flatnonzero(heights > NOTHING * heights.max())
-    outputs = jacobian[states:, moving]
+    outputs, loads = jacobian[states:, moving], _loads(plan)
     return Linear(
         A=jacobian[np.ix_(moving, moving)],
         B=_inputs(plan, states)[moving],
-        C=outputs[:2],
+        C=outputs[: len(loads)],
         B_command=frame.command_slopes(q)[moving],
-        C_command=outputs[2:],
+        C_command=outputs[len(loads) :],
         states=tuple(frame.labels[1 + i] for i in moving),
+        loads=loads,
         course=frame.course,
         distance=math.hypot(*q[:2]),
         load=frame.row(q)[frame.loads],
@@ -139,10 +150,17 @@ def _arrive(plan: Plan, compiled: bool) -> Vector:
     return np.asarray(np.column_stack([log[name] for name in state])[-1])
 
 
+def _loads(plan: Plan) -> tuple[str, ...]:
+    """The loads on the hull that answer the law's demands."""
+    return LOADS[:3] if plan.loop.controller.asks_sway() else (LOADS[0], LOADS[2])
+
+
 def _inputs(plan: Plan, states: int) -> Vector:
-    """Rates of the states by a surge force and by a yaw moment on the hull, shape (states, 2)."""
-    k, nothing, rates = bundle(plan.constants["vessel"]), np.zeros(6), np.zeros((states, 2))
-    for column, tau in enumerate(np.eye(3)[[0, 2]]):
+    """Rates of the states by each of the loads on the hull, shape (states, loads)."""
+    loads = [LOADS.index(name) for name in _loads(plan)]
+    k, nothing = bundle(plan.constants["vessel"]), np.zeros(6)
+    rates = np.zeros((states, len(loads)))
+    for column, tau in enumerate(np.eye(3)[loads]):
         rate = np.zeros(6)
         plant(nothing, tau, nothing, k, rate)
         rates[:6, column] = rate
@@ -170,15 +188,18 @@ class _Frame:
         self.course = along
         column = {name: i - 1 for i, name in enumerate(self.labels)}
         self.loads = [column[name] for name in LOADS[3:]]
-        self._demands = [column[name] for name in DEMAND]
-        self._seen = [*range(len(s)), column["tau_u"], column["tau_r"], *self._demands]
+        sway = [SWAY_DEMAND.name] if plan.loop.controller.asks_sway() else []
+        self._demands = [column[name] for name in (*DEMAND, *sway)]
+        self._seen = [*range(len(s)), *(column[name] for name in _loads(plan)), *self._demands]
         self._rates = rates_at(plan, compiled=compiled)
         self._origin = np.zeros(len(s))
         self._origin[:2] = along.position
         self.start = s - self._origin
         self._drift = np.zeros(len(s))
         self._drift[:2] = along.velocity
+        self._idle = list[int]()
         self._turn_angles(plan.about)
+        self._idle = self._idle_memory(plan.layout.memory)
 
     def _turn_angles(self, about: Mapping[str, Signal]) -> None:
         """Let angles turn with the course: the heading, and those like it in the law's memory."""
@@ -189,6 +210,22 @@ class _Frame:
             self._drift[np.array(angles) & (abs(pace - 1.0) < 0.5)] = turn
             self._drift[2] = turn
 
+    def _idle_memory(self, first: int) -> list[int]:
+        """Which states, from `first` on, nothing but such states reads: they may grow for ever.
+
+        Such are the integrals of a law whose integral gain is 0. Looked for off the steady motion,
+        where no factor is 0.
+        """
+        count = len(self.start)
+        here = self.start + ASIDE * np.sqrt(1.0 + np.arange(count)) * _size(self.start)
+        shifts = ASIDE * np.diag(_size(here))[first:]
+        reads = (self.rows(here + shifts) != self.rows(here[None]))[:, self._seen]
+        idle, before = np.arange(first, count), count
+        while 0 < len(idle) < before:
+            before, readers = len(idle), np.delete(np.arange(len(self._seen)), idle)
+            idle = idle[~reads[np.ix_(idle - first, readers)].any(axis=1)]
+        return [int(place) for place in idle]
+
     def rows(self, q: Vector, given: Vector | None = None) -> Vector:
         """For q (n, states): rates of q, then the loop's row; `given` as `rates_at` has it."""
         count = q.shape[1]
@@ -197,6 +234,7 @@ class _Frame:
         out[:, :count] -= self._drift
         out[:, 0] += self.course.turn * q[:, 1]
         out[:, 1] -= self.course.turn * q[:, 0]
+        out[:, self._idle] = 0.0
         return out
 
     def row(self, q: Vector) -> Vector:
@@ -286,11 +324,12 @@ class _Frame:
         raise NotConvergedError(self._no_derivative(q, int(at[1])))
 
     def command_slopes(self, q: Vector) -> Vector:
-        """Derivatives of the rates by the demands that reach the actuator, shape (states, 2)."""
+        """Derivatives of the rates by the demands that reach the actuator, (states, demands)."""
         demand = self.row(q)[self._demands]
         steps = STEPS[0] * _size(demand)
         shifts = np.diag(steps)
-        rates = self.rows(np.tile(q, (4, 1)), np.vstack([demand + shifts, demand - shifts]))
+        given = np.vstack([demand + shifts, demand - shifts])
+        rates = self.rows(np.tile(q, (len(given), 1)), given)
         above, below = np.split(rates[:, : len(q)], 2)
         return np.asarray(((above - below) / (2.0 * steps[:, None])).T)
 

@@ -66,5 +66,9 @@ def _with_margins(run: PastRun, scenario: Scenario, wanted: set[str], extras: Ex
     except (LawError, NotConvergedError) as error:
         extras.missing.append(Failure(what, str(error)))
     else:
-        return replace(run, cost={**run.cost, **{name: margins[name] for name in wanted}})
+        if wanted - margins.keys():
+            why = "its law asks for no sway force, so there is no sway loop"
+            extras.missing.append(Failure(what, why))
+        known = {name: margins[name] for name in wanted & margins.keys()}
+        return replace(run, cost={**run.cost, **known})
     return run

@@ -22,8 +22,10 @@ from podusv_cli.workflows.claimed_margins import with_margins
 
 SHOWN_MARGINS = (
     "phase_margin_u",
+    "phase_margin_v",
     "phase_margin_r",
     "gain_margin_u",
+    "gain_margin_v",
     "gain_margin_r",
     "delay_margin",
     "decay_rate",
@@ -102,7 +104,7 @@ def margins_of(case: Case) -> dict[str, Any]:
     if not found.stable:
         return {"why": "its loop is unstable about the steady motion", "rows": []}
     numbers = found.numbers()
-    rows = [(OF_LOOP[name].about, numbers[name]) for name in SHOWN_MARGINS]
+    rows = [(OF_LOOP[name].about, numbers[name]) for name in SHOWN_MARGINS if name in numbers]
     return {
         "why": "",
         "left_out": list(found.left_out),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -113,9 +114,11 @@ def _write(writer: RunWriter, result: MarginsOfLaws, formats: Sequence[str]) -> 
     from podusv_cli.figures.style import house_style, image
 
     writer.add_json("margins.json", result.as_json())
+    columns = [law.numbers() for law in result.laws.values()]
     rows = [
-        [name, OF_LOOP[name].unit, *(law.numbers()[name] for law in result.laws.values())]
+        [name, OF_LOOP[name].unit, *(numbers.get(name, math.nan) for numbers in columns)]
         for name in OF_LOOP
+        if any(name in numbers for numbers in columns)
     ]
     writer.add("margins.csv", csv_files.lines([["margin", "unit", *result.laws], *rows]).encode())
     with house_style():

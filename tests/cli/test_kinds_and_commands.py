@@ -18,7 +18,7 @@ OTTER = "vessel: {preset: otter}\nactuator: {kind: pod, preset: otter}\n"
 PID = "controller: {kind: pid}\n"
 STILL = "start: {u: 1.0}\npath: {kind: line, speed: 0.0}\ndisturbance: {kind: none}\n"
 LEGS = "path: {kind: legs, points: [[0, 0], [6, 0], [6, 6]]}\n"
-POSES = "path: {kind: poses, poses: [[0, 0, 0], [1, 0.5, 0.5]], travel: 9.0, dwell: 0.5}\n"
+POSES = "path: {kind: poses, poses: [[0, 0, 0], [1, 0.5, 0.5]], travel: 9.0, dwell: 1.5}\n"
 # What a scenario of each kind has.
 KINDS = {
     "trial": OTTER
@@ -40,6 +40,11 @@ KINDS = {
     + "disturbance: {kind: none}\nactuator: {kind: saturated_full}\n"
     + SHORT
     + "controller: {kind: pose_pid}\n",
+    "stations": "vessel: {preset: cybership2}\nstart: {x: 0.1}\n"
+    + "path: {kind: stations, poses: [[0, 0, 0], [1, 0.5, 0.5]], travel: 9.0, keep: 0.5}\n"
+    + "disturbance: {kind: none}\nactuator: {kind: saturated_full}\n"
+    + SHORT
+    + "controller: {kind: pose_backstepping, k_i: 0.02}\n",
     "plug-in": HULL + TASK + SHORT + "plugins: [law.py]\ncontroller: {kind: cross_track}\n",
 }
 STUDY = (
@@ -85,7 +90,7 @@ def gym(podusv: Command, kind: str) -> Said:
     from podusv_cli.core.errors import PodusvError
 
     try:
-        count = 3 if kind == "poses" else 2
+        count = 3 if kind in ("poses", "stations") else 2
         limits, action = (8.0, 2.5, 8.0)[:count], (1.0, 0.1, 0.2)[:count]
         env = podusv.gym.Env("a.yaml", period=0.1, reward="effort_u", limits=limits)
         env.reset(seed=0)
@@ -147,9 +152,12 @@ REFUSED = {
     ("trial", "optimum"): POD,
     ("legs", "margins"): "its target moves with the vessel, and margins are those of a law that",
     ("legs", "optimum"): LEG,
-    ("poses", "margins"): "it asks for a sway force, too, and margins are those of two loops",
     ("poses", "optimum"): FULL,
-    ("poses", "export"): "the law asks for a sway force, or reads a heading of its target",
+    (
+        "stations",
+        "margins",
+    ): "its target moves with the vessel, and margins are those of a law that",
+    ("stations", "optimum"): "path.kind: stations does not fit",
     ("policy", "tune"): "no number of policy is a gain that changes a run",
     ("policy", "margins"): "no steady motion was found",
     ("pods", "optimum"): POD,
@@ -158,11 +166,11 @@ REFUSED = {
 # These compile C code of their own, search, or wait for a vessel that never settles.
 SLOW = {
     *((kind, "export") for kind in KINDS if kind != "plug-in"),
-    *((kind, "tune") for kind in ("pods", "sensors", "legs", "plug-in")),
+    *((kind, "tune") for kind in ("pods", "sensors", "legs", "stations", "plug-in")),
     ("policy", "margins"),
     ("plug-in", "margins"),
     *((kind, "doubt") for kind in KINDS if kind != "plug-in"),
-    *((kind, "identify") for kind in ("legs", "policy", "pods")),
+    *((kind, "identify") for kind in ("legs", "policy", "pods", "stations")),
 }
 
 

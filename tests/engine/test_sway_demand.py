@@ -5,10 +5,9 @@ import pytest
 from conftest import vessel
 from pose_samples import BOAT, HELD, POSES, marched, quintic
 
-from podusv_cli.core.errors import LawError, ScenarioError, UsageError
+from podusv_cli.core.errors import ScenarioError, UsageError
 from podusv_cli.interface.session import open_session
 from podusv_cli.scenario.load import load_text
-from podusv_cli.theory.loop_margins import loop_margins
 
 
 def test_a_law_of_two_demands_leaves_the_sway_force_0():
@@ -34,7 +33,8 @@ REFUSED = {
     "actuator.kind=saturated": "asks for a sway force, and saturated takes surge force and yaw "
     "moment alone; take ideal_full, saturated_full, or pods that push every way with sway_weight "
     "above 0",
-    "path={kind: circle}": "wants a heading, and circle has none; take poses, hold or ellipse",
+    "path={kind: circle}": "wants a heading, and circle has none; take poses, stations, hold or "
+    "ellipse",
 }
 
 
@@ -43,13 +43,6 @@ def test_what_does_not_fit_is_refused_with_the_remedy(change):
     with pytest.raises(ScenarioError) as error:
         load_text(BOAT + POSES + HELD, "s.yaml", (change,))
     assert REFUSED[change] in " ".join(str(error.value).split())
-
-
-def test_margins_of_three_loops_are_refused():
-    single = load_text(BOAT + POSES + HELD, "s.yaml").scenario.alone()
-    plan = single.plan()
-    with pytest.raises(LawError, match="margins are those of two loops"):
-        loop_margins(plan.loop, plan.grid)
 
 
 THREE = BOAT.replace("ideal_full", "saturated_full") + POSES + "controller: {kind: pose_pid}\n"

@@ -43,12 +43,12 @@ static int moved(int what, int file, const void *data, int count)
 
 __attribute__((noinline)) static void steps(void)
 {
-    double in[15], demand[2];
+    double in[9 + PODUSV_LAW_TARGET], demand[PODUSV_LAW_DEMAND];
     int from = opened("in.bin", 1, 6), to = opened("out.bin", 5, 7);
 
     podusv_law_start(&law);
     while (moved(6, from, in, sizeof in) == 0) {
-        podusv_law_step(&law, in, in + 6, in + 12, demand);
+        podusv_law_step(&law, in, in + 6, in + 6 + PODUSV_LAW_TARGET, demand);
         moved(5, to, demand, sizeof demand);
         moved(5, to, podusv_law_signals(&law), 8 * PODUSV_LAW_SIGNALS);
         moved(5, to, podusv_law_memory(&law), 8 * PODUSV_LAW_MEMORY);
@@ -90,7 +90,7 @@ void *memset(void *, int, size_t);
 
 
 def stepped(folder: Path, inputs: bytes) -> bytes:
-    """What the law in an exported folder makes of rows of 15 numbers."""
+    """What the law in an exported folder makes of rows of inputs."""
     for name, text in FILES.items():
         (folder / name).write_text(text)
     (folder / "in.bin").write_bytes(inputs)

@@ -20,14 +20,23 @@ import numpy as np
 import pytest
 from command_samples import one_line
 from conftest import example, failure_of, kinds
-from export_samples import HARDWARE, SOURCE, export_law, exported, law, needs_cc, scenario, task
+from export_samples import (
+    CC,
+    HARDWARE,
+    KINDS,
+    SOURCE,
+    export_law,
+    exported,
+    law,
+    needs_cc,
+    scenario,
+    task,
+)
 from exported_laws import Unit
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import podusv
-from podusv_cli.components.controllers.base import Controller
-from podusv_cli.core import registry
 from podusv_cli.core.errors import StorageError, UsageError
 from podusv_cli.engine.running import simulate
 from podusv_cli.export import c, link, objects
@@ -40,13 +49,8 @@ from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
-KINDS = registry.kinds("podusv_cli.components.controllers", Controller)
-LAWS = sorted(name for name, kind in KINDS.items() if not example(kind).asks_sway())
-POSES = (
-    "controller={kind: pose_pid}",
-    "path={kind: poses, poses: [[0, 0, 0]]}",
-    "actuator={kind: ideal_full}",
-)
+LAWS, QUICK = sorted(KINDS), ("alos", "pose_pid")
+FED = ("controllers=null", "controller={kind: pose_pid, load: estimated}")
 PODS = {"actuator": {"kind": "pod", "preset": "otter"}, "vessel": {"preset": "otter"}}
 
 
@@ -84,6 +88,20 @@ TASKS: dict[str, tuple[str, dict[str, Any]]] = {
         },
     ),
     "a command path": ("podusv:sea/delay.yaml", {}),
+    "stations that are kept": (
+        "podusv:dp/stations.yaml",
+        {
+            "controllers": None,
+            "controller": {"kind": "pose_backstepping", "k_i": 0.02},
+            "measurement": {"kind": "sensors"},
+            "estimator": {"kind": "passive_observer"},
+            "simulation.duration": 40.0,
+        },
+    ),
+    "a law of two demands on a path with a heading": (
+        "podusv:dp/four_corners.yaml",
+        {"controllers": None, "controller": {"kind": "velocity_vector"}},
+    ),
     "rounded corners": (
         "podusv:laws/corners.yaml",
         {"controllers": None, "controller": {"kind": "hand_position"}},
@@ -323,8 +341,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
         r"logs every step, too many of them in 700000 s; simulate less",
     ),
     (
-        {"overrides": ["control.period=0.1", "simulation.duration=1", *POSES]},
-        "asks for a sway force, or reads a heading of its target.*export another law",
+        {"source": "podusv:dp/estimated_load.yaml", "overrides": ["control.period=0.1", *FED]},
+        "takes the load that an estimator finds, and what is exported has no input.*to unknown",
     ),
     ({"platforms": ["linux"]}, r"unknown platform 'linux'; did you mean 'linux64'\? \(allowed: "),
     ({"platforms": ["thumbv7em"], "fmu": True}, "thumbv7em has no shared libraries.*--no-fmu"),
@@ -335,8 +353,9 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
 @pytest.mark.parametrize(("options", "says"), REFUSED)
 def test_what_cannot_be_exported_gets_a_sentence(tmp_path, options, says):
     changes = {"overrides": ["control.period=0.1", "simulation.duration=1"]} | options
+    source = Path(changes.pop("source", SOURCE))
     with pytest.raises(UsageError, match=says):
-        export_law(Path(SOURCE), tmp_path / "law", **changes)
+        export_law(source, tmp_path / "law", **changes)
     assert not (tmp_path / "law").exists()
 
 
@@ -477,7 +496,7 @@ def test_code_that_a_folder_brings_along_is_run_with_trust_alone(
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(law, marks=() if law == "alos" else pytest.mark.slow) for law in LAWS]
+    "kind", [pytest.param(law, marks=() if law in QUICK else pytest.mark.slow) for law in LAWS]
 )
 def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     folder = export_law(Path(SOURCE), tmp_path / "law", task(kind))
@@ -491,6 +510,31 @@ def test_fmpy_finds_no_fault_and_the_bits_of_the_run(tmp_path, kind):
     assert {"m", "rad", "m/s", "N", "N m"} <= {unit.name for unit in told.unitDefinitions}
     units = {variable.name: variable.unit for variable in told.modelVariables}
     assert (units["x"], units["psi"], units["tau_r_cmd"]) == ("m", "rad", "N m")
+
+
+@needs_cc
+@pytest.mark.parametrize("kind", ["pid", "pose_pid"])
+def test_a_program_without_loads_has_the_bits_behind_limits(tmp_path, kind):
+    """With NULL the law takes its own demand, cut at each limit: the sway force's, too."""
+    limits = ("actuator={kind: saturated_full, surge_limit: 3, sway_limit: 0.4, yaw_limit: 0.2}",)
+    changes = (*task(kind, 20), *(limits if kind == "pose_pid" else ()))
+    folder = export_law(Path(SOURCE), tmp_path / "law", changes, fmu=False)
+    program = STEPS.replace("in + 6 + PODUSV_LAW_TARGET, demand", "NULL, demand")
+    (folder / "steps.c").write_text(program)
+    about = json.loads((folder / "law.json").read_text())
+    samples = np.loadtxt(folder / "check.csv", delimiter=",", skiprows=1)
+    end = 1 + len(about["inputs"])
+    (folder / "in.bin").write_bytes(samples[:, 1:end].tobytes())
+    made = f"{CC} steps.c law.c {about['platforms'][0]}/law.o -lm -o steps.run"
+    subprocess.run(made.split(), cwd=folder, check=True)
+    subprocess.run([folder / "steps.run"], cwd=folder, check=True)
+    said = np.fromfile(folder / "out.bin").reshape(len(samples), -1)
+    np.testing.assert_array_equal(said, samples[:, end:])
+    demands = [number["name"] for number in about["demand"]]
+    asked = dict(zip(demands, said.T, strict=False))
+    if kind == "pose_pid":
+        assert demands == ["tau_u_cmd", "tau_r_cmd", "tau_v_cmd"]
+        assert np.abs(asked["tau_v_cmd"]).max() > 0.4
 
 
 WINE = shutil.which("wine64", path=f"{os.environ.get('PATH')}:/usr/lib/wine") or "wine64"
@@ -508,11 +552,11 @@ static podusv_law law;
 
 int main(void)
 {
-    double in[15], demand[2];
+    double in[9 + PODUSV_LAW_TARGET], demand[PODUSV_LAW_DEMAND];
     FILE *from = fopen("in.bin", "rb"), *to = fopen("out.bin", "wb");
     podusv_law_start(&law);
     while (fread(in, sizeof in, 1, from) == 1) {
-        podusv_law_step(&law, in, in + 6, in + 12, demand);
+        podusv_law_step(&law, in, in + 6, in + 6 + PODUSV_LAW_TARGET, demand);
         fwrite(demand, sizeof demand, 1, to);
         fwrite(podusv_law_signals(&law), sizeof(double), PODUSV_LAW_SIGNALS, to);
         fwrite(podusv_law_memory(&law), sizeof(double), PODUSV_LAW_MEMORY, to);
@@ -523,7 +567,7 @@ int main(void)
 
 
 def stepped_on(platform: str, folder: Path, inputs: bytes) -> bytes:
-    """What the law in an exported folder makes of rows of 15 numbers, emulated."""
+    """What the law in an exported folder makes of rows of inputs, emulated."""
     runner, target = EMULATED[platform]
     (folder / "steps.c").write_text(STEPS)
     (folder / "in.bin").write_bytes(inputs)
@@ -551,6 +595,7 @@ def test_other_processors_have_the_bits_of_the_run(tmp_path, platform, kind):
     folder = export_law(Path(SOURCE), tmp_path / "law", task(kind), fmu=False, platforms=[platform])
     samples = np.loadtxt(folder / "check.csv", delimiter=",", skiprows=1)
     assert len(samples) == 3001
-    out = stepped(folder, samples[:, 1:16].tobytes())
+    end = 1 + len(json.loads((folder / "law.json").read_text())["inputs"])
+    out = stepped(folder, samples[:, 1:end].tobytes())
     said = np.frombuffer(out).reshape(len(samples), -1)
-    np.testing.assert_array_equal(said.view(int), samples[:, 16:].copy().view(int))
+    np.testing.assert_array_equal(said.view(int), samples[:, end:].copy().view(int))

@@ -420,7 +420,7 @@ def test_the_command_tells_writes_and_encodes_the_same(podusv):
     assert kept | {"folder": "m"} == told
     law = told["laws"]["pid"]
     assert law["stable"]
-    assert law["margins"].keys() == OF_LOOP.keys()
+    assert law["margins"].keys() == {name for name in OF_LOOP if not name.endswith("_v")}
     assert Path("m/figures/sensitivities.pdf").read_bytes().startswith(b"%PDF")
     rows = [line.split(",") for line in Path("m/margins.csv").read_text().splitlines()[1:]]
     assert {name: float(number) for name, _, number in rows if number != "inf"} == pytest.approx(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -99,6 +99,14 @@ class Controller(KernelPart):
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""
         return False
+
+    def wants_load_estimate(self) -> bool:
+        """Whether the loads that an estimator finds are fed forward, beside the law's demand."""
+        return False
+
+    def without_load_estimate(self) -> Self:
+        """The law that wants no such loads; itself where it wants none."""
+        return self
 
     def sample_period(self) -> float:
         """Seconds between two calls of `sample`; 0 where the law needs none."""

@@ -17,8 +17,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from podusv_cli.components.controllers.base import Controller, Slots, each
+from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.pose_errors import ERRORS, pose_errors
+from podusv_cli.components.controllers.pose_law import PoseLaw
 from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.core.component import value
@@ -32,7 +33,7 @@ INTEGRALS = (
 )
 
 
-class PoseBackstepping(Controller):
+class PoseBackstepping(PoseLaw):
     """Vectorial backstepping for position and heading."""
 
     kind: Literal["pose_backstepping"] = "pose_backstepping"
@@ -41,14 +42,6 @@ class PoseBackstepping(Controller):
     k_psi: float = value(0.2, "1/s", "gain of the heading error", gt=0)
     k_i: float = value(0.0, "1/s2", "gain of the integral of errors", ge=0)
     k_d: float = value(0.5, "1/s", "gain of the velocity errors, times the inertia", gt=0)
-
-    def asks_sway(self) -> bool:
-        """Always."""
-        return True
-
-    def wants_heading(self) -> bool:
-        """Always."""
-        return True
 
     def slots(self) -> Slots:
         """The integrals."""

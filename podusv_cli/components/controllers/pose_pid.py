@@ -15,8 +15,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from podusv_cli.components.controllers.base import Controller, Slots, each
+from podusv_cli.components.controllers.base import Slots, each
 from podusv_cli.components.controllers.pose_errors import ERRORS, pose_errors
+from podusv_cli.components.controllers.pose_law import PoseLaw
 from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.core.component import value
 from podusv_cli.core.elementary import cos_sin
@@ -31,7 +32,7 @@ INTEGRALS = (
 )
 
 
-class PosePid(Controller):
+class PosePid(PoseLaw):
     """PID on position and heading, with feedforward of the motion that is asked for."""
 
     kind: Literal["pose_pid"] = "pose_pid"
@@ -41,14 +42,6 @@ class PosePid(Controller):
     w_r: float = value(1.0, "rad/s", "natural frequency of the heading", gt=0)
     zeta: float = value(1.0, "1", "damping ratio of the three axes", gt=0)
     integral: float = value(SLOW, "1", "frequency of the integrals over that of the axis", ge=0)
-
-    def asks_sway(self) -> bool:
-        """Always."""
-        return True
-
-    def wants_heading(self) -> bool:
-        """Always."""
-        return True
 
     def slots(self) -> Slots:
         """The integrals."""

@@ -15,8 +15,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.pose_errors import ERRORS, pose_errors
+from podusv_cli.components.controllers.pose_law import PoseLaw
 from podusv_cli.components.controllers.velocity_loop import ALONE, Axis, Loop
 from podusv_cli.components.vessels.plant import surge_force, sway_force, yaw_moment
 from podusv_cli.core.component import value
@@ -31,7 +31,7 @@ MISSING = (
 )
 
 
-class PoseSlidingMode(Controller):
+class PoseSlidingMode(PoseLaw):
     """Moves to a pose with a velocity that it enforces against bounded loads."""
 
     kind: Literal["pose_sliding_mode"] = "pose_sliding_mode"
@@ -44,14 +44,6 @@ class PoseSlidingMode(Controller):
     load_r: float = value(0.3, "N m", "bound of the loads in yaw", ge=0)
     phi: float = value(0.02, "m/s", "boundary layer of surge and sway velocity", gt=0)
     phi_r: float = value(0.05, "rad/s", "boundary layer of the yaw rate", gt=0)
-
-    def asks_sway(self) -> bool:
-        """Always."""
-        return True
-
-    def wants_heading(self) -> bool:
-        """Always."""
-        return True
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Within the layer m nu' = -(k_d + gain of the error) m nu - load/phi nu."""

@@ -63,6 +63,11 @@ class Estimator(KernelPart):
         """
         return 0, 0
 
+    @property
+    def load_at(self) -> int:
+        """Where in its state the estimated loads `LOADS` begin; 0 where it finds none."""
+        return self.states.index(LOADS[0]) if LOADS[0] in self.states else 0
+
     def assumed_noise(self) -> tuple[tuple[str, float], ...]:
         """For each number of the state the key and value of the noise that is assumed, or ""."""
         return (("", 0.0),) * len(ESTIMATE)

@@ -216,6 +216,11 @@ class ExtendedKalmanFilter(Estimator):
         return (*ESTIMATE, *LOADS, *[COVARIANCE] * PACKED, *[sums] * MOVING, *[counts] * MOVING)
 
     @property
+    def load_at(self) -> int:
+        """Behind the estimate, with `bias`."""
+        return len(ESTIMATE) if self.bias else 0
+
+    @property
     def covariance(self) -> tuple[int, int]:
         """Behind the loads."""
         return N, N

@@ -3,7 +3,8 @@
 A path gives a target at each time. A path that is *followed* (`follows`) has no timetable: its
 target is the point of the path beside the vessel, and the distance to it says nothing about time.
 Where the vessel is on such a path are numbers of the loop's state, which `locate` sets at every
-instant, so that they are logged.
+instant, so that they are logged. Where such a path `waits`, its target goes on by itself once the
+vessel has come, so the distance to it counts.
 """
 
 from __future__ import annotations
@@ -48,12 +49,18 @@ class Path(KernelPart):
 
     noun: ClassVar[str] = "path"
     follows: ClassVar[bool] = False
+    waits: ClassVar[bool] = False  # True: it follows, and its target waits until the vessel comes
     places: ClassVar[tuple[Signal, ...]] = ()
     heads: ClassVar[bool] = False  # True: `evaluate` writes a heading behind the distance, too
 
     evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
     evaluate_shown: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate_shown"))
     locate: ClassVar[Callable[..., None]] = staticmethod(absent("locate"))
+
+    @property
+    def goes_beside(self) -> bool:
+        """Whether the target is beside the vessel, so that the distance to it says nothing."""
+        return self.follows and not self.waits
 
     def targets(self, times: Iterable[float]) -> Vector:
         """The target (n, 6) at each of these times [s], a row of `TARGET` each.

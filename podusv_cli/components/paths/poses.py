@@ -15,6 +15,25 @@ from podusv_cli.core.signal import PSI_D
 Pose = tuple[float, float, float]
 
 
+# table: poses (n, 3); s: the part of the time that is over; writes target (10): position [m] with
+# two rates, the distance, which is not this kernel's, heading [rad] with two rates.
+@kernel
+def between_poses(i: int, j: int, s: float, travel: float, table: Vector, target: Vector) -> None:
+    """The quintic from pose i to pose j."""
+    part = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+    speed = 30.0 * s * s * (1.0 + s * (s - 2.0)) / travel
+    growth = s * (60.0 + s * (120.0 * s - 180.0)) / (travel * travel)
+    for axis in range(2):
+        way = table[3 * j + axis] - table[3 * i + axis]
+        target[axis] = table[3 * i + axis] + way * part
+        target[2 + axis] = way * speed
+        target[4 + axis] = way * growth
+    way = table[3 * j + 2] - table[3 * i + 2]
+    target[PSI_D] = table[3 * i + 2] + way * part
+    target[PSI_D + 1] = way * speed
+    target[PSI_D + 2] = way * growth
+
+
 class Poses(Path):
     """Stays at each pose for `dwell`, and goes to the next in `travel`; the last one is kept.
 
@@ -54,17 +73,5 @@ class Poses(Path):
         """The quintic between two poses."""
         period, last = k.travel + k.dwell, int(k.count) - 1
         i = min(int(max(t, 0.0) / period), last)
-        j = min(i + 1, last)
         s = min(max((t - i * period - k.dwell) / k.travel, 0.0), 1.0)
-        part = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        speed = 30.0 * s * s * (1.0 + s * (s - 2.0)) / k.travel
-        growth = s * (60.0 + s * (120.0 * s - 180.0)) / (k.travel * k.travel)
-        for axis in range(2):
-            way = table[3 * j + axis] - table[3 * i + axis]
-            target[axis] = table[3 * i + axis] + way * part
-            target[2 + axis] = way * speed
-            target[4 + axis] = way * growth
-        way = table[3 * j + 2] - table[3 * i + 2]
-        target[PSI_D] = table[3 * i + 2] + way * part
-        target[PSI_D + 1] = way * speed
-        target[PSI_D + 2] = way * growth
+        between_poses(i, min(i + 1, last), s, k.travel, table, target)

@@ -42,8 +42,11 @@ def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
     return path.passed_by(share) if path.follows and law.aims() else {}
 
 
-def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, str]]:
-    """What a law wants of a path and an actuator that they have not: the part, and a sentence."""
+def unmet(law: Controller, path: Path, actuator: Actuator, load_at: int) -> list[tuple[str, str]]:
+    """What a law wants of other parts that they have not: the part, and a sentence.
+
+    `load_at` is where in the state that it is given there are estimated loads; 0 without.
+    """
     texts = []
     if law.asks_sway() and not actuator.takes_sway:
         text = (
@@ -55,9 +58,16 @@ def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, st
         ]
     if law.wants_heading() and not path.heads:
         text = (
-            f"{law.label} wants a heading, and {path.label} has none; take poses, hold or ellipse"
+            f"{law.label} wants a heading, and {path.label} has none; take poses, stations, hold "
+            "or ellipse"
         )
         texts += [("path", text)]
+    if law.wants_load_estimate() and not load_at:
+        text = (
+            f"{law.label} wants an estimated load, and nothing finds one; take passive_observer, "
+            "or ekf with bias, behind `measurement: {kind: sensors}`"
+        )
+        texts += [("estimator", text)]
     return texts
 
 
@@ -125,6 +135,11 @@ class ClosedLoop:
         return not self.measured and self.actuator.delay() == 0.0
 
     @property
+    def load_at(self) -> int:
+        """Where in the state that the law is given there are estimated loads; 0 without."""
+        return self.estimator.load_at if self.measured else 0
+
+    @property
     def sway_demand(self) -> tuple[Signal, ...]:
         """The demand behind surge and yaw; none for an actuator that makes no sway force."""
         return (SWAY_DEMAND,) if self.actuator.takes_sway else ()
@@ -137,7 +152,7 @@ class ClosedLoop:
     @property
     def has_target(self) -> bool:
         """Whether the distance to the target says how good the law is."""
-        return self.controller.aims() and not self.path.follows
+        return self.controller.aims() and not self.path.goes_beside
 
     def passed_by(self, share: float) -> dict[str, float]:
         """Where this share of the path lies behind the vessel, see `passed_by`."""
@@ -181,7 +196,7 @@ class ClosedLoop:
             "measurement": self.measurement.conflicts(step),
         }
         texts = [f"{part}.{key}: {text}" for part, faults in parts.items() for key, text in faults]
-        wanted = unmet(self.controller, self.path, self.actuator)
+        wanted = unmet(self.controller, self.path, self.actuator, self.load_at)
         texts += [f"{part}: {text}" for part, text in wanted]
         if lacking := self.estimator.lacking(self.measurement.measured()):
             texts.append(f"estimator: {lacking}")

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from podusv_cli.components.controllers.base import Controller
+from podusv_cli.components.controllers.pose_law import with_load
 from podusv_cli.components.disturbances.base import FLOW, WAVE_MOTION
 from podusv_cli.components.paths.base import TARGET
 from podusv_cli.core.kernel import Vector, bundle
@@ -189,7 +190,7 @@ class Plan:
             "path": path.evaluate_shown if self.row["shown"] else path.evaluate,
             "locate": path.locate if path.follows else nothing,
             "disturbance": loop.disturbance.kernel_with(loop.vessel),
-            "law": law.law,
+            "law": self.law_kernel,
             "sample": law.sample if law.takes_samples() else nothing,
             "actuator": loop.actuator.drive_with(law.commands()),
             "after_saturation": law.after_saturation if law.wants_loads() else nothing,
@@ -202,6 +203,13 @@ class Plan:
             Function(part, inner, () if inner is nothing else tuple(names[OWNERS.get(part, part)]))
             for part, inner in zip(Parts._fields, Parts(**kernels), strict=True)
         )
+
+    @property
+    def law_kernel(self) -> Any:
+        """What the loop calls as its law: the law, and the loads that it wants fed forward."""
+        law, load_at = self.loop.controller, self.loop.load_at
+        fed_forward = load_at and law.wants_load_estimate()
+        return with_load(law.law, load_at) if fed_forward else law.law
 
     @cached_property
     def outline(self) -> tuple[Any, ...]:
@@ -311,7 +319,7 @@ class Plan:
             stages=np.zeros(5 * layout.states),
             sensed=loop.measurement.first(start, grid.step),
             delay_line=delay_line(loop.actuator.delay(), grid),
-            held=np.zeros(HELD_SIGNALS + len(law.signals)),
+            held=np.zeros(HELD_SIGNALS + max(len(law.signals), len(estimator.states))),
             work=np.zeros(law.workspace()),
             seen=self.probe.first(),
             under_way=np.zeros(2),

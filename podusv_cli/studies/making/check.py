@@ -315,11 +315,11 @@ def _by(others: list[str]) -> str:
 
 
 def gathered_metrics(scenario: Scenario) -> dict[str, Metric]:
-    """The metrics that are gathered during a run; none of a target where a path is followed."""
+    """The metrics that are gathered during a run; none of a target that is beside the vessel."""
     return {
         name: metric
         for name, metric in scenario.known_metrics().items()
-        if metric.accumulator and not (scenario.path.follows and metric.accumulator.of_target)
+        if metric.accumulator and not (scenario.path.goes_beside and metric.accumulator.of_target)
     }
 
 

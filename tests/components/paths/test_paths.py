@@ -24,7 +24,11 @@ from podusv_cli.core.signal import PSI_D
 POINTS = ((0.0, 0.0), (5.0, 1.0), (8.0, 6.0), (8.0, 12.0), (3.0, 15.0))
 ORDERS = ("position", "velocity", "acceleration")
 
-PATHS: dict[str, Any] = {n: example(kind) for n, kind in kinds("paths").items() if n != "legs"} | {
+PATHS: dict[str, Any] = {
+    name: example(kind)
+    for name, kind in kinds("paths").items()
+    if issubclass(kind, Path) and not kind.follows
+} | {
     "literal": LineCircle(reading="literal"),
     "sine": LineCircle(reading="sine"),
     "velocity, other speed": LineCircle(speed=0.4),
