@@ -605,6 +605,13 @@ TABLE: dict[str, list[Row]] = {
      "test_trials_read_back_with_infinite_numbers"),
 ],
 "theory": [
+    ("speed * math.cos(angle), speed * math.sin(angle), 0.0]", "0.0, 0.0, 0.0]",
+     "test_thrusters_feel_the_water_of_a_current"),
+    ("demand, before = demand - left[demands], excess", "before = excess",
+     "test_a_small_weight_of_the_sway_force_costs_no_capability"),
+    ("flow = Current(speed=speed, direction=angle + math.pi)",
+     "flow = Current(speed=speed, direction=angle)",
+     "test_a_run_holds_just_below_and_drifts_away_just_above"),
     ("gain_reduction=max((gain for", "gain_reduction=min((gain for",
      "test_of_several_gains_that_the_loop_needs_the_nearest_to_its_own_is_told"),
     ("0.5 * weight * square for", "weight * square for",

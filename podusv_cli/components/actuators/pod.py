@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import ValidationError, model_validator
 
 from podusv_cli.components.actuators.allocation import allocate, settings
 from podusv_cli.components.actuators.allocation_qp import MOST_PODS
@@ -331,6 +331,17 @@ class Pods(Actuator):
                 break
             state = command.copy()
         return tau
+
+    def without_each(self) -> dict[str, Self | None]:
+        """The other pods; no command path, which may be one of a sway force that is lost."""
+        return {f"pods[{i}]": self._without(i) for i in range(len(self.pods))}
+
+    def _without(self, lost: int) -> Self | None:
+        rest = tuple(pod for i, pod in enumerate(self.pods) if i != lost)
+        try:
+            return self.changed({"pods": rest, "failure": None, "command": None})
+        except ValidationError:
+            return None
 
     def input_matrix(self) -> Vector:
         """As for every actuator, but for loads that have settled, about a third of full thrust.
