@@ -25,7 +25,18 @@ from podusv_cli.cli.installed_commands import installed_commands, load_command
 # What `--help` lists below each heading. NAME is the function NAME of cli/NAME.py.
 GROUPS = {
     "First steps": ("demo", "init", "live", "docs", "explain", "list"),
-    "One run": ("run", "validate", "plot", "verify", "margins", "optimum", "rerun", "diff", "runs"),
+    "One run": (
+        "run",
+        "validate",
+        "plot",
+        "verify",
+        "margins",
+        "capability",
+        "optimum",
+        "rerun",
+        "diff",
+        "runs",
+    ),
     "Many runs": ("compare", "sweep", "tune", "bench"),
     "Papers and laws of your own": ("doubt", "new", "schema"),
     "Boats": ("start", "identify"),

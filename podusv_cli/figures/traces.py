@@ -20,6 +20,7 @@ MOST, CURVES = 20, 200  # signals of many runs, and curves of all signals of a f
 NUMBERED = re.compile(r" \(\d+\)")  # equations of the first paper, which few readers have at hand
 DISTANCE = "z_e"
 FIRST = (DISTANCE, "e_ct", "psi_e", "tau_u", "tau_r")  # which readers look at first
+ASKED, SWAY = "tau_v_cmd", "tau_v"  # of a vessel that is asked for a sway force, that one, too
 NEXT = ("x_e", "y_e")  # which follow from the log
 
 
@@ -35,7 +36,7 @@ def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
         return {}
     return {
         "signals": [_describe_signal(runs, name) for name in shown],
-        "first": sum(name in FIRST for name in shown) or 1,
+        "first": sum(name in _first(runs) for name in shown) or 1,
         "runs": [
             {
                 "label": run.label,
@@ -55,10 +56,15 @@ def traces(runs: Sequence[Shown], names: Sequence[str] = ()) -> dict[str, Any]:
     }
 
 
+def _first(runs: Sequence[Shown]) -> Sequence[str]:
+    """What readers look at first."""
+    return (*FIRST, SWAY) if any(run.has(ASKED) for run in runs) else FIRST
+
+
 def _scalar(runs: Sequence[Shown]) -> list[str]:
     """The names of what is one number at every instant, in the order of readers' interest."""
     names = [n for run in runs for n, numbers in run.recording.signals.items() if numbers.ndim == 1]
-    first = [name for name in (*FIRST, *NEXT) if any(run.has(name) for run in runs)]
+    first = [name for name in (*_first(runs), *NEXT) if any(run.has(name) for run in runs)]
     return [name for name in dict.fromkeys([*first, *names]) if name != "time"]
 
 

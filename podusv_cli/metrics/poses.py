@@ -74,33 +74,24 @@ def _corner_time(seen: Vector, step: float) -> float:
 
 
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
-heading_rms = Metric(
-    "heading_rms",
-    "rad",
-    "root of the mean of (psi - heading_d)^2, wrapped",
-    OF,
-    _rms,
-    place=1,
-    words="heading error, rms",
-    headline=True,
-)
-heading_max = Metric(
-    "heading_max",
-    "rad",
-    "largest |psi - heading_d|, wrapped",
-    OF,
-    gathered(LARGEST),
-    place=1,
-    words="heading error, largest",
-)
 watch_circle = Metric(
     "watch_circle",
     "m",
     "largest z_e while the target stays at a pose",
     OF,
     _circle,
-    place=1,
+    place=0,
     words="watch circle: largest distance at a pose",
+    headline=True,
+)
+heading_rms = Metric(
+    "heading_rms",
+    "rad",
+    "root of the mean of (psi - heading_d)^2, wrapped",
+    OF,
+    _rms,
+    place=0,
+    words="heading error, rms",
     headline=True,
 )
 corner_time = Metric(
@@ -110,7 +101,17 @@ corner_time = Metric(
     "radius and stays there while the target stays",
     OF,
     _corner_time,
-    place=1,
+    place=0,
     happens=True,
     words="longest time to a pose",
+    headline=True,
+)
+heading_max = Metric(
+    "heading_max",
+    "rad",
+    "largest |psi - heading_d|, wrapped",
+    OF,
+    gathered(LARGEST),
+    place=0,
+    words="heading error, largest",
 )

@@ -111,8 +111,9 @@ use_u = Metric(
     "mean |tau_u| over the actuator's limit of it",
     OF_USE,
     ratio(USE_U, TIME),
-    place=5,
+    place=0,
     words="use of the surge force, mean part of its limit",
+    headline=True,
 )
 use_v = Metric(
     "thrust_use_v",
@@ -120,8 +121,9 @@ use_v = Metric(
     "mean |tau_v| over the actuator's limit of it",
     OF_USE,
     ratio(USE_V, TIME),
-    place=5,
+    place=0,
     words="use of the sway force, mean part of its limit",
+    headline=True,
 )
 use_r = Metric(
     "thrust_use_r",
@@ -129,6 +131,7 @@ use_r = Metric(
     "mean |tau_r| over the actuator's limit of it",
     OF_USE,
     ratio(USE_R, TIME),
-    place=5,
+    place=0,
     words="use of the yaw moment, mean part of its limit",
+    headline=True,
 )

@@ -137,6 +137,7 @@ COMMANDS: dict[str, Callable[[Command, str], Said]] = {
     "doubt": doubt,
     "verify": of_scenario("verify", "a.yaml", "--tolerance", "1e9"),
     "margins": of_scenario("margins", "a.yaml"),
+    "capability": of_scenario("capability", "a.yaml", "--every", "90"),
     "optimum": of_scenario("optimum", "a.yaml", "--no-figures"),
     "export": of_scenario("export", "a.yaml", "--no-fmu", "--to", "law", *SAMPLED),
     "gym": gym,

@@ -93,6 +93,13 @@ def test_all_scalars_are_shown_in_words_symbols_and_units_and_one_that_a_run_lac
     assert numbers.max() == pytest.approx(recording()["tau_u"].max(), rel=1e-6)
 
 
+def test_of_a_vessel_that_is_asked_for_a_sway_force_it_is_seen_first_too():
+    asked = recording(tau_v_cmd=np.sin, tau_v=np.cos)
+    both = traces.traces(shown(("a", recording()), ("b", asked)))
+    names = [signal["name"] for signal in both["signals"]]
+    assert names[: both["first"]] == ["z_e", "psi_e", "tau_u", "tau_r", "tau_v"]
+
+
 def test_of_many_runs_there_are_fewer_signals():
     runs = shown(*[(f"run {i}", recording()) for i in range(30)])
     assert len(traces.traces(runs)["signals"]) == traces.MOST

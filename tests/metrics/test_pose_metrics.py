@@ -7,6 +7,7 @@ import pytest
 from pose_samples import BOAT, loaded_pose
 
 import podusv
+from podusv_cli.metrics.table import METRICS, headlines_first
 
 LIMITS = "actuator={kind: saturated_full, surge_limit: 3.0, yaw_limit: 2.0, sway_limit: 1.5}"
 LAW = "controller: {kind: pose_pid, w_x: 0.4, w_y: 0.5, w_r: 0.9}\n"
@@ -56,6 +57,15 @@ def test_metrics_of_the_sway_force_are_those_of_a_plain_loop(run):
     for axis, limit in (("u", 3.0), ("v", 1.5), ("r", 2.0)):
         used = (weights * np.abs(run[f"tau_{axis}"])).sum() / limit / 47.0
         assert run.metrics[f"thrust_use_{axis}"] == pytest.approx(used, rel=1e-9)
+
+
+def test_a_run_begins_with_what_holds_a_pose(run):
+    """Watch circle, heading, time to a pose, use of each force; then what other runs begin with."""
+    own = ["watch_circle", "heading_rms", "corner_time"]
+    use = [f"thrust_use_{axis}" for axis in "uvr"]
+    rows = [m.name for m in headlines_first(METRICS) if m.name in run.metrics]
+    assert rows[:6] == [*own, *use]
+    assert rows[6] == "settling_time"
 
 
 def test_a_pose_that_is_left_outside_the_radius_was_never_reached():

@@ -167,6 +167,7 @@ COMMANDS = (
     "validate -v",
     "verify",
     "margins",
+    "capability --every 180",
     "optimum",
     "export",
     "tune",

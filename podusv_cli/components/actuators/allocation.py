@@ -19,6 +19,7 @@ from podusv_cli.components.actuators.allocation_qp import (
     MOST_PODS,
     SECTOR,
     SECTORS,
+    STRAIGHT,
     several_pods,
 )
 from podusv_cli.components.actuators.allocation_single import YAW, one_pod, within
@@ -26,6 +27,7 @@ from podusv_cli.components.actuators.propeller import (
     ANGLE,
     DELTA_RATE,
     LIFT,
+    MOUNT,
     N_AHEAD,
     N_ASTERN,
     N_RATE,
@@ -33,10 +35,11 @@ from podusv_cli.components.actuators.propeller import (
     X,
     Y,
     force,
+    on_hull,
     speed_for,
     thrust,
 )
-from podusv_cli.components.actuators.rudder import slant, steer_rudder
+from podusv_cli.components.actuators.rudder import part_when_slanted, slant, steer_rudder
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 from podusv_cli.core.kinematics import direction
@@ -111,7 +114,7 @@ def by_least_squares(
         at = reach(state[i], state[count + i], flows[i], pod, k)
         most[i] = max(at.most_ahead, at.most_astern, 1e-12)
         low[i], high[i] = at.low, at.high
-        shape(at, pod, most[i], tail(sectors, i * SECTOR))
+        shape(at, pod, most[i], k.takes_sway, tail(sectors, i * SECTOR))
         all_u += most[i]
         all_r += most[i] * math.sqrt(pod[X] * pod[X] + pod[Y] * pod[Y])
     C, tau, g = scratch(COLUMNS), scratch(AXES), scratch(FORCES)
@@ -124,6 +127,8 @@ def by_least_squares(
         c[2], c[3] = 0.0, weight_v * most[i] / all_u
         c[4] = -weight_r * pod[Y] * most[i] / all_r
         c[5] = weight_r * pod[X] * most[i] / all_r
+        if pod[MOUNT] != 0.0:
+            turn_columns(pod[MOUNT], c)
     tau[0] = weight_u * within(demand[0] / all_u, -1.0, 1.0)
     tau[1] = 0.0
     if k.takes_sway > 0.0:
@@ -140,15 +145,33 @@ def by_least_squares(
     return meets_demand(demand, all_u, all_r, k, table, T, delta)
 
 
-# `at` is what the pod can reach within a step. Writes `sector` in the order of FIXED, LOW_COS, ...;
-# `pod`, its row of the table, is not needed here.
+# Changes c (6): two numbers an axis, for forces along and across the hull.
 @kernel
-def shape(at: Reach, pod: Vector, most: float, sector: Vector) -> None:
-    """The pod's sector, in parts of its `most` thrust."""
+def turn_columns(mount: float, c: Vector) -> None:
+    """Make them those for forces along and across a pod that is mounted at this angle [rad]."""
+    cosine, sine = cos_sin(mount)
+    for a in range(AXES):
+        along, across = c[2 * a], c[2 * a + 1]
+        c[2 * a], c[2 * a + 1] = along * cosine + across * sine, across * cosine - along * sine
+
+
+# `at` is what the pod can reach within a step, `pod` its row of the table. Writes `sector` in the
+# order of LOW_COS, ...
+@kernel
+def shape(at: Reach, pod: Vector, most: float, takes_sway: float, sector: Vector) -> None:
+    """The pod's sector, in parts of its `most` thrust.
+
+    A rudder's is what it makes at every angle: its drag is taken off, and astern it is straight.
+    Asked for two demands, a rudder has the sector of a pod that turns.
+    """
     sector[LOW_COS], sector[LOW_SIN] = cos_sin(at.low)
     sector[HIGH_COS], sector[HIGH_SIN] = cos_sin(at.high)
     sector[MOST_ASTERN], sector[MOST_AHEAD] = at.most_astern / most, at.most_ahead / most
     sector[FIXED] = 1.0 if at.high <= at.low else 0.0
+    sector[STRAIGHT] = 0.0
+    if takes_sway > 0.0 and pod[LIFT] > 0.0:
+        sector[STRAIGHT] = 1.0
+        sector[MOST_AHEAD] *= part_when_slanted(pod)
 
 
 # demand (2, or 3 where `k.takes_sway`) [N, N m, N]; T (count) [N], delta (count) [rad]. `all_u` [N]
@@ -162,6 +185,7 @@ def meets_demand(
     for i in range(int(k.count)):
         pod = tail(table, i * WIDTH)
         along, across = force(T[i], delta[i])
+        along, across = on_hull(along, across, pod)
         tau_u += along
         tau_v += across
         tau_r += pod[X] * across - pod[Y] * along

@@ -1,8 +1,8 @@
 """Allocation for several pods: least squares over sectors of force, solved exactly.
 
 Pod i makes the force R_i g_i, where g_i lies in a circular sector (the angles it can take, thrust
-up to its limit) or, for thrust astern, in the opposite one; a fixed propeller's is a segment. With
-a side chosen for each pod the problem
+up to its limit) or, for thrust astern, in the opposite one; a fixed propeller's is a segment, as is
+that of a propeller astern with a rudder behind it. With a side chosen for each pod the problem
 
     minimise 1/2 |y|^2 + eps/2 sum |g_i|^2,  y = sum C_i g_i - tau,  g_i in its sector
 
@@ -20,8 +20,9 @@ from podusv_cli.core.kernel import Vector, kernel, scratch, tail
 
 MOST_PODS = 4  # all 2^4 choices of ahead and astern are tried
 AXES = 3  # surge, sway, yaw
-# A pod's row in `sectors`: directions of the two edges, least and most along them, most astern.
-LOW_COS, LOW_SIN, HIGH_COS, HIGH_SIN, MOST_ASTERN, MOST_AHEAD, FIXED, SECTOR = range(8)
+# A pod's row in `sectors`: directions of the two edges, most along them and astern; 1 for a segment
+# both ways; 1 for a rudder, whose force astern is straight.
+LOW_COS, LOW_SIN, HIGH_COS, HIGH_SIN, MOST_ASTERN, MOST_AHEAD, FIXED, STRAIGHT, SECTOR = range(9)
 # Room for all pods: sectors, columns C_i, and the forces g_i with three numbers more.
 SECTORS, COLUMNS, FORCES = SECTOR * MOST_PODS, 2 * AXES * MOST_PODS, 2 * MOST_PODS + 3
 # Where a thrust is at its limit the part of a step that is level can be 1e-7 of it. A search that
@@ -38,6 +39,10 @@ def nearest(p_x: float, p_y: float, sector: Vector, side: float, out: Vector) ->
     most = sector[MOST_AHEAD] if side > 0.0 else sector[MOST_ASTERN]
     least = 0.0
     p_x, p_y = side * p_x, side * p_y
+    if side < 0.0 and sector[STRAIGHT] > 0.0:
+        out[0], out[1] = -min(max(p_x, 0.0), most), 0.0
+        out[2], out[3], out[4] = 1.0 if 0.0 < p_x < most else 0.0, 0.0, 0.0
+        return
     if sector[FIXED] > 0.0:
         least = -sector[MOST_ASTERN] if side > 0.0 else -sector[MOST_AHEAD]
     elif (

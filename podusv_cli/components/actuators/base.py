@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -265,6 +265,14 @@ class Actuator(KernelPart):
             signals=signals,
         )
         return tau, rate
+
+    def without_each(self) -> dict[str, Self | None]:
+        """The actuator without each of its thrusters, by the thruster's key; none by default.
+
+        The allocation knows what is left, other than that of a `failure`. None where what is left
+        cannot be steered.
+        """
+        return {}
 
     def input_matrix(self) -> Vector:
         """How loads (tau_u, tau_v, tau_r) follow small demands at rest, shape (3, 2) or (3, 3).

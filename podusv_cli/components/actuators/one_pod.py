@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Sequence
 from typing import ClassVar, Literal, Self
 
@@ -38,6 +39,15 @@ class Pod(Component):
     values_of: ClassVar[dict[str, ValuesOf]] = {"table": of_file}
     x: float = value(..., "m", "position ahead of the body origin; negative at the stern")
     y: float = value(0.0, "m", "position to starboard of the body origin")
+    mount: float = value(
+        0.0,
+        "rad",
+        "direction in which it pushes at angle 0, from the bow to starboard; 90 deg with "
+        "angle_limit 0 is a tunnel thruster",
+        ge=-math.pi,
+        le=math.pi,
+        exclude_if=operator.not_,  # logs from before this key keep their bytes
+    )
     T_nn: float | None = value(
         None, "N s2", "thrust over |n|n ahead, at rest; needed without a table", gt=0
     )
@@ -205,7 +215,19 @@ class Pod(Component):
             self.rudder.stall if self.rudder else 0.0,
             *self._dead_band(),
             *places,
+            self.mount,
         ]
+
+    def pushes(self) -> list[tuple[float, float, float]]:
+        """Surge and sway force and yaw moment of 1 N in the directions that it can push."""
+        turned = [self.mount] + ([self.mount + 0.5 * math.pi] if self.angle_limit > 0.0 else [])
+        ways = [(_round(math.cos(at)), _round(math.sin(at))) for at in turned]
+        return [(X, Y, self.x * Y - self.y * X) for X, Y in ways]
+
+
+def _round(part: float) -> float:
+    """A cosine or sine without what a right angle in floating point leaves of 0."""
+    return round(part, 12)
 
 
 class PodFailure(EffectivenessLoss):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import ValidationError, model_validator
 
 from podusv_cli.components.actuators.allocation import allocate, settings
 from podusv_cli.components.actuators.allocation_qp import MOST_PODS
@@ -36,6 +36,7 @@ from podusv_cli.components.actuators.propeller import (
     Y,
     force,
     inflow,
+    on_hull,
     thrust,
     turning,
 )
@@ -43,7 +44,7 @@ from podusv_cli.components.actuators.rudder import loads
 from podusv_cli.core.component import Presets, value
 from podusv_cli.core.kernel import Vector, bundle, call, kernel, scratch, tail
 from podusv_cli.core.portable import add_up
-from podusv_cli.core.signal import DEMAND_SIZE, Signal
+from podusv_cli.core.signal import DEMAND, DEMAND_SIZE, Signal
 from podusv_cli.core.units import Scale, Scales
 
 SATURATED, SPEED_LIMITED, ANGLE_LIMITED, RATE_LIMITED, FLAGS = range(5)
@@ -68,6 +69,7 @@ def act(
         flows[i] = inflow(x, pod, delta, k)
         T = thrust(state[i], flows[i], pod, k)
         along, across = loads(turning(state[i], pod), T, delta, pod)
+        along, across = on_hull(along, across, pod)
         thrusts[i] = T
         tau[0] += along
         tau[1] += 0.0 if k.neglect_sway_force > 0.0 else across
@@ -175,7 +177,8 @@ class Pods(Actuator):
         """Raises ValueError for pods that cannot make force and moment apart from each other."""
         if not 1 <= len(self.pods) <= MOST_PODS:
             raise ValueError(f"has {len(self.pods)} pods; 1 to {MOST_PODS} are possible")
-        if not any((pod.angle_limit > 0 and pod.x != 0) or pod.y != 0 for pod in self.pods):
+        pushes = [push for pod in self.pods for push in pod.pushes()]
+        if not any(moment for _, _, moment in pushes):
             raise ValueError(
                 "has no authority over yaw: a pod that turns needs a lever arm x other than 0, "
                 "one that does not (angle_limit 0) a lever arm y"
@@ -185,8 +188,9 @@ class Pods(Actuator):
                 "has one pod, which cannot make surge force and yaw moment apart from each other; "
                 "it needs a lever arm x and an angle_limit, both other than 0"
             )
-        fixed = [pod for pod in self.pods if pod.angle_limit == 0]
-        if len(fixed) == len(self.pods) and len({pod.y for pod in fixed}) == 1:
+        fixed = all(pod.angle_limit == 0 for pod in self.pods)
+        apart = np.linalg.matrix_rank(np.array(pushes)[:, [0, 2]]) == len(DEMAND)
+        if fixed and not apart:
             raise ValueError(
                 "has only fixed propellers side by side at the same y, which cannot make surge "
                 "force and yaw moment apart from each other; place them at different y"
@@ -250,9 +254,8 @@ class Pods(Actuator):
         """With a weight of it, where forces of the pods span surge, sway and yaw."""
         if self.sway_weight == 0.0 or self.neglect_sway_force:
             return False
-        along = [(1.0, 0.0, -pod.y) for pod in self.pods]
-        across = [(0.0, 1.0, pod.x) for pod in self.pods if pod.angle_limit > 0.0]
-        return bool(np.linalg.matrix_rank(np.array(along + across)) == DEMAND_SIZE)
+        pushes = [push for pod in self.pods for push in pod.pushes()]
+        return bool(np.linalg.matrix_rank(np.array(pushes)) == DEMAND_SIZE)
 
     @property
     def states(self) -> tuple[Signal, ...]:
@@ -274,7 +277,9 @@ class Pods(Actuator):
             "count": float(len(self.pods)),
             "power_known": float(known),
             "takes_sway": float(self.takes_sway),
-            "closed_form": float(len(self.pods) == 1 and self.pods[0].y == 0.0),
+            "closed_form": float(
+                len(self.pods) == 1 and self.pods[0].y == self.pods[0].mount == 0.0
+            ),
         }
 
     def table(self) -> Vector:
@@ -327,6 +332,17 @@ class Pods(Actuator):
                 break
             state = command.copy()
         return tau
+
+    def without_each(self) -> dict[str, Self | None]:
+        """The other pods; no command path, which may be one of a sway force that is lost."""
+        return {f"pods[{i}]": self._without(i) for i in range(len(self.pods))}
+
+    def _without(self, lost: int) -> Self | None:
+        rest = tuple(pod for i, pod in enumerate(self.pods) if i != lost)
+        try:
+            return self.changed({"pods": rest, "failure": None, "command": None})
+        except ValidationError:
+            return None
 
     def input_matrix(self) -> Vector:
         """As for every actuator, but for loads that have settled, about a third of full thrust.
@@ -412,6 +428,7 @@ class Pods(Actuator):
         if pod[LIFT] > 0.0:
             along, across = loads(turning(state[i], pod), thrusts[i], state[count + i], pod)
             along, across = part * along, part * across
+        along, across = on_hull(along, across, pod)
         thrusts[i] -= lost
         tau[0] -= along
         tau[1] -= 0.0 if k.neglect_sway_force > 0.0 else across

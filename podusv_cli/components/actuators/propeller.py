@@ -65,8 +65,9 @@ PHYSICAL = 0.0
     STRETCH_ASTERN,
     CURVE_AHEAD,
     CURVE_ASTERN,
+    MOUNT,
     WIDTH,
-) = range(23)
+) = range(24)
 
 
 @kernel
@@ -79,7 +80,7 @@ def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     """
     if k.thrust_form == PHYSICAL:
         ahead, aside = x[3] - pod[Y] * x[5], x[4] + pod[X] * x[5]
-        cosine, sine = cos_sin(0.0 if pod[LIFT] > 0.0 else delta)
+        cosine, sine = cos_sin(pod[MOUNT] + (0.0 if pod[LIFT] > 0.0 else delta))
         return float(-(ahead * cosine + aside * sine))
     return math.sqrt(x[3] * x[3] + x[4] * x[4])
 
@@ -118,9 +119,18 @@ def thrust(n: float, flow: float, pod: Vector, k: Any) -> float:
 
 @kernel
 def force(T: float, delta: float) -> tuple[float, float]:
-    """Force [N] along and across the vessel of the thrust T [N] at the angle delta [rad]."""
+    """Force [N] along and across a pod's mounting of the thrust T [N] at the angle delta [rad]."""
     cosine, sine = cos_sin(delta)
     return T * cosine, T * sine
+
+
+@kernel
+def on_hull(along: float, across: float, pod: Vector) -> tuple[float, float]:
+    """Force [N] along and across the vessel of one along and across the pod as it is mounted."""
+    if pod[MOUNT] == 0.0:
+        return along, across
+    cosine, sine = cos_sin(pod[MOUNT])
+    return along * cosine - across * sine, along * sine + across * cosine
 
 
 # n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table.

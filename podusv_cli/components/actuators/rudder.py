@@ -10,6 +10,7 @@ Oceanic Eng. 33 (2008); a normal force that is side force and drag is H. Yasukaw
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from podusv_cli.components.actuators.propeller import (
@@ -34,7 +35,7 @@ AGREED = 1.001  # of the largest angle: more is out of reach
 
 @kernel
 def loads(turns: float, T: float, delta: float, pod: Vector) -> tuple[float, float]:
-    """Force [N] along and across the vessel of a pod at angle delta [rad], or of its rudder.
+    """Force [N] along and across its mounting of a pod at angle delta [rad], or of its rudder.
 
     `turns` is how fast its propeller is `turning`.
     """
@@ -57,6 +58,13 @@ def slant(delta: float, pod: Vector) -> float:
         return delta
     along, across = loads(1.0, pod[T_AHEAD], min(max(delta, -pod[STALL]), pod[STALL]), pod)
     return float(direction(along, across))
+
+
+@kernel
+def part_when_slanted(pod: Vector) -> float:
+    """Force of thrust and rudder together at the largest angle, in parts of the thrust, at rest."""
+    along, across = loads(1.0, pod[T_AHEAD], min(pod[ANGLE], pod[STALL]), pod)
+    return float(math.sqrt(along * along + across * across) / pod[T_AHEAD])
 
 
 # flow [m/s] is the advance speed, `pod` its row of the table. Writes out (2): speed [1/s], angle

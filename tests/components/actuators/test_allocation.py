@@ -18,7 +18,7 @@ from podusv_cli.components.actuators.allocation import EFFORT, PREFERENCE, alloc
 from podusv_cli.components.actuators.allocation_single import one_pod
 from podusv_cli.components.actuators.base import whole_demand
 from podusv_cli.components.actuators.pod import Pod, Pods
-from podusv_cli.core.kernel import Vector, bundle
+from podusv_cli.core.kernel import Vector, bundle, call
 
 LIMIT = math.radians(35.0)
 AHEAD, ASTERN = 8.0, 5.0
@@ -241,6 +241,70 @@ def test_pods_take_a_sway_force_with_a_weight_of_it_where_they_can_push_every_wa
     assert not several(LAYOUTS["one aside"], **weighed).takes_sway
     with pytest.raises(ValidationError, match="a dead zone of a sway force, and takes none"):
         several([(-0.5, -0.4, 0.0), (-0.5, 0.4, 0.0)], command={"dead_zone_v": 1.0})
+
+
+def tunnelled(**options: Any) -> Pods:
+    """Two fixed propellers at the stern and a tunnel in the bow, which pushes to starboard."""
+    fixed = {"T_nn": 4e-3, "T_nn_astern": 4e-3, "angle_limit": 0.0}
+    places = ({"x": -0.5, "y": -0.4}, {"x": -0.5, "y": 0.4}, {"x": 0.6, "mount": math.pi / 2})
+    return Pods(pods=tuple(Pod(**POD | fixed | place) for place in places), **options)
+
+
+@given(surge=unit, yaw=unit, sway=unit)
+def test_a_tunnel_and_two_propellers_make_three_demands_as_three_equations_say(surge, yaw, sway):
+    """X = T_1 + T_2, N = 0.4 (T_1 - T_2) + 0.6 T_3, Y = T_3."""
+    ship = tunnelled(sway_weight=1.0)
+    assert ship.takes_sway
+    demand = np.array([surge * 2.0, yaw * 0.5, sway * 1.5])
+    rows = np.array([[1.0, 1.0, 0.0], [0.4, -0.4, 0.6], [0.0, 0.0, 1.0]])
+    T, delta = allocated(ship, demand)
+    np.testing.assert_allclose(T, np.linalg.solve(rows, demand), atol=1e-3)
+    assert not delta.any()
+
+
+def test_a_tunnel_pushes_to_starboard_and_turns_the_bow_there():
+    """Loads of running thrusters, with the water's flow along the tunnel that takes thrust away."""
+    ship, n = tunnelled(), np.array([10.0, 10.0, 20.0])
+    tau = ship._drive_once(np.zeros(6), np.concatenate([n, np.zeros(3)]), np.zeros(2))[0]
+    T = 4e-3 * n * n
+    np.testing.assert_allclose(tau, [T[0] + T[1], T[2], 0.6 * T[2]], atol=1e-12)
+    ship = Pods.model_validate(
+        ship.model_dump() | {"pods": [one | {"T_nV": 0.01} for one in ship.model_dump()["pods"]]},
+        strict=False,
+    )
+    v, r = 0.3, 0.2
+    x = np.array([0.0, 0.0, 0.0, 0.0, v, r])
+    state = np.array([0.0, 0.0, 20.0, 0.0, 0.0, 0.0])
+    slowed = ship._drive_once(x, state, np.zeros(2))[0]
+    assert slowed[1] == pytest.approx(T[2] - 0.01 * 20.0 * (v + 0.6 * r))
+
+
+def test_a_failed_tunnel_pushes_no_more():
+    ship = tunnelled(failure={"time": 0.0, "pod": 2})
+    tau, signals = np.array([1.0, 1.6, 0.96]), np.zeros(len(ship.signals))
+    signals[4 + 2 * 3 : 4 + 3 * 3] = [0.5, 0.5, 1.6]
+    k = bundle(ship.constants())
+    call(ship.lose, state=np.zeros(6), k=k, table=ship.table(), tau=tau, signals=signals)
+    np.testing.assert_allclose(tau, [1.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_tunnels_alone_cannot_push_ahead():
+    tunnels = [Pod(**POD | {"x": x, "angle_limit": 0.0, "mount": math.pi / 2}) for x in (-1, 1)]
+    with pytest.raises(ValidationError, match="cannot make surge"):
+        Pods(pods=tuple(tunnels))
+
+
+def test_pods_mounted_at_an_angle_make_what_straight_ones_make_with_it():
+    """Two pods that turn by 90 deg reach the same forces however they are mounted."""
+    demand = np.array([3.0, -0.7, 1.1])
+    for mount in (0.0, 0.4, -1.2):
+        pods = several(LAYOUTS["bow and stern"], sway_weight=1.0)
+        turned = tuple(pod.model_copy(update={"mount": mount}) for pod in pods.pods)
+        T, delta = allocated(pods.model_copy(update={"pods": turned}), demand)
+        X, Y = T * np.cos(delta + mount), T * np.sin(delta + mount)
+        assert X.sum() == pytest.approx(3.0, abs=1e-3)
+        assert Y.sum() == pytest.approx(1.1, abs=1e-3)
+        assert np.array([0.6, -0.5]) @ Y == pytest.approx(-0.7, abs=1e-3)
 
 
 def test_a_sway_force_that_is_no_number_is_not_lost_between_limits_of_pods():
