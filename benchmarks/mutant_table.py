@@ -657,6 +657,8 @@ TABLE: dict[str, list[Row]] = {
      "test_any_windows_and_radii_have_the_same_code"),
 ],
 "engine": [
+    ("follows=int(loop.path.follows or loop.own_time)", "follows=int(loop.path.follows)",
+     "test_it_stays_at_rounding_level_on_a_path_that_it_begins_on"),
     ("whole = np.zeros((len(rows), DEMAND_SIZE))", "whole = np.zeros(given.shape)",
      "test_a_simulated_command_may_be_late_by_the_delay_margin"),
     ("seen = tail(c.held, HELD_X)", "seen = given",
@@ -740,6 +742,12 @@ TABLE: dict[str, list[Row]] = {
      "test_the_place_is_bracketed_however_near"),
 ],
 "controllers": [
+    ("rate_u = (a_2 * pace + r * e.v_d) * v_s", "rate_u = (a_2 * pace - r * e.v_d) * v_s",
+     "test_a_lyapunov_function_falls_with_the_path_s_time_as_the_proof_says"),
+    ("by_s * (v_s + w) + by_t,", "by_s * v_s + by_t,",
+     "test_a_sampled_delayed_loop_at_its_own_path_time_is_that_of_plain_python"),
+    ("rate[LOAD + 1] -= k.gamma * (s * ahead + c * aside)", "pass",
+     "test_what_is_learnt_does_not_grow_behind_a_limit_on_the_way"),
     (", ROUTH_SHARE * routh_gain(p, at.d, eta, k))", ")",
      "test_its_gain_leaves_routh_s_third_condition_a_margin_where_it_binds"),
     ("MOST * k.U and learns * more > 0.0", "MOST * k.U",

@@ -58,6 +58,9 @@ def unmet(law: Controller, path: Path, actuator: Actuator) -> list[tuple[str, st
             f"{law.label} wants a heading, and {path.label} has none; take poses, hold or ellipse"
         )
         texts += [("path", text)]
+    if law.keeps_path_time() and (path.follows or path.fillet_for_law()):
+        text = f"{law.label} goes along a path with a timetable, whose corners it rounds not"
+        texts += [("path", f"{text}; {path.label} has another; take poses, hold or ellipse")]
     return texts
 
 
@@ -133,6 +136,11 @@ class ClosedLoop:
     def headings(self) -> tuple[Signal, ...]:
         """The heading that the path asks for, with its rates; none of a path without one."""
         return HEADING if self.path.heads else ()
+
+    @property
+    def own_time(self) -> bool:
+        """Whether the law says at which time its path is read, see `Controller.keeps_path_time`."""
+        return self.controller.keeps_path_time()
 
     @property
     def has_target(self) -> bool:
