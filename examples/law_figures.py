@@ -37,6 +37,7 @@ SHOWN = {
     "pose_pid": ("dp/four_corners", ("pid", "pd")),
     "pose_backstepping": ("dp/four_corners", ("backstepping", "backstepping_plain")),
     "pose_sliding_mode": ("dp/four_corners", ("sliding_mode", "backstepping_plain")),
+    "maneuvering": ("skjetne_2005/limits", ("gradient", "tracking")),
     "policy": ("laws/learned", ("policy", "velocity_vector")),
 }
 LEAST = 1e-4  # m, the lower end of the axis of errors

@@ -1,6 +1,6 @@
 """Print a line a paper: how many of its claims are reproduced, made by `make reproduce`.
 
-    python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003
+    python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003 ...
 
 A name is a folder below results/runs: one comparison, or all those in it.
 """

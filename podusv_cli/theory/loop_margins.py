@@ -79,6 +79,11 @@ def loop_margins(
             "continuously; set controller.rate=analytic and controller.hold_below=0 where it has "
             "these keys, or choose another law"
         )
+    if law.keeps_path_time():
+        raise LawError(
+            f"{law.noun} {law.label}: its target moves as the law wants, and margins are those of "
+            "a law that follows a target with a timetable; choose pose_backstepping"
+        )
     if loop.path.follows:
         raise LawError(
             f"{loop.path.noun} {loop.path.label}: its target moves with the vessel, and margins "

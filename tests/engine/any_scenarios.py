@@ -76,6 +76,12 @@ KINDS: dict[str, dict[str, Any]] = {
         "actuator": {"kind": "pod", "preset": "milliampere", "sway_weight": 1.0},
         "vessel": {"preset": "milliampere"},
     },
+    "a path at the law's own time": {
+        "controller": {"kind": "maneuvering", "speed": 0.2, "gamma": 0.3},
+        "path": {"kind": "ellipse", "period": 40.0},
+        "actuator": {"kind": "saturated_full"},
+        "vessel": {"preset": "cybership2"},
+    },
     "a trial": {"controller": {"kind": "zigzag"}},
     "a difference of headings": {
         "controller": {"kind": "adaptive_neural", "rate": "difference", "hold_below": 0.1}
@@ -133,7 +139,7 @@ class Drawn:
             "start.v": self.between(-0.1, 0.1),
             "start.r": self.between(-0.2, 0.2),
         }
-        if KINDS[self.kind].get("path", LEGS)["kind"] != "poses":  # which are timed
+        if KINDS[self.kind].get("path", LEGS)["kind"] not in ("poses", "ellipse"):  # timed
             numbers["path.speed"] = self.between(0.2, 0.8)
         if "actuator" in KINDS[self.kind]:
             numbers["actuator.command.delay"] = self.seconds(self.whole(0, 9))

@@ -96,6 +96,13 @@ class Controller(KernelPart):
         """Whether it reads a heading behind the target's distance, from a path that `heads`."""
         return False
 
+    def keeps_path_time(self) -> bool:
+        """Whether the path is read at the first number of its memory [s], not at the clock's time.
+
+        So the law decides by that number's rate how fast the target goes along its path.
+        """
+        return False
+
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""
         return False

@@ -12,18 +12,31 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from functools import cache
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from podusv_cli.components.paths.fillet import Fillet
 from podusv_cli.core.component import KernelPart
-from podusv_cli.core.kernel import Vector, absent, bundle, call
+from podusv_cli.core.kernel import Vector, absent, arguments_of, bundle, call, kernel
+from podusv_cli.core.plugins import TEXT
 from podusv_cli.core.signal import TARGET_SIZE, Signal
 
 Point = tuple[float, float]
 
+ARGUMENTS = ("t", "x", "place", "k", "table", "target")  # of `evaluate`
 TARGET = ("x_d", "y_d", "x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot")
+
+
+@cache
+def read_at_place(evaluate: Callable[..., None]) -> Any:
+    """A kernel that is a path's `evaluate` at the time [s] that stands first in `place`."""
+    passed = ("place[0]" if name == "t" else name for name in arguments_of(evaluate, ARGUMENTS))
+    text = f"def at_place({', '.join(ARGUMENTS[1:])}):\n    evaluate({', '.join(passed)})"
+    scope: dict[str, Any] = {"evaluate": evaluate, "__name__": evaluate.__module__, TEXT: text}
+    exec(compile(text, "a path at its own time", "exec"), scope)  # noqa: S102
+    return kernel(scope["at_place"])
 
 
 @dataclass(frozen=True)

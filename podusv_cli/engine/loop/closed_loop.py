@@ -68,6 +68,9 @@ def unmet(law: Controller, path: Path, actuator: Actuator, load_at: int) -> list
             "or ekf with bias, behind `measurement: {kind: sensors}`"
         )
         texts += [("estimator", text)]
+    if law.keeps_path_time() and (path.follows or path.fillet_for_law()):
+        text = f"{law.label} goes along a path with a timetable, whose corners it rounds not"
+        texts += [("path", f"{text}; {path.label} has another; take poses, hold or ellipse")]
     return texts
 
 
@@ -148,6 +151,11 @@ class ClosedLoop:
     def headings(self) -> tuple[Signal, ...]:
         """The heading that the path asks for, with its rates; none of a path without one."""
         return HEADING if self.path.heads else ()
+
+    @property
+    def own_time(self) -> bool:
+        """Whether the law says at which time its path is read, see `Controller.keeps_path_time`."""
+        return self.controller.keeps_path_time()
 
     @property
     def has_target(self) -> bool:

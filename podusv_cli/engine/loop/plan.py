@@ -13,7 +13,7 @@ import numpy as np
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.pose_law import with_load
 from podusv_cli.components.disturbances.base import FLOW, WAVE_MOTION
-from podusv_cli.components.paths.base import TARGET
+from podusv_cli.components.paths.base import TARGET, read_at_place
 from podusv_cli.core.kernel import Vector, bundle
 from podusv_cli.core.kernel import call as call_kernel
 from podusv_cli.core.recording import Allocate
@@ -152,7 +152,7 @@ class Plan:
         return Layout(
             states=s["end"],
             estimate=s["estimator"] if loop.measured else 0,
-            place=s["path"],
+            place=s["law" if loop.own_time else "path"],
             memory=s["law"],
             target=TARGET_SIZE if loop.path.heads else len(TARGET),
             shown=row["shown"] if self.row["shown"] else 0,
@@ -170,7 +170,7 @@ class Plan:
             sample_every=_sample_steps(loop.controller, grid),
             measured=int(loop.measured),
             update_first=int(grid.update_first),
-            follows=int(loop.path.follows),
+            follows=int(loop.path.follows or loop.own_time),
             load_of_time=int(loop.disturbance.of_time),
             wants_loads=int(loop.controller.wants_loads()),
             by_delay_line=int(loop.actuator.by_delay_line),
@@ -187,7 +187,7 @@ class Plan:
         loop, names = self.loop, self.constants
         law, path, seen, estimator = loop.controller, loop.path, loop.measurement, loop.estimator
         kernels = {
-            "path": path.evaluate_shown if self.row["shown"] else path.evaluate,
+            "path": self._target_kernel(),
             "locate": path.locate if path.follows else nothing,
             "disturbance": loop.disturbance.kernel_with(loop.vessel),
             "law": self.law_kernel,
@@ -210,6 +210,13 @@ class Plan:
         law, load_at = self.loop.controller, self.loop.load_at
         fed_forward = load_at and law.wants_load_estimate()
         return with_load(law.law, load_at) if fed_forward else law.law
+
+    def _target_kernel(self) -> Any:
+        """What writes the target: at the clock's time, or at the law's own."""
+        path = self.loop.path
+        if self.loop.own_time:
+            return read_at_place(path.evaluate)
+        return path.evaluate_shown if self.row["shown"] else path.evaluate
 
     @cached_property
     def outline(self) -> tuple[Any, ...]:
