@@ -26,6 +26,9 @@ OVERFLOWING = """[...document.querySelectorAll("body *")].filter((one) => {
     const { right, width } = one.getBoundingClientRect();
     return width && right > innerWidth + 1 && !one.closest(".wide, svg, .key");
 }).map((one) => one.tagName + "#" + one.id)"""
+CUT_TITLES = """[...document.querySelectorAll("#plot .title")].filter((one) =>
+    one.getBoundingClientRect().right > document.getElementById("plot").getBoundingClientRect().right
+).map((one) => one.textContent)"""
 ROLES = {"slider", "spinbutton", "combobox", "textbox", "button", "checkbox"}
 
 
@@ -189,6 +192,7 @@ def test_nothing_is_wider_than_the_window(page: Page, width: int, scheme: str) -
     page.run("dispatchEvent(new Event('resize')); new Promise((done) => setTimeout(done, 100))")
     assert page.run("document.documentElement.scrollWidth") <= width
     assert page.run(OVERFLOWING) == []
+    assert page.run(CUT_TITLES) == []
     colour = page.run("getComputedStyle(document.body).backgroundColor")
     assert (colour == "rgb(255, 255, 255)") == (scheme == "light")
 

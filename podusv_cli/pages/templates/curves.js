@@ -78,7 +78,8 @@ const curvesOn = (card) => {
       make(plot, "path", { d: `M${LEFT} ${up(one, y)}H${width - RIGHT}`, class: "rule" });
       make(plot, "text", { x: LEFT - 6, y: up(one, y) + 4, "text-anchor": "end" }, `${+y.toPrecision(6)}`);
     }
-    make(plot, "text", { x: LEFT, y: top - 6, class: "title" }, signal.meaning);
+    const title = make(plot, "text", { x: LEFT, y: top - 6, class: "title" }, signal.meaning);
+    if (title.getComputedTextLength() > width - LEFT) title.textContent = signal.meaning.split(/[:,]/)[0];
     formula(make(plot, "text", { transform: `rotate(-90 12 ${middle})`, x: 12, y: middle, "text-anchor": "middle", class: "label" }), [...signal.symbol, [` [${signal.unit}]`, ""]]);
     const clip = make(make(plot, "clipPath", { id: `plotted-${place}` }), "rect", { x: LEFT, y: top, width: width - LEFT - RIGHT, height: tall });
     const inside = make(plot, "g", { "clip-path": `url(#plotted-${place})`, fill: "none" });
