@@ -79,7 +79,8 @@ const curvesOn = (card) => {
       make(plot, "text", { x: LEFT - 6, y: up(one, y) + 4, "text-anchor": "end" }, `${+y.toPrecision(6)}`);
     }
     const title = make(plot, "text", { x: LEFT, y: top - 6, class: "title" }, signal.meaning);
-    if (title.getComputedTextLength() > width - LEFT) title.textContent = signal.meaning.split(/[:,]/)[0];
+    for (const shorter of [signal.meaning.split(/[:,(]| that /)[0], signal.name]) // where the window is narrow
+      if (title.getComputedTextLength() > width - LEFT) title.textContent = shorter;
     formula(make(plot, "text", { transform: `rotate(-90 12 ${middle})`, x: 12, y: middle, "text-anchor": "middle", class: "label" }), [...signal.symbol, [` [${signal.unit}]`, ""]]);
     const clip = make(make(plot, "clipPath", { id: `plotted-${place}` }), "rect", { x: LEFT, y: top, width: width - LEFT - RIGHT, height: tall });
     const inside = make(plot, "g", { "clip-path": `url(#plotted-${place})`, fill: "none" });
