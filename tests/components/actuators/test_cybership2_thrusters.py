@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -165,3 +166,15 @@ def test_two_demands_take_rudders_for_pods_that_turn():
     """As ever, so that runs of two demands keep their bits: 0.13 of 0.2 N m, as the page says."""
     own = load("podusv:pod/rudders.yaml").scenario.actuator
     assert own.settled(np.zeros(6), np.array([0.0, 0.2]))[2] == pytest.approx(0.132, abs=5e-4)
+
+
+def test_the_four_corners_are_wider_with_the_ship_s_own_thrusters_as_the_page_says():
+    page = Path(__file__).parents[3].joinpath("docs/actuators.md").read_text()
+    for law, words in (("pid", "grows from {} to {} m"), ("backstepping", "from {} to {} m.")):
+        circles = [
+            podusv.simulate(load(f"podusv:dp/{name}.yaml").scenario.singles()[law]).metrics[
+                "watch_circle"
+            ]
+            for name in ("four_corners", "thrusters")
+        ]
+        assert words.format(*(f"{circle:.2f}" for circle in circles)) in page
