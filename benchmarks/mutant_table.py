@@ -475,6 +475,8 @@ TABLE: dict[str, list[Row]] = {
      "test_a_module_beside_a_plug_in_is_noticed_and_one_that_is_installed_is_not"),
 ],
 "figures": [
+    ("if any(run.has(ASKED) for run in runs) else FIRST", "if False else FIRST",
+     "test_of_a_vessel_that_is_asked_for_a_sway_force_it_is_seen_first_too"),
     ("counts[begin : begin + came] = False", "pass",
      "test_what_a_corner_leaves_is_no_distance_that_a_run_comes_to"),
     ("(own * own[0] <= 0.0) | (size <= np.median(size))", "size <= np.median(size)",
@@ -844,6 +846,8 @@ TABLE: dict[str, list[Row]] = {
      "test_what_running_thrusters_make_the_allocation_makes_again"),
     ("sector[MOST_AHEAD] *= part_when_slanted(pod)", "sector[MOST_AHEAD] *= 1.0",
      "test_the_allocation_finds_the_most_sway_that_the_preset_has"),
+    ("_with(whole.get(step), steps[1:], new)", "_with(whole[step], steps[1:], new)",
+     "test_thrusters_march_side_by_side_with_the_bits_that_they_have_alone"),
     ("exclude_if=operator.not_,", "",
      "test_a_mount_is_written_only_where_a_pod_has_one"),
     ("return along * cosine - across * sine, along * sine + across * cosine",

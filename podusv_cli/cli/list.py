@@ -30,7 +30,8 @@ class ListPart(NamedTuple):
 LAWS = "controller"  # the section that most people look for comes first
 THEN = {
     LAWS: "podusv compare, sweep and bench hold laws beside each other, podusv tune finds "
-    "their gains, and podusv export takes one of them to a boat's computer"
+    "their gains, and podusv export takes one of them to a boat's computer",
+    "actuator": "podusv capability finds the current, wind or force that one of them holds at rest",
 }  # by section
 
 

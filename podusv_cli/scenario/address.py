@@ -147,10 +147,10 @@ def _with(whole: Any, steps: Route, new: Any) -> Any:
     if not steps:
         return new
     step = steps[0]
-    inner = _with(whole[step], steps[1:], new)
     if isinstance(step, int):
-        return (*whole[:step], inner, *whole[step + 1 :])
-    return {**whole, step: inner}
+        return (*whole[:step], _with(whole[step], steps[1:], new), *whole[step + 1 :])
+    # A key that is written only where it has a value may not be there.
+    return {**whole, step: _with(whole.get(step), steps[1:], new)}
 
 
 def _refusal(

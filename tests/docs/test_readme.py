@@ -28,6 +28,7 @@ PAGES = (
     "docs/vessel.md",
     "docs/start.md",
     "docs/papers.md",
+    "docs/station_keeping.md",
 )
 LONG = [
     pytest.param(page, marks=pytest.mark.slow)

@@ -305,8 +305,8 @@ class Pods(Actuator):
     def settled(self, x: Vector, demand: Vector) -> Vector:
         """Loads (3,) where the pods' state is what is commanded: x (6,), demand (2,) or (3,).
 
-        The advance speed hangs on the angle. A horizon only takes longer to get there, so it is
-        left out.
+        The advance speed hangs on the angle; where thrust does not answer it, the first commands
+        are the last. A horizon only takes longer to get there, so it is left out.
         """
         k, table, count = (
             bundle(self.constants() | {"horizon": 0.0}),
@@ -315,6 +315,7 @@ class Pods(Actuator):
         )
         tau, rate, state = np.zeros(3), np.zeros(count), self.rest()
         signals, demand = np.zeros(len(self.signals)), whole_demand(demand)
+        felt = any(pod.T_nV or pod.T_nV_astern for pod in self.pods)
         for _ in range(ROUNDS):
             call(
                 self.drive,
@@ -331,6 +332,9 @@ class Pods(Actuator):
             if np.allclose(state, command, rtol=1e-9, atol=0.0):
                 break
             state = command.copy()
+            if not felt:
+                act(x, state, k, table, tau, np.zeros(MOST_PODS), np.zeros(MOST_PODS))
+                break
         return tau
 
     def without_each(self) -> dict[str, Self | None]:

@@ -2,14 +2,17 @@
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
+import podusv
 from podusv_cli.components.actuators.pod import Pods
 from podusv_cli.core.kernel import bundle, call
 from podusv_cli.scenario.load import load
@@ -141,3 +144,37 @@ def test_a_mount_is_written_only_where_a_pod_has_one():
     assert ["mount" in pod for pod in written] == [False, False, True]
     again = yaml.safe_load(yaml.safe_dump(own.model_dump(mode="json")))
     assert Pods.model_validate(again, strict=False) == own
+
+
+def test_thrusters_march_side_by_side_with_the_bits_that_they_have_alone():
+    """Mounts differ between the runs, one of which is 0 and has no key that is written."""
+    scenario = podusv.load("podusv:dp/thrusters.yaml", {"simulation.duration": 6.0}).alone()
+    drawn = {
+        "actuator.pods.2.mount": np.linspace(-1.6, 1.6, 9),
+        "actuator.pods.0.mount": np.linspace(0.0, 0.4, 9),
+        "vessel.m": np.linspace(22.0, 26.0, 9),
+    }
+    alone, together = (
+        podusv.simulate_many(scenario, drawn, workers=1, side_by_side=way) for way in (False, True)
+    )
+    assert set(alone["status"]) == {"finished"}
+    assert len(set(alone["iae"])) == 9
+    pd.testing.assert_frame_equal(alone, together, check_exact=True)
+
+
+def test_two_demands_take_rudders_for_pods_that_turn():
+    """As ever, so that runs of two demands keep their bits: 0.13 of 0.2 N m, as the page says."""
+    own = load("podusv:pod/rudders.yaml").scenario.actuator
+    assert own.settled(np.zeros(6), np.array([0.0, 0.2]))[2] == pytest.approx(0.132, abs=5e-4)
+
+
+def test_the_four_corners_are_wider_with_the_ship_s_own_thrusters_as_the_page_says():
+    page = Path(__file__).parents[3].joinpath("docs/actuators.md").read_text()
+    for law, words in (("pid", "grows from {} to {} m"), ("backstepping", "from {} to {} m.")):
+        circles = [
+            podusv.simulate(load(f"podusv:dp/{name}.yaml").scenario.singles()[law]).metrics[
+                "watch_circle"
+            ]
+            for name in ("four_corners", "thrusters")
+        ]
+        assert words.format(*(f"{circle:.2f}" for circle in circles)) in page
