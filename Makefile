@@ -106,6 +106,8 @@ bench-laws: $(VENV)/run.done ## all laws over standard tasks, into results/bench
 	    cp results/.bench/figures/profiles.png results/bench/figures
 	@$(BIN)/podusv bench configs/bench_boats --force --out results/.bench_boats && \
 	    cp results/.bench_boats/runs.csv results/bench/boats.csv
+	@$(BIN)/podusv bench configs/bench_dp --force --out results/.bench_dp && \
+	    cp results/.bench_dp/runs.csv results/bench/dp.csv
 	@$(BIN)/python examples/reproduce/bench.py > results/.table && mv results/.table docs/bench.md
 	@echo "what was found: docs/bench.md; the page: results/.bench/report.html"
 

@@ -82,6 +82,18 @@ KINDS: dict[str, dict[str, Any]] = {
         "actuator": {"kind": "saturated_full"},
         "vessel": {"preset": "cybership2"},
     },
+    "stations behind an observer": {
+        "controller": {"kind": "pose_backstepping", "load": "estimated"},
+        "path": {"kind": "stations", "poses": POSES, "keep": 0.1, "travel": 0.5, "radius": 2.0},
+        "actuator": {"kind": "saturated_full"},
+        "vessel": {"preset": "cybership2"},
+        "measurement": {"kind": "sensors"},
+        "estimator": {"kind": "passive_observer"},
+    },
+    "legs that end in a hold": {
+        "controller": {"kind": "los_pid"},
+        "path": {**LEGS, "kind": "legs_hold", "points": [[0, 0], [1, 0.3]], "radius": 0.4},
+    },
     "a trial": {"controller": {"kind": "zigzag"}},
     "a difference of headings": {
         "controller": {"kind": "adaptive_neural", "rate": "difference", "hold_below": 0.1}
@@ -139,7 +151,8 @@ class Drawn:
             "start.v": self.between(-0.1, 0.1),
             "start.r": self.between(-0.2, 0.2),
         }
-        if KINDS[self.kind].get("path", LEGS)["kind"] not in ("poses", "ellipse"):  # timed
+        timed = ("poses", "ellipse", "stations")
+        if KINDS[self.kind].get("path", LEGS)["kind"] not in timed:
             numbers["path.speed"] = self.between(0.2, 0.8)
         if "actuator" in KINDS[self.kind]:
             numbers["actuator.command.delay"] = self.seconds(self.whole(0, 9))

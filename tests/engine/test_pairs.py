@@ -236,8 +236,8 @@ def exported_law(drawn: Drawn, place: Path) -> None:
     """A sampled law in the run, by itself, as C and as an FMU."""
     drawn.held = max(drawn.held, 1)
     scenario = drawn.scenario()
-    if scenario.controller.asks_sway():
-        with pytest.raises(UsageError, match="asks for a sway force"):
+    if scenario.controller.wants_load_estimate():
+        with pytest.raises(UsageError, match="takes the load that an estimator finds"):
             ExportedLaw.of(scenario)
         return
     law = ExportedLaw.of(scenario)
@@ -257,7 +257,8 @@ def exported_law(drawn: Drawn, place: Path) -> None:
     same(unit.read()[:inputs], unit.starts, "start")
     same(unit.starts, rows[0, 1 : 1 + inputs], "first sample")
     for row in by_itself:
-        same(unit.step(row[0], row[1 : 1 + inputs]), row[16:], f"t = {row[0]}")
+        said = row[1 + len(law.inputs(rows)[0]) :]
+        same(unit.step(row[0], row[1 : 1 + inputs]), said, f"t = {row[0]}")
 
 
 @pair
