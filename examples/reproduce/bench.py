@@ -15,9 +15,12 @@ from podusv_cli.studies.bench.standing import CROSS, PLACE, by_vessel, leaderboa
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "bench.md"
-RUNS, BOATS, OPTIMA = (
-    pd.read_csv(ROOT / "results" / "bench" / f"{name}.csv") for name in ("runs", "boats", "optima")
+RUNS, BOATS, POSES, OPTIMA = (
+    pd.read_csv(ROOT / "results" / "bench" / f"{name}.csv")
+    for name in ("runs", "boats", "dp", "optima")
 )
+HOLDING, FERRY = "## Holding a pose\n", "The ferry:\n"
+SEAS = ["calm", "slight", "moderate", "rough"]
 BOARDS, BOAT_BOARDS = (
     {vessel: leaderboard(rows) for vessel, rows in by_vessel(made).items()}
     for made in (RUNS, BOATS)
@@ -65,7 +68,8 @@ def sentences() -> Iterator[tuple[Any, ...]]:
     """Sentences with places for numbers, and the numbers."""
     axes = ("law", "task", "vessel", "condition")
     counts = [RUNS[name].nunique() for name in axes]
-    yield "{} laws over {} tasks, {} vessels and {} conditions, {} runs", *counts, len(RUNS)
+    said = "`make bench-laws`: {} laws over {} tasks, {} vessels and {} conditions, {} runs"
+    yield said, *counts, len(RUNS)
     best = RUNS[RUNS.ratio == 1.0].groupby("law").size()
     yield (
         "Over all {} cases `super_twisting` has the least IAE in {}, `velocity_vector` in {}, "
@@ -177,10 +181,35 @@ def _boat_sentences() -> Iterator[tuple[Any, ...]]:
     yield "On the WAM-V in wind it fails in {} of 16 cases", windy.px4
 
 
+def pose_rows(vessel: str) -> Iterator[list[str]]:
+    """Of laws that hold a pose: rank, ratio, and what each settles at in each sea [mm]; by rank."""
+    rows = POSES[POSES.vessel == vessel]
+    for law, row in leaderboard(rows).iterrows():
+        ratio = f"{row.median_ratio:.2f}" if np.isfinite(row.median_ratio) else CROSS
+        held = rows[(rows.task == "hold") & (rows.law == law)].set_index("condition").loc[SEAS]
+        ends = zip(held.status, 1000.0 * held.z_e_steady, strict=True)
+        shown = [f"{float(f'{end:.3g}'):g}" if one == "finished" else CROSS for one, end in ends]
+        yield [str(law), f"{row.mean_rank:.1f}, {row.failed:.0f}", ratio, *shown]
+
+
+def pose_sentences() -> Iterator[tuple[Any, ...]]:
+    """Of laws that hold a pose."""
+    counts = [POSES[name].nunique() for name in ("law", "task", "vessel", "condition")]
+    said = "{} laws over {} tasks, {} vessels and {} conditions, {} runs"
+    yield said, *counts, len(POSES)
+    lost = failures("vessel == 'milliampere'", POSES).drop(["pid", "pd_fed"])
+    yield "drift off** in {} of 32 cases", lost.sum()
+
+
 def filled(page: str) -> str:
     """The page with its tables and numbers anew; where lines break stays."""
+    page, holding, poses = page.partition(HOLDING)
     page = with_rows(page, "| law | `cybership2` |", law_rows())
-    return with_numbers(with_rows(page, "| law | Otter |", boat_rows()), sentences())
+    page = with_numbers(with_rows(page, "| law | Otter |", boat_rows()), sentences())
+    model, ferry, boat = with_numbers(poses, pose_sentences()).partition(FERRY)
+    model = with_rows(model, "| law | rank, failed |", pose_rows("cybership2"))
+    boat = with_rows(boat, "| law | rank, failed |", pose_rows("milliampere"))
+    return "".join((page, holding, model, ferry, boat))
 
 
 if __name__ == "__main__":

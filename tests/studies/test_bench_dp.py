@@ -1,4 +1,4 @@
-"""The bench of laws that hold a pose: its page tells the committed runs, as cases come out now."""
+"""The bench of laws that hold a pose: words of its page hold for the committed runs, made anew."""
 
 from pathlib import Path
 
@@ -8,13 +8,11 @@ import pytest
 
 from podusv_cli.studies.bench.cases import AXES, Selection, cases
 from podusv_cli.studies.bench.runs import play
-from podusv_cli.studies.bench.standing import CROSS, PLACE, by_vessel, leaderboard, table
+from podusv_cli.studies.bench.standing import PLACE, by_vessel, leaderboard, table
 
 ROOT = Path(__file__).parents[2]
 BENCH = ROOT / "configs" / "bench_dp"
 RUNS = pd.read_csv(ROOT / "results" / "bench" / "dp.csv")
-PAGE = (ROOT / "docs" / "bench.md").read_text().partition("## Holding a pose")[2]
-SEAS = ("calm", "slight", "moderate", "rough")
 LENGTHS = {"cybership2": 1.255, "milliampere": 5.0}
 HULLS = by_vessel(RUNS)
 
@@ -27,9 +25,6 @@ def chosen(overrides=(), **names):
 def test_the_committed_runs_are_those_of_the_bench():
     for axis in AXES:
         assert set(RUNS[axis.rstrip("s")]) == {path.stem for path in (BENCH / axis).iterdir()}
-    counts = [RUNS[name].nunique() for name in ("law", "task", "vessel", "condition")]
-    said = "{} laws over {} tasks, {} vessels and {} conditions, {} runs"
-    assert said.format(*counts, len(RUNS)) in PAGE
     for vessel, length in LENGTHS.items():
         (case,) = chosen(vessels=vessel, tasks="hold", conditions="calm")
         assert set(RUNS.law) == set(case.laws)
@@ -47,25 +42,6 @@ def test_a_case_run_now_is_the_committed_one(vessel):
     np.testing.assert_allclose(fresh.iae[whole], kept.iae[whole], rtol=5e-6)  # six digits are kept
 
 
-def settled(rows, law):
-    """What a law settles at in each sea when it holds a pose [mm]."""
-    held = rows[(rows.task == "hold") & (rows.law == law)].set_index("condition")
-    for sea in SEAS:
-        steady = 1000.0 * held.z_e_steady[sea]
-        yield f"{float(f'{steady:.3g}'):g}" if held.status[sea] == "finished" else CROSS
-
-
-@pytest.mark.parametrize("vessel", LENGTHS)
-def test_each_hull_has_the_table_of_its_runs(vessel):
-    rows = HULLS[vessel]
-    board = leaderboard(rows)
-    for law in board.index:
-        ratio = board.median_ratio[law]
-        shown = f"{ratio:.2f}" if np.isfinite(ratio) else CROSS
-        cells = [f"{board.mean_rank[law]:.1f}, {board.failed[law]:.0f}", shown, *settled(rows, law)]
-        assert f"| {law} | {' | '.join(cells)} |" in PAGE
-
-
 def test_what_the_page_says_in_words_is_that_of_the_runs():
     iae = HULLS["cybership2"].pivot_table("iae", ["task", "condition"], "law").drop("calm", level=1)
     for fed, own in (("pd_fed", "pid"), ("backstepping_fed", "backstepping")):
@@ -74,8 +50,7 @@ def test_what_the_page_says_in_words_is_that_of_the_runs():
     assert boards.pd_fed / boards.pid == pytest.approx(1.2, abs=0.05)
     lost = HULLS["milliampere"].query("status != 'finished'").law
     linear = lost.isin(["pid", "pd_fed"]).sum()
-    assert f"in {len(lost) - linear} of 32 cases, PID and PD in one of 16" in PAGE
-    assert linear == 1
+    assert linear == 1  # "in one of 16"
 
 
 def test_without_pods_backstepping_holds_the_ferry():

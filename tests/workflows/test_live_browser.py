@@ -27,7 +27,7 @@ OVERFLOWING = """[...document.querySelectorAll("body *")].filter((one) => {
     return width && right > innerWidth + 1 && !one.closest(".wide, svg, .key");
 }).map((one) => one.tagName + "#" + one.id)"""
 CUT_TITLES = """[...document.querySelectorAll("#plot .title")].filter((one) =>
-    one.getBoundingClientRect().right > document.getElementById("plot").getBoundingClientRect().right
+    one.getBoundingClientRect().right > one.closest("svg").getBoundingClientRect().right
 ).map((one) => one.textContent)"""
 ROLES = {"slider", "spinbutton", "combobox", "textbox", "button", "checkbox"}
 
