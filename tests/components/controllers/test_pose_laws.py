@@ -275,12 +275,13 @@ def test_a_constant_current_leaves_no_error_at_a_pose(law):
 
 
 @pytest.mark.parametrize("law", LEARNING)
-def test_what_is_learnt_does_not_grow_behind_a_limit_that_the_load_exceeds(law):
-    """Half a newton of sway does not hold the hull in 1 N: the error times the time is wound up."""
+@pytest.mark.parametrize(("load", "limit"), [("b_u", "surge_limit"), ("b_v", "sway_limit")])
+def test_what_is_learnt_does_not_grow_behind_a_limit_that_the_load_exceeds(law, load, limit):
+    """Half a newton does not hold the hull in 1 N: the error times the time is wound up."""
     stay = "path: {kind: poses, poses: [[0, 0, 0.2]]}\n"
-    gust = "disturbance: {kind: step, b_v: 1.0}\n"
+    gust = f"disturbance: {{kind: step, {load}: 1.0}}\n"
     boat = BOAT.replace("disturbance: {kind: none}\n", gust).replace(
-        "ideal_full", "saturated_full, sway_limit: 0.5"
+        "ideal_full", f"saturated_full, {limit}: 0.5"
     )
     log = marched(boat + stay + LEARNING[law], "simulation.duration=300", "simulation.step=0.05")
     learnt = {"pose_pid": ("int_x", "int_y"), "pose_backstepping": ("zeta_u", "zeta_v")}[law]
