@@ -643,6 +643,8 @@ TABLE: dict[str, list[Row]] = {
      SURVIVES + "test_vessel_with_coupled_sway_and_yaw_and_a_wrong_nominal_one"),
 ],
 "metrics": [
+    ("total += abs(row[int(k.thrust) + i])", "total += row[int(k.thrust) + i]",
+     "test_the_use_of_thrusters_is_that_of_a_plain_loop"),
     ("        elif seen[INSIDE] == 0.0:\n", "        else:\n",
      "test_metrics_of_poses_are_those_of_a_plain_loop"),
     ("weight * abs(row[tau + 1]) / k.limit_v", "weight * row[tau + 1] / k.limit_v",

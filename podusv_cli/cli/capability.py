@@ -80,4 +80,7 @@ def _report(done: CapabilityOfScenario) -> None:
         echo(
             f"{name}: holds {size:.4g} {done.found.unit} from anywhere, least from {angle:.4g} deg"
         )
+    if not done.takes_sway:
+        echo("the actuator takes no sway force, so the law cannot balance one; pods that push")
+        echo("every way take one with --set actuator.sway_weight=1")
     echo(f"written to {done.folder}")

@@ -15,6 +15,8 @@ TIME, EFFORT, INTEGRALS = range(3)
 USE_U, USE_V, USE_R, USES = range(1, 5)
 PEAK, TV, LAST, SETTLED = range(2 * INTEGRALS, 2 * INTEGRALS + 4)
 SIZE = SETTLED + 1
+USE, THRUSTS = 1, 2
+THRUST = "thrust"  # of each thruster, as actuators log it
 SWAY = 2  # where a demand has the sway force
 
 
@@ -46,6 +48,17 @@ def watch_use(weight: float, row: Vector, k: Any, seen: Vector) -> None:
     add(seen, USES, USE_R, weight * abs(row[tau + 2]) / k.limit_r)
 
 
+# Arguments as those of `spans.all_kernels`; changes `seen`.
+@kernel
+def watch_thrust(weight: float, row: Vector, k: Any, seen: Vector) -> None:
+    """Gather the part of full thrust that thrusters give."""
+    add(seen, THRUSTS, TIME, weight)
+    total = 0.0
+    for i in range(int(k.thrusters)):
+        total += abs(row[int(k.thrust) + i])
+    add(seen, THRUSTS, USE, weight * total / k.full_thrust)
+
+
 def _size(layout: Measured) -> int:
     return SIZE if layout.loop.actuator.takes_sway else 0
 
@@ -66,6 +79,22 @@ def _limits(layout: Measured) -> dict[str, float]:
     return {"tau": float(layout.plan.tau), "limit_u": u, "limit_v": v, "limit_r": r}
 
 
+def _size_of_thrust(layout: Measured) -> int:
+    """None without a sway force, or without thrusters."""
+    actuator = layout.loop.actuator
+    return 2 * THRUSTS if actuator.takes_sway and actuator.full_thrust() > 0.0 else 0
+
+
+def _thrusters(layout: Measured) -> dict[str, float]:
+    """How many there are, the column of the first one's thrust, and full thrust [N]."""
+    names = [signal.name for signal in layout.loop.actuator.signals]
+    return {
+        "thrusters": float(names.count(THRUST)),
+        "thrust": float(layout.column(THRUST)),
+        "full_thrust": layout.loop.actuator.full_thrust(),
+    }
+
+
 def _variation(seen: Vector, step: float) -> float:
     """The total variation; NaN with fewer than two steady instants."""
     return float(seen[TV]) if seen[SETTLED] > 1.0 else math.nan
@@ -74,6 +103,9 @@ def _variation(seen: Vector, step: float) -> float:
 OF = Accumulator(watch, _size, _constants, INTEGRALS)
 OF_USE = Accumulator(
     watch_use, _size_of_use, _limits, USES, differing=("limit_u", "limit_v", "limit_r")
+)
+OF_THRUST = Accumulator(
+    watch_thrust, _size_of_thrust, _thrusters, THRUSTS, differing=("full_thrust",)
 )
 peak_v = Metric(
     "peak_tau_v",
@@ -133,5 +165,15 @@ use_r = Metric(
     ratio(USE_R, TIME),
     place=0,
     words="use of the yaw moment, mean part of its limit",
+    headline=True,
+)
+thrust_use = Metric(
+    "thrust_use",
+    "1",
+    "mean sum of the thrusters' |thrust| over that of all at full thrust, at rest",
+    OF_THRUST,
+    ratio(USE, TIME),
+    place=0,
+    words="use of all thrusters, mean part of full thrust",
     headline=True,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +26,10 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class CapabilityOfScenario:
-    """What is held, with directions in degrees, and where it lies."""
+    """What is held, with directions in degrees, whether by a sway force, too, and where it lies."""
 
     found: Capability
+    takes_sway: bool
     folder: Path
 
     @property
@@ -93,10 +94,10 @@ def capability(
             progress=progress,
         )
         with interrupts_deferred():
-            done = CapabilityOfScenario(found, target)
+            done = CapabilityOfScenario(found, scenario.actuator.takes_sway, target)
             _write(writer, done, request.formats)
             writer.add_origin(scenario.plugged)
-            return CapabilityOfScenario(found, writer.finish())
+            return replace(done, folder=writer.finish())
 
 
 def _check_formats(formats: Any) -> None:

@@ -42,6 +42,14 @@ def test_it_prints_a_table_and_writes_csv_json_and_a_figure(podusv):
     assert json.loads(folder.joinpath("manifest.json").read_text())["status"] == "finished"
 
 
+def test_two_demands_are_said_to_hold_along_the_keel_alone(podusv):
+    two = ("actuator.kind=saturated", "controller.kind=pid", "path.kind=line")
+    said = podusv("capability", "a.yaml", *[w for s in two for w in ("--set", s)], "--every", "90")
+    assert said.code == 0, said.err
+    assert "the actuator takes no sway force" in said.out
+    assert "the actuator takes no sway force" not in podusv("capability", "a.yaml").out
+
+
 def test_json_is_what_is_written_and_each_thruster_has_a_column(podusv):
     pods = ("actuator.kind=pod", "actuator.preset=milliampere", "actuator.sway_weight=1")
     set_ = [word for key in ("vessel.preset=milliampere", *pods) for word in ("--set", key)]

@@ -41,7 +41,7 @@ from podusv_cli.metrics.operations import operations
 from podusv_cli.metrics.spans import WITHIN
 from podusv_cli.metrics.table import METRICS, metrics_probe, metrics_with
 from podusv_cli.metrics.windows import CROSSED, NAMED, SETTLING, find, settle, settled_from
-from podusv_cli.scenario.load import load_text
+from podusv_cli.scenario.load import load, load_text
 from podusv_cli.studies.counting.expressions import parse_success
 
 
@@ -334,6 +334,8 @@ def test_every_metric_is_computed_and_documented(limited):
     of_path = set(gathered(corrected(path=example(Legs)), steps=10)[1])
     posed = corrected(actuator=SaturatedFull(), path=example(Poses))
     of_poses = set(gathered(posed, steps=10)[1])
+    ferry = load("podusv:dp/ferry.yaml").scenario.actuator
+    of_poses |= set(gathered(corrected(actuator=ferry, path=example(Poses)), steps=10)[1])
     always = {name for name in METRICS if NAMED not in name}
     compared = {metric.name for metric in (*OF_OPTIMUM.values(), *OF_LOG)} | set(OF_LOOP)
     simulated = (

@@ -59,6 +59,18 @@ def test_metrics_of_the_sway_force_are_those_of_a_plain_loop(run):
         assert run.metrics[f"thrust_use_{axis}"] == pytest.approx(used, rel=1e-9)
 
 
+def test_the_use_of_thrusters_is_that_of_a_plain_loop():
+    pods = "actuator={kind: pod, preset: cybership2_thrusters, sway_weight: 1.0}"
+    run = podusv.simulate(loaded_pose(BOAT + WAY + LAW, pods, "start.x=0.3", *SET))
+    full, used = 2 * 5.10256e-3 * 33.0**2 + 1.56822e-4 * 33.0**2, 0.0
+    for i, thrusts in enumerate(run["thrust"]):
+        weight = 0.01 if i in (0, len(run["time"]) - 1) else 0.02
+        used += weight * sum(abs(T) for T in thrusts) / full / 47.0
+    assert run.metrics["thrust_use"] == pytest.approx(used, rel=1e-9)
+    assert 0.01 < used < 0.5
+    assert "thrust_use_u" not in run.metrics
+
+
 def test_a_run_begins_with_what_holds_a_pose(run):
     """Watch circle, heading, time to a pose, use of each force; then what other runs begin with."""
     own = ["watch_circle", "heading_rms", "corner_time"]

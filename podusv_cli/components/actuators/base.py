@@ -222,6 +222,13 @@ class Actuator(KernelPart):
         """
         return (math.inf,) * (DEMAND_SIZE if self.takes_sway else len(DEMAND))
 
+    def full_thrust(self) -> float:
+        """The largest thrusts at rest of all its thrusters, `thrust` in its signals, summed [N].
+
+        0 for an actuator that has no thrusters.
+        """
+        return 0.0
+
     def shortest_lag(self) -> float:
         """The smallest time constant of its states [s]; infinite without states."""
         return math.inf

@@ -293,6 +293,10 @@ class Pods(Actuator):
             rows += pod.numbers(places or (0.0, 0.0))
         return np.array(rows + curves)
 
+    def full_thrust(self) -> float:
+        """Ahead or astern, whichever is larger of each."""
+        return sum(max(pod.most_thrust) for pod in self.pods)
+
     def shortest_lag(self) -> float:
         """Of speeds, and of angles that turn."""
         return min(lag for pod in self.pods for lag in pod.lags() if lag > 0.0)
