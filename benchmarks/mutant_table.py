@@ -523,6 +523,10 @@ TABLE: dict[str, list[Row]] = {
      "test_a_ranking_that_holds_changes_or_is_too_close"),
 ],
 "optimum": [
+    ("return [surge, *(sway or [0.0]), yaw]", "return [surge, 0.0, yaw]",
+     "test_full_sway_force_is_reversed_when_pontryagin_says_so"),
+    ("[vessel.m11, vessel.m33, vessel.m22]", "[vessel.m11, vessel.m22, vessel.m33]",
+     "test_with_a_sway_force_the_regulator_has_the_same_gains_there"),
     ("h / 8.0 * (f0 - f1)", "h / 6.0 * (f0 - f1)",
      "test_the_gaps_and_the_cost_of_a_segment_are_of_the_fifth_order_along_a_known_motion"),
     ("h * weight + B_h.T", "weight + B_h.T",

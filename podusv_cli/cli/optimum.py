@@ -102,9 +102,14 @@ def _report(done: Optimum) -> None:
     echo("another law in `controllers` may lead to a lower one")
     if name in done.run.metrics and done.departures:
         away = done.departures
+        added = [
+            f"{away[f'feedback_{axis}']:.2g} {unit}"
+            for axis, unit in (("u", "N"), ("v", "N"), ("r", "N m"))
+            if f"feedback_{axis}" in away
+        ]
         echo(
             f"repeated by podusv: {name} {done.run.metrics[name]:.7g} {unit}; at most "
             f"{away['position']:.2g} m from the optimum, where the feedback that holds it there "
-            f"added at most {away['feedback_u']:.2g} N and {away['feedback_r']:.2g} N m"
+            f"added at most {', '.join(added[:-1])} and {added[-1]}"
         )
     echo(f"{done.run.status}: {done.run.folder}")

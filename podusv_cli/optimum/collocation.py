@@ -21,7 +21,7 @@ from podusv_cli.components.vessels.plant import plant
 from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.errors import NotConvergedError, UsageError
 from podusv_cli.core.kernel import Vector, bundle, transplant
-from podusv_cli.optimum.problem import Motion, OptimumProblem
+from podusv_cli.optimum.problem import Motion, OptimumProblem, loads_of
 from podusv_cli.process.interrupts import interrupts_caught, interrupts_deferred
 
 TOLERANCE = 1e-8  # of IPOPT
@@ -35,7 +35,7 @@ WARM = {
     "ipopt.warm_start_bound_push": 1e-6,
     "ipopt.warm_start_mult_bound_push": 1e-6,
 }
-STATES, UNKNOWNS = 6, 8  # at each time: (x, y, psi, u, v, r), and with the two demands
+STATES = 6  # at each time (x, y, psi, u, v, r); behind them the demands
 Tell = Callable[[str, float], None]
 
 
@@ -63,16 +63,16 @@ def casadi() -> Any:
     return casadi
 
 
-def dynamics(k: Any) -> Any:
+def dynamics(k: Any, demands: int = 2) -> Any:
     """A CasADi function: the rate of the state (x, y, psi, u, v, r) under demand and load.
 
-    `k` has the coefficients of the vessel.
+    `k` has the coefficients of the vessel; `demands` counts the numbers of a demand, two or three.
     """
     ca = casadi()
     kernel = transplant(plant, {cos_sin: lambda a: (ca.cos(a), ca.sin(a)), float: lambda x: x})
-    x, demand, b = ca.SX.sym("x", STATES), ca.SX.sym("demand", 2), ca.SX.sym("b", 3)
+    x, demand, b = ca.SX.sym("x", STATES), ca.SX.sym("demand", demands), ca.SX.sym("b", 3)
     rate: list[Any] = [0.0] * STATES
-    tau = [demand[0], 0.0, demand[1]]
+    tau = loads_of(ca.vertsplit(demand))
     kernel(ca.vertsplit(x), tau, ca.vertsplit(b), k, rate)
     return ca.Function("dynamics", [x, demand, b], [ca.vertcat(*rate)])
 
@@ -150,13 +150,14 @@ class _Program:
         self.step = problem.duration / n
         self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
         self.problem, self.n, self.told, self.iterations = problem, n, told, 0
+        self._unknowns = STATES + problem.demands
         self.warm = dict(warm)  # IPOPT's options where the guess is nearly an optimum
         between = self.times[:-1] + 0.5 * self.step
         self._loads = [problem.loads(times.tolist()).T for times in (self.times, between)]
         self._places = [problem.places(times.tolist()).T for times in (self.times, between)]
         self._segment = _segment(problem, self.step)
-        w, eps = ca.MX.sym("w", UNKNOWNS * (n + 1)), ca.MX.sym("eps")
-        every = ca.reshape(w, UNKNOWNS, n + 1)
+        w, eps = ca.MX.sym("w", self._unknowns * (n + 1)), ca.MX.sym("eps")
+        every = ca.reshape(w, self._unknowns, n + 1)
         gaps, cost, _ = self._segment.map(n)(
             every[:, :-1],
             every[:, 1:],
@@ -174,7 +175,7 @@ class _Program:
         own = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
         own |= {"ipopt.tol": TOLERANCE, "ipopt.max_iter": MOST_ITERATIONS}
         with interrupts_caught() as here, interrupts_deferred():
-            watch = _watch(UNKNOWNS * (self.n + 1), STATES * self.n, self._look(here))
+            watch = _watch(self._unknowns * (self.n + 1), STATES * self.n, self._look(here))
             options = own | {"iteration_callback": watch} | self.warm
             solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
             start = np.hstack([guess.states, guess.demands]).clip(low, high).ravel()
@@ -193,7 +194,7 @@ class _Program:
             raise NotConvergedError(f"IPOPT: {stats['return_status']}")
         self.warm = {"ipopt.mu_init": BARRIER, **WARM}
         self._multipliers = {"lam_g0": solution["lam_g"], "lam_x0": solution["lam_x"]}
-        rows = np.array(solution["x"]).reshape(self.n + 1, UNKNOWNS).clip(low, high)
+        rows = np.array(solution["x"]).reshape(self.n + 1, self._unknowns).clip(low, high)
         return Motion(self.times, rows[:, :STATES], rows[:, STATES:])
 
     def integral(self, motion: Motion) -> float:
@@ -211,7 +212,7 @@ class _Program:
 
     def _bounds(self) -> tuple[Vector, Vector]:
         """The least and the largest of every unknown (unknowns,); the first state is given."""
-        low = np.full((self.n + 1, UNKNOWNS), -np.inf)
+        low = np.full((self.n + 1, self._unknowns), -np.inf)
         low[:, STATES:] = -np.array(self.problem.loop.actuator.limits())
         high = -low
         low[0, :STATES] = high[0, :STATES] = self.problem.loop.start
@@ -236,8 +237,9 @@ def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
 
 def _segment(problem: OptimumProblem, h: float) -> Any:
     """A CasADi function of a segment of `h` [s]: its gaps, share of the integral, middle place."""
-    ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
-    before, after = ca.SX.sym("before", UNKNOWNS), ca.SX.sym("after", UNKNOWNS)
+    ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()), problem.demands)
+    unknowns = STATES + problem.demands
+    before, after = ca.SX.sym("before", unknowns), ca.SX.sym("after", unknowns)
     loads = [ca.SX.sym(f"b{i}", 3) for i in range(3)]
     places = [ca.SX.sym(f"d{i}", 2) for i in range(3)]
     eps = ca.SX.sym("eps")

@@ -12,7 +12,11 @@ from podusv_cli.optimum.problem import Motion, OptimumProblem
 
 BANDWIDTH = 1.0  # rad/s, about that with which the vessel is held to the motion
 MOST_ROWS = 3500  # that fit into a resolved scenario
-HEADER = "t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r"
+# By how many loads the demand has
+HEADERS = {
+    2: "t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r",
+    3: "t, tau_u, tau_r, tau_v, x, y, psi, u, v, r, then the gains of all three",
+}
 
 
 def schedule(problem: OptimumProblem, motion: Motion) -> str:
@@ -24,13 +28,13 @@ def schedule(problem: OptimumProblem, motion: Motion) -> str:
         ", ".join([*(f"{x:.10g}" for x in rows[i]), *(f"{x:.4g}" for x in gains[i])])
         for i in chosen
     )
-    return "\n".join([HEADER, *lines, ""])
+    return "\n".join([HEADERS[problem.demands], *lines, ""])
 
 
 def _choose_rows(demands: Vector) -> list[int]:
     """The rows that a schedule has: all, or every so many and those where the demand bends most.
 
-    `demands` is (times, 2) [N, N m].
+    `demands` is (times, 2) [N, N m], or (times, 3) with a sway force [N].
     """
     last, half = len(demands) - 1, MOST_ROWS // 2
     if last < MOST_ROWS:
@@ -41,16 +45,17 @@ def _choose_rows(demands: Vector) -> list[int]:
 
 
 def _gains(problem: OptimumProblem, motion: Motion) -> Vector:
-    """The gains of the linear-quadratic regulator along the motion, (2, 6) at each of its times.
+    """The gains of the linear-quadratic regulator along the motion, at each of its times.
 
-    From the end backwards, over matrices that are discretised by the trapezoidal rule. The weights
-    are 1 for every state, and for a demand what makes 1 m or 1 rad worth an acceleration of
-    BANDWIDTH squared.
+    Shape (times, demands, 6). From the end backwards, over matrices that are discretised by the
+    trapezoidal rule. The weights are 1 for every state, and for a demand what makes 1 m or 1 rad
+    worth an acceleration of BANDWIDTH squared.
     """
     vessel, h = problem.loop.vessel, float(motion.times[1] - motion.times[0])
-    weight = np.diag([vessel.m11**-2, vessel.m33**-2]) / BANDWIDTH**4
+    inertia = [vessel.m11, vessel.m33, vessel.m22][: problem.demands]
+    weight = np.diag([m**-2 for m in inertia]) / BANDWIDTH**4
     unit = np.eye(STATES)
-    cost, gains = unit, np.zeros((len(motion.times), 2, STATES))
+    cost, gains = unit, np.zeros((len(motion.times), problem.demands, STATES))
     for i, (A, B) in reversed(list(enumerate(zip(*_slopes(problem, motion), strict=True)))):
         left = np.linalg.inv(unit - 0.5 * h * A)
         A_h, B_h = left @ (unit + 0.5 * h * A), left @ (h * B)
@@ -60,12 +65,13 @@ def _gains(problem: OptimumProblem, motion: Motion) -> Vector:
 
 
 def _slopes(problem: OptimumProblem, motion: Motion) -> tuple[Vector, Vector]:
-    """The rates' derivatives by state (times, 6, 6) and demand (times, 6, 2) along the motion."""
-    ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()))
-    arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate((STATES, 2, 3))]
+    """The rates' derivatives by state (times, 6, 6) and demand (times, 6, demands)."""
+    ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()), problem.demands)
+    sizes = (STATES, problem.demands, 3)
+    arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate(sizes)]
     both = ca.jacobian(rate(*arguments), ca.vertcat(*arguments[:2]))
     slopes = ca.Function("slopes", arguments, [both]).map(len(motion.times))(
         motion.states.T, motion.demands.T, problem.loads(motion.times.tolist()).T
     )
-    columns = np.array(slopes).reshape(STATES, len(motion.times), STATES + 2).transpose(1, 0, 2)
+    columns = np.array(slopes).reshape(STATES, len(motion.times), -1).transpose(1, 0, 2)
     return columns[:, :, :STATES], columns[:, :, STATES:]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.kernel import Vector
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import SWAY_DEMAND
 from podusv_cli.engine.loop.closed_loop import STATE, ClosedLoop
 from podusv_cli.scenario.model import Scenario
 
@@ -19,7 +20,10 @@ Minimised = Literal["iae", "ise"]
 
 @dataclass(frozen=True)
 class Motion:
-    """States (a row of x, y, psi, u, v, r each) and demands (tau_u, tau_r) at these times [s]."""
+    """States (a row of x, y, psi, u, v, r each) and demands at these times [s].
+
+    Demands are (tau_u, tau_r), or (tau_u, tau_r, tau_v) of an actuator that takes a sway force.
+    """
 
     times: Vector
     states: Vector
@@ -28,7 +32,8 @@ class Motion:
     @classmethod
     def of(cls, log: Recording) -> Motion:
         """The motion of a run."""
-        states, demands = ([log[name] for name in names] for names in (STATE, ("tau_u", "tau_r")))
+        loads = ("tau_u", "tau_r", *(("tau_v",) if SWAY_DEMAND.name in log.signals else ()))
+        states, demands = ([log[name] for name in names] for names in (STATE, loads))
         return cls(log["time"], np.column_stack(states), np.column_stack(demands))
 
     def at(self, times: Vector) -> Motion:
@@ -48,6 +53,11 @@ class OptimumProblem:
     loop: ClosedLoop
     duration: float
     minimised: Minimised
+
+    @property
+    def demands(self) -> int:
+        """How many loads the actuator is asked for: three where it takes a sway force."""
+        return len(self.loop.actuator.limits())
 
     def loads(self, times: Sequence[float]) -> Vector:
         """The disturbance (b_u, b_v, b_r) at each of these times, a row each."""
@@ -69,7 +79,8 @@ def problem(scenario: Scenario, minimised: Minimised) -> OptimumProblem:
         ),
         "actuator": (
             _passes_on(loop),
-            "actuators that deliver the demand up to constant limits: ideal, saturated",
+            "actuators that deliver the demand up to constant limits: ideal, saturated, "
+            "ideal_full, saturated_full",
         ),
     }
     if loop.actuator.by_delay_line:
@@ -94,4 +105,11 @@ def _passes_on(loop: ClosedLoop) -> bool:
         return False
     half = 0.5 * np.minimum(actuator.limits(), 1.0)
     given = actuator.settled(np.zeros(len(loop.start)), half)
-    return bool(np.allclose(given, [half[0], 0.0, half[1]], rtol=1e-12, atol=0.0))
+    asked = loads_of(list(half))
+    return bool(np.allclose(given, asked, rtol=1e-12, atol=0.0))
+
+
+def loads_of(demand: Sequence[Any]) -> list[Any]:
+    """Loads (tau_u, tau_v, tau_r) of a demand (tau_u, tau_r) or (tau_u, tau_r, tau_v)."""
+    surge, yaw, *sway = demand
+    return [surge, *(sway or [0.0]), yaw]

@@ -13,6 +13,7 @@ from podusv_cli.components.controllers.schedule import Schedule
 from podusv_cli.components.controllers.velocity_vector import VelocityVector
 from podusv_cli.core.errors import UsageError
 from podusv_cli.core.recording import Recording
+from podusv_cli.core.signal import SWAY_DEMAND
 from podusv_cli.engine.running.simulate import to_end
 from podusv_cli.findings.finding import preflight, unknown_codes
 from podusv_cli.optimum import collocation
@@ -38,7 +39,7 @@ class Optimum:
     """Optima from several beginnings and on finer grids, and the run that repeats the last one.
 
     `departures` are the largest differences between run and optimum: of the position [m], and what
-    the feedback added in surge [N] and yaw [N m].
+    the feedback added in surge [N], yaw [N m] and, where there is a sway force, sway [N].
     """
 
     minimised: Minimised
@@ -169,4 +170,7 @@ def _departures(folder: Path, motion: Motion) -> dict[str, float]:
     away = [np.interp(motion.times, log["time"], log[name]) for name in ("x", "y")]
     position = np.hypot(away[0] - motion.states[:, 0], away[1] - motion.states[:, 1])
     added = {name: float(abs(log[name]).max()) for name in ("feedback_u", "feedback_r")}
+    for sway in motion.demands[:, 2:].T:
+        asked = np.interp(motion.times, log["time"], log[SWAY_DEMAND.name])
+        added["feedback_v"] = float(abs(asked - sway).max())
     return {"position": float(position.max()), **added}

@@ -146,14 +146,12 @@ COMMANDS: dict[str, Callable[[Command, str], Said]] = {
     "rerun": of_run("rerun", "r", "--trust"),
     "diff": of_run("diff", "r", "r"),
 }
-FULL = "actuator.kind: saturated_full does not fit"
 POD, LEG = "actuator.kind: pod does not fit", "path.kind: legs does not fit"
 REFUSED = {
     ("trial", "margins"): "it takes samples, and margins are those of a law that acts continuously",
     ("trial", "optimum"): POD,
     ("legs", "margins"): "its target moves with the vessel, and margins are those of a law that",
     ("legs", "optimum"): LEG,
-    ("poses", "optimum"): FULL,
     (
         "stations",
         "margins",

@@ -122,6 +122,24 @@ def test_the_gains_are_those_of_the_linear_quadratic_regulator(monkeypatch):
     np.testing.assert_allclose(found, [[w**2, math.sqrt(2.0 * w**2 + w**4)]] * 2, rtol=3e-4)
 
 
+def test_with_a_sway_force_the_regulator_has_the_same_gains_there():
+    """The hull at rest without damping, whose sway and yaw go by themselves."""
+    pytest.importorskip("casadi", reason=REASON)
+    undamped = BESIDE.replace("  x_g: 0.0", "  x_g: 0.0\n  X_u: 0.0")
+    beside = problem(load_text(undamped, "a.yaml").scenario, "iae")
+
+    def first(h: float) -> np.ndarray:
+        times = h * np.arange(round(14.0 / h) + 1)
+        still = Motion(times, np.zeros((len(times), 6)), np.zeros((len(times), 3)))
+        surge, yaw, sway = feedback._gains(beside, still)[0]
+        hull = beside.loop.vessel
+        own = (surge[[0, 3]] / hull.m11, yaw[[2, 5]] / hull.m33, sway[[1, 4]] / hull.m22)
+        return np.stack(own)
+
+    found = 2.0 * first(0.01) - first(0.02)
+    np.testing.assert_allclose(found, [[1.0, math.sqrt(3.0)]] * 3, rtol=3e-4)
+
+
 def test_the_plant_on_symbols_is_the_plant():
     pytest.importorskip("casadi", reason=REASON)
     random = np.random.default_rng(3)
@@ -238,7 +256,7 @@ def test_what_the_solver_cannot_take_is_refused_in_a_sentence():
         problem(pods.scenario, "iae")
     assert str(raised.value) == (
         "a: actuator.kind: pod does not fit; podusv optimum knows actuators that deliver the "
-        "demand up to constant limits: ideal, saturated"
+        "demand up to constant limits: ideal, saturated, ideal_full, saturated_full"
     )
     with pytest.raises(UsageError, match=r"a: disturbance\.kind: leaning does not fit"):
         problem(replaced(disturbance=Leaning()), "iae")
@@ -398,3 +416,69 @@ def test_a_long_motion_keeps_the_rows_where_its_demand_bends():
     assert {0, 5000, 5001, len(demands) - 1} <= set(kept)
     assert len(kept) <= MOST_ROWS + 1
     assert np.diff(kept).max() <= 6
+
+
+# --- three demands
+
+BESIDE = """
+vessel:
+  preset: cybership2_linear
+  Y_v: 0.0
+  Y_r: 0.0
+  N_v: 0.0
+  N_r: 0.0
+  Y_rdot: 0.0
+  N_vdot: 0.0
+  x_g: 0.0
+path: {kind: hold, y: 2.0}
+disturbance: {kind: none}
+actuator: {kind: saturated_full, surge_limit: 1e-6, sway_limit: 4.0, yaw_limit: 1e-6}
+start: {u: 0.0}
+simulation: {duration: 8.0}
+controller: {kind: pose_pid}
+"""
+
+
+def test_full_sway_force_is_reversed_when_pontryagin_says_so():
+    """The target lies abeam: the same switch as ahead, by the sway force alone."""
+    pytest.importorskip("casadi", reason=REASON)
+    chase = load_text(BESIDE, "a.yaml").scenario
+    a = 4.0 / chase.vessel.m22
+    t_s, t_c = switching(2.0, a, 8.0)
+    t = np.linspace(0.0, 8.0, 100_001)
+    e = np.where(t < t_s, 2 - a * t**2 / 2, 2 + a * (t - 2 * t_s) ** 2 / 2 - a * t_s**2)
+    assert 0.0 < t_s < t_c < 8.0
+    guess = Motion(np.array([0.0, 8.0]), np.zeros((2, 6)), np.zeros((2, 3)))
+    stages, motion = collocation.search_optima(problem(chase, "iae"), {"rest": guess}, 0.1)
+    assert stages[-1].integral == pytest.approx(np.trapezoid(abs(e), t), rel=3e-4)
+    away = abs(motion.times - t_s) > 0.11
+    known = np.where(motion.times < t_s, 4, -4)[away]
+    np.testing.assert_allclose(motion.demands[:, 2][away], known, atol=0.05)
+
+
+AWAY = """
+vessel: {preset: cybership2}
+path: {kind: poses, poses: [[0, 0, 0.3], [1.5, 1, 1.2]], travel: 8.0, dwell: 1.0}
+disturbance: {kind: step, b_v: 0.3}
+actuator: {kind: saturated_full}
+start: {x: -1.0, y: 1.5, psi: 0.3}
+simulation: {step: 0.02, duration: 20.0}
+controller: {kind: pose_pid}
+"""
+
+
+def test_an_optimum_with_a_sway_force_is_repeated_and_beats_the_law(podusv):
+    pytest.importorskip("casadi", reason=REASON)
+    Path("a.yaml").write_text(AWAY)
+    said = podusv("optimum", "a.yaml", "--no-figures", "--out", "o", "--step", "0.2", "--json")
+    told = json.loads(said.out)
+    found, law = (
+        told["grids"][-1]["integral"],
+        json.loads(podusv("run", "a.yaml", "--no-figures", "--out", "r", "--json").out),
+    )
+    assert told["metrics"]["iae"] == pytest.approx(found, rel=2e-3)
+    assert told["departures"]["position"] < 5e-3
+    assert found < 0.95 * law["metrics"]["iae"]
+    run = open_run(Path("o")).recording
+    assert np.abs(run["tau_v"]).max() == pytest.approx(2.0, abs=1e-6)
+    assert told["departures"]["feedback_v"] < 0.2

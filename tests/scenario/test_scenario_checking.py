@@ -182,7 +182,8 @@ def test_a_law_among_several_is_wrong_once():
         (
             "{kind: line}",
             "{radius: 1}",
-            f"2:7: path.kind: missing (allowed: {', '.join(PATHS)}); radius belongs to kind circle",
+            f"2:7: path.kind: missing (allowed: {', '.join(PATHS)}); radius belongs to kind "
+            "circle, legs_hold or stations",
         ),
         (
             "{kind: pid}",
@@ -199,7 +200,7 @@ def test_a_law_among_several_is_wrong_once():
         (
             "{kind: line}",
             "{kind: line, radius: 1}",
-            "2:20: path.radius: unknown key; radius belongs to kind circle "
+            "2:20: path.radius: unknown key; radius belongs to kind circle, legs_hold or stations "
             "(allowed: kind, x, y, course, speed)",
         ),
         ("{kind: line}", "{kind: waypoints}", "2:7: path: needs at least two points, has 0"),

@@ -184,7 +184,7 @@ def test_kinds_in_which_a_key_is_the_same_share_a_row():
     rows = explain("path.speed")
     assert [row.kinds for row in rows] == [
         ("circle", "line"),
-        ("legs",),
+        ("legs", "legs_hold"),
         ("line_circle",),
         ("sinusoid",),
         ("waypoints",),

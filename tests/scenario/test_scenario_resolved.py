@@ -131,7 +131,7 @@ def possible(data: dict[str, Any]) -> Scenario:
         vessel.update(preset="paper", x_g=0.0, Y_rdot=0.0, N_vdot=0.0, X_udot=-1.0, Y_vdot=-1.0)
         vessel.update(N_rdot=-1.0)
     data["plugins"] = {}  # none of these files exists
-    if data["path"]["kind"] in ("waypoints", "legs"):
+    if data["path"]["kind"] in ("waypoints", "legs", "legs_hold"):
         points = ((0.0, 0.0), (1.0, 0.5), *data["path"]["points"])
         data["path"].update(file=None, speed=0.5, points=tuple(dict.fromkeys(points)))
     if data["actuator"]["kind"] == "pod":
@@ -156,7 +156,7 @@ def possible(data: dict[str, Any]) -> Scenario:
         return reject()
     seas, step = made.disturbances().values(), made.simulation.step
     refused = any(any(sea.conflicts(made.vessel, step)) for sea in seas)
-    missing = any(any(unmet(law, made.path, made.actuator)) for law in made.laws().values())
+    missing = any(any(unmet(law, made.path, made.actuator, 0)) for law in made.laws().values())
     return reject() if refused or missing else made
 
 

@@ -108,7 +108,7 @@ class Controller(KernelPart):
         return False
 
     def wants_load_estimate(self) -> bool:
-        """Whether the loads that an estimator finds are fed forward, beside the law's demand."""
+        """Whether the loads that an estimator finds are taken off the law's three demands."""
         return False
 
     def without_load_estimate(self) -> Self:

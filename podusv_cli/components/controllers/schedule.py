@@ -22,18 +22,20 @@ from podusv_cli.core.timed_rows import lines_of, named_rows, timed_rows
 TIMED, STATES = 3, 6  # numbers of a row: time and demand; then the state, then the gains
 WITH_SWAY = TIMED + 1  # or time and a demand with a sway force
 WITH_MOTION = TIMED + STATES + 2 * STATES
+WITH_BOTH = WITH_SWAY + STATES + 3 * STATES
 DEMAND = ("t [s]", "tau_u [N]", "tau_r [N m]")
 MOTION = ("x [m]", "y [m]", "psi [rad]", "u [m/s]", "v [m/s]", "r [rad/s]")
 LAYOUTS = {
     TIMED: DEMAND,
     WITH_SWAY: (*DEMAND, "tau_v [N]"),
     WITH_MOTION: (*DEMAND, *MOTION, "then the gains of tau_u and tau_r"),
+    WITH_BOTH: (*DEMAND, "tau_v [N]", *MOTION, "then the gains of all three"),
 }
 NUMBERED = re.compile(r".*_[0-9]+( *\[.*\])?")  # a column of one propeller or pod
 FULL = 3  # demands of a row with a sway force
 HOLD = 1.0  # the place of "hold" among the choices of `between`, as kernels know it
-# Where a row of the table has these, behind the demand: state and its rate, gains (surge, yaw).
-STATE, GAINS = 2, 2 + 2 * STATES
+# Numbers of a row of the table: demand, state and its rate, gains (surge, yaw, sway).
+FOLLOWING, FOLLOWING_FULL = 2 + 2 * STATES + 2 * STATES, FULL + 2 * STATES + 3 * STATES
 FEEDBACK_U = Signal("feedback_u", "N", "surge force that departures from the scheduled motion add")
 FEEDBACK_R = Signal("feedback_r", "N m", "yaw moment that departures from the motion add")
 
@@ -56,8 +58,9 @@ def _rows(text: str) -> Vector:
         rows = named_rows(text, NOUN).rows[:, [0, 0, 0]] * [1.0, 0.0, 0.0]
     else:
         rows = timed_rows(text, NOUN, LAYOUTS)
-    if rows.shape[1] == WITH_MOTION:
-        rows[:, TIMED + 2] = np.unwrap(rows[:, TIMED + 2])
+    if rows.shape[1] >= WITH_MOTION:
+        psi = (WITH_SWAY if rows.shape[1] == WITH_BOTH else TIMED) + 2
+        rows[:, psi] = np.unwrap(rows[:, psi])
     rows.flags.writeable = False
     return rows
 
@@ -68,7 +71,8 @@ class Schedule(Controller):
     tau(t) = tau_s(t) + K(t) (x_s(t) - x), of which the rows give tau_s, x_s and K.
 
     Rows of three numbers (t, tau_u, tau_r) have no x_s: then there is no feedback. Nor have rows of
-    four, which ask for a sway force, too: (t, tau_u, tau_r, tau_v). A hull that does
+    four, which ask for a sway force, too: (t, tau_u, tau_r, tau_v). With x_s and K such rows have
+    28 numbers; what the feedback adds to the sway force is no signal. A hull that does
     not keep its course by itself needs feedback to repeat a motion: every rounding error grows.
     Demand and gains are straight lines between rows, x_s a cubic. Before the first and after the
     last row the nearest row holds.
@@ -87,8 +91,8 @@ class Schedule(Controller):
         "",
         "",
         "lines of t [s], tau_u [N], tau_r [N m]; or of these and tau_v [N], of an actuator that "
-        "takes a sway force; or of the first three, the state x, y, psi, u, v, r "
-        "and the gains from its errors, six of tau_u and six of tau_r; or of t and the commands "
+        "takes a sway force; or of these three or four, the state x, y, psi, u, v, r "
+        "and the gains from its errors, six of each force and moment; or of t and the commands "
         "of every pod, such as n_1 [1/s] and delta_1 [rad] of the first",
     )
     between: Literal["linear", "hold"] = value(
@@ -113,7 +117,7 @@ class Schedule(Controller):
 
     def asks_sway(self) -> bool:
         """Where rows have one."""
-        return bool(_rows(self.rows).shape[1] == WITH_SWAY)
+        return _rows(self.rows).shape[1] in (WITH_SWAY, WITH_BOTH)
 
     def commands(self) -> Recorded | None:
         """The rows, where their columns are commands to propellers."""
@@ -126,7 +130,8 @@ class Schedule(Controller):
     def constants(self) -> dict[str, float]:
         """The fields' choices, how many rows there are, and how many numbers in each of them."""
         rows, columns = _rows(self.rows).shape
-        width = GAINS + 2 * STATES if columns == WITH_MOTION else columns - 1
+        motion = {WITH_MOTION: FOLLOWING, WITH_BOTH: FOLLOWING_FULL}
+        width = motion.get(columns, columns - 1)
         return super().constants() | {"rows_count": float(rows), "row_width": float(width)}
 
     def table(self) -> Vector:
@@ -134,7 +139,7 @@ class Schedule(Controller):
         times, given = np.split(_rows(self.rows), [1], axis=1)
         if given.shape[1] < WITH_MOTION - 1:
             return np.concatenate([times.ravel(), given.ravel()])
-        demand, motion = np.split(given, [TIMED - 1], axis=1)
+        demand, motion = np.split(given, [FULL if self.asks_sway() else TIMED - 1], axis=1)
         state, gains = np.split(motion, [STATES], axis=1)
         rates = np.gradient(state, times.ravel(), axis=0)
         return np.concatenate([times.ravel(), np.hstack([demand, state, rates, gains]).ravel()])
@@ -150,16 +155,20 @@ class Schedule(Controller):
         a, b = tail(table, count + width * i), tail(table, count + width * (i + 1))
         held = math.floor(s) if k.between == HOLD else s
         tau[0], tau[1] = linear(held, a[0], b[0]), linear(held, a[1], b[1])
-        if width == FULL:
+        state = 2  # where a row has it, behind the demand
+        if width == FULL or width > FOLLOWING:
+            state = FULL
             tau[2] = linear(held, a[2], b[2])
         signals[0] = signals[1] = 0.0
-        if width > GAINS:
+        if width >= FOLLOWING:
             for j in range(STATES):
-                before, after = tail(a, STATE + j), tail(b, STATE + j)
+                before, after = tail(a, state + j), tail(b, state + j)
                 there = cubic(s, length, before[0], after[0], before[STATES], after[STATES])
                 error = wrap(there - x[j]) if j == 2 else there - x[j]
-                g = GAINS + j
+                g = state + 2 * STATES + j
                 signals[0] += linear(s, a[g], b[g]) * error
                 signals[1] += linear(s, a[g + STATES], b[g + STATES]) * error
+                if width > FOLLOWING:
+                    tau[2] += linear(s, a[g + 2 * STATES], b[g + 2 * STATES]) * error
         tau[0] += signals[0]
         tau[1] += signals[1]

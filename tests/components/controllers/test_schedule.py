@@ -145,7 +145,8 @@ def test_one_of_several_laws_may_have_a_schedule():
             "0,1,1\n1,2\n",
             "line 2 of the schedule has 2; every line must have 3 (t, tau_u, tau_r) "
             "or 4 (t, tau_u, tau_r, tau_v) "
-            "or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r)",
+            "or 21 (t, tau_u, tau_r, x, y, psi, u, v, r, then the gains of tau_u and tau_r) "
+            "or 28 (t, tau_u, tau_r, tau_v, x, y, psi, u, v, r, then the gains of all three)",
         ),
         ("t,tau_u,tau_r\n0,1,1\n1,s3cret,2\n", "line 3, column 2 of the schedule is no number"),
         ("0,1,1\n1,nan,2\n", "line 2, column 2 of the schedule is not a finite number"),
@@ -170,6 +171,28 @@ def test_a_header_of_a_motion_names_the_columns_up_to_the_gains():
     Schedule(rows=f"{head}\n0,{row}\n1,{row}\n")
     with pytest.raises(ValidationError, match="line 1 of the schedule names columns in another or"):
         Schedule(rows=f"{head.replace('u, v', 'v, u')}\n0,{row}\n1,{row}\n")
+
+
+def test_a_motion_with_a_sway_force_has_a_feedback_of_three_loads():
+    """Two rows 2 s apart, a quarter of the way between them; the heading goes the short way."""
+    random = np.random.default_rng(5)
+    demands, states, gains = (random.normal(0, 1, (2, n)) for n in (3, 6, 18))
+    states[:, 2] = 3.1, -3.1
+    rows = np.column_stack([[0.0, 2.0], demands, states, gains])
+    law = Schedule(rows="\n".join(", ".join(map(repr, row)) for row in rows.tolist()))
+    tau, signals, x = np.full(3, np.nan), np.full(2, np.nan), random.normal(0, 1, 6)
+    k = bundle(law.constants())
+    call(law.law, t=0.5, x=x, k=k, table=law.table(), tau=tau, signals=signals)
+    states[1, 2] = 2.0 * np.pi - 3.1
+    there = states[0] + 0.25 * (states[1] - states[0])  # rates of two rows are those of their line
+    error = there - x
+    error[2] -= 2.0 * np.pi * np.round(error[2] / (2.0 * np.pi))
+    K = (gains[0] + 0.25 * (gains[1] - gains[0])).reshape(3, 6)
+    expected = demands[0] + 0.25 * (demands[1] - demands[0]) + K @ error
+    np.testing.assert_allclose(tau, expected, rtol=1e-12)
+    assert law.asks_sway()
+    head = "t, tau_u, tau_r, tau_v, x, y, psi, u, v, r, then the gains of all three"
+    assert Schedule(rows=f"{head}\n{law.rows}\n").table() == pytest.approx(law.table())
 
 
 def test_a_schedule_that_the_resolved_scenario_could_not_hold_is_refused():
