@@ -52,6 +52,10 @@ NO_LOAD = (
     "the law takes the load that an estimator finds, and what is exported has no input for it; "
     "set its `load` to unknown"
 )
+OWN_TIME = (
+    "the law reads its path at a time of its own, and what is exported is told its target; choose "
+    "a law of a timetable, as pose_backstepping"
+)
 NO_LAW = "the controller gives recorded commands to propellers, which is no law; export a law"
 
 
@@ -118,6 +122,8 @@ class ExportedLaw:
             raise UsageError(f"{scenario.name}: {NOT_SAMPLED}")
         if scenario.controller.wants_load_estimate():
             raise UsageError(f"{scenario.name}: {NO_LOAD}")
+        if scenario.controller.keeps_path_time():
+            raise UsageError(f"{scenario.name}: {OWN_TIME}")
         whole, signals = plan.layout, len(plan.loop.controller.signals)
         memory, demands = whole.states - whole.memory, len(demand_numbers(plan.loop))
         target = TARGET_SIZE if plan.loop.controller.wants_heading() else len(TARGET)

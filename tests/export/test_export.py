@@ -49,8 +49,9 @@ from podusv_cli.scenario.resolved import resolved_yaml
 from podusv_cli.storage import manifest
 from podusv_cli.workflows import export as workflow
 
-LAWS, QUICK = sorted(KINDS), ("alos", "pose_pid")
+LAWS, QUICK = sorted(KINDS.keys() - {"maneuvering"}), ("alos", "pose_pid")  # that is refused
 FED = ("controllers=null", "controller={kind: pose_pid, load: estimated}")
+MANEUVERING = ("controllers=null", "controller={kind: maneuvering}", "control.period=0.1")
 PODS = {"actuator": {"kind": "pod", "preset": "otter"}, "vessel": {"preset": "otter"}}
 
 
@@ -343,6 +344,10 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     (
         {"source": "podusv:dp/estimated_load.yaml", "overrides": ["control.period=0.1", *FED]},
         "takes the load that an estimator finds, and what is exported has no input.*to unknown",
+    ),
+    (
+        {"source": "podusv:skjetne_2005/ellipse.yaml", "overrides": MANEUVERING},
+        "reads its path at a time of its own, and what is exported is told its target; choose",
     ),
     ({"platforms": ["linux"]}, r"unknown platform 'linux'; did you mean 'linux64'\? \(allowed: "),
     ({"platforms": ["thumbv7em"], "fmu": True}, "thumbv7em has no shared libraries.*--no-fmu"),
