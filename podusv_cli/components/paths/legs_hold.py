@@ -7,6 +7,7 @@ grows with the distance. ArduPilot's Loiter mode of rovers and boats does the sa
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Literal
 
 from podusv_cli.components import rules as by
@@ -32,7 +33,7 @@ on_legs, seek_leg = Legs.evaluate, Legs.locate
 def drift(x: Vector, course: float, waypoint: Vector, k: Any, target: Vector) -> None:
     """A target at the vessel that goes back to the waypoint, as fast as it is beyond the radius."""
     north, east = waypoint[0] - x[0], waypoint[1] - x[1]
-    away = (north * north + east * east) ** 0.5
+    away = math.sqrt(north * north + east * east)
     c, s = cos_sin(course)
     speed = CREEP * k.speed
     if away > k.radius:
