@@ -13,6 +13,7 @@ from podusv_cli.core import json_text
 from podusv_cli.core.about import BESIDE_RUNS
 from podusv_cli.core.component import Component
 from podusv_cli.core.errors import SizingError
+from podusv_cli.core.system import name_refused
 from podusv_cli.engine.loop.closed_loop import unmet
 from podusv_cli.scenario.doubt import Doubt
 from podusv_cli.scenario.identify import Identify
@@ -157,7 +158,7 @@ def possible(data: dict[str, Any]) -> Scenario:
     seas, step = made.disturbances().values(), made.simulation.step
     refused = any(any(sea.conflicts(made.vessel, step)) for sea in seas)
     missing = any(any(unmet(law, made.path, made.actuator, 0)) for law in made.laws().values())
-    return reject() if refused or missing else made
+    return reject() if refused or missing or name_refused(made.name) else made
 
 
 # podusv refuses most mixtures of values, as it should; in place of the checks of conftest.py.
