@@ -31,10 +31,12 @@ JUDGES := fresh cybership2 otter
 LEFEBER := circle line port load damping
 FOSSEN := course cybership2 damping load limits beside
 ALOS := demo line far windward sensors
+SKJETNE := ellipse far limits load
+THRUSTERS := thrusters thrusters_weak thrusters_far thrusters_load
 COMPARISONS := printed_compare figures_compare figures_compare_standoff corrected_compare
 JUDGED := hull_and_sea unknown_dynamics rivals learned
 DOUBTED := $(addprefix mu_2017/,$(COMPARISONS)) $(addprefix lefeber_2003/,$(LEFEBER)) $(addprefix fossen_2003/,$(FOSSEN)) \
-    $(addprefix fossen_2023/,$(ALOS))
+    $(addprefix fossen_2023/,$(ALOS)) $(addprefix skjetne_2005/,$(SKJETNE))
 
 .DEFAULT_GOAL := help
 .PHONY: help quick reproduce claim pod sea doubt sweep tune bench-laws docs test test-papers test-all test-faults test-oldest test-newest kernels dist bench checks lint types contracts clean
@@ -44,8 +46,8 @@ help: ## what can be made
 
 # Exit code 4: diverged, as it must. Exit code 3: some of the runs diverged; in figures_compare they must.
 reproduce: $(VENV)/run.done ## papers, claim by claim, into results/runs/ and results/paper.md
-	@echo "$(words printed_from_zero $(COMPARISONS) $(LEFEBER) $(FOSSEN) $(ALOS)) steps, two to eight minutes on two cores:"
-	@rm -f results/mu_2017.log results/lefeber_2003.log results/fossen_2003.log results/fossen_2023.log
+	@echo "$(words printed_from_zero $(COMPARISONS) $(LEFEBER) $(FOSSEN) $(ALOS) $(SKJETNE) $(THRUSTERS)) steps, three to twelve minutes on two cores:"
+	@rm -f results/mu_2017.log results/lefeber_2003.log results/fossen_2003.log results/fossen_2023.log results/skjetne_2005.log
 	@$(STEP) run mu_2017 printed_from_zero 4
 	@for name in $(COMPARISONS); do \
 	    $(STEP) compare mu_2017 $$name $$(case $$name in figures_compare) echo 3;; *) echo 0;; esac) || exit 1; \
@@ -53,11 +55,12 @@ reproduce: $(VENV)/run.done ## papers, claim by claim, into results/runs/ and re
 	@for name in $(LEFEBER); do $(STEP) compare lefeber_2003 $$name 0 || exit 1; done
 	@for name in $(FOSSEN); do $(STEP) compare fossen_2003 $$name 0 || exit 1; done
 	@for name in $(ALOS); do $(STEP) compare fossen_2023 $$name 0 || exit 1; done
+	@for name in $(SKJETNE) $(THRUSTERS); do $(STEP) compare skjetne_2005 $$name 0 || exit 1; done
 	@$(BIN)/python examples/reproduce/verdicts.py
-	@$(BIN)/python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003 fossen_2023
+	@$(BIN)/python examples/reproduce/papers.py mu_2017/corrected_compare lefeber_2003 fossen_2003 fossen_2023 skjetne_2005
 	@$(BIN)/python examples/reproduce/paper_figures.py
 	@echo "every table, claim and figure: results/runs/*/*/report.html"
-	@echo "what was found: results/README.md, lefeber_2003.md, fossen_2003.md, fossen_2023.md; the first paper in figures: results/paper.md"
+	@echo "what was found: results/README.md, lefeber_2003.md, fossen_2003.md, fossen_2023.md, skjetne_2005.md; the first paper in figures: results/paper.md"
 
 # In F and S the law without its network diverges, as it must: exit code 3.
 claim: $(VENV)/run.done ## the paper's central claim: parts off, wrong vessels, sampling

@@ -23,7 +23,7 @@ FULL = "full_backstepping"
 NAMES = ("printed_compare", "figures_compare", "figures_compare_standoff", "corrected_compare")
 LETTERS = dict(zip("PFSC", NAMES, strict=True))  # as results/README.md calls them
 SOON = ("corrected_compare",)  # in `make test-papers` already
-PAPERS = ("lefeber_2003", "fossen_2003", "fossen_2023")  # with a page of their own
+PAPERS = ("lefeber_2003", "fossen_2003", "fossen_2023", "skjetne_2005")  # with a page of their own
 SIGNS = {"reproduced": "+", "not reproduced": "-", "cannot tell": "?"}
 README = (ROOT / "results/README.md").read_text()
 # Sits on the singularity and chatters; the last bit of the start decides its settled numbers.
@@ -401,7 +401,7 @@ def test_the_table_of_papers_counts_the_verdicts_of_each(paper):
     """The verdicts themselves are held to the runs by the tests of each law."""
     page = (ROOT / "results" / f"{paper}.md").read_text()
     verdicts = [
-        row[1] for row in re.findall(r"^\| [AFL]\d+\w? \| (.+?) \| (.+?) \| .+ \|$", page, re.M)
+        row[1] for row in re.findall(r"^\| [AFLS]\d+\w? \| (.+?) \| (.+?) \| .+ \|$", page, re.M)
     ]
     kinds = (("reproduced", "holds"), ("not reproduced", "fails"), ("cannot tell",))
     counts = [sum(verdicts.count(word) for word in kind) for kind in kinds]
@@ -445,7 +445,7 @@ def test_the_table_of_what_verdicts_depend_on_counts_the_verdicts():
 @pytest.mark.parametrize("paper", PAPERS)
 def test_the_table_of_papers_counts_the_papers_own_claims_apart(paper):
     page = (ROOT / "results" / f"{paper}.md").read_text()
-    rows = re.findall(r"^\| [AFL]\d+\w? \| (.+?) \| (.+?) \| .+ \|$", page, re.M)
+    rows = re.findall(r"^\| [AFLS]\d+\w? \| (.+?) \| (.+?) \| .+ \|$", page, re.M)
     own = [verdict for says, verdict in rows if not says.endswith("(ours)")]
     counts = [own.count(word) for word in ("reproduced", "not reproduced", "cannot tell")]
     told = f"{len(own)}: {', '.join(map(str, counts))}"

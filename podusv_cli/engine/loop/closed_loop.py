@@ -69,8 +69,11 @@ def unmet(law: Controller, path: Path, actuator: Actuator, load_at: int) -> list
         )
         texts += [("estimator", text)]
     if law.keeps_path_time() and (path.follows or path.fillet_for_law()):
-        text = f"{law.label} goes along a path with a timetable, whose corners it rounds not"
-        texts += [("path", f"{text}; {path.label} has another; take poses, hold or ellipse")]
+        text = f"{law.label} goes along a timetable without rounded corners, and {path.label} is"
+        texts += [("path", f"{text} another path; take poses, hold or ellipse")]
+    if law.keeps_path_time() and not law.slots():
+        text = "and has no memory for it; give slots() a signal of one number first"
+        texts += [("controller", f"{law.label} keeps the path's time {text}")]
     return texts
 
 

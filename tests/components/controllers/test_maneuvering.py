@@ -5,9 +5,12 @@ import math
 import numpy as np
 import pytest
 import sympy as sp
-from conftest import vessel
+from conftest import corrected, run, vessel
 from pose_samples import BOAT, POSES, loaded_pose, marched
 
+from podusv_cli.components.actuators.ideal_full import IdealFull
+from podusv_cli.components.controllers.maneuvering import Maneuvering
+from podusv_cli.components.paths.ellipse import Ellipse
 from podusv_cli.core.errors import LawError, ScenarioError
 from podusv_cli.theory.loop_margins import loop_margins
 
@@ -306,6 +309,20 @@ def test_poses_are_reached_by_their_timetable_where_no_speed_is_asked_for():
     log = marched(BOAT + POSES + LAW)
     assert log["z_e"].max() < 1e-9
     np.testing.assert_allclose(log["path_time"], log["time"], atol=1e-9)
+
+
+class Forgetful(Maneuvering):
+    """Keeps a time, and has nowhere to keep it."""
+
+    def slots(self):
+        return ()
+
+
+def test_a_law_that_keeps_a_path_time_without_a_memory_is_refused():
+    path = Ellipse(length=6.0, breadth=4.0, period=60.0)
+    loop = corrected(controller=Forgetful(), actuator=IdealFull(), path=path)
+    with pytest.raises(LawError, match="has no memory for it; give slots"):
+        run(loop, 1.0)
 
 
 def test_a_path_without_a_timetable_is_refused_and_margins_are_too():
