@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -77,9 +78,10 @@ def _report(done: CapabilityOfScenario) -> None:
     echo_table([str(name) for name in head], [[f"{cell:.4g}" for cell in row] for row in rows])
     echo("the direction is where the load comes from: 0 from ahead, 90 from starboard")
     for name, (size, angle) in done.least().items():
-        echo(
-            f"{name}: holds {size:.4g} {done.found.unit} from anywhere, least from {angle:.4g} deg"
-        )
+        words = f"holds {size:.4g} {done.found.unit} from anywhere, least from {angle:.4g} deg"
+        if math.isnan(size):
+            words = "unknown: those left cannot make surge force and yaw moment apart"
+        echo(f"{name}: {words}")
     if not done.takes_sway:
         echo("the actuator takes no sway force, so the law cannot balance one; pods that push")
         echo("every way take one with --set actuator.sway_weight=1")

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
 from podusv_cli.core import signal
 from podusv_cli.core.errors import UsageError, in_a_line
@@ -59,6 +59,13 @@ class About(BaseModel):
     period: PositiveFloat
     platforms: list[str]
     of_run: bool
+
+    @model_validator(mode="after")
+    def _check_lengths(self) -> Self:
+        """Raises ValueError for lengths that no export has; the library would write beyond them."""
+        if len(self.inputs) not in (INPUTS, INPUTS + len(signal.HEADING)):
+            raise ValueError(f"has {len(self.inputs)} inputs, which no exported law has")
+        return self
 
     @property
     def columns(self) -> list[str]:

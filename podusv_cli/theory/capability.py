@@ -55,7 +55,8 @@ class LoadKind(NamedTuple):
 class Capability:
     """What is held from each of `angles` (n,) [rad], 0 from ahead, pi/2 from starboard.
 
-    `held` has for all thrusters, and without each of them, sizes (n,) in `unit`.
+    `held` has for all thrusters, and without each of them, sizes (n,) in `unit`; NaN where those
+    that are left cannot be allocated.
     """
 
     load: str
@@ -130,7 +131,7 @@ def capability(
     sets: dict[str, Actuator | None] = {HEALTHY: actuator}
     sets |= {f"without {key}": rest for key, rest in actuator.without_each().items()}
     for name, thrusters in sets.items():
-        held[name] = sizes = np.zeros(len(angles))
+        held[name] = sizes = np.full(len(angles), math.nan if thrusters is None else 0.0)
         if thrusters is None:
             continue
         for i, angle in enumerate(angles.tolist()):

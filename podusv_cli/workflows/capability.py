@@ -77,9 +77,10 @@ def capability(
         raise UsageError(f"{config} is a run folder; give its resolved.yaml")
     count = round(TURN / every)
     if not math.isclose(count * every, TURN):
+        whole = [hundredths for hundredths in range(10, 18001) if 36000 % hundredths == 0]
+        near = min(whole, key=lambda hundredths: abs(hundredths - 100.0 * every)) / 100.0
         raise UsageError(
-            f"--every {every:g}: {every:g} deg do not divide a turn of 360 deg; give "
-            f"{TURN / count:.4g}"
+            f"--every {every:g}: {every:g} deg do not divide a turn of 360 deg; give {near:g}"
         )
     scenario = open_scenario(config, request, (unknown_codes,)).scenario
     _check_formats(request.formats)

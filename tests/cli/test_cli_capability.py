@@ -63,7 +63,7 @@ def test_json_is_what_is_written_and_each_thruster_has_a_column(podusv):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--every", "50"], "--every 50: 50 deg do not divide a turn of 360 deg; give 51.43"),
+        (["--every", "50"], "--every 50: 50 deg do not divide a turn of 360 deg; give 45"),
         (["--set", "actuator.kind=ideal_full"], "the actuator ideal_full has no limits"),
         (["--of", "wind", "--set", "vessel.windage=null"], "the vessel has no windage"),
         (["--format", "bmp"], "bmp"),

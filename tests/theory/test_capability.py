@@ -188,3 +188,13 @@ def test_what_has_no_limit_and_what_the_wind_cannot_act_on_are_refused():
     bare = {"vessel": {"preset": "cybership2", "windage": None}}
     with pytest.raises(UsageError, match="the vessel has no windage"):
         held("wind", [0.0], CYBERSHIP | bare)
+
+
+def test_what_cannot_be_allocated_without_the_main_propeller_has_no_number():
+    """Two tunnels hold a force from abeam, though they steer no ship by themselves: 0 is untrue."""
+    tunnel = PROPELLERS[0] | {"y": 0.0, "mount": "90 deg", "T_nn": 1e-3, "T_nn_astern": 1e-3}
+    pods = [PROPELLERS[0] | {"y": 0.0}, tunnel | {"x": -0.4}, tunnel | {"x": 0.4}]
+    actuator = {"kind": "pod", "pods": pods, "sway_weight": 1.0}
+    found = held("force", [0.0, 90.0], CYBERSHIP | {"actuator": actuator})
+    assert found[HEALTHY][1] == pytest.approx(2.0 * 1e-3 * 33.0**2, rel=2e-3)
+    assert np.isnan(found["without pods[0]"]).all()

@@ -181,7 +181,7 @@ class Pods(Actuator):
         if not any(moment for _, _, moment in pushes):
             raise ValueError(
                 "has no authority over yaw: a pod that turns needs a lever arm x other than 0, "
-                "one that does not (angle_limit 0) a lever arm y"
+                "one that does not (angle_limit 0) a lever arm y, or x where it pushes across"
             )
         if len(self.pods) == 1 and not (self.pods[0].angle_limit > 0 and self.pods[0].x != 0):
             raise ValueError(
@@ -192,8 +192,9 @@ class Pods(Actuator):
         apart = np.linalg.matrix_rank(np.array(pushes)[:, [0, 2]]) == len(DEMAND)
         if fixed and not apart:
             raise ValueError(
-                "has only fixed propellers side by side at the same y, which cannot make surge "
-                "force and yaw moment apart from each other; place them at different y"
+                "has only fixed propellers side by side at the same y, or across the ship, which "
+                "cannot make surge force and yaw moment apart from each other; place two that push "
+                "ahead at different y"
             )
         return self
 
@@ -295,7 +296,7 @@ class Pods(Actuator):
 
     def full_thrust(self) -> float:
         """Ahead or astern, whichever is larger of each."""
-        return sum(max(pod.most_thrust) for pod in self.pods)
+        return add_up(max(pod.most_thrust) for pod in self.pods)
 
     def shortest_lag(self) -> float:
         """Of speeds, and of angles that turn."""

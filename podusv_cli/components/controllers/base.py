@@ -103,6 +103,10 @@ class Controller(KernelPart):
         """
         return False
 
+    def wants_path_speed(self) -> bool:
+        """Whether it goes along the path at a speed of its own, where it keeps the path's time."""
+        return False
+
     def wants_loads(self) -> bool:
         """Whether the law has to know the loads that act."""
         return False

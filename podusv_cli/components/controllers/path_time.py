@@ -8,7 +8,9 @@ that of the timetable.
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, Self
+
+from pydantic import model_validator
 
 from podusv_cli.components.controllers.base import Controller
 from podusv_cli.components.controllers.pose_errors import PoseErrors
@@ -50,9 +52,22 @@ class PathTimed(Controller):
     speed_change: float = value(0.0, "s", "when the wanted speed changes", ge=0)
     speed_lag: float = value(5.0, "s", "lag of a change of the wanted speed", gt=0)
 
+    @model_validator(mode="after")
+    def _check_speeds(self) -> Self:
+        """Raises ValueError for a later speed without a first one."""
+        if self.speed == 0.0 and (self.speed_after > 0.0 or self.speed_change > 0.0):
+            raise ValueError(
+                "has speed_after or speed_change, and no speed before; give `speed`, too, in m/s"
+            )
+        return self
+
     def keeps_path_time(self) -> bool:
         """Always."""
         return True
+
+    def wants_path_speed(self) -> bool:
+        """Where one is given."""
+        return self.speed > 0.0
 
 
 class PathPace(NamedTuple):

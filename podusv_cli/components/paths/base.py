@@ -65,6 +65,7 @@ class Path(KernelPart):
     waits: ClassVar[bool] = False  # True: it follows, and its target waits until the vessel comes
     places: ClassVar[tuple[Signal, ...]] = ()
     heads: ClassVar[bool] = False  # True: `evaluate` writes a heading behind the distance, too
+    rests: ClassVar[bool] = False  # True: its timetable stands still at some time
 
     evaluate: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate"))
     evaluate_shown: ClassVar[Callable[..., None]] = staticmethod(absent("evaluate_shown"))

@@ -15,6 +15,7 @@ class Hold(Path):
 
     kind: Literal["hold"] = "hold"
     heads: ClassVar[bool] = True
+    rests: ClassVar[bool] = True
     x: float = value(0.0, "m", "position, north")
     y: float = value(0.0, "m", "position, east")
     psi: float = value(0.0, "rad", "heading")

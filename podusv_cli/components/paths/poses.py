@@ -43,6 +43,7 @@ class Poses(Path):
 
     kind: Literal["poses"] = "poses"
     heads: ClassVar[bool] = True
+    rests: ClassVar[bool] = True
     poses: tuple[Pose, ...] = value(
         ..., "m, m, rad", "list of [x, y, psi], at least one", strict=False
     )

@@ -28,15 +28,16 @@ NEAR = 1e-9  # s; a time this near to the one asked for has come
 class Stations(Path):
     """Stays at each pose until the vessel has been there for `keep`, then goes to the next.
 
-    There is within `radius` and `angle` of the pose, as the law sees it. On the way, which takes
-    `travel`, each coordinate follows 10 s^3 - 15 s^4 + 6 s^5. Once the last station has been kept,
-    metrics end, and the target stays.
+    There is within `radius` and `angle` of the pose, as the law sees it, once the target is there.
+    On the way, which takes `travel`, each coordinate follows 10 s^3 - 15 s^4 + 6 s^5. Once the last
+    station has been kept, metrics end, and the target stays.
     """
 
     kind: Literal["stations"] = "stations"
     follows: ClassVar[bool] = True
     waits: ClassVar[bool] = True
     heads: ClassVar[bool] = True
+    rests: ClassVar[bool] = True
     places: ClassVar[tuple[Signal, ...]] = PLACES
     poses: tuple[Pose, ...] = value(
         ..., "m, m, rad", "list of [x, y, psi], at least one", strict=False
@@ -84,7 +85,8 @@ class Stations(Path):
             pose = tail(table, 3 * station)
             north, east, turn = x[0] - pose[0], x[1] - pose[1], abs(wrap(x[2] - pose[2]))
             square = north * north + east * east
-            if square > k.radius * k.radius or turn > k.angle:
+            on_the_way = station > 0 and t - place[LEFT] < k.travel - NEAR
+            if on_the_way or square > k.radius * k.radius or turn > k.angle:
                 place[SINCE] = AWAY
             elif place[SINCE] < 0.0:
                 place[SINCE] = t

@@ -71,6 +71,9 @@ def unmet(law: Controller, path: Path, actuator: Actuator, load_at: int) -> list
     if law.keeps_path_time() and (path.follows or path.fillet_for_law()):
         text = f"{law.label} goes along a timetable without rounded corners, and {path.label} is"
         texts += [("path", f"{text} another path; take poses, hold or ellipse")]
+    if law.wants_path_speed() and path.rests:
+        text = f"{law.label} has a speed of its own, and {path.label} stands still at its poses"
+        texts += [("path", f"{text}; leave controller.speed at 0, or take ellipse")]
     if law.keeps_path_time() and not law.slots():
         text = "and has no memory for it; give slots() a signal of one number first"
         texts += [("controller", f"{law.label} keeps the path's time {text}")]

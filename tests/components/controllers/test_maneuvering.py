@@ -334,3 +334,15 @@ def test_a_path_without_a_timetable_is_refused_and_margins_are_too():
     plan = single.plan()
     with pytest.raises(LawError, match="its target moves as the law wants"):
         loop_margins(plan.loop, plan.grid)
+
+
+@pytest.mark.parametrize(
+    ("law", "says"),
+    [
+        ("speed: 0.1", "has a speed of its own, and poses stands still at its poses; leave"),
+        ("speed_after: 0.2, speed_change: 10", "and no speed before; give `speed`, too"),
+    ],
+)
+def test_a_speed_along_a_path_that_rests_or_a_later_one_alone_is_refused(law, says):
+    with pytest.raises(ScenarioError, match=says):
+        loaded_pose(BOAT + POSES + LAW.replace("kind: maneuvering", f"kind: maneuvering, {law}"))
