@@ -23,7 +23,7 @@ PAGE = (RESULTS / "skjetne_2005.md").read_text()
 ROWS = re.findall(r"^\| (S\d+\w?) \| (.+?) \| (.+?) \| (.*?) ?\| (.+?) \|$", PAGE, re.M)
 VERDICTS = {claim: verdict for claim, _, verdict, _, _ in ROWS}
 FOUND = {claim: found for claim, *_, found in ROWS}
-# Claims with the sway of the ship's own thrusters have one more letter: t at 33, w at 25 rev/s.
+# Claims with the ship's own thrusters have a letter behind the claim's: t at 33, w at 25 rev/s.
 OWN_THRUSTERS = {
     claim + letter: verdict
     for claim, _, _, own, _ in ROWS
@@ -83,6 +83,21 @@ def test_the_sway_that_the_ellipse_takes_is_that_of_its_sharpest_bend():
         assert np.abs(run["tau_v"][there]).max() == pytest.approx(across_needed(speed), rel=0.01)
 
 
+def test_weak_thrusters_lack_sway_where_they_make_the_moment_of_the_bend():
+    """By hand, at 25 rev/s: a propeller ahead with its rudder, one astern, and the tunnel."""
+    scenario = podusv.load(CONFIGS / "thrusters_weak.yaml").singles()["gradient"]
+    stern, _, bow = scenario.actuator.pods
+    surge, sway, moment = 0.158, across_needed(0.15), 0.086
+    tunnel = bow.T_nn * bow.n_max**2
+    rudder = sway - tunnel  # what is missing, at the stern
+    apart = (moment - bow.x * tunnel - stern.x * rudder) / 0.078  # N between the propellers
+    ahead = 0.5 * (surge + apart)
+    assert (tunnel, rudder, ahead) == pytest.approx((0.098, 0.361, 1.607), abs=1e-3)
+    given = stern.rudder.lift * stern.rudder.stall * ahead / stern.T_nn
+    assert given == pytest.approx(0.28, abs=5e-3)
+    assert given < 0.8 * rudder
+
+
 @pytest.mark.papers
 def test_the_numbers_on_the_page_are_those_of_the_comparisons():
     far, own, limits = (compared(name).table for name in ("far", "thrusters_far", "limits"))
@@ -112,14 +127,19 @@ def test_the_numbers_on_the_page_are_those_of_the_comparisons():
     }
     learnt, plain, weak = ([f"{mm:.0f}" for mm in pair] for pair in left.values())
     assert f"{learnt[0]} mm at 0.15 m/s, {learnt[1]} mm at 0.25 m/s" in FOUND["S4"]
-    assert f"with 1.42 N {weak[0]} and {weak[1]} mm" in FOUND["S4"]
+    assert f"own thrusters {weak[0]} and {weak[1]} mm" in FOUND["S4"]
     assert FOUND["S4b"] == f"{plain[0]} and {plain[1]} mm"
 
 
 def test_the_verdicts_and_numbers_of_the_study_are_those_on_the_page():
-    verdicts = json.loads((RESULTS / "skjetne_2005" / "claims.json").read_text())["claims"]
-    told = dict(re.findall(r"^\| (G\d) \| .+? \| (.+?) \| .+? \|$", PAGE, re.M))
+    studies = ("claims.json", "thrusters.json")
+    files = [json.loads((RESULTS / "skjetne_2005" / name).read_text()) for name in studies]
+    verdicts = [claim for file in files for claim in file["claims"]]
+    told = dict(re.findall(r"^\| ([GT]\d) \| .+? \| (.+?) \| .+? \|$", PAGE, re.M))
     assert {claim["claim"]: in_words(claim) for claim in verdicts} == told
+    failures = [claim["statistics"][0]["estimate"] for claim in files[1]["claims"]]
+    shown = re.findall(r"^\| T\d .* (\d+) % (?:of the draws )?fail", PAGE, re.M)
+    assert [int(share) for share in shown] == [round(100.0 * share) for share in failures]
     numbers = pd.read_csv(RESULTS / "skjetne_2005" / "summary.csv")
     for law, *cells in re.findall(r"^\| `(\w+)` \| (.+?) \| (.+?) \| (.+?) \|$", PAGE, re.M):
         rows = numbers[numbers.law == law].sort_values("cell")
