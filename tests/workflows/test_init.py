@@ -114,7 +114,11 @@ def test_a_folder_s_old_name_still_names_its_scenarios(podusv):
 def test_init_lists_every_scenario_that_is_meant_to_be_run(podusv):
     points = starting_points()
     others = {name[7:-5] for name in shipped.names()} - set(points)
-    layers = {name for name in others if name.startswith(("bench/", "bench_legs/", "bench_boats/"))}
+    layers = {
+        name
+        for name in others
+        if name.startswith(("bench/", "bench_legs/", "bench_boats/", "bench_dp/"))
+    }
     assert others - layers == {
         "fossen_2003/base",
         "lefeber_2003/base",
