@@ -58,7 +58,11 @@ class Facts:
     duration: float = 0.0
 
     def _given_demand(self, u: float, demand: tuple[float, float]) -> float:
-        """What is given of a demand at the speed u [m/s], on the axis of its largest number."""
+        """What the actuator gives [N or N m] of a demand (tau_u [N], tau_r [N m]) once it settled.
+
+        On the axis of the demand's larger number, straight ahead at the speed u [m/s]. Raises
+        SizingError where the actuator raises.
+        """
         x, axis = np.array([0.0, 0.0, 0.0, u, 0.0, 0.0]), int(abs(demand[1]) > abs(demand[0]))
         try:
             return float(self.actuator.settled(x, np.array(demand))[2 * axis])
@@ -88,7 +92,7 @@ class Facts:
         if not math.isfinite(self._ahead(0.0)):
             return U0 * math.sqrt(self.lam)
         fastest = self._speed(self.F)
-        if self._ahead(fastest) == self.F:
+        if self._ahead(fastest) == self.F:  # thrust does not fall with speed: nothing to search
             return fastest
         return _rises_to(lambda u: self._drag(u) - self._ahead(u), 0.0, fastest, ASKED)
 
@@ -106,11 +110,12 @@ class Facts:
     @cached_property
     def N(self) -> float:
         """Least moment left at either side while cruising [N m]; by Froude without a limit."""
+        # By Froude rates go with 1/sqrt(lam), so a moment goes with m33 times 1/lam
         asked = ENOUGH * W0 * W0 * self.nominal.m33 / self.lam
         u = CRUISE * self.U
         cruising = self._drag(u)
         given = [side * self._given_demand(u, (cruising, side * asked)) for side in (1.0, -1.0)]
-        least = min(given)
+        least = min(given)  # a single rudder or pod may give less to one side
         return least if least < DELIVERED * asked else asked / ENOUGH
 
     @cached_property
@@ -136,6 +141,7 @@ class Facts:
     def _turning(self, r: float) -> float:
         """Part of N that holds the yaw rate r [rad/s] at half the top speed, at rest in sway."""
         u = HALF * self.U
+        # The search starts from 0, so it runs over v + U: v from -U to U
         drift = _rises_to(lambda v: -sway_force(u, v - self.U, r, self._k), 0.0, 2.0 * self.U)
         return -yaw_moment(u, drift - self.U, r, self._k) / self.N
 
@@ -230,6 +236,7 @@ class Facts:
 
     def _in_words(self) -> str:
         """The facts with their units, in a sentence."""
+        # g_r is the smaller of w_f, the pace that the moment gives, and what the delay allows
         why = "the moment" if self.g_r == self.w_f else "the delay"
         return (
             f"F = {self.F:.4g} N, U = {self.U:.4g} m/s, N = {self.N:.4g} N m, r_top = "
@@ -246,7 +253,10 @@ def _over(number: float, delay: float) -> float:
 def _rises_to(
     force: Callable[[float], float], wanted: float, highest: float, halvings: int = HALVINGS
 ) -> float:
-    """Where a rising force comes to a wanted one, at most `highest`; by so many halvings."""
+    """The speed in [0, `highest`] at which `force`, which rises with speed, reaches `wanted`.
+
+    Speed and force have the units of `force`. By `halvings` bisections, each one call of `force`.
+    """
     low, high = 0.0, highest
     for _ in range(halvings):
         middle = 0.5 * (low + high)

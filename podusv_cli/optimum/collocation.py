@@ -67,6 +67,7 @@ def dynamics(k: Any, demands: int = 2) -> Any:
     """A CasADi function: the rate of the state (x, y, psi, u, v, r) under demand and load.
 
     `k` has the coefficients of the vessel; `demands` counts the numbers of a demand, two or three.
+    The function takes state (6,), demand (demands,) and load (3,) [N, N, N m].
     """
     ca = casadi()
     kernel = transplant(plant, {cos_sin: lambda a: (ca.cos(a), ca.sin(a)), float: lambda x: x})
@@ -80,18 +81,20 @@ def dynamics(k: Any, demands: int = 2) -> Any:
 def search_optima(
     problem: OptimumProblem, guesses: Mapping[str, Motion], step: float, tell: Tell | None = None
 ) -> tuple[list[Stage], Motion]:
-    """Optima on the coarsest grid from every guess, then of the best on finer grids; the last.
+    """Optima on the coarsest grid from every guess, then of the best on finer grids.
 
-    The finest has this step or a little less. Raises NotConvergedError. An interrupt ends the
-    solver at its next iteration.
+    Returns all stages, and the motion of the last. `guesses` are motions by what they come from;
+    the finest grid has the `step` [s] or a little less; `tell` hears what is done and which
+    fraction. Raises NotConvergedError. An interrupt ends the solver at its next iteration.
     """
     finest = 2 ** (GRIDS - 1)
-    n = max(1, int(np.ceil(problem.duration / step / finest - 1e-9)))
+    n = max(1, int(np.ceil(problem.duration / step / finest - 1e-9)))  # 1e-9: of rounding
     count = len(guesses) + GRIDS - 1
     stages: list[Stage] = []
     for start, guess in guesses.items():
         report = partial(_tell, tell, len(stages), count)
         stages.append(_solve_stage(_Program(problem, n, report), start, guess))
+    # What did not converge is last: its integral is NaN, which compares with nothing
     best = min(stages, key=lambda stage: (stage.motion is None, stage.integral))
     for grid in range(1, GRIDS):
         report = partial(_tell, tell, len(stages), count)
@@ -112,10 +115,16 @@ def _motion_or_raise(stage: Stage) -> Motion:
 
 
 def _solve_stage(program: _Program, start: str, guess: Motion) -> Stage:
-    """The optimum on a program's grid, smoothed less and less."""
+    """The optimum on a program's grid, smoothed less and less.
+
+    `start` names what the guess comes from. Where IPOPT does not converge, the stage has no motion,
+    and NaN for the integral.
+    """
     began, iterations, motion = time.perf_counter(), 0, guess.at(program.times)
     smoothed = SMOOTHED[program.problem.minimised]
     try:
+        # A warm guess is an optimum of a coarser grid already: much smoothing would lead away from
+        # it
         for eps in smoothed[-2:] if program.warm else smoothed:
             motion = program.solve(motion, eps)
             iterations += program.iterations
@@ -127,7 +136,7 @@ def _solve_stage(program: _Program, start: str, guess: Motion) -> Stage:
 
 
 def _tell(tell: Tell | None, stage: int, count: int, iterations: int) -> None:
-    """Tell the fraction that is done: stages, and a guess at the iterations of this one."""
+    """Tell the fraction done: `stage` of `count`, and a part of this one by its iterations."""
     if tell:  # nobody knows how many iterations there will be
         tell("solving", (stage + iterations / (iterations + 50.0)) / count)
 
@@ -169,7 +178,10 @@ class _Program:
         self._multipliers: dict[str, Any] = {}
 
     def solve(self, guess: Motion, eps: float) -> Motion:
-        """The optimum with this smoothing [m], from a guess on the grid."""
+        """The optimum with the smoothing `eps` [m], from a guess on the grid.
+
+        Sets `iterations`, and what a further call starts from. Raises NotConvergedError.
+        """
         ca = casadi()
         low, high = self._bounds()
         own = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
@@ -198,8 +210,12 @@ class _Program:
         return Motion(self.times, rows[:, :STATES], rows[:, STATES:])
 
     def integral(self, motion: Motion) -> float:
-        """The integral of the distance or of its square, by Simpson's rule."""
+        """The integral of the distance to the target [m s] or of its square [m2 s].
+
+        By Simpson's rule, whose middle place in a segment is that of the collocation. No smoothing.
+        """
         rows = np.hstack([motion.states, motion.demands]).T
+        # The last argument is eps: no smoothing. `half` are the places at the segments' middles.
         _, _, half = self._segment.map(self.n)(
             rows[:, :-1], rows[:, 1:], *_thirds(*self._loads), *_thirds(*self._places), 0.0
         )
@@ -211,7 +227,10 @@ class _Program:
         return float(self.step / 6.0 * (ends[:-1] + 4.0 * middle + ends[1:]).sum())
 
     def _bounds(self) -> tuple[Vector, Vector]:
-        """The least and the largest of every unknown (unknowns,); the first state is given."""
+        """The least and the largest value of every unknown, each (n + 1, unknowns).
+
+        Demands have the actuator's limits; the first state is given, so both bounds are it.
+        """
         low = np.full((self.n + 1, self._unknowns), -np.inf)
         low[:, STATES:] = -np.array(self.problem.loop.actuator.limits())
         high = -low
@@ -231,12 +250,19 @@ class _Program:
 
 
 def _thirds(ends: Vector, middle: Vector) -> tuple[Vector, Vector, Vector]:
-    """The columns at a segment's beginning, middle and end."""
+    """The columns at a segment's beginning, middle and end, each (numbers, n).
+
+    `ends` (numbers, n + 1) are at the grid's times, `middle` (numbers, n) between them.
+    """
     return ends[:, :-1], middle, ends[:, 1:]
 
 
 def _segment(problem: OptimumProblem, h: float) -> Any:
-    """A CasADi function of a segment of `h` [s]: its gaps, share of the integral, middle place."""
+    """A CasADi function of a segment of `h` [s]: its gaps, share of the integral, middle place.
+
+    Gaps (6,) are the collocation's defects, 0 on a motion; the place (2,) is in m. It takes states
+    and demands before and after, three loads, three places of the target, and the smoothing [m].
+    """
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()), problem.demands)
     unknowns = STATES + problem.demands
     before, after = ca.SX.sym("before", unknowns), ca.SX.sym("after", unknowns)
@@ -245,7 +271,7 @@ def _segment(problem: OptimumProblem, h: float) -> Any:
     eps = ca.SX.sym("eps")
     x0, x1 = before[:STATES], after[:STATES]
     f0, f1 = rate(x0, before[STATES:], loads[0]), rate(x1, after[STATES:], loads[2])
-    half = (x0 + x1) / 2.0 + h / 8.0 * (f0 - f1)
+    half = (x0 + x1) / 2.0 + h / 8.0 * (f0 - f1)  # of Hermite's cubic through both ends
     demand = (before[STATES:] + after[STATES:]) / 2.0
     gaps = x1 - x0 - h / 6.0 * (f0 + 4.0 * rate(half, demand, loads[1]) + f1)
     squares = [ca.sumsqr(x[:2] - d) for x, d in zip((x0, half, x1), places, strict=True)]
@@ -256,7 +282,10 @@ def _segment(problem: OptimumProblem, h: float) -> Any:
 
 
 def _watch(unknowns: int, gaps: int, look: Callable[[], bool]) -> Any:
-    """A CasADi callback that IPOPT calls after every iteration; `look` says whether to stop."""
+    """A CasADi callback that IPOPT calls after every iteration; `look` says whether to stop.
+
+    `unknowns` and `gaps` count the program's variables and constraints, whose shapes CasADi asks.
+    """
     ca: Any = casadi()
     sizes = {"f": 1, "x": unknowns, "lam_x": unknowns, "g": gaps, "lam_g": gaps}
 

@@ -20,7 +20,7 @@ HEADERS = {
 
 
 def schedule(problem: OptimumProblem, motion: Motion) -> str:
-    """The rows of the law `schedule` that repeats the motion."""
+    """The text of a schedule that repeats the motion, for the law `schedule`: header and rows."""
     gains = _gains(problem, motion).reshape(len(motion.times), -1)
     chosen = _choose_rows(motion.demands)
     rows = np.column_stack([motion.times, motion.demands, motion.states])
@@ -39,7 +39,7 @@ def _choose_rows(demands: Vector) -> list[int]:
     last, half = len(demands) - 1, MOST_ROWS // 2
     if last < MOST_ROWS:
         return list(range(last + 1))
-    bends = abs(np.diff(demands, 2, axis=0))
+    bends = abs(np.diff(demands, 2, axis=0))  # at rows 1 to last - 1, so 1 is added below
     sharpest = np.argsort((bends / bends.max(axis=0).clip(1e-300)).sum(axis=1))[-half:] + 1
     return sorted({*range(0, last, -(-last // half)), *sharpest.tolist(), last})
 
@@ -52,7 +52,7 @@ def _gains(problem: OptimumProblem, motion: Motion) -> Vector:
     worth an acceleration of BANDWIDTH squared.
     """
     vessel, h = problem.loop.vessel, float(motion.times[1] - motion.times[0])
-    inertia = [vessel.m11, vessel.m33, vessel.m22][: problem.demands]
+    inertia = [vessel.m11, vessel.m33, vessel.m22][: problem.demands]  # in the order of a demand
     weight = np.diag([m**-2 for m in inertia]) / BANDWIDTH**4
     unit = np.eye(STATES)
     cost, gains = unit, np.zeros((len(motion.times), problem.demands, STATES))
@@ -73,5 +73,6 @@ def _slopes(problem: OptimumProblem, motion: Motion) -> tuple[Vector, Vector]:
     slopes = ca.Function("slopes", arguments, [both]).map(len(motion.times))(
         motion.states.T, motion.demands.T, problem.loads(motion.times.tolist()).T
     )
+    # CasADi's map puts the matrices (6, 6 + demands) of all times side by side
     columns = np.array(slopes).reshape(STATES, len(motion.times), -1).transpose(1, 0, 2)
     return columns[:, :, :STATES], columns[:, :, STATES:]

@@ -31,7 +31,7 @@ class Motion:
 
     @classmethod
     def of(cls, log: Recording) -> Motion:
-        """The motion of a run."""
+        """The motion of a run: its states, and what acted on the hull as demands."""
         loads = ("tau_u", "tau_r", *(("tau_v",) if SWAY_DEMAND.name in log.signals else ()))
         states, demands = ([log[name] for name in names] for names in (STATE, loads))
         return cls(log["time"], np.column_stack(states), np.column_stack(demands))
@@ -60,11 +60,14 @@ class OptimumProblem:
         return len(self.loop.actuator.limits())
 
     def loads(self, times: Sequence[float]) -> Vector:
-        """The disturbance (b_u, b_v, b_r) at each of these times, a row each."""
+        """The disturbance (b_u, b_v, b_r) at these times [s], (times, 3) [N, N, N m].
+
+        The states are zeros: `problem` lets only loads pass that depend on time alone.
+        """
         return self.loop.disturbance.loads(self.loop.vessel, times, np.zeros((len(times), 6)))
 
     def places(self, times: Sequence[float]) -> Vector:
-        """Where the target is at each of these times, a row each."""
+        """Where the target is at these times [s], (times, 2) [m], north and east."""
         return self.loop.path.targets(times)[:, :2]
 
 
@@ -99,7 +102,10 @@ def problem(scenario: Scenario, minimised: Minimised) -> OptimumProblem:
 
 
 def _passes_on(loop: ClosedLoop) -> bool:
-    """Whether the actuator has no state, and delivers demands within its limits as they are."""
+    """Whether the actuator has no state, and delivers demands within its limits as they are.
+
+    Tried at one demand, half the limits or half a unit where these are larger.
+    """
     actuator = loop.actuator
     if actuator.states:
         return False

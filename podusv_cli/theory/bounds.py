@@ -98,6 +98,7 @@ def least_eigenvalue(form: Vector) -> float:
     pairs = [(p, q) for p in range(n) for q in range(p + 1, n)]
     for p, q in SWEEPS * pairs:
         if a[p, q] != 0.0:
+            # t is the tangent of the rotation, of at most 45 deg, that makes a[p, q] zero
             slope = float(a[q, q] - a[p, p]) / (2.0 * float(a[p, q]))
             t = math.copysign(1.0 / (abs(slope) + math.sqrt(slope * slope + 1.0)), slope)
             c = 1.0 / math.sqrt(t * t + 1.0)
@@ -117,7 +118,11 @@ class _Axis:
     cross: float  # 0, or 1 with the printed sign, which doubles the cross term
 
     def slowest(self) -> float:
-        """The largest lambda for -k e^2 - gain w^2 - A y^2 + |e y| + 2 cross |e w|."""
+        """The largest lambda [1/s] for -k e^2 - gain w^2 - A y^2 + |e y| + 2 cross |e w|.
+
+        It is the least eigenvalue of that form over the squares' weights 1, mass, 1 in 2 V. NaN
+        where a number is not finite.
+        """
         form = np.array([[self.k, self.cross, 0.5], [self.cross, self.gain, 0.0], [0.5, 0.0, 0.0]])
         form[2, 2] = self.A if math.isfinite(self.A) else 0.0
         size = 3 if math.isfinite(self.A) else 2  # without a filter there is no y
@@ -126,7 +131,7 @@ class _Axis:
         return least_eigenvalue(scaled) if np.isfinite(scaled).all() else math.nan
 
     def limit(self) -> float:
-        """The value that k must exceed for a positive lambda."""
+        """The value that k must exceed for a positive lambda; infinite where none is enough."""
         from_cross = self.cross**2 / self.gain if self.gain > 0 else math.inf * self.cross
         return 1.0 / (4.0 * self.A) + (from_cross if self.cross else 0.0)
 
@@ -183,6 +188,7 @@ def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | No
     }
     if observed is None:
         return Bound(_least(candidates), math.nan, math.nan, candidates)
+    # A smaller lambda leaves the filters more room, which makes Delta smaller: the best is sought
     rates = np.arange(1, TRIES) / TRIES * _least(candidates)
     rooms = (surge.room(rates), yaw.room(rates))
     terms = _terms(law, observed, "rest", observed.rest)
@@ -213,7 +219,10 @@ def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None
 
 
 def _terms(law: PolarBackstepping, observed: Observed, left: str, over: Pair) -> dict[str, float]:
-    """The terms of Delta that are independent of lambda; what is `left` over differs by form."""
+    """The terms of Delta that are independent of lambda, by name.
+
+    What is left `over` [N, N m or m/s2, rad/s2], and its name `left`, differ between the forms.
+    """
     return {
         "W_u": law.sigma_u * _half_square(observed.W.u),
         "W_r": law.sigma_r * _half_square(observed.W.r),
@@ -232,7 +241,11 @@ def _best(
     rooms: tuple[Vector, Vector],
     drift: Pair,
 ) -> Bound:
-    """The lowest bound over lambda, which fixes sigma_yu and sigma_yr of (47)."""
+    """The lowest bound over lambda, which fixes sigma_yu and sigma_yr of (47).
+
+    `rates` (n,) [1/s] are the values of lambda that are tried, `rooms` what each leaves of 2 A in
+    surge and yaw, (n,) each; `drift` drives the filters' errors.
+    """
     largest = _least(candidates)
     if largest <= 0.0:
         return Bound(largest, math.nan, math.inf, candidates, terms)
@@ -254,7 +267,7 @@ def _half_square(x: float) -> float:
 
 
 def _conditions(law: PolarBackstepping, axes: Axes) -> tuple[GainCondition, ...]:
-    """What gains must exceed, by the corrected proof and by the printed one."""
+    """What gains must exceed, by the corrected proof and by the printed one; axes: surge, yaw."""
     surge, yaw = axes
     why = "must outweigh -z_e y_u cos psi_e and -psi_e y_r, which the paper's V' leaves out"
     if surge.cross:
@@ -303,10 +316,14 @@ def sway_push(vessel: Vessel, log: Recording, now: Replayed) -> tuple[Vector, Ve
 
 
 def sway_bound(vessel: Vessel, push: float, printed_push: float) -> SwayBound:
-    """The sway speed at which damping equals the push; infinite without positive damping."""
+    """The sway speed at which damping equals the push; infinite without positive damping.
+
+    `push` and `printed_push` [N] are the largest sway forces of `sway_push` in a part of a run.
+    """
     d22, d_vv = -vessel.Y_v, -vessel.Y_vv
     value = math.inf
     if d22 > 0.0 and d_vv >= 0.0:
+        # The root of d_vv v^2 + d22 v = push, in the form that holds for d_vv = 0 as well
         value = 2.0 * push / (d22 + math.sqrt(d22 * d22 + 4.0 * d_vv * push))
     elif d22 == 0.0 and d_vv > 0.0:
         value = math.sqrt(push / d_vv)

@@ -66,10 +66,11 @@ class Capability:
 
 
 def _current(vessel: Vessel, own: Disturbance) -> LoadOf:
-    """Of a current, whose size is its speed."""
+    """Of a current, whose size is its speed [m/s]; the angle is where it comes from."""
 
     def acting(speed: float, angle: float) -> Acting:
         flow = Current(speed=speed, direction=angle + math.pi)
+        # A hull at rest goes through the water against the flow
         x = np.array([0.0, 0.0, 0.0, speed * math.cos(angle), speed * math.sin(angle), 0.0])
         return Acting(flow.loads(vessel, [0.0], [AT_REST])[0], x)
 
@@ -77,12 +78,13 @@ def _current(vessel: Vessel, own: Disturbance) -> LoadOf:
 
 
 def _wind(vessel: Vessel, own: Disturbance) -> LoadOf:
-    """Of a wind without gusts, whose size is its mean speed at 10 m.
+    """Of a wind without gusts, whose size is its mean speed at 10 m [m/s].
 
-    Height where it acts and density are those of the scenario's own wind, if it has one.
+    Height where it acts and density are those of the scenario's own wind, if it has one. Raises
+    UsageError for a vessel without windage.
     """
     one = next((part for part in own.each() if isinstance(part, Wind)), Wind(speed=1.0))
-    fault = next(Wind(speed=1.0).conflicts(vessel, 1.0), None)
+    fault = next(Wind(speed=1.0).conflicts(vessel, 1.0), None)  # without gusts any step will do
     if fault:
         raise UsageError(fault[1])
 
@@ -135,6 +137,7 @@ def capability(
         if thrusters is None:
             continue
         for i, angle in enumerate(angles.tolist()):
+            # The search starts from the angle before; the first one's "before" is the last, still 0
             sizes[i] = _largest(thrusters, acting, angle, vessel.length, (sizes[i - 1], usual))
             if progress:
                 progress(name, (i + 1.0) / len(angles))
@@ -158,9 +161,9 @@ def _full_thrust(actuator: Actuator) -> float:
 
 
 def _usual(acting: LoadOf, thrust: float) -> float:
-    """The size of a load from ahead and aside that is as large as full thrust, or up to twice it.
+    """The size at which the load from 45 deg is first as large as full `thrust` [N], by doubling.
 
-    From ahead alone a hull may have no resistance.
+    From ahead alone a hull may have no resistance. The largest size tried where none is enough.
     """
     sizes = [FIRST * 2.0**i for i in range(DOUBLINGS)]
     enough = (s for s in sizes if np.hypot(*acting(s, 0.25 * math.pi).b[:2]) >= thrust)
@@ -172,8 +175,9 @@ def _largest(
 ) -> float:
     """The largest size that is held from an angle [rad], sought from that of the angle before.
 
-    `near` has that, and the usual size. Up to `ACCURACY`; 0 where less than `LEAST` is held,
-    infinite where the load does nothing that has to be balanced.
+    `near` has that, and the usual size; `length` [m] is the hull's. Up to `ACCURACY`; 0 where less
+    than `LEAST` is held, infinite where the load does nothing that has to be balanced. Doubled
+    while it is held, halved while nothing is, then by bisection.
     """
     before, usual = near
     low, high = 0.0, max(min(before, usual), LEAST * usual)
@@ -200,7 +204,7 @@ def holds(actuator: Actuator, load: Acting, length: float) -> bool:
 
     As an integrator does, the demand makes up for what the thrusters leave, as long as that helps.
     """
-    b, demands = load.b, [0, 2, 1][: len(actuator.limits())]
+    b, demands = load.b, [0, 2, 1][: len(actuator.limits())]  # a demand is (tau_u, tau_r, tau_v)
     force = math.hypot(b[0], b[1])
     most = BALANCED * np.array([force, force, abs(b[2])])
     most[2] += TURNED * force * length
@@ -210,6 +214,7 @@ def holds(actuator: Actuator, load: Acting, length: float) -> bool:
     for _ in range(ROUNDS):
         left = actuator.settled(load.x, demand) + b
         excess = float((np.abs(left) / most).max())
+        # Held, or no round will do: what is over did not fall to half of what it was
         if excess <= 1.0 or excess > 0.5 * before:
             return excess <= 1.0
         demand, before = demand - left[demands], excess

@@ -55,17 +55,22 @@ def course(path: Path, duration: float, at: float | None = None) -> Course:
 
 
 def _course(path: Path, t: float) -> Course | None:
-    """The motion at t, where it is steady from NEAR before it to NEAR after it, as laws see it."""
+    """The motion at t [s], where it is steady from NEAR before to NEAR after it, as laws see it.
+
+    None where it is not. A fillet changes what laws see half its duration before and after a
+    corner.
+    """
     fillet = path.fillet_for_law()
     near = NEAR + (0.5 * fillet.time if fillet else 0.0)
     now, *around = rows = path.whole_targets([t, max(t - near, 0.0), t + near])
-    (x, y), (ahead, across) = now[2:4], now[4:6]
+    (x, y), (ahead, across) = now[2:4], now[4:6]  # velocity [m/s] and acceleration [m/s2]
     turn = (x * across - y * ahead) / max(x * x + y * y, 1e-300)
     if path.heads and abs(rows[:, PSI_D + 1 :] - (turn, 0.0)).max() > STRAIGHT:
         return None
     for sign, other in zip((-min(t, near), near), around, strict=True):
         angle = turn * sign
         cosine, sine = math.cos(angle), math.sin(angle)
+        # What velocity and acceleration are there if the target goes on turning at this rate
         same = (x * cosine - y * sine, y * cosine + x * sine, -turn * y, turn * x)
         changed = [*(other[2:4] - same[:2]), *(now[4:6] - same[2:])]
         if max(map(abs, changed)) > ALIKE * max(math.hypot(x, y), ALIKE):

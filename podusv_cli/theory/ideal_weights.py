@@ -35,7 +35,7 @@ class IdealWeights:
 def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vector]:
     """f_u [m/s2] and f_r [rad/s2] (rows,): accelerations less those of actuator and disturbance.
 
-    For any vessel.
+    For any vessel, with its full mass matrix, in which a sway force turns the hull as well.
     """
     m, s, d = loop.vessel, now.signals, now.rates
     sway, yaw = s["tau_v"] + s["b_v"], s["tau_r"] + s["b_r"]
@@ -80,7 +80,11 @@ def network_output(phi: Vector, weights: Vector) -> Vector:
 def fit_weights(
     loop: ClosedLoop, law: PolarBackstepping, log: Recording, now: Replayed
 ) -> IdealWeights:
-    """The fit described above; f_u and f_r are scaled by true over nominal inertia."""
+    """The fit described above; f_u and f_r are scaled by true over nominal inertia.
+
+    `log` and `now` are the run's rows and the rates there. The law multiplies what its networks
+    give by nominal inertia.
+    """
     f_u, f_r = unloaded_accelerations(loop, now)
     usable = (np.abs(f_u) < 1e100) & (np.abs(f_r) < 1e100)  # not those of a diverging run
     phi = node_outputs(law.network, log)[usable]
@@ -89,6 +93,7 @@ def fit_weights(
         (f_u, loop.vessel.m11, loop.nominal.m11, law.sigma_u),
         (f_r, loop.vessel.m33, loop.nominal.m33, law.sigma_r),
     ):
+        # W = start + dW: what is fitted is dW, and its size counts
         aim = f[usable] * (mass / nominal) - start * total(phi.T)
         damping = np.float64(sigma * len(phi)) / (
             nominal * nominal
@@ -98,7 +103,10 @@ def fit_weights(
 
 
 def _gram(phi: Vector) -> Callable[[Vector, float], Vector]:
-    """W(f, c) that minimises |f - Phi W|^2 + c |W|^2, by the smaller of Phi^T Phi and Phi Phi^T."""
+    """W(f, c) that minimises |f - Phi W|^2 + c |W|^2, by the smaller of Phi^T Phi and Phi Phi^T.
+
+    `phi` is (rows, nodes). The matrix is made once, for surge and yaw.
+    """
     tall = phi.shape[0] >= phi.shape[1]
     short = phi if tall else phi.T
     square = _gram_matrix(short)
@@ -124,6 +132,6 @@ def _gram_matrix(short: Vector) -> Vector:
 
 
 def rows_to_fit(rows: int, nodes: int) -> Vector:
-    """Indices (n,) of the rows that the fit uses."""
+    """Indices (n,) of the rows that the fit uses, evenly spread over so many `rows`."""
     most = max(1, min(MOST_ROWS, MOST_NUMBERS // nodes, rows))
     return np.linspace(0, rows - 1, most).astype(int)

@@ -60,12 +60,16 @@ def velocity_vector_loop(
 ) -> Vector:
     """Rates of (y, psi, v, r) with `velocity_vector`, by the full mass matrix; shape (4, 4).
 
+    At the speed V [m/s] and the sway v [m/s] that the loads cause. Every vector below has the
+    factors (4,) of (y, psi, v, r) in one quantity of the loop.
+
     `share` is the sway force that comes with a yaw moment of 1 N m [1/m]. Without it, m23 and m32,
     and with V above V_m, the characteristic polynomial is that of `velocity_vector_polynomial`.
     """
     c = min(1.0, V * V / (law.V_m * law.V_m))
     sway, yaw = np.zeros((2, 4))
     sway[2:], yaw[2:] = _sway_slopes(vessel, V, v), _yaw_slopes(vessel, V, v)
+    # The moment that balances the hull's comes with a sway force of pods `thrust_lever` [m] astern
     across = sway + yaw / (law.thrust_lever or np.inf)
     y_rate, r = np.array([0.0, V, 1.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0])
     turn = -c * law.k_p / V * y_rate  # of V_c
@@ -125,5 +129,5 @@ def momentum_vector_gains(
 
 
 def growth(polynomial: Vector) -> float:
-    """Largest real part of the roots [1/s]."""
+    """Largest real part of the roots [1/s] of a polynomial's coefficients (n,), highest first."""
     return float(np.roots(polynomial).real.max())

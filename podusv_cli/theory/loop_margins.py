@@ -109,7 +109,7 @@ def loop_margins(
 
 
 def _left_out(loop: ClosedLoop, grid: TimeGrid, linear: Linear) -> Iterator[str]:
-    """What of the loop its linear model has not."""
+    """What of the loop its linear model leaves out, in words for the user."""
     if loop.measured:
         yield "measurement and estimator"
     if loop.controller.wants_load_estimate():

@@ -63,6 +63,7 @@ class Cut:
         """Frequencies [rad/s] up to where L is below 1, with that of every resonance among them."""
         sizes = np.abs(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.open_matrix)]))
         sizes = BESIDE * sizes[sizes > SLOWEST]
+        # At high frequency L is about C B/w, so it crosses 1 near |C B|
         slow = max(1e-2 * sizes.min(initial=1.0), SLOWEST)
         fast = 1e2 * max(sizes.max(initial=1.0), float(np.linalg.norm(self.C @ self.B)))
         count = int(DENSITY * math.log10(fast / slow))
@@ -92,7 +93,7 @@ class Margins:
 
 
 def poles(A: Vector) -> Complex:
-    """Eigenvalues [1/s], the slowest to decay first."""
+    """Eigenvalues (n,) [1/s] of A (n, n), the slowest to decay first."""
     eigenvalues = np.linalg.eigvals(A)
     return np.asarray(eigenvalues[np.lexsort((eigenvalues.imag, -eigenvalues.real))], dtype=complex)
 
@@ -104,7 +105,7 @@ def stable(A: Vector) -> bool:
 
 
 def margins(cut: Cut) -> Margins:
-    """The margins of one loop, m = 1."""
+    """The margins of one loop, m = 1; only S and T where the closed loop is unstable."""
     omega = cut.frequencies()
     L = cut.response(omega)[:, 0, 0]
     S, T = np.abs(1.0 / (1.0 + L)), np.abs(L / (1.0 + L))
@@ -132,12 +133,18 @@ def delay_margin(cut: Cut) -> float:
 
 
 def _delay(crossed: Vector, angles: Vector) -> float:
-    """Smallest lag over frequency; a lead is a lag of a turn less."""
+    """Shortest delay [s] that takes a crossing to -1; infinite without one.
+
+    `crossed` (n,) [rad/s], `angles` (n,) [rad] from -1. A lead is a lag of a turn less.
+    """
     return float((np.mod(angles, 2.0 * math.pi) / crossed).min(initial=math.inf))
 
 
 def _crossings(cut: Cut, omega: Vector) -> tuple[Vector, Vector]:
-    """Where a locus has magnitude 1 [rad/s], and its angle there from -1, in (-pi, pi]."""
+    """Where a locus has magnitude 1 (n,) [rad/s], and its angle there from -1 (n,), in (-pi, pi].
+
+    `omega` (w,) [rad/s] are frequencies between which it is looked for.
+    """
 
     def size(w: float, i: int) -> float:
         return float(np.log(np.abs(cut.loci(np.array([w]))[0, i])))
@@ -154,6 +161,7 @@ def _gains(cut: Cut, omega: Vector, L: Complex) -> list[float]:
 
     L (n,) is the loop's response at `omega` (n,) [rad/s].
     """
+    # With a gain of -1/L the response passes through -1; L is real at these w, and at 0
     at = _roots(lambda w: float(cut.response(np.array([w]))[0, 0, 0].imag), omega, L.imag)
     values = [complex(cut.response(np.array([w]))[0, 0, 0]).real for w in at]
     if abs(np.linalg.eigvals(cut.open_matrix)).min() > SLOWEST:
@@ -170,7 +178,10 @@ def _roots(f: Callable[[float], float], omega: Vector, values: Vector) -> list[f
 
 
 def _peak(cut: Cut, omega: Vector, values: Vector, of: Callable[[complex], float]) -> float:
-    """The largest value between the frequencies `omega` (n,) [rad/s], too."""
+    """The largest value of `of` (a function of L) over all frequencies.
+
+    `values` (n,) are those at `omega` (n,) [rad/s]; beside the largest it is looked for in between.
+    """
     from scipy.optimize import minimize_scalar  # slow to import
 
     at = int(np.argmax(values))

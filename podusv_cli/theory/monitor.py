@@ -181,7 +181,11 @@ def _traces(
     now: Replayed,
     unknown: tuple[ideal_weights.IdealWeights, bounds.Pair],
 ) -> Traces:
-    """All that the proof is about, over the rows of a log (rows,): V, its rate, remainders."""
+    """All that the proof is about, (rows,) each, over the rows of a log: V, its rate, remainders.
+
+    `now` has the rates at these rows; `unknown` are the weights fitted to the run, and the largest
+    |b_u| [N], |b_r| [N m].
+    """
     ideal, b = unknown
     e = error_rates(log, now, law)
     factors = ideal_weights.exponents(law.network, log)
@@ -195,6 +199,7 @@ def _traces(
     return lyapunov(loop, law, log, now, e, ideal, b) | {
         "alpha_u_dot": e.alpha_u_dot,
         "alpha_r_dot": e.alpha_r_dot,
+        # Without a filter A is infinite, and nothing lags behind the virtual control
         "drift_u": np.where(np.isinf(A_u), 0.0, e.y_u_dot + A_u * e.y_u),
         "drift_r": np.where(np.isinf(A_r), 0.0, e.y_r_dot + A_r * e.y_r),
         "epsilon_u": f_u - fit_u,
@@ -226,7 +231,8 @@ class _Bounds:
     continuous: bool
 
     def window(self, since: float) -> Window:
-        """The part of the run from a time [s] on."""
+        """The part of the run from a time [s] on, with its largest values and bounds."""
+        # 1e-9 s: times of a log are rounded
         rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
         value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]
         observed = self._observe_rows(rows) if self.continuous and len(value) else None
@@ -238,7 +244,7 @@ class _Bounds:
         return Window(since, observed, bound, sway, _largest(value), largest_v, kept)
 
     def _observe_rows(self, rows: slice) -> bounds.Observed:
-        """What the proof takes as bounded, as large as it was in these rows."""
+        """What the proof takes as bounded, as large as it was in these rows of the log."""
         start, ideal = self.law.network.initial_weight, self.ideal
         W = (math.sqrt(total((weights - start) ** 2)) for weights in (ideal.W_u, ideal.W_r))
         return bounds.Observed(

@@ -49,15 +49,17 @@ class Errors:
 
 
 def error_rates(log: Recording, now: Replayed, law: PolarBackstepping) -> Errors:
-    """The errors of (18), (23), (32), (38), (42) and their rates.
+    """The errors of (18), (23), (32), (38), (42) and their rates at every row of a log.
 
-    Jumps at the samples of a held direction or difference are not in the rates.
+    `now` has signals and rates of the loop there. Jumps at the samples of a held direction or
+    difference are not in the rates.
     """
     signals, rates = now.signals, now.rates
     sight = _line_of_sight(log, now, law)
     psi_e, psi_e_dot = signals["psi_e"], sight.w - log["r"]
     z_e, z_e_dot = (sight.side * (sight.distance - law.standoff), sight.side * sight.distance_rate)
     alpha_u_dot = _alpha_u_rate(log, now, law, sight)
+    # With another `rate` the law takes psi_d' for constant between samples
     alpha_r_dot = sight.w_rate * (law.rate == "analytic") + law.k_psie * psi_e_dot
     filtered = "beta_u" in rates
     beta_u_dot = rates["beta_u"] if filtered else alpha_u_dot
@@ -89,6 +91,7 @@ def _line_of_sight(log: Recording, now: Replayed, law: PolarBackstepping) -> Sig
     """
     s, d, u, v = now.signals, now.rates, log["u"], log["v"]
     psi_e, psi_d, distance = s["psi_e"], s["psi_d"], s["z_e"]
+    # psi_e is psi_d - psi, plus half a turn where it is folded: then this cosine is -1, else 1
     turn = np.where(cosine_and_sine(psi_e - psi_d + log["psi"])[0] < 0.0, -1.0, 1.0)
     cos_e, sin_e = (turn * part for part in cosine_and_sine(psi_e))
     x_e, y_e = s["x_d"] - log["x"], s["y_d"] - log["y"]
@@ -121,7 +124,10 @@ def _along(psi_d: Vector, x: Vector, y: Vector) -> tuple[Vector, Vector]:
 def _alpha_u_rate(
     log: Recording, now: Replayed, law: PolarBackstepping, sight: SightLine
 ) -> Vector:
-    """Rate of (21) (rows,) [m/s2]; the paper's X_1 (40) with the true accelerations."""
+    """Rate of alpha_u (21), (rows,) [m/s2]; the paper's X_1 (40) with the true accelerations.
+
+    By the chain rule through distance, target, sway and the angle psi_e, which turns at `spin`.
+    """
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]
     (cos_e, sin_e), spin = cosine_and_sine(psi_e), sight.w - log["r"]
     approach = sight.side * (law.k_ze * sight.distance_rate + sight.P_rate)

@@ -16,7 +16,10 @@ from podusv_cli.theory.monitor import Monitored, Window
 
 
 def as_json(loop: ClosedLoop, grid: TimeGrid, monitored: Monitored) -> dict[str, Any]:
-    """Gain conditions, assumptions of the proof, visited set, and bounds by window."""
+    """What theory.json has: gain conditions, assumptions, visited set, and bounds by window.
+
+    `monitored` is a run of the loop over the grid.
+    """
     first = next(iter(monitored.windows.values()))
     return {
         "format": 1,
@@ -38,6 +41,7 @@ def _assumptions(
 ) -> Iterator[dict[str, Any]]:
     """Assumptions behind V' <= -2 lambda V + Delta: whether each held, and its number if any."""
     law, log, turn = loop.lyapunov(), monitored.recording, monitored.traces["turn"]
+    # Largest difference of load and demand; -1 and 1 of `turn` change where psi_e is folded
     withheld = max(_withheld(monitored, "u"), _withheld(monitored, "r"))
     turned = int(np.count_nonzero(turn[1:] != turn[:-1]))
     alone = law.fold == "printed" and bool(np.any(turn < 0.0))

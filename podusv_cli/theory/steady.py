@@ -82,7 +82,10 @@ class Linear:
 
 
 def idealise(loop: ClosedLoop) -> ClosedLoop:
-    """The loop with exact measurements and without a delay of the command."""
+    """The loop with exact measurements, no estimator, no load estimate, no delay of the command.
+
+    All of these have memory or noise that the loop's state does not hold; see `rates_at`.
+    """
     actuator = loop.actuator
     if actuator.command:
         command = actuator.command.model_copy(update={"delay": 0.0})
@@ -117,9 +120,9 @@ def linearise(loop: ClosedLoop, along: Course, step: float, *, compiled: bool = 
 
 
 def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
-    """The loop linear about `q`, the state in the target's frame; states at rest are left out."""
+    """The loop linear about `q` (states,) in the target's frame; states at rest are left out."""
     jacobian, reach = frame.jacobian(q)
-    states = len(q)
+    states = len(q)  # below the rows of their rates the jacobian has those of loads, then demands
     heights = (abs(jacobian[:states]) * _size(q)).max(axis=1)
     moving = np.flatnonzero(heights > NOTHING * heights.max())
     outputs, loads = jacobian[states:, moving], _loads(plan)
@@ -140,12 +143,16 @@ def _about(plan: Plan, frame: _Frame, q: Vector) -> Linear:
 
 
 def _arrive(plan: Plan, compiled: bool) -> Vector:
-    """The loop's state (states,) at the end of a run. Raises NotConvergedError if it diverges."""
+    """The loop's state (states,) at the end of a run.
+
+    Raises NotConvergedError where the run diverges, KeyboardInterrupt where the user ends it.
+    """
     log = run(plan, compiled=compiled)
     if log.status == "interrupted":
         raise KeyboardInterrupt
     if log.status != "finished":
         raise NotConvergedError(f"there is no steady motion: the run {log.message}")
+    # The numbers of one vector share a name, whose signal has a column for each
     state = dict.fromkeys(plan.names[1 : 1 + plan.layout.states])
     return np.asarray(np.column_stack([log[name] for name in state])[-1])
 
@@ -156,7 +163,10 @@ def _loads(plan: Plan) -> tuple[str, ...]:
 
 
 def _inputs(plan: Plan, states: int) -> Vector:
-    """Rates of the states by each of the loads on the hull, shape (states, loads)."""
+    """Rates of the states by each of the loads on the hull, shape (states, loads).
+
+    At rest the plant's rates are those that the load makes, and they are linear in it.
+    """
     loads = [LOADS.index(name) for name in _loads(plan)]
     k, nothing = bundle(plan.constants["vessel"]), np.zeros(6)
     rates = np.zeros((states, len(loads)))
@@ -183,11 +193,14 @@ class _Frame:
     """The loop as a target sees it that moves on a course, its load held."""
 
     def __init__(self, plan: Plan, along: Course, s: Vector, compiled: bool) -> None:
-        """The frame that moves along the course, from state `s` at its begin."""
+        """A frame that moves with the course, starting at the loop's state `s` (states,).
+
+        `compiled`: rates by compiled kernels, not by Python.
+        """
         self.labels = plan.names
         self.course = along
-        column = {name: i - 1 for i, name in enumerate(self.labels)}
-        self.loads = [column[name] for name in LOADS[3:]]
+        column = {name: i - 1 for i, name in enumerate(self.labels)}  # rows lack the leading time
+        self.loads = [column[name] for name in LOADS[3:]]  # the disturbance's b_u, b_v, b_r
         sway = [SWAY_DEMAND.name] if plan.loop.controller.asks_sway() else []
         self._demands = [column[name] for name in (*DEMAND, *sway)]
         self._seen = [*range(len(s)), *(column[name] for name in _loads(plan)), *self._demands]
@@ -197,12 +210,15 @@ class _Frame:
         self.start = s - self._origin
         self._drift = np.zeros(len(s))
         self._drift[:2] = along.velocity
-        self._idle = list[int]()
+        self._idle = list[int]()  # what is idle is found from `rows`, which reads this
         self._turn_angles(plan.about)
         self._idle = self._idle_memory(plan.layout.memory)
 
     def _turn_angles(self, about: Mapping[str, Signal]) -> None:
-        """Let angles turn with the course: the heading, and those like it in the law's memory."""
+        """Let angles turn with the course: the heading, and those like it in the law's memory.
+
+        Such a memory turns at the course's rate, or within half of it, where the run arrived.
+        """
         turn, count = self.course.turn, len(self.start)
         if turn:
             pace = self.row(self.start)[:count] / turn
@@ -214,12 +230,14 @@ class _Frame:
         """Which states, from `first` on, nothing but such states reads: they may grow for ever.
 
         Such are the integrals of a law whose integral gain is 0. Looked for off the steady motion,
-        where no factor is 0.
+        where no factor is 0: every state is moved by another amount.
         """
         count = len(self.start)
         here = self.start + ASIDE * np.sqrt(1.0 + np.arange(count)) * _size(self.start)
         shifts = ASIDE * np.diag(_size(here))[first:]
         reads = (self.rows(here + shifts) != self.rows(here[None]))[:, self._seen]
+        # A state that an idle one alone reads is idle too, so those read by the rest are taken out
+        # until none is left to take
         idle, before = np.arange(first, count), count
         while 0 < len(idle) < before:
             before, readers = len(idle), np.delete(np.arange(len(self._seen)), idle)
@@ -227,11 +245,15 @@ class _Frame:
         return [int(place) for place in idle]
 
     def rows(self, q: Vector, given: Vector | None = None) -> Vector:
-        """For q (n, states): rates of q, then the loop's row; `given` as `rates_at` has it."""
+        """For q (n, states): rates of q, then the loop's row, (n, states + columns).
+
+        `given` as `rates_at` has it.
+        """
         count = q.shape[1]
         times = np.full((len(q), 1), self.course.time)
         out = self._rates(np.hstack([times, q + self._origin]), given)
         out[:, :count] -= self._drift
+        # The frame turns with the course, so a place at rest in it has the rate turn x q
         out[:, 0] += self.course.turn * q[:, 1]
         out[:, 1] -= self.course.turn * q[:, 0]
         out[:, self._idle] = 0.0
@@ -245,7 +267,10 @@ class _Frame:
         return row
 
     def settle(self, q: Vector) -> _Left:
-        """The vessel once it was left to settle, or as far as it came."""
+        """The vessel once it was left to settle from `q` (states,), or as far as it came.
+
+        BDF takes long steps once the fast states are at rest.
+        """
         from scipy.integrate import BDF  # slow to import
 
         solver = BDF(
@@ -265,7 +290,10 @@ class _Frame:
         return _Left(np.asarray(solver.y), solver.t, min(late), max(late))
 
     def steady(self, left: _Left) -> Vector:
-        """The q (states,) near the settled vessel's which does not change, by Newton's method."""
+        """The q (states,) near the settled vessel's which does not change, by Newton's method.
+
+        Raises NotConvergedError after ROUNDS.
+        """
         q: Vector = left.q
         for _ in range(ROUNDS):
             rates, slopes = self.row(q)[: len(q)], self._central(q, STEPS[1])[: len(q)]
@@ -274,6 +302,8 @@ class _Frame:
             heights = abs(scaled).max(axis=1)
             most = heights.max()
             heights = np.maximum(heights, NOTHING * most)
+            # Every rate counts in parts of its largest derivative. Least squares, since states at
+            # rest make the slopes singular: their move is 0.
             move = size * np.linalg.lstsq(scaled / heights[:, None], -rates / heights)[0]
             q = q + move
             still = abs(rates) <= 1e-6 * heights + ROUNDED * most
@@ -302,6 +332,7 @@ class _Frame:
         state.
         """
         steps = relative * _size(q)
+        # All points in one call, each with one state moved up or down, and q itself last
         rows = self.rows(np.vstack([q + np.diag(steps), q - np.diag(steps), q]))[:, self._seen].T
         above, below, here = np.split(rows, [len(q), 2 * len(q)], axis=1)
         return (above - below) / (2.0 * steps), (above + below - 2.0 * here) / (2.0 * steps)
@@ -317,9 +348,10 @@ class _Frame:
             fine, apart = self._differences(q, 0.5 * relative)
             doubt = np.maximum(abs(coarse - fine), abs(apart)) * _size(q)
             largest = (abs(fine) * _size(q)).max(axis=1, keepdims=True)
+            # What a number of this size may lose by rounding, over the step
             rounding = 1e-12 * np.maximum(abs(self.row(q)[self._seen]), 1.0)[:, None] / relative
             if (doubt <= CURVED * largest + rounding).all():
-                return fine + (fine - coarse) / 3.0, relative
+                return fine + (fine - coarse) / 3.0, relative  # errors go with the square of a step
         at = np.unravel_index(np.nanargmax(doubt / largest), doubt.shape)
         raise NotConvergedError(self._no_derivative(q, int(at[1])))
 

@@ -58,6 +58,10 @@ class Reach(NamedTuple):
     most_ahead: float
 
 
+# n [1/s] is the pod's speed, delta [rad] its angle, flow [m/s] its `propeller.inflow`, pod (WIDTH)
+# its row of the table, k.horizon [s] the time it has; 0: all that its limits allow.
+# Thrust is asked at n_low and n_high, which it takes for most astern and most ahead. So 0 has to
+# lie between them: a propeller that cannot stop in time counts as able to.
 @kernel
 def reach(n: float, delta: float, flow: float, pod: Vector, k: Any) -> Reach:
     """The pod's reach within its limits and, with a horizon, within that time from n and delta."""

@@ -32,7 +32,8 @@ SETTLED, LEVEL = 1e-9, 0.1
 
 
 # The point (p_x, p_y) is in parts of the largest thrust; side 1 is ahead, -1 astern. Writes out
-# (5): the nearest point (2) and its derivative (3).
+# (5): the nearest point (2) and its derivative (3). In turn: a rudder astern, whose force is
+# straight; a point between the edges, cut at the arc; else the nearer of the two edges.
 @kernel
 def nearest(p_x: float, p_y: float, sector: Vector, side: float, out: Vector) -> None:
     """The nearest point of the sector, then the derivative of that point (xx, xy, yy)."""
@@ -152,6 +153,8 @@ def climb(
 
 
 # Arguments as those of `pull`; `way` (3) is Newton's direction. Changes y (3), g, slope and curve.
+# The rise along the way falls from `first` (the dual is concave); the zero is sought by halving
+# and, every other time, by the secant, which a kink can hold up.
 @kernel
 def along(
     count: int,
@@ -189,7 +192,7 @@ def along(
             part = low + (high - low) * rise_low / (rise_low - rise_high)
 
 
-# Arguments as those of `pull`; y begins at 0.
+# Arguments as those of `pull`; y starts at 0. Settled is relative to the size of what is wanted.
 @kernel
 def on_these_sides(
     count: int, C: Vector, tau: Vector, sides: Vector, sectors: Vector, eps: float, g: Vector
@@ -211,7 +214,8 @@ def on_these_sides(
 
 
 # C, tau and sectors as in `pull`. All 2^count choices of ahead or astern are tried: on given sides
-# the problem is convex, and pods are few.
+# the problem is convex, and pods are few. A fixed propeller's segment reaches both ways, so a
+# choice that has it astern is left out. Writes best (2 count).
 @kernel
 def several_pods(
     count: int, C: Vector, tau: Vector, sectors: Vector, eps: float, best: Vector

@@ -17,6 +17,9 @@ def within(number: float, low: float, high: float) -> float:
     return min(max(number, low), high)
 
 
+# Writes out (2): thrust [N], angle [rad]. All is turned by `side` first, so that thrust astern is a
+# force ahead in the mirrored plane. Yaw first: across is cut at the most that the sector gives,
+# then along follows. Surge first: along is cut at the arc, then across.
 @kernel
 def one_pod(
     X: float,
@@ -54,6 +57,9 @@ def one_pod(
     out[1] = within(direction(along, across), low, high)
 
 
+# Forces in N, ahead of the pod and to starboard, `most` [N] the radius of the sector between the
+# edges with these tangents. An edge on the same side as `across` is the steeper bound; where both
+# edges lie on the other side of a force of 0 across, only 0 is left.
 @kernel
 def _along_beside(
     along: float, across: float, tan_low: float, tan_high: float, most: float

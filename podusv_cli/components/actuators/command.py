@@ -87,6 +87,7 @@ class EffectivenessLoss(Component):
     )
 
 
+# Both in N or N m. Adding WHOLE and taking it off rounds in one addition, to the even of two.
 @kernel
 def round_to(demand: float, resolution: float) -> float:
     """The nearest multiple of the resolution, of two the even one; as it is for resolution 0."""
@@ -194,7 +195,8 @@ def _failing(
 def with_command_path(drive: Drive, *, sway: bool = False) -> Drive:
     """A kernel with the command path before `drive`; the same one for the same arguments.
 
-    `sway` says whether the demand has a sway force.
+    `sway` says whether the demand has a sway force. The kernel takes the arguments `DRIVE`, and its
+    demand has one more number, when the step began [s].
     """
     inner, outer = taking(drive, DRIVE), _drive_fully_commanded if sway else _drive_commanded
     made: Drive = specialise(outer, f"{drive.__qualname__}_commanded", _inner=inner)
@@ -217,7 +219,7 @@ def failing(drive: Drive, lose: Drive) -> Drive:
     remedy="let the failure happen earlier, or simulate longer",
 )
 def late_failure(case: Any) -> Sentences:
-    """The run ends before the actuator fails."""
+    """Warn where the run ends before the actuator fails; `case` is the run's case."""
     failure, end = case.scenario.actuator.failure, case.scenario.simulation.duration
     if failure and failure.time >= end:
         yield (
@@ -234,7 +236,7 @@ def late_failure(case: Any) -> Sentences:
     remedy="take a shorter delay, or simulate longer",
 )
 def late_command(case: Any) -> Sentences:
-    """The run ends before the first command arrives."""
+    """Warn where the run ends before the first command arrives; `case` is the run's case."""
     delay, end = case.scenario.actuator.delay(), case.scenario.simulation.duration
     if delay >= end:
         yield (

@@ -70,6 +70,8 @@ PHYSICAL = 0.0
 ) = range(24)
 
 
+# x (6) is relative to the water, delta [rad] the pod's angle, k.thrust_form that of (8). A rudder
+# turns behind its propeller, whose axis stays. The sign is that of what the flow takes from thrust.
 @kernel
 def inflow(x: Vector, pod: Vector, delta: float, k: Any) -> float:
     """What T_nV is multiplied with in the thrust: a speed [m/s], with its sign.
@@ -155,6 +157,8 @@ def speed_for(T: float, flow: float, pod: Vector, k: Any) -> float:
     return -float(turns / pod[STRETCH_ASTERN] + pod[DEAD_ASTERN]) if turns > 0.0 else -turns
 
 
+# a > 0 and c >= 0, so the root is real and n is not negative; of two forms the one without a
+# difference of two numbers alike is taken.
 @kernel
 def _positive_root(a: float, b: float, c: float) -> float:
     """The larger n of a n^2 + b n = c >= 0, without cancellation."""

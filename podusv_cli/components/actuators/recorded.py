@@ -34,7 +34,7 @@ class Recorded(NamedTuple):
 def rows_of(
     text: str, replayed: Signals, lagged: Signals, zero: Sequence[str], scales: KnownScales = ()
 ) -> Vector:
-    """The rows of the text (rows, 1 + commands): t [s], and each of the signals `replayed`.
+    """The rows of a `text` with commas, (rows, 1 + commands): t [s], and each signal `replayed`.
 
     Columns are called as these, or as the commands `lagged` that they follow. Those that belong to
     signals called in `zero` may all be left out; `scales` are further units of some. Raises
@@ -42,7 +42,7 @@ def rows_of(
     """
     header, _ = lines_of(text)
     names = {cell.partition(" [")[0] for cell in header.cells} if header else set()
-    signals = lagged if names & {signal.name for signal in lagged} else replayed
+    signals = lagged if names & {signal.name for signal in lagged} else replayed  # same order
     needed = [s for s, there in zip(signals, replayed, strict=True) if there.name not in zero]
     layouts = {1 + len(some): (TIME, *map(_column, some)) for some in (signals, needed)}
     rows = timed_rows(text, NOUN, layouts, {(name, unit): scale for name, unit, scale in scales})
@@ -58,7 +58,7 @@ def _column(signal: Signal) -> str:
 
 
 def table_of(rows: Vector) -> Vector:
-    """What `obeying` reads behind the actuator's own table: the times [s], then the commands.
+    """What `obeying` reads behind the actuator's own table: the times [s], then command rows.
 
     `rows` are (rows, 1 + commands), as `rows_of` gives them.
     """

@@ -33,6 +33,8 @@ ROUNDS = 6  # until angle and propeller speed agree; 80 deg from ahead they leav
 AGREED = 1.001  # of the largest angle: more is out of reach
 
 
+# pod (WIDTH) is its row of the table, T [N] its thrust. LIFT is 0 of a pod that turns itself.
+# Beyond the stall the normal force no longer grows with the angle, but still turns with it.
 @kernel
 def loads(turns: float, T: float, delta: float, pod: Vector) -> tuple[float, float]:
     """Force [N] along and across its mounting of a pod at angle delta [rad], or of its rudder.
@@ -48,6 +50,8 @@ def loads(turns: float, T: float, delta: float, pod: Vector) -> tuple[float, flo
     return T - normal * sine, normal * cosine
 
 
+# Any thrust will do at rest, where both forces go with the square of the speed: `turns` is 1, whose
+# thrust is T_AHEAD.
 @kernel
 def slant(delta: float, pod: Vector) -> float:
     """Angle [rad] of a pod's force at rest; of a rudder, that of thrust and rudder together.
@@ -68,7 +72,8 @@ def part_when_slanted(pod: Vector) -> float:
 
 
 # flow [m/s] is the advance speed, `pod` its row of the table. Writes out (2): speed [1/s], angle
-# [rad].
+# [rad]. The rudder's drag is across times tan(delta), and its lift needs the speed: fixed-point
+# rounds settle both.
 @kernel
 def steer_rudder(T: float, angle: float, flow: float, pod: Vector, k: Any, out: Vector) -> bool:
     """Propeller speed and rudder angle for a force T [N] at an angle [rad]; whether they make it.

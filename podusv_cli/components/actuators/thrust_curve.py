@@ -23,7 +23,9 @@ def thrust_at(n: float, curve: Vector) -> float:
     return linear(s, thrusts[i], thrusts[i + 1])
 
 
-# `gain` [N] is what one of the command changes in the thrust, in the water's flow.
+# `gain` [N] is what one of the command changes in the thrust, in the water's flow. Pieces are tried
+# from the last to the first, so the first on the way up is kept. Adding 0 T keeps what is no
+# number.
 @kernel
 def command_for(T: float, gain: float, curve: Vector) -> float:
     """The least command from 0 up whose thrust is T >= 0 [N]; the last row's where none is.

@@ -65,14 +65,14 @@ class PwmCommand(Component):
         return self
 
     def dead_ends(self) -> tuple[float, float]:
-        """The ends of the dead band ahead and astern, in parts of full speed."""
+        """The ends of the dead band ahead and astern, in parts of full speed, both at least 0."""
         low, high = self.dead_band or (self.rest, self.rest)
         ends = sorted((edge - self.rest) / self.span for edge in (low, high))
         return ends[1], -ends[0]
 
 
 def check_rows(rows: Vector) -> None:
-    """Raise ValueError for rows (rows, 2) of n and thrust that no propeller's are."""
+    """Raises ValueError for rows (rows, 2) of n and thrust [N] that no propeller has."""
     n, thrusts = rows.T
     if len(rows) < 2:
         raise ValueError(f"has a table of {len(rows)} rows; it needs that of rest and one ahead")
@@ -105,7 +105,7 @@ def check_rows(rows: Vector) -> None:
 def curve_of(rows: Vector, side: float) -> Vector:
     """The rows (rows, 2) of one side, 1 ahead or -1 astern, as `thrust_curve` has a curve.
 
-    A side without rows has a curve without thrust.
+    Shape (1 + 2 count,), from rest on. A side without rows has a curve without thrust.
     """
     inside = rows[side * rows[:, 0] > 0.0][:: int(side)]
     n, thrusts = side * inside.T if len(inside) else np.array([[1.0], [0.0]])
@@ -113,16 +113,17 @@ def curve_of(rows: Vector, side: float) -> Vector:
 
 
 def of_file(text: str, given: Collection[str]) -> tuple[dict[str, Any], list[str]]:
-    """The keys of a pod that a table's text gives, and remarks; `given` are keys that it has.
+    """The keys of a pod that a table's text gives, and remarks for the user.
 
-    The first line names the columns, and in brackets their units. Raises ValueError.
+    `given` are keys that the scenario has for the pod. The first line names the columns, and in
+    brackets their units. Raises ValueError.
     """
     read = named_rows(text, "the table")
     names = [_Column.of(name) for name in read.names]
     places = [_place_of(names, COMMAND, "command"), _place_of(names, FORCE, "thrust")]
     command, force = (names[i] for i in places)
     rows, remarks = read.rows[:, places], list[str]()
-    if len(rows) > 1 and rows[0, 0] > rows[-1, 0]:
+    if len(rows) > 1 and rows[0, 0] > rows[-1, 0]:  # a test that went down from full speed
         rows = rows[::-1]
     rows[:, 1] *= force.factor_of_force()
     if not force.unit:
@@ -192,7 +193,10 @@ class _Column(NamedTuple):
 
 
 def _place_of(names: Sequence[_Column], known: re.Pattern[str], what: str) -> int:
-    """Which column is called so; of two columns the first has commands. Raises ValueError."""
+    """The position of the column whose name `known` matches; of two the first has commands.
+
+    `what` it is, command or thrust, is for the message. Raises ValueError.
+    """
     if len(names) == 2:
         return ("command", "thrust").index(what)
     places = [i for i, column in enumerate(names) if known.fullmatch(column.name)]
@@ -205,7 +209,10 @@ def _place_of(names: Sequence[_Column], known: re.Pattern[str], what: str) -> in
 
 
 def _without_noise(thrusts: Vector, remarks: list[str]) -> Vector:
-    """Thrusts that do not fall, where they fall by no more than a load cell's noise."""
+    """Thrusts (rows,) [N] without falls, where none is larger than a load cell's noise.
+
+    Other thrusts come back as they are, for `check_rows` to refuse. A change adds to `remarks`.
+    """
     level = np.maximum.accumulate(thrusts)
     most, full = float((level - thrusts).max()), float(np.abs(thrusts).max())
     if not 0.0 < most <= NOISE * full:
@@ -218,7 +225,10 @@ def _without_noise(thrusts: Vector, remarks: list[str]) -> Vector:
 
 
 def _pulses_of(rows: Vector) -> dict[str, float]:
-    """Rest and span of the pulses of a table: the middle of its dead band, and its farther end."""
+    """Rest and span [us] of a table's pulses: the middle of its dead band, its farther end.
+
+    `rows` (rows, 2) are pulses [us] and thrusts [N]. Raises ValueError without a row of rest.
+    """
     still = rows[rows[:, 1] == 0.0, 0]
     if not len(still):
         raise ValueError(

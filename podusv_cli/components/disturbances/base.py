@@ -23,7 +23,7 @@ WAVE_MOTION = (
     Signal("r_w", "rad/s", "yaw rate of the first-order wave motion"),
 )
 
-# The velocity of the water, which actuators are told of. A disturbance that has it declares these
+# The velocity of the water, which actuators receive. A disturbance that has it declares these
 # two among its `signals`, one behind the other.
 FLOW = (
     Signal("V_c", "m/s", "speed of the current"),
@@ -74,12 +74,17 @@ class Disturbance(KernelPart):
         return name
 
     def loads(self, vessel: Vessel, times: Iterable[float], states: Iterable[Vector]) -> Vector:
-        """The loads (b_u, b_v, b_r) on this vessel at each of these times [s] and states."""
+        """The loads (b_u, b_v, b_r) on this vessel at these times [s]: (times, 3) [N, N, N m].
+
+        `states` are (x, y, psi, u, v, r), one for each time; at least one.
+        """
         times = list(times)
         rows = np.zeros((len(times), 3 + len(self.signals)))
+        # The table is made for a run that ends with the last time: it has to reach so far
         k, table = bundle(self.constants_with(vessel)), self.table_for(vessel, max(times))
         evaluate = self.kernel_with(vessel)
         for t, x, b in zip(times, states, rows, strict=True):
+            # Each time stands alone: `b` has nothing from before, and it is no stage of a step
             call(evaluate, t=t, x=x, k=k, table=table, b=b, again=0.0, stage=0.0)
         return rows[:, :3]
 
@@ -92,7 +97,7 @@ class Disturbance(KernelPart):
         return self.constants()
 
     def table_for(self, vessel: Vessel, duration: float) -> Vector:
-        """Its table, for this vessel and a run of this duration [s].
+        """Its table (n,), for this vessel and a run of this duration [s].
 
         What is random in it is a function of (seed, time): a longer run starts with the same
         numbers.

@@ -19,7 +19,12 @@ from podusv_cli.core.signal import Signal
 from podusv_cli.core.steps import misfit
 
 
-# V_c [m/s], beta_c [rad]; k has the hull's coefficients and `form`. Writes b (3) [N, N, N m].
+# V_c [m/s], beta_c [rad] where it flows to; x (6) is the vessel's state over ground; k has the
+# hull's coefficients and `form`. Writes b (3) [N, N, N m].
+# u_c_dot and v_c_dot are the current's rate in the hull's axes, which turn with r: 0 with
+# `form: no_acceleration`, whose number is 1. The loads are differences between the hull's forces at
+# the velocity through the water and over ground, see `Current`. `lacking` has what a vessel with a
+# share of C(nu) lacks of these forces; it is added last, so that with all of it no bit changes.
 @kernel
 def load_of_flow(V_c: float, beta_c: float, x: Vector, k: Any, b: Vector) -> None:
     """The load that makes the equations of calm water those of water that moves at V_c."""
@@ -75,7 +80,11 @@ class Current(Disturbance):
         return vessel.constants() | self.constants()
 
     def table_for(self, vessel: Vessel, duration: float) -> Vector:
-        """The position of the last piece, then speed and direction at 0, interval, ..."""
+        """Index of the last piece, then speed [m/s] and direction [rad] at 0, interval, ...
+
+        Shape (1 + 2 count,), for a run of `duration` [s].
+        """
+        # Steady: one piece, which reaches as far as is wanted. Else one number lies behind the end.
         count = 2 if self._steady() else math.ceil(duration / self.interval) + 2
         speed = self.speed + self.speed_std * self._wandering("speed", count)
         direction = self.direction + self.direction_std * self._wandering("direction", count)
@@ -85,14 +94,17 @@ class Current(Disturbance):
         return self.speed_std == self.direction_std == 0.0
 
     def _wandering(self, quantity: str, count: int) -> Vector:
-        """A process of variance 1 (count,), drawn from its steady distribution at the start."""
+        """A process of variance 1 at `count` instants (count,), steady from the start.
+
+        `quantity` names its stream of random numbers, so speed and direction are independent.
+        """
         if self._steady():
             return np.zeros(count)
         stream = (self.seed, "current", quantity)
         return gauss_markov(stream, count, self.interval / self.time_constant)
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
-        """An interval that the step does not divide: a kink within a step costs accuracy."""
+        """An interval that the step [s] does not divide: a kink in a step costs accuracy."""
         if not self._steady() and (fault := misfit(self.interval, step)):
             yield "interval", fault
 

@@ -56,7 +56,7 @@ class FromFile(Disturbance):
         return {"count": float(len(_rows(self.rows)))}
 
     def table(self) -> Vector:
-        """The times, then the loads row by row."""
+        """The times [s], then the loads [N, N, N m] row by row: (4 rows,)."""
         rows = _rows(self.rows)
         return np.concatenate([rows[:, 0], rows[:, 1:].ravel()])
 

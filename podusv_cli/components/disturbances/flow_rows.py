@@ -45,7 +45,10 @@ def read_flow(text: str, most: float) -> Vector:
 
 
 def _check_turns(rows: Vector) -> None:
-    """Raises ValueError where a direction turns to the opposite, and so either way round."""
+    """Raises ValueError where a direction turns to the opposite, and so either way round.
+
+    `rows` (rows, 3) are t [s], speed [m/s] and the continuous direction [rad].
+    """
     turns = np.abs(np.diff(rows[:, 2]))
     turned = np.flatnonzero(turns > OPPOSITE)
     if turned.size:
@@ -58,11 +61,12 @@ def _check_turns(rows: Vector) -> None:
 
 
 def flow_table(rows: Vector) -> Vector:
-    """The times, then speed and direction row by row."""
+    """The table (3 rows,) of rows (rows, 3): the times [s], then speed and direction row by row."""
     return np.concatenate([rows[:, 0], rows[:, 1:].ravel()])
 
 
-# t [s]; `count` rows in a table as `flow_table` has it. Returns m/s and rad.
+# t [s]; `count` rows in a table as `flow_table` has it. Returns m/s and rad. `s` is the share of
+# the piece between row i and the next; cut at 0 and 1 it holds the first and the last row.
 @kernel
 def flow_between_rows(t: float, count: int, table: Vector) -> tuple[float, float]:
     """Speed and direction on straight lines between rows; beyond them the nearest row's."""

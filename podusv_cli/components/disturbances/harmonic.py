@@ -41,14 +41,17 @@ class Harmonic(Component):
     cos_phase: float = value(0.0, "rad", "angle of the cosine at t = 0", ge=-1e6, le=1e6)
 
     def waves(self) -> tuple[Wave, ...]:
-        """The sine and the cosine, each as a cosine and a sine without phase."""
+        """The sine and the cosine, each as a cosine and a sine without phase, in that order.
+
+        By sin(a + b) = sin a cos b + cos a sin b, and likewise for the cosine.
+        """
         c, s = cos_sin(self.sin_phase)
         sine = Wave(self.sin_rate, float(self.sin * s), float(self.sin * c))
         c, s = cos_sin(self.cos_phase)
         return sine, Wave(self.cos_rate, float(self.cos * c), float(-self.cos * s))
 
     def bound(self) -> float:
-        """What its magnitude never exceeds.
+        """What its magnitude never exceeds, in the unit of the axis.
 
         A wave of rate 0 is constant, and waves of one rate are one wave. Of two rates it is the sum
         of the amplitudes, which the load reaches only where the rates have no common period.
@@ -61,8 +64,8 @@ class Harmonic(Component):
         return add_up((abs(mean), *moving))
 
 
-# Reads table (3 count): frequencies [rad/s], then factors of cosine and of sine. Writes b (3) [N,
-# N, N m].
+# Reads table (3 count) as `HarmonicDisturbance.table` has it: frequencies [rad/s], then factors of
+# cosine and of sine; waves i and i + 3 belong to axis i. Writes b (3) [N, N, N m].
 @kernel
 def harmonic(t: float, k: Any, table: Vector, b: Vector) -> None:
     """Equation (52), scaled."""
@@ -121,7 +124,11 @@ class HarmonicDisturbance(Disturbance):
         return super().constants() | {"waves": float(whole_lanes(WAVES))}
 
     def table(self) -> Vector:
-        """Rates of the waves, their cosines, their sines: three rows, the sines of (52) first."""
+        """Rates of the waves [rad/s], their cosines, their sines: three rows, one behind another.
+
+        In each the sines of (52) come first, u, v, r, then its cosines. Rows are filled up with
+        zeros to whole vector registers.
+        """
         axes = (self.b_u.waves(), self.b_v.waves(), self.b_r.waves())
         waves = [sine for sine, _ in axes] + [cosine for _, cosine in axes]
         rows = np.zeros((3, whole_lanes(WAVES)))
@@ -129,7 +136,10 @@ class HarmonicDisturbance(Disturbance):
         return rows.ravel()
 
     def bounds(self) -> tuple[float, float, float]:
-        """The bound of every axis, scaled."""
+        """The bound of every axis [N, N, N m], scaled; fixed to earth, either force may turn fully.
+
+        Then surge and sway each may have the whole horizontal force.
+        """
         u, v, r = (self.scale * axis.bound() for axis in (self.b_u, self.b_v, self.b_r))
         return (u, v, r) if self.frame == "body" else (math.hypot(u, v), math.hypot(u, v), r)
 

@@ -38,7 +38,7 @@ SIDES = ReflectionCurve(
 
 
 def interpolate_shares(curve: ReflectionCurve, size: Vector) -> Vector:
-    """The shares (n,) at these sizes (n,).
+    """The shares (n,) at these sizes (n,), which are k L or k B of the curve, without unit.
 
     Between two points a power law; below the first that of the first two; above the last its share.
     """

@@ -45,12 +45,12 @@ class Cosines(NamedTuple):
 
 
 def power(x: Vector, exponent: float | Vector) -> Vector:
-    """x^exponent for positive x."""
+    """x^exponent for positive x (n,), by podusv's own exp and log: the same bits everywhere."""
     return exponential(np.maximum(exponent * logarithm(x), SMALLEST))
 
 
 def jonswap(rate: Vector, height: float, peak: float, gamma: float) -> Vector:
-    """Density [m2 s] of the surface elevation at `rate` [rad/s].
+    """Density (n,) [m2 s] of the surface elevation at `rate` (n,) [rad/s].
 
     `height` is the significant height [m], `peak` the rate of the peak [rad/s]. With gamma = 1 it
     is the ITTC's modified Pierson-Moskowitz spectrum A rate^-5 exp(-B rate^-4) with B = 1.25
@@ -74,19 +74,20 @@ def peak_period(gamma: float, period: Period, lowest: float = 0.3, highest: floa
     """The peak's period as a multiple of another period of the same sea, by moments m_n.
 
     The moments are those of the band between `lowest` and `highest`, in terms of the peak's rate.
-    Mean: 2 pi m0/m1. Zero-crossing: 2 pi sqrt(m0/m2).
+    Mean: 2 pi m0/m1. Zero-crossing: 2 pi sqrt(m0/m2). `gamma` is the JONSWAP peakedness.
     """
     if period == "peak":
         return 1.0
     edges = growing_edges(max(lowest, 1.0 / FAR), highest, 4000)
     rate, width = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges)
+    # Any height and a peak at 1 rad/s will do: the height cancels, and the peak's period is 2 pi
     energy = jonswap(rate, 4.0, 1.0, gamma) * width
     m0, m1, m2 = (math.fsum(moment) for moment in (energy, energy * rate, energy * rate * rate))
     return m1 / m0 if period == "mean" else math.sqrt(m2 / m0)
 
 
 def norsok(frequency: Vector, speed: float, height: float) -> Vector:
-    """Density [m2/s2/Hz] of the wind's speed at `frequency` [Hz], `height` [m] above the sea.
+    """Density (n,) [m2/s2/Hz] of the wind speed at `frequency` (n,) [Hz], `height` [m] up.
 
     `speed` is the mean over an hour 10 m above the sea [m/s]. Froya spectrum of NORSOK N-003; seen
     in the crate ndspec 0.1.1, froya.rs, and in a second program, which agree.
@@ -98,7 +99,7 @@ def norsok(frequency: Vector, speed: float, height: float) -> Vector:
 
 
 def harris(frequency: Vector, speed: float, drag: float) -> Vector:
-    """Density [m2/s2/Hz] of the wind's speed at `frequency` [Hz], the same at every height.
+    """Density (n,) [m2/s2/Hz] of the wind speed at `frequency` (n,) [Hz], at every height alike.
 
     `speed` is the mean 10 m above the sea [m/s], `drag` the surface's drag coefficient. Seen in a
     public program with NORSOK's spectrum beside it; both are those of Fossen's handbook.
@@ -108,7 +109,10 @@ def harris(frequency: Vector, speed: float, drag: float) -> Vector:
 
 
 def in_bins(density: Density, edges: Vector) -> Vector:
-    """The variance (n - 1,) in each bin between neighbouring edges (n,) [Hz or rad/s]."""
+    """The variance (n - 1,) in each bin between neighbouring edges (n,) [Hz or rad/s].
+
+    `density` gives the spectrum per unit of the edges; by the midpoint rule in every bin.
+    """
     width = np.diff(edges)
     count = max(SAMPLES, math.ceil(ALL_SAMPLES / len(width)))
     places = (np.arange(count) + 0.5) / count
@@ -117,12 +121,12 @@ def in_bins(density: Density, edges: Vector) -> Vector:
 
 
 def as_given(count: int, seed: int, stream: str) -> Vector:
-    """Factors on the variance of `count` components: 1."""
+    """Factors (count,) on the variance of `count` components: 1."""
     return np.ones(count)
 
 
 def rayleigh(count: int, seed: int, stream: str) -> Vector:
-    """Factors on the variance of `count` components whose amplitudes are Rayleigh's.
+    """Factors (count,) on the variance of components whose amplitudes are Rayleigh-distributed.
 
     They are exponential variates of mean 1. With them a sum of cosines is a sample of a Gaussian
     process, and its variance scatters from seed to seed as that of a sea does; with the same
@@ -140,14 +144,19 @@ def resolving(variance: Vector, edges: Vector, duration: float) -> int:
 
     The variance of such a sum scatters by the sum of all v^2, with v of each bin; that of the
     process by the integral of S^2 over the duration, the sum of all v^2 over bin's width and
-    duration. They are equal where the bins, weighted by S^2, are 1/duration wide. `edges` in Hz.
+    duration. They are equal where the bins, weighted by S^2, are 1/duration wide.
+
+    `variance` (n,) is that of each bin, `edges` (n + 1,) are in Hz, `duration` in s.
     """
     wide = np.sum(variance**2) / np.sum(variance**2 / np.diff(edges))
     return math.ceil(len(variance) * duration * wide)
 
 
 def cosines(variance: Vector, edges: Vector, seed: int, stream: str, amplitudes: str) -> Cosines:
-    """One component a bin: its rate uniform in the bin, its phase uniform in a turn.
+    """One component a bin: its rate uniform in the bin, its phase [rad] uniform in a turn.
+
+    `variance` (n,) is that of each bin, `edges` (n + 1,) set the unit of the rates. `stream` names
+    the random numbers of `seed`; `amplitudes` is a key of `AMPLITUDES`.
 
     Its amplitude is sqrt(2 variance), so that the sum has the variance of all bins together, or
     drawn with that mean square. Rates that are drawn have no common period, so the sum does not
@@ -167,7 +176,9 @@ def even_edges(low: float, high: float, count: int) -> Vector:
 
 
 def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
-    """Edges of `count` bins [rad/s] that elevation, velocity and acceleration share evenly.
+    """Edges (count + 1,) [rad/s] of bins that elevation, velocity and acceleration share evenly.
+
+    From `low` to `high` [rad/s]; `density` is the elevation's spectrum [m2 s].
 
     Each bin has the same share of S/m0 + rate^2 S/m2 + rate^4 S/m4. By the energy S alone the few
     bins of the tail would be so wide that velocities, and the drift of hulls that reflect short
@@ -200,7 +211,7 @@ def clear_sums(count: int, sums: Vector) -> None:
 
 
 def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
-    """Departures of `count` components from the mean direction [rad].
+    """Departures (count,) [rad] of the components from the mean direction.
 
     Their density is cos^(2 spreading) within a quarter turn to either side; spreading 0: none.
     With spreading 1 it is that of cybergalactic/MSS, waveDirectionalSpectrum.m.
@@ -214,7 +225,11 @@ def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
 
 @cache
 def _shares(spreading: int) -> Vector:
-    """The share of cos^(2 spreading) up to each of the angles (angles,), by Simpson's rule."""
+    """The share of cos^(2 spreading) up to each of the angles (angles,), by Simpson's rule.
+
+    The angles go from -pi/2 to pi/2 as `SHARES` does; the shares from 0 to 1.
+    """
+    # Simpson's rule needs the middle of every piece as well
     fine = math.pi * (np.linspace(0.0, 1.0, 2 * len(SHARES) - 1) - 0.5)
     base = np.maximum([cos_sin(angle)[0] for angle in fine.tolist()], 0.0)
     density = np.ones_like(base)

@@ -73,20 +73,26 @@ def _gamma(height: float, steepness: float) -> float:
 
 
 def peaks(height: float, period: float) -> tuple[Peak, Peak]:
-    """The peak at `period` [s], and the other one: a swell, or where that is one, a wind sea."""
+    """The peak at `period` [s], and the other one: a swell, or where that is one, a wind sea.
+
+    `height` is the significant height [m] of the whole sea. The numbers are those of the fit, see
+    the module's text. A period shorter than the fully developed sea's is a wind sea's.
+    """
     developed, n = DEVELOPED * _power(height, 1.0 / 3.0), 0.5 * math.sqrt(height) + 3.2
     if period < developed:
+        # 0 of a developed sea, 1 of the steepest; the younger the sea, the more of it is swell
         young = (developed - period) / (developed - STEEPEST * math.sqrt(height))
         share = 0.3 * _e(-((young / 0.5) ** 2)) + 0.7
         steepness = 2.0 * math.pi / GRAVITY * share * height / period**2
         first = Peak(share * height, period, _gamma(height, steepness), n, 4.0)
-        rest = math.sqrt(1.0 - share**2) * height
+        rest = math.sqrt(1.0 - share**2) * height  # energies add up, so squares of heights do
         return first, Peak(rest, developed + 2.0, 1.0, n, 4.0)
-    old = (period - developed) / (LONGEST - developed)
+    old = (period - developed) / (LONGEST - developed)  # 0 of a developed sea, 1: the longest swell
     share = 0.4 * _e(-((old / 0.3) ** 2)) + 0.6
     steepness = 2.0 * math.pi / GRAVITY * height / developed**2
     first = Peak(share * height, period, _gamma(height, steepness) * (1.0 + 6.0 * old), n, 4.0)
     rest = math.sqrt(1.0 - share**2) * height
+    # The wind sea's period follows from its height and the level of its tail; 1 s stands for it
     other = Peak(rest, 1.0, 1.0, n, 4.0 * (1.0 - 0.7 * _e(-height / 3.0)))
     level = 0.08 * (1.0 - _e(-height / 3.0)) * _power(0.4, n)
     return first, other._replace(
@@ -95,6 +101,9 @@ def peaks(height: float, period: float) -> tuple[Peak, Peak]:
 
 
 def torsethaugen(rate: Vector, height: float, peak: float) -> Vector:
-    """Density [m2 s] of the surface elevation at `rate` [rad/s]; `peak` is the first peak's."""
+    """Density (n,) [m2 s] of the surface elevation at `rate` (n,) [rad/s].
+
+    `height` is the significant height [m], `peak` the rate of the first peak [rad/s].
+    """
     both = peaks(height, 2.0 * math.pi / peak)
     return np.asarray(sum(part.density(rate) for part in both if part.height > 0.0))

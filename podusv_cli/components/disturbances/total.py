@@ -55,7 +55,10 @@ class Total(Disturbance):
             before |= set(part.signals)
 
     def _places(self) -> Iterator[tuple[int, ...]]:
-        """Where each part's signals are among those of the sum."""
+        """For each part the places of its signals among those of the sum.
+
+        A signal that parts before it have already shares their place, so that it adds up there.
+        """
         known, behind = self.signals, 0
         for part, own in self.told():
             new = {signal: behind + i for i, signal in enumerate(own)}
@@ -88,7 +91,7 @@ class Total(Disturbance):
         }
 
     def table_for(self, vessel: Vessel, duration: float) -> Vector:
-        """Where each part's table begins, then these tables."""
+        """Where each part's table begins, one number a part, then these tables; one vector."""
         tables = [part.table_for(vessel, duration) for part in self.parts]
         starts = np.cumsum([len(tables), *map(len, tables[:-1])]).astype(float)
         return np.concatenate([starts, *tables])
@@ -120,7 +123,7 @@ class Total(Disturbance):
 
 @cache
 def _sum(parts: Sequence[SumPart]) -> Callable[..., None]:
-    """The kernel that adds up the loads of these parts.
+    """The kernel that adds up the loads of these parts, with the arguments `ARGUMENTS`.
 
     Its source is written out, because compiled code cannot choose between functions.
     """
@@ -128,6 +131,7 @@ def _sum(parts: Sequence[SumPart]) -> Callable[..., None]:
     scope["__name__"] = __name__  # podusv's own, which may use `shared`
     lines = [f"def evaluate({', '.join(ARGUMENTS)}):", "    u = v = r = 0.0"]
     written: set[int] = set()
+    # By place how many parts write it: a signal of one part alone is found again at the next call
     count = Counter(place for part in parts for place in part.places)
     for i, part in enumerate(parts):
         scope |= {f"evaluate{i}": part.evaluate, f"Constants{i}": constants_type(part.constants)}
@@ -139,7 +143,12 @@ def _sum(parts: Sequence[SumPart]) -> Callable[..., None]:
 
 
 def _lines(i: int, part: SumPart, written: Set[int], alone: bool) -> Iterator[str]:
-    """What the kernel of the sum does for a part. One whose signals add up does not find them."""
+    """Lines of the kernel of the sum for part `i`: call it, add its load, put its signals away.
+
+    `written` are places of signals that parts before it have written, and that it adds to. One that
+    is `alone` at its places finds there what it wrote last, which `again` needs; one whose signals
+    add up does not.
+    """
     given = ", ".join(f"k.part{i}_{name}" for name in part.constants)
     own = {"k": f"Constants{i}({given})", "table": f"tail(table, begin{i})", "b": f"load{i}"}
     own |= {} if alone else {"again": "0.0"}

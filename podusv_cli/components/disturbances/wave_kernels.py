@@ -15,7 +15,8 @@ TURN = 2.0 * math.pi  # rad; phases are in turns, which are cheap to bring into 
 PAIRS, LONG_ROOM, FACES, SHORT_ROOM = 4 * LANES, 9 * LANES, 8 * LANES, 15 * LANES
 
 
-# sums (n, LANES): partial sums side by side, so that they fit the registers.
+# sums (n, LANES): partial sums side by side, so that they fit the registers. They are added in
+# pairs, an order that is the same on every machine.
 @kernel
 def _add_parts(sums: Vector, which: int) -> float:
     """One sum from its eight parts."""
@@ -86,7 +87,9 @@ def _add_reflected(
     sums[3 * LANES + j] += sides * s
 
 
-# Returns that of bow and stern, and that of the sides.
+# `way` as in `_wave`; table has eight rows as `Waves.table_for` gives them. Returns the squared
+# envelope [m2] of what bow and stern reflect, and that of the sides. Components come in groups of
+# two registers, so that the compiler makes vector code of the inner loops.
 @kernel
 def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float, float]:
     """Their squared magnitudes. Sums lie in the kernel of their loop, or it gets no vector code."""
@@ -103,7 +106,9 @@ def _long_envelopes(t: float, way: float, k: Any, table: Vector) -> tuple[float,
 
 
 # (c_gamma, s_gamma) is the waves' direction against the bow. Writes b from 3 on; returns the two
-# squared magnitudes.
+# squared magnitudes [m2]. `part` is 1/(1 + q/2) of the module `waves`, `met` the encounter
+# frequency [1/s], `fading` the factor's rate [1/s]. Sums 4 to 8: surge-wise motion, slope, rates of
+# both, elevation.
 @kernel
 def _long_motion(
     t: float,
@@ -221,7 +226,9 @@ def _short_envelopes(
     _drift(sums, k, b)
 
 
-# Reads x (6); (c_psi, s_psi) is the heading. Writes all of b, as `long_crested` does.
+# Reads x (6); (c_psi, s_psi) is the heading. Writes all of b, as `long_crested` does. Every
+# component has a direction of its own, so each sum has its factors of direction inside. `met` and
+# `fading` are in rad/s; sums 8 to 14: elevation, motion north and east, yaw, and their rates.
 @kernel
 def _short_motion(
     t: float, x: Vector, c_psi: float, s_psi: float, k: Any, table: Vector, b: Vector

@@ -160,7 +160,7 @@ class Waves(Disturbance):
         return self
 
     def _suits_torsethaugen(self) -> None:
-        """Raise ValueError outside the spectrum's range, and where a peak is cut off."""
+        """Raises ValueError outside the spectrum's range, and where a peak is cut off."""
         if self.period_is != "peak":
             raise ValueError("period_is must be peak for the torsethaugen spectrum")
         if not (self.height <= HIGHEST and self.period < LONGEST):
@@ -171,6 +171,7 @@ class Waves(Disturbance):
         kept = self._share_between_cutoffs()
         if kept < BOTH:
             ratio = self.period / peaks(self.height, self.period)[1].period
+            # A cut-off so far beyond the second peak leaves nearly all of its energy
             bound = f"lowest {0.6 * ratio:.2g}" if ratio < 1.0 else f"highest {3.0 * ratio:.2g}"
             raise ValueError(
                 f"the second peak has {ratio:.3g} of the first one's frequency, and between lowest "
@@ -247,7 +248,11 @@ class Waves(Disturbance):
         return np.array([self.peak]) if self.components == 1 else drawn
 
     def table_for(self, vessel: Vessel, duration: float) -> Vector:
-        """Rows of rates and phases in turns, wave numbers, amplitudes, directions, reflections."""
+        """Eight rows, one number a component, one behind another and filled up to whole groups.
+
+        Rate [1/s], phase [turns], wave number [rad/m], amplitude [m], cosine and sine of the
+        direction it goes to, reflected shares of bow and stern and of the sides.
+        """
         count, stream = self.components, (self.seed, STREAM)
         drawn = spectra.cosines(self._variance(), self._edges(), *stream, self.amplitudes)
         rate = self._rates(drawn.rate)
@@ -275,7 +280,11 @@ class Waves(Disturbance):
         return self.direction + math.pi
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
-        """What the kernel needs: sizes, direction, the hull's lengths, drift coefficients."""
+        """What the kernel needs: sizes, direction, the hull's lengths, drift coefficients.
+
+        `long2` and `wide2` [m2] are L^2/48 and B^2/48, by which k^2 makes the q/2 of the module's
+        text; `drift_u` and `drift_v` [N/m2] are rho g B/2 and rho g L/2.
+        """
         pressure = 0.5 * spectra.WATER * spectra.GRAVITY
         c_beta, s_beta = cos_sin(self._travel)
         return {
@@ -295,8 +304,8 @@ class Waves(Disturbance):
         return short_crested if self.spreading else self.evaluate
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
-        """A cut-off that the step cannot resolve."""
-        most = math.pi / step
+        """A cut-off that the step [s] cannot resolve."""
+        most = math.pi / step  # rad/s, two steps a wave
         if self.highest * self.peak > most:
             yield (
                 "highest",

@@ -26,7 +26,7 @@ FROM = Signal("beta_w", "rad", "direction that the wind comes from", r"\beta_w")
 
 
 # t [s]; table holds `count` numbers each of frequency [1/s], phase [turns], amplitude [m/s].
-# Returns m/s.
+# Returns m/s. Partial sums fill the vector registers and fix the order of the additions.
 @kernel
 def _gust(t: float, count: int, table: Vector) -> float:
     """The sum of all components, by sixteen partial sums, in groups of four."""
@@ -70,7 +70,8 @@ def blendermann(u_r: float, v_r: float, k: Any, b: Vector) -> None:
         b[2] = (k.s_L - LEVER * (angle - 0.5 * math.pi) * k.length) * b[1]
 
 
-# Speed [m/s], cosine and sine of where it comes from; x the state; writes b (3) [N, N, N m].
+# Speed [m/s], cosine and sine of where it comes from; x the state; writes b (3) [N, N, N m]. A wind
+# from ahead adds to the hull's own speed through the air.
 @kernel
 def load_of_wind(speed: float, c_from: float, s_from: float, x: Vector, k: Any, b: Vector) -> None:
     """The load of a wind on a hull that moves."""
@@ -81,12 +82,12 @@ def load_of_wind(speed: float, c_from: float, s_from: float, x: Vector, k: Any, 
 
 
 def logarithmic_shear(drag: float) -> float:
-    """C of the profile over a surface with this drag."""
+    """C of the logarithmic profile (see `Wind`) over a surface with this drag coefficient."""
     return 2.5 * math.sqrt(drag)
 
 
 def share_of_wind(at: float, C: float) -> float:
-    """What the wind at a height `at` [m] is of that at 10 m: 1 + C ln(at/10).
+    """What the wind at a height `at` [m] is of that at 10 m: 1 + C ln(at/10), without unit.
 
     Raises ValueError where the profile has ended above that height.
     """
@@ -185,7 +186,10 @@ class Wind(Disturbance):
         return self.components if self.full_scale() else 0
 
     def resolving(self, duration: float) -> int:
-        """The cosines of the gusts; bins grow with frequency, and the energy lies low."""
+        """How many cosines the gusts of a run of `duration` [s] need, see `Disturbance.resolving`.
+
+        Bins grow with frequency, and the energy lies low.
+        """
         if self.gusts == "none" or self.amplitudes == "deterministic":
             return 0
         edges = self._edges()
@@ -196,7 +200,10 @@ class Wind(Disturbance):
         return spectra.growing_edges(self.lowest, self.highest, self.components)
 
     def table(self) -> Vector:
-        """Rows of rates and phases in turns, and amplitudes; no rows without gusts."""
+        """Rows of rates [1/s], phases [turns] and amplitudes [m/s], filled up to whole groups.
+
+        One behind another; a single zero without gusts.
+        """
         if self.gusts == "none":
             return np.zeros(1)
         edges = self._edges()

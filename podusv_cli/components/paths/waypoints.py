@@ -82,7 +82,7 @@ class Waypoints(Path):
 
     @model_validator(mode="after")
     def _check_way(self) -> Self:
-        """Raises ValueError for points of which no way can be made."""
+        """Raises ValueError for points of which no way can be made, or an unfit fillet."""
         if len(self.points) < 2:
             raise ValueError(f"needs at least two points, has {len(self.points)}")
         with np.errstate(all="ignore"):
@@ -111,7 +111,10 @@ class Waypoints(Path):
             raise ValueError("a fillet rounds corners, and this path has none; leave it out")
 
     def _has_numbers(self, knots: Vector) -> bool:
-        """Whether a bound of all numbers on the way to the spline's coefficients is finite."""
+        """Whether a bound of all numbers on the way to the spline's coefficients is finite.
+
+        `knots` (points,) are the times [s]. Coefficients are places over cubes of steps at most.
+        """
         steps, size = np.diff(knots), np.abs(self._course()).max()
         scales = np.maximum(steps, 1.0).max() ** 2 / np.minimum(steps, 1.0).min() ** 3
         return bool(np.isfinite(1e3 * (size + 1.0) * scales))
@@ -133,7 +136,10 @@ class Waypoints(Path):
         return tuple(Break(time, "velocity") for time in times.tolist())
 
     def fillet_for_law(self) -> Fillet | None:
-        """The corners; of a loop the first point has one too, from the second round on."""
+        """The corners; of a loop the first point has one too, from the second round on.
+
+        Its jump at the end of a round is that at the start of the next, so it stands there as well.
+        """
         if self.fillet == 0.0:
             return None
         (times, jumps), end = self._corners(), float(self._knots()[-1])
@@ -143,7 +149,10 @@ class Waypoints(Path):
         return Fillet(self.fillet, end if loop else FOREVER, times, jumps) if len(times) else None
 
     def _corners(self) -> tuple[Vector, Vector]:
-        """When the velocity jumps between straight legs, or at the stop [s], and by what [m/s]."""
+        """Times [s] (corners,) and jumps of the velocity (corners, 2) [m/s].
+
+        Between straight legs and at the last point, where the jump is more than rounding.
+        """
         legs, knots = np.diff(self._course(), axis=0), self._knots()
         velocities = legs / np.diff(knots)[:, None]
         after = {"loop": velocities[:1], "stop": np.zeros((1, 2)), "continue": velocities[-1:]}
@@ -159,7 +168,7 @@ class Waypoints(Path):
         return np.asarray((*self.points, *closing), float)
 
     def _knots(self) -> Vector:
-        """Time [s] at which the target passes each point."""
+        """Time [s] at which the target passes each point of `_course` (points,)."""
         chords = np.hypot(*np.diff(self._course(), axis=0).T)
         return np.concatenate([[0.0], np.cumsum(chords)]) / self.speed
 
@@ -172,7 +181,8 @@ class Waypoints(Path):
     def table(self) -> Vector:
         """The knots, eight coefficients a knot: cubic in x and in y, highest power first; corners.
 
-        The corners are those that a law sees rounded, if any.
+        The last knot's are those of what comes after it: straight on or at rest. The corners are
+        those that a law sees rounded, if any.
         """
         knots, cubic = self._knots(), self._cubic()
         end = cubic(knots[-1])

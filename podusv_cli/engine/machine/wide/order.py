@@ -26,7 +26,7 @@ class BlockLoop:
     outer: BlockLoop | None = None
 
 
-Node = Any  # a block's number, or a Loop
+Node = Any  # a block's number, or a BlockLoop
 
 
 @dataclass(eq=False)
@@ -46,7 +46,11 @@ class NodeLevel:
 
 
 def depth_first(begin: Hashable, successors: Mapping[Any, Iterable[Any]]) -> list[Any]:
-    """Everything that can be reached, each before what it leads to (in a graph without cycles)."""
+    """Everything that can be reached, each before what it leads to (in a graph without cycles).
+
+    `successors` has by node what follows it; what is no key there, as END, is left out. No
+    recursion: functions have thousands of blocks.
+    """
     seen, done = {begin}, []
     under_way = [(begin, iter(successors[begin]))]
     while under_way:
@@ -62,7 +66,11 @@ def depth_first(begin: Hashable, successors: Mapping[Any, Iterable[Any]]) -> lis
 
 
 def dominators(order: list[Any], leads: Mapping[Any, Iterable[Any]]) -> dict[Any, set[Any]]:
-    """By node all nodes that are on every way from the first one to it, itself included."""
+    """By node all nodes that are on every way from the first one to it, itself included.
+
+    `order` has every node, the first one first; `leads` has by node those that lead to it. Sets
+    only shrink or appear, so it is done once a round leaves their sizes alone.
+    """
     dominating: dict[Any, set[Any]] = {order[0]: {order[0]}}
     while True:
         before = sum(map(len, dominating.values())), len(dominating)
@@ -91,7 +99,11 @@ class Order:
         self.levels = {loop: self._level(loop) for loop in [None, *self.loops]}
 
     def _loops(self) -> list[BlockLoop]:
-        """All loops, the outer ones first; a loop with several ways in is NotForLanes."""
+        """All loops, the outer ones first. Raises NotForLanes for a loop with several ways in.
+
+        A step back in the order closes a loop, whose header must dominate where the step comes
+        from.
+        """
         order = depth_first(0, self.successors)
         above = dominators(order, self.leads)
         place = {block: i for i, block in enumerate(order)}
@@ -103,10 +115,10 @@ class Order:
                         raise NotForLanes("a loop with several ways in")
                     self._gather(bodies.setdefault(target, {target}), block)
         loops = [BlockLoop(header, body) for header, body in bodies.items()]
-        return sorted(loops, key=lambda loop: -len(loop.blocks))
+        return sorted(loops, key=lambda loop: -len(loop.blocks))  # an outer one has more blocks
 
     def _gather(self, body: set[int], block: int) -> None:
-        """Add a block, and all that lead to it within the loop."""
+        """Add to `body`, which has the header, a block and all that lead to it within the loop."""
         waiting = [block]
         while waiting:
             if (leading := waiting.pop()) not in body:
@@ -124,10 +136,14 @@ class Order:
         """The node of a loop's level that a way to this block leads to."""
         if block == RETURN or (loop and (block == loop.header or block not in loop.blocks)):
             return END
-        return self.holder(loop, block)
+        return self.node_with_block(loop, block)
 
-    def holder(self, loop: BlockLoop | None, block: int) -> Node:
-        """The node of a loop's level that has a block of the loop."""
+    def node_with_block(self, loop: BlockLoop | None, block: int) -> Node:
+        """The node that contains `block` on the level of `loop` (None: of the function).
+
+        The block itself if it lies directly there, else the loop directly within `loop` that it is
+        in.
+        """
         inner: Any = self.inner[block]
         if inner is loop:
             return block
@@ -136,7 +152,7 @@ class Order:
         return inner
 
     def _targets(self, loop: BlockLoop | None) -> dict[Node, list[Node]]:
-        """Where every node of a level leads."""
+        """By node of a level the nodes to which it leads, END for ways out of the level."""
         nodes: list[Node] = [b for b in self.successors if self.inner[b] is loop]
         nodes += [inner for inner in self.loops if inner.outer is loop]
         targets = {}
@@ -164,6 +180,7 @@ class Order:
         for node in order[1:]:
             level.parent[node] = max(above[node] - {node}, key=place.__getitem__)
             below[level.parent[node]].append(node)
+        # Down the tree of dominators, so that what a node dominates follows it at once
         level.nodes = depth_first(order[0], {node: below[node][::-1] for node in order})
         level.place = {node: i for i, node in enumerate([*level.nodes, END])}
         level.later = {END: set()}
