@@ -198,6 +198,7 @@ class Blocks(Instructions):
         loop = self.masks.order.inner[end]
         if self.masks.order.inner[begin] is not loop:
             return False
-        leads = [self.masks.order.node_with_block(loop, other) for other in
-        self.masks.order.leads[end]] return bool(self.masks.order.levels[loop].first(leads) ==
-        begin)
+        leads = [
+            self.masks.order.node_with_block(loop, other) for other in self.masks.order.leads[end]
+        ]
+        return bool(self.masks.order.levels[loop].first(leads) == begin)
