@@ -24,7 +24,7 @@ def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
     """The rule for a pole of an observer, which a slow measurement limits."""
 
     def of(facts: Facts, default: float) -> float:
-        """The pole [1/s or rad/s] that suits a boat; `default` is that of the model ship."""
+        """The pole [1/s] that suits a boat; `default` is that of the model ship."""
         most = OBSERVED / facts.period if facts.period else math.inf
         return min(default * factor(facts), most)
 
@@ -41,7 +41,10 @@ def noise(place: int) -> Rule:
 
 
 def reach(facts: Facts) -> float:
-    """How far ahead a hull has to aim: its length, or what it goes while it turns."""
+    """How far ahead a hull has to aim: its length, or what it goes while it turns.
+
+    Over that of the model ship, as all facts with small letters.
+    """
     return max(facts.lam, facts.s / facts.g_r)
 
 

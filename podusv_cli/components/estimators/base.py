@@ -69,7 +69,7 @@ class Estimator(KernelPart):
         return self.states.index(LOADS[0]) if LOADS[0] in self.states else 0
 
     def assumed_noise(self) -> tuple[tuple[str, float], ...]:
-        """For each number of the state the key and value of the noise that is assumed, or ""."""
+        """For each of x, y, psi, u, v, r the key and value of the noise assumed; "" without one."""
         return (("", 0.0),) * len(ESTIMATE)
 
     def assumed_delay(self) -> tuple[str, float]:
@@ -84,7 +84,10 @@ class Estimator(KernelPart):
         return (True,) * len(ESTIMATE)
 
     def lacking(self, measured: tuple[bool, ...]) -> str:
-        """What it needs and is not measured, in a sentence; else empty."""
+        """What it needs and is not measured, in a sentence; "" where nothing is missing.
+
+        `measured` says it of x, y, psi, u, v, r.
+        """
         pairs = zip(STATE, self.needs(), measured, strict=True)
         missing = [state.name for state, needed, known in pairs if needed and not known]
         if not missing:
@@ -97,7 +100,7 @@ class Estimator(KernelPart):
         return nominal.constants() | self.constants()
 
     def start(self, x: Vector, nominal: Vessel) -> Vector:
-        """Its state at t = 0, where the vessel's state is x: the truth, and zeros behind it."""
+        """Its state (states,) at t = 0, where the vessel's is x (6,): the truth, then zeros."""
         return np.concatenate([x, np.zeros(len(self.states) - len(ESTIMATE))])
 
     def shortest_lag(self) -> float:

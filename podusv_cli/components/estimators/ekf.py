@@ -81,7 +81,9 @@ def unpack_triangle(packed: Vector, full: Vector) -> None:
             at += 1
 
 
-# f (6, 9), packed P (45), q (9) the diagonal of Q; writes rate (45), packed as P is.
+# f (6, 9), packed P (45), q (9) the diagonal of Q; writes rate (45), packed as P is. `moved` is F
+# P, whose last three rows are 0, as loads have no rate. At the end of row i of the triangle `at` is
+# one row's length beyond its diagonal, N - i numbers; so q goes to at - N + i.
 @kernel
 def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
     """P' = F P + P F^T + Q; F has entries in rows 0 to 5 and columns 2 to 8 alone."""
@@ -104,7 +106,8 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
 
 
 # h (6) is the derivative, `innovation` measured less expected, sigma its deviation. Changes state:
-# estimate (9), then packed P (45).
+# estimate (9), then packed P (45), then sums of squared innovations (6) and their numbers (6). A
+# value that is late depends on several states, so all of h counts.
 @kernel
 def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> float:
     """Correct estimate and covariance by the measured value i, whose derivative is h.
@@ -159,6 +162,9 @@ def wanderings(k: Any, q: Vector) -> None:
     q[8] = k.q_b_psi * k.q_b_psi
 
 
+# tau (3) [N, N, N m]; state (66) as `states` declares it. Writes rate (66) and f (6, 9). The load
+# is fixed to the earth, so it is turned into the body frame for the plant. Sums of innovations
+# rest.
 @kernel
 def predict(tau: Vector, state: Vector, k: Any, f: Vector, rate: Vector) -> None:
     """Rates of estimate, load and covariance; f becomes F."""

@@ -27,7 +27,8 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import wrap
 
 
-# seen as the sensors write it (VALUE, KNOWN), state (6) the estimate; `time` [s] is the lag.
+# seen as the sensors write it (VALUE, KNOWN), state (6) the estimate; `time` [s] is the lag,
+# `derived` [m/s or rad/s] what the pose's rates say. Returns m/s2 or rad/s2.
 @kernel
 def lagging(i: int, derived: float, time: float, seen: Vector, state: Vector) -> float:
     """Rate of velocity i, towards what is measured or else towards what the pose says."""

@@ -77,7 +77,8 @@ def axis(i: int, drift: float, e: float, gain: float, state: Vector, k: Any, rat
     rate[SEEN + i] = drift + swell
 
 
-# Reads velocities state[3:6]; changes b (3) [N, N, N m].
+# Reads velocities state[3:6]; changes b (3) [N, N, N m]. `plant` has all forces of the vessel, so
+# what goes beyond linear damping is taken off here as a load.
 @kernel
 def add_nonlinear_forces(state: Vector, k: Any, b: Vector) -> None:
     """Add to the load what leaves linear damping alone of the nominal vessel's forces."""
@@ -125,7 +126,7 @@ class PassiveObserver(Estimator):
         return STATES
 
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
-        """The gains behind the fields."""
+        """The constants, with the gains K_ij of the module's text that follow from the fields."""
         notch, stiff = 2.0 * (self.zeta_n - self.lambda_w), self.omega_c * self.omega_v
         force, moment = stiff * (nominal.m11 + nominal.m22) / 2.0, stiff * nominal.m33
         return super().constants_with(nominal) | {
@@ -179,6 +180,6 @@ class PassiveObserver(Estimator):
         return POSE_ALONE
 
     def shortest_lag(self) -> float:
-        """That of the fastest pole: -omega_c, or of the wave filter."""
+        """That of the fastest pole: -omega_c, or the wave filter's, overdamped above zeta_n = 1."""
         beyond = np.sqrt(max(self.zeta_n**2 - 1.0, 0.0))
         return float(1.0 / max(self.omega_c, self.omega_0 * (self.zeta_n + beyond)))

@@ -21,7 +21,9 @@ def sign(x: float, variance: float) -> float:
     return 1.0 if x >= 0.0 else -1.0
 
 
-# `unsure_v` and `unsure_r` are variances, which round the kink of |v| and |r|. Writes s (3, 3).
+# u, v [m/s], r [rad/s]; `unsure_v` and `unsure_r` are variances, which round the kink of |v| and
+# |r|. Writes s (3, 3). |v| v has the smooth derivative 2 |v|, so only the mixed terms need the
+# sign.
 @kernel
 def force_slopes(
     u: float, v: float, r: float, unsure_v: float, unsure_r: float, k: Any, s: Vector
@@ -41,7 +43,8 @@ def force_slopes(
     s[8] -= k.coriolis * (k.m23 * u)
 
 
-# Changes f (6, WIDTH).
+# surge, sway [N] and yaw [N m] are derivatives of the forces by the column's state. Changes f (6,
+# WIDTH). The inverse of the mass matrix is written out.
 @kernel
 def accelerate_column(
     column: int, surge: float, sway: float, yaw: float, k: Any, f: Vector

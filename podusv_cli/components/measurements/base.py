@@ -73,7 +73,10 @@ class Measurement(KernelPart):
         return []
 
     def first(self, start: Vector, step: float) -> Vector:
-        """What is seen before anything has been delivered: the state at the start."""
+        """What is seen before anything has been delivered: the state `start` (6,), then marks.
+
+        Laid out as `VALUE`, `FRESH`, `KNOWN`: nothing is fresh.
+        """
         marks = np.concatenate([np.zeros(len(STATE)), np.array(self.measured(), float)])
         return np.concatenate([start, marks])
 

@@ -54,7 +54,10 @@ class Sensor(Component):
     )
 
     def errors(self, stream: tuple[int | str, ...], quantities: int, count: int) -> Vector:
-        """Errors of the first samples, shape (quantities, count); NaN for a lost sample."""
+        """Errors of the first `count` samples, (quantities, count); NaN for a lost sample.
+
+        `stream` names the random numbers. A sample is lost for all of an instrument's quantities.
+        """
         each = [self._error((*stream, i), count) for i in range(quantities)]
         lost = uniforms((*stream, "lost"), 0, count) < self.lost
         sample = np.arange(count)
@@ -70,12 +73,12 @@ class Sensor(Component):
         """Noise and bias of `count` samples (count,), in the unit of the quantity."""
         error = self.noise * normals((*stream, "noise"), 0, count)
         if self.bias > 0.0:
-            lag = self.period / self.bias_time
+            lag = self.period / self.bias_time  # a sample, in time constants of the bias
             error += self.bias * gauss_markov((*stream, "bias"), count, lag)
         return error
 
     def conflicts(self, step: float) -> Iterator[tuple[str, str]]:
-        """Key and message for times that do not fit."""
+        """Key and message for times that do not fit the step [s]."""
         for key, time in (("period", self.period), ("delay", self.delay)):
             if time and (fault := misfit(time, step)):
                 yield key, fault
@@ -129,7 +132,7 @@ class Sensors(Measurement):
         )
 
     def noise_of_each(self) -> tuple[float, ...]:
-        """White noise and bias of the sensors together."""
+        """Standard deviation of white noise and bias together, of each quantity in its unit."""
         sensors = self.instruments().values()
         each = [
             (math.hypot(sensor.noise, sensor.bias) if sensor else 0.0, n) for sensor, n in sensors
@@ -154,7 +157,11 @@ class Sensors(Measurement):
         return {"motion": float(motion)}
 
     def table_for(self, step: float, steps: int) -> Vector:
-        """A head for each quantity, see `PERIOD`, then the errors of all samples."""
+        """A head for each quantity, see `PERIOD`, then the errors of all samples; one vector.
+
+        For a run of `steps` steps of `step` [s]. A quantity without a sensor has a head of zeros.
+        """
+        # Where the next errors begin in the table, and the next waiting samples in `seen`
         heads, errors, filled, waiting = [], [np.zeros(0)], HEAD * len(STATE), OWN
         for name, (sensor, count) in self.instruments().items():
             if not sensor:
@@ -208,6 +215,8 @@ class Sensors(Measurement):
                         seen[FRESH + i] = 1.0
 
 
+# Both in the unit of the quantity. Adding ROUND, a number without fraction digits, and taking it
+# off rounds without a function call.
 @kernel
 def round_to(number: float, resolution: float) -> float:
     """The nearest multiple of the resolution; the number itself for a resolution of 0."""
@@ -217,6 +226,9 @@ def round_to(number: float, resolution: float) -> float:
 
 
 def _steps(sensor: Sensor, step: float) -> tuple[int, int, int]:
-    """Period and delay in steps, and how many samples wait for their delivery at most."""
+    """Period and delay in steps, and how many samples wait for their delivery at most.
+
+    One more than whole periods in the delay: the one that is due is still there.
+    """
     period, delay = max(1, round(sensor.period / step)), round(sensor.delay / step)
     return period, delay, delay // period + 1

@@ -31,7 +31,10 @@ TARGET = ("x_d", "y_d", "x_d_dot", "y_d_dot", "x_d_ddot", "y_d_ddot")
 
 @cache
 def read_at_place(evaluate: Callable[..., None]) -> Any:
-    """A kernel that is a path's `evaluate` at the time [s] that stands first in `place`."""
+    """A kernel that is a path's `evaluate` at the time [s] that stands first in `place`.
+
+    It takes `ARGUMENTS` but the time. Its source is written out with the arguments that are needed.
+    """
     passed = ("place[0]" if name == "t" else name for name in arguments_of(evaluate, ARGUMENTS))
     text = f"def at_place({', '.join(ARGUMENTS[1:])}):\n    evaluate({', '.join(passed)})"
     scope: dict[str, Any] = {"evaluate": evaluate, "__name__": evaluate.__module__, TEXT: text}
@@ -84,7 +87,10 @@ class Path(KernelPart):
         return self.whole_targets(times)[:, : len(TARGET)]
 
     def whole_targets(self, times: Iterable[float]) -> Vector:
-        """The same (n, 10) with a place for the distance and with a heading, 0 where none is."""
+        """The same (n, 10): behind `TARGET` the distance, left 0, and psi_d with two rates.
+
+        The heading [rad] is 0 of a path that has none.
+        """
         times = list(times)
         rows, k, table = np.zeros((len(times), TARGET_SIZE)), bundle(self.constants()), self.table()
         for t, row in zip(times, rows, strict=True):

@@ -20,6 +20,9 @@ from podusv_cli.core.interpolation import segment
 from podusv_cli.core.kernel import Vector, kernel, tail
 
 
+# t [s]; writes shown (6) from target (6): position [m], velocity, acceleration. Corners of the lap
+# are sought half a fillet ahead, so the one just before or after t is found; `s` [s] is the time
+# since it. By the module's formula; `side` is the derivative of the square, with its sign.
 @kernel
 def round_corner(t: float, k: Any, table: Vector, target: Vector, shown: Vector) -> None:
     """shown = the target at t as the law sees it; the path's table ends in `Fillet.rows`."""
@@ -52,7 +55,7 @@ class Fillet:
     jumps: Vector  # a row of north and east a corner
 
     def rows(self) -> Vector:
-        """The corners as the kernel reads them: times, then two jumps a corner."""
+        """The corners as the kernel reads them (3 corners,): times [s], two jumps a corner."""
         return np.concatenate([self.times, self.jumps.ravel()])
 
     def edges(self) -> Vector:

@@ -36,7 +36,7 @@ LEG, E_CT, ALONG = range(3)  # their positions
 PASSED = 1.0  # the place of "passed" among the choices of `switch`
 
 
-# Reads (x[0], x[1]) and the corners (n, 2) [m] in table. Writes at (5).
+# Reads (x[0], x[1]) and the corners (n, 2) [m] in table. Writes at (5); across is to starboard.
 @kernel
 def leg_frame(x: Vector, leg: int, table: Vector, at: Vector) -> None:
     """at = direction of a leg (cosine, sine), its length, and the vessel along and across it."""
@@ -98,9 +98,12 @@ class Legs(Path):
         return tuple((x, y, self.acceptance) for x, y in self.points[1:])
 
     def passed_by(self, share: float) -> dict[str, float]:
-        """Legs that are done, and metres [m] along the next one; at the end all legs."""
+        """Legs that are done, and metres along the next one; at the end all legs.
+
+        `share` of the whole length, from 0 to 1, by the names of `places`.
+        """
         lengths = np.hypot(*np.diff(self.points, axis=0).T)
-        begins = np.concatenate([[0.0], np.cumsum(lengths)])
+        begins = np.concatenate([[0.0], np.cumsum(lengths)])  # m from the first waypoint
         way = share * begins[-1]
         leg = int(np.searchsorted(begins, way, side="right")) - 1
         if share <= 0.0:

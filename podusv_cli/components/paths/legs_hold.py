@@ -28,7 +28,8 @@ CREEP = 1e-6  # of the wanted speed, and metres ahead: a target that rests keeps
 on_legs, seek_leg = Legs.evaluate, Legs.locate
 
 
-# Reads (x[0], x[1]) and the waypoint [m]; writes target (6).
+# Reads (x[0], x[1]) and the waypoint [m]; `course` [rad] holds while the vessel is within the
+# radius. Writes target (6). The law steers by the target's velocity, so it never rests altogether.
 @kernel
 def drift(x: Vector, course: float, waypoint: Vector, k: Any, target: Vector) -> None:
     """A target at the vessel that goes back to the waypoint, as fast as it is beyond the radius."""
@@ -44,7 +45,8 @@ def drift(x: Vector, course: float, waypoint: Vector, k: Any, target: Vector) ->
     target[4], target[5] = 0.0, 0.0
 
 
-# Arguments as those of `drift`.
+# Arguments as those of `drift`. The angle is that of the vessel seen from the waypoint; a growing
+# one goes round clockwise.
 @kernel
 def go_round(x: Vector, waypoint: Vector, k: Any, target: Vector) -> None:
     """The point of the circle beside the vessel, or ahead of it by the lead, clockwise."""

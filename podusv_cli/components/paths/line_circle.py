@@ -86,7 +86,10 @@ class LineCircle(Path):
             _sine(t - k.switch, k, target)
 
     def breaks(self) -> tuple[Break, ...]:
-        """The switch, with the lowest derivative that jumps there."""
+        """The switch, with the lowest derivative that jumps there.
+
+        Read as a velocity of the line's own size, the target only begins to turn.
+        """
         smooth = self.reading == "velocity" and self.amplitude == self.speed
         gentle: Literal["velocity", "acceleration"] = "acceleration" if smooth else "velocity"
         return (Break(self.switch, "position" if self.reading == "literal" else gentle),)

@@ -15,8 +15,10 @@ from podusv_cli.core.signal import PSI_D
 Pose = tuple[float, float, float]
 
 
-# table: poses (n, 3); s: the part of the time that is over; writes target (10): position [m] with
-# two rates, the distance, which is not this kernel's, heading [rad] with two rates.
+# table: poses (n, 3); s: the part of the `travel` time [s] that is over; writes target (10):
+# position [m] with two rates, the distance, which is not this kernel's, heading [rad] with two
+# rates. part, speed, growth are the quintic and its derivatives after time, the same for all
+# coordinates.
 @kernel
 def between_poses(i: int, j: int, s: float, travel: float, table: Vector, target: Vector) -> None:
     """The quintic from pose i to pose j."""

@@ -27,7 +27,10 @@ class Envelope(Component):
     yaw_rate: float = value(..., "rad/s", "largest yaw rate, either way", gt=0)
 
     def shares(self, u: Vector, v: Vector, r: Vector) -> dict[str, Vector]:
-        """Speed, drift angle and yaw rate over their limits, at velocities [m/s, m/s, rad/s]."""
+        """Speed, drift angle and yaw rate over their limits, by name, each (n,) without unit.
+
+        `u`, `v` [m/s] and `r` [rad/s] are (n,). At hardly any speed the drift angle counts as 0.
+        """
         speed = np.hypot(u, v) / self.speed
         drift = np.where(speed > AT_REST, np.abs(np.arctan2(v, np.abs(u))) / self.drift, 0.0)
         return {"speed": speed, "drift": drift, "yaw_rate": np.abs(r) / self.yaw_rate}

@@ -96,6 +96,7 @@ def estimate_vessel(hull: Hull) -> dict[str, float]:
     - `Y_vv`, `N_rr`: cross-flow drag over the length with Hoerner's coefficient (Fossen 2021,
       section 6.4), one axis at a time.
     """
+    # SI units; `apart` is from the centre line to a hull's, `wide` is beam over draught
     length, beam, draught, hulls = hull.length, hull.narrow, hull.draught, hull.hulls
     apart = 0.5 * (hull.beam - beam) if hulls > 1 else 0.0
     surge = 2.7 * WATER * (hull.mass / (WATER * hulls)) ** (5.0 / 3.0) / length**2 * hulls

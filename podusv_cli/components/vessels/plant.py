@@ -12,6 +12,8 @@ from podusv_cli.core.kernel import Vector, kernel
 from podusv_cli.core.kinematics import earth_velocity
 
 
+# In the three forces u and v are in m/s, r in rad/s; k has the vessel's constants. Damping
+# coefficients are negative where they brake.
 @kernel
 def surge_force(u: float, v: float, r: float, k: Any) -> float:
     """Coriolis and damping force along surge [N], row 1 of -C nu - D nu."""
@@ -43,6 +45,9 @@ def lacking(u: float, v: float, r: float, k: Any) -> tuple[float, float, float]:
     return less * (momentum * r), -less * (k.m11 * u * r), less * yaw
 
 
+# x (6), tau and b (3) [N, N, N m], k the vessel's constants; writes rate (6). Sway and yaw are
+# solved together, since m23 and m32 couple them; surge stands alone. `less` comes last in each sum,
+# so that a vessel with all of C nu has the same bits as without it.
 @kernel
 def plant(x: Vector, tau: Vector, b: Vector, k: Any, rate: Vector) -> None:
     """Rate of the state (x, y, psi, u, v, r) under forces tau and b, each (surge, sway, yaw).

@@ -77,6 +77,7 @@ class Vessel(Component):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         """Raises ValueError for a mass matrix that is not positive definite."""
+        # x^T M x depends on the symmetric part of M alone
         m11, m22, m33, symmetric = self.m11, self.m22, self.m33, (self.m23 + self.m32) / 2
         if m11 <= 0 or m22 <= 0 or m22 * m33 <= symmetric * symmetric:
             raise ValueError(
@@ -112,7 +113,10 @@ class Vessel(Component):
         return self.I_z - self.N_rdot
 
     def constants(self) -> dict[str, float]:
-        """The fields' numbers and the entries of the mass matrix (5), without the windage."""
+        """The fields' numbers and the entries of the mass matrix (5), without the windage.
+
+        In the order of `COEFFICIENTS`, in SI units.
+        """
         return {name: float(getattr(self, name)) for name in COEFFICIENTS}
 
 
