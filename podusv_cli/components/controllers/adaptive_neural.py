@@ -20,6 +20,7 @@ from podusv_cli.core.component import Positive, value
 from podusv_cli.core.kernel import Vector, kernel, specialise
 
 
+# alpha and beta [m/s or rad/s], A and B [1/s]; the rate is in the unit of beta a second.
 @kernel
 def shunting_rate(alpha: float, beta: float, A: float, B: float) -> float:
     """Rate of the shunting model (17) with f = max(alpha, 0), g = max(-alpha, 0) and D = B.
@@ -72,5 +73,5 @@ class AdaptiveNeural(FilteredBackstepping):
     )
 
     def filter_decay(self, alpha_u: Any, alpha_r: Any) -> tuple[Any, Any]:
-        """A + |alpha|, see (41) and (45)."""
+        """A + |alpha| [1/s] of surge and yaw, see (41) and (45); numbers or arrays, as alpha is."""
         return self.A_u + abs(alpha_u), self.A_r + abs(alpha_r)

@@ -41,6 +41,8 @@ class Adrc(HandController, ObservingController):
         surge, yaw = self.rate_gains()
         return ("k_v", surge, self.omega_u), ("k_v", yaw, self.omega_r)
 
+    # x (6), memory and rate (7), target (6); writes tau (2) [N, N m], rate and signals (3). The
+    # loads are taken off in `push`, and the observer is told the demand that follows.
     @staticmethod
     @kernel
     def law(

@@ -43,6 +43,9 @@ LEARNT = (
 ADAPTIVE, INTEGRAL, PUBLISHED = 0.0, 1.0, 2.0  # places among the choices of `learns`
 
 
+# across, offset [m], crab [rad]; returns rad/s and m/s. The rate of the angle goes to zero far from
+# the line, where the line of sight is steep whatever the crab angle. At its limit it may only come
+# back.
 @kernel
 def learning(across: float, crab: float, offset: float, k: Any) -> tuple[float, float]:
     """Rates of crab angle and offset; one is always 0.
@@ -106,9 +109,12 @@ class Alos(LineOfSight, ObservingController):
         return "k_psi", self.k_psi
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
-        """The yaw rate's gain with that of the heading."""
+        """Key, gain and observer's bandwidth: the yaw rate's gain with that of the heading."""
         return ("k_u", self.k_u, self.omega_u), ("k_r", self.k_r + self.k_psi, self.omega_r)
 
+    # x (6), memory and rate (8), target (6); writes tau (2) [N, N m], rate and signals (4). Yaw
+    # comes first, since surge yields where its moment is large, or the bow is off. The loads that
+    # the observer finds are taken off.
     @staticmethod
     @kernel
     def law(

@@ -44,7 +44,9 @@ LEARNS = math.radians(5.0)  # within it the cross-track integral learns
 LEARNT_MOST = 0.1  # rad
 
 
-# x (6) state, target (6); returns m/s and rad/s.
+# x (6) state, target (6); returns m/s and rad/s. The wanted velocity is cut to the approach speed,
+# and turned into the body frame; what is wanted sideways becomes a lateral acceleration, and that
+# over the speed a yaw rate.
 @kernel
 def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
     """Wanted speed and yaw rate of the position controller."""
@@ -58,7 +60,9 @@ def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
     return u_d, sideways / max(u_d, SLOWEST)
 
 
-# x (6) state, target (6), angle_i [rad] the integral; returns m/s, rad/s, rad/s.
+# x (6) state, target (6), angle_i [rad] the integral; returns m/s, rad/s, rad/s. The lateral
+# acceleration is 4 zeta^2 V^2/L_1 sin(off), of which the yaw rate is the share over the speed, with
+# its sign, so that a boat going astern is turned the other way.
 @kernel
 def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, float, float]:
     """Wanted speed and yaw rate of L1 guidance, and the rate of the integral's angle."""
@@ -81,6 +85,8 @@ def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, flo
     return approach_speed(x, target, k.pos_P, k), sideways / over, learns
 
 
+# error and integral in parts of full scale over the gain. An error of the integral's own sign would
+# make it grow, so it is left out where the output is limited.
 @kernel
 def shrinks(integral: float, error: float, gain: float, limited: bool) -> float:
     """The rate of an integral within +-1 that may only shrink where its output is `limited`."""
@@ -113,6 +119,7 @@ class ArduPilot(Rover):
         """With the cross-track integral."""
         return (*super().slots(), *each((LEARNT,)))
 
+    # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (4).
     @staticmethod
     @kernel
     def law(

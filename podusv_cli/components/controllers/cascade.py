@@ -35,6 +35,7 @@ HALVINGS = 60  # of the speed, until the drift of the virtual ship is a float's 
 V_R = Signal("v_ref", "m/s", "sway velocity of the virtual ship", "v_r")
 
 
+# x, y [m], psi [rad]; writes z (2) [m], ahead and to starboard.
 @kernel
 def along_bow(x: float, y: float, psi: float, z: Vector) -> None:
     """z = the position in axes turned by psi about the origin of the coordinates."""
@@ -84,7 +85,10 @@ class Cascade(Controller):
         return 4
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The virtual ship in a steady turn, where there is one."""
+        """The virtual ship's sway velocity (1,) [m/s] in a steady turn at the target's speed.
+
+        By bisection of its sway force; where there is no such turn, an end of the range.
+        """
         k, speed = bundle(nominal.constants()), math.hypot(target[2], target[3])
         turn = turn_rate(Moving(*target[2:6]), SLOWEST)
         low, high = -speed, speed
@@ -102,6 +106,10 @@ class Cascade(Controller):
             Loop(yaw.name, "k_r", yaw.damping, np.array([-self.k_r / yaw.inertia]), ALONE),
         ]
 
+    # x (6), memory and rate (1), target (6), work (4); writes tau (2) [N, N m], rate and signals
+    # (4). The virtual ship has the target's speed and drifts by v_r, so its heading is the course
+    # less the drift angle, and its surge acceleration follows from that of the speed. `away` is 1
+    # with the origin of the coordinates, else positions are those from the target.
     @staticmethod
     @kernel
     def law(

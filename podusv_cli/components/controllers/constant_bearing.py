@@ -24,6 +24,8 @@ class Moving(NamedTuple):
     rate_y: float
 
 
+# e [m] to the target, V_d [m/s] its velocity, U [m/s]. What U leaves beside the target's velocity
+# across the line of sight, less that along it; a faster target is neared at NEARS.
 @kernel
 def approach_speed(e: Moving, V_d: Moving, U: float) -> float:
     """s_max [m/s]: with it towards the target the vessel moves at U over ground."""
@@ -34,6 +36,8 @@ def approach_speed(e: Moving, V_d: Moving, U: float) -> float:
     return max(math.sqrt(max(U * U - across * across, 0.0)) - along, NEARS)
 
 
+# kappa e is s_max far away and k_p e near; `fall` is what kappa's rate leaves out of it, with s_max
+# taken as constant.
 @kernel
 def approach(e: Moving, V_d: Moving, k: Any) -> Moving:
     """V_c = p_d' + kappa e and its rate; |V_c| stays below U if the target is slower.

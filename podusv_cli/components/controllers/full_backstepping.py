@@ -26,7 +26,7 @@ from podusv_cli.components.vessels.plant import surge_force, sway_force
 from podusv_cli.core.kernel import Vector, kernel, specialise
 
 
-# x (6) state, target (6); in m/s2.
+# x (6) state, target (6); in m/s2. By the chain rule through z_e, P, v and psi_e.
 @kernel
 def alpha_u_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
     """Rate of alpha_u (21), the expansion that the paper calls X_1 in (40)."""
@@ -41,7 +41,8 @@ def alpha_u_rate(e: Tracking, x: Vector, target: Vector, k: Any) -> float:
     return float((k.k_ze * z_e_dot + along + e.Q * w - v_dot * e.sin_e + swing) / e.cos_e)
 
 
-# x (6) state, target (6); in rad/s2.
+# x (6) state, target (6); in rad/s2. w = (Q + u sin psi_e - v cos psi_e)/distance is differentiated
+# before folding. While the direction is held w is 0, and psi_e' is -r.
 @kernel
 def alpha_r_rate(e: Tracking, x: Vector, target: Vector, k: Any, tau_u: float) -> float:
     """Rate of alpha_r (30), the paper's X_2 in (44), for the surge force tau_u [N]."""

@@ -41,7 +41,8 @@ class Frame(NamedTuple):
     sin_off: float
 
 
-# x (6) state, target (6).
+# x (6) state, target (6). The rates are those in a frame that turns with the course; of a target at
+# rest that turn counts as 0.
 @kernel
 def course_frame(x: Vector, target: Vector, k: Any) -> Frame:
     """Errors along and across; the course of a target at rest is the line of sight."""
@@ -74,7 +75,8 @@ def line_of_sight(
     return -arctangent(across, ahead), -rate / (ahead * ahead + across * across)
 
 
-# x (6) state; in m/s.
+# x (6) state; in m/s. The speed along the course is u cos_off - v sin_off, solved for u; the cosine
+# is not taken below STEEPEST, or a bow crosswise would ask for an endless speed.
 @kernel
 def wanted_speed(x: Vector, at: Frame, k: Any) -> float:
     """The surge velocity with which the speed along the course is the target's, plus k_s along.

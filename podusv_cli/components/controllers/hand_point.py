@@ -36,6 +36,7 @@ class Hand(NamedTuple):
     psi_f_rate: float  # [rad/s]
 
 
+# psi_f [rad], rate [rad/s] and bend [rad/s2] of the lagged heading, target (6); m/s and m/s2.
 @kernel
 def hand_target(psi_f: float, rate: float, bend: float, target: Vector, k: Any) -> Moving:
     """Velocity of the hand point's target: l ahead along the lagged heading, or at the target."""
@@ -49,7 +50,9 @@ def hand_target(psi_f: float, rate: float, bend: float, target: Vector, k: Any) 
     )
 
 
-# x (6) state, target (6); psi_f [rad] is the filtered heading.
+# x (6) state, target (6); psi_f [rad] is the filtered heading, which follows psi behind the lag T_f
+# and turns with the target's course, so that a steady turn leaves no lag. A is seen in the body
+# frame, where a velocity at rest over ground turns: hence r w and -r u.
 @kernel
 def hand_errors(x: Vector, psi_f: float, target: Vector, k: Any) -> Hand:
     """What the hand point lacks to the velocity of constant-bearing guidance."""
@@ -130,6 +133,9 @@ class HandController(Controller):
         return Most(self.U, NEARS)
 
     def rate_gains(self) -> tuple[float, float]:
-        """What answers a change of u and of r [1/s], at rest, with the part of A in it."""
+        """Gains [1/s] with which surge and yaw answer a change of u and of r at rest.
+
+        The part of A in them is k_p; with `reference: origin` the lagged heading takes 1/T_f off.
+        """
         gain = self.k_v + self.k_p
         return gain, gain - (1.0 / self.T_f if self.reference == "origin" else 0.0)

@@ -60,6 +60,8 @@ class HandPosition(HandController):
             for axis, gain in zip(axes, self.rate_gains(), strict=True)
         ]
 
+    # demand (2), tau (3), rate (3): what the loads fall short of, as accelerations of the hand
+    # point.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
@@ -68,6 +70,7 @@ class HandPosition(HandController):
         rate[I_A] += share * (tau[0] - demand[0]) / k.m11
         rate[I_B] += share * (k.hand * (tau[2] - demand[1]) / k.m33 + tau[1] / k.m22)
 
+    # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (3).
     @staticmethod
     @kernel
     def law(

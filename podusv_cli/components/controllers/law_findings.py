@@ -38,9 +38,9 @@ GROWN = 0.01  # by which it may grow there
     law=PolarBackstepping,
 )
 def coupling_saddle(case: Any) -> Sentences:
-    """With the printed sign, z_e' = -k_ze z_e - u_e and m11 u_e' = -k_ue u_e - z_e; yaw alike.
+    """Warn of a saddle: with the printed sign z_e' = -k_ze z_e - u_e, m11 u_e' = -k_ue u_e - z_e.
 
-    The determinant (k_ze k_ue - 1)/m11 is negative where k_ze k_ue < 1: a saddle.
+    Yaw is alike. The determinant (k_ze k_ue - 1)/m11 is negative where k_ze k_ue < 1: a saddle.
     """
     law, vessel = case.scenario.controller, case.scenario.vessel
     pairs = (
@@ -68,6 +68,7 @@ def coupling_saddle(case: Any) -> Sentences:
 )
 def network_range(case: Any) -> Sentences:
     """No node of the network within two widths of the velocities that keep up with the target."""
+    # (rows, 3): u, v, r along the path; where there is no such steady motion they are NaN
     nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
     if not len(nu):
         return
@@ -137,7 +138,10 @@ def bound_growing(scenario: Any, log: Recording) -> Sentences:
     law=TrackingController,
 )
 def start_astern(case: Any) -> Sentences:
-    """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error."""
+    """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error.
+
+    `case.first_signals` has what the law logs at t = 0; without psi_d nothing is said.
+    """
     law, start = case.scenario.controller, case.scenario.start
     if law.fold == "joint":
         return
@@ -238,7 +242,7 @@ def relay_gains(case: Any) -> Sentences:
     )
     swinging = {}
     for axis, proportional, derivative, inertia, late in axes:
-        gain = (proportional + derivative / law.T_d) / inertia
+        gain = (proportional + derivative / law.T_d) / inertia  # 1/s, of a sudden error
         if gain * (late + facts.period) > RELAY:
             swinging[axis] = gain, late + facts.period
     if swinging:

@@ -36,7 +36,8 @@ MEMORY = (
 )
 
 
-# x (6) state, target (6).
+# x (6) state, target (6). `across` [m] is the vessel to starboard of the path; the circle of this
+# radius meets the path at the angle asin(-across/circle) from it.
 @kernel
 def sight(x: Vector, target: Vector, k: Any) -> float:
     """Angle [rad] to where a circle about the ship meets the path; across it, where it does not."""
@@ -55,6 +56,8 @@ def filter_angle(memory: Vector, sighted: float, w: float, rate: Vector) -> None
     rate[3] = w * (w * (w * wrap(sighted - memory[1]) - 3.0 * memory[2]) - 3.0 * memory[3])
 
 
+# v, alpha_2 [m/s], r [rad/s], turn [rad/s2]. `braked` [N] is Y_v v + k2 (v - alpha_2): damping, and
+# k2 pulls the wanted sway velocity to the vessel's own.
 @kernel
 def sway_rate(v: float, r: float, alpha_2: float, turn: float, k: Any) -> float:
     """alpha_2' [m/s2]: row 2 of M z_2' = -K z_2, for a yaw rate that is to change by `turn`."""
@@ -100,7 +103,7 @@ class LosBackstepping(Controller):
         return each(MEMORY)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """At rest, at the heading or at the line of sight."""
+        """The memory (4,): alpha_2 of 0, and the filter at rest at the heading or the sight."""
         k = bundle(self.constants())
         angle = x[2] if self.filter_start == "heading" else sight(x, target, k)
         return np.array([0.0, angle, 0.0, 0.0])
@@ -114,6 +117,9 @@ class LosBackstepping(Controller):
             Loop(yaw.name, "k3", yaw.damping, np.array([-braking / yaw.inertia]), ALONE),
         ]
 
+    # x (6), memory and rate (4), target (6); writes tau (2) [N, N m], rate and signals (5).
+    # `faster` [m/s2] is the target's acceleration along its course, `turn` the rate of alpha_3 =
+    # r_f - c z1.
     @staticmethod
     @kernel
     def law(

@@ -70,7 +70,10 @@ class LosPid(LineOfSight):
         return "omega_psi", self.omega_psi
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Surge with its integral; yaw with heading and integral; integrals per told inertia."""
+        """Surge with its integral; yaw with heading and integral; integrals per told inertia.
+
+        Yaw has a triple pole at -omega_psi, whose polynomial has the factors 3 w, 3 w^2, w^3.
+        """
         surge, yaw = axes
         to_r, w = yaw.told / yaw.inertia, self.omega_psi
         return [
@@ -86,6 +89,7 @@ class LosPid(LineOfSight):
             ),
         ]
 
+    # x (6), memory and rate (2), target (6); writes tau (2) [N, N m], rate and signals (4).
     @staticmethod
     @kernel
     def law(

@@ -78,7 +78,10 @@ class Maneuvering(PathTimed):
         return self.gamma > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """As of `pose_backstepping`: m nu' = -(k_d + gain of the position) m nu."""
+        """Surge and yaw, as of `pose_backstepping`: m nu' = -(k_d + gain of the position) m nu.
+
+        The law cancels the hull's damping, so it is added to what acts here.
+        """
         loops = []
         for axis, gain in zip(axes, (self.k_d + self.k_p, self.k_d + self.k_psi), strict=True):
             growth = np.array([axis.damping - gain * axis.told / axis.inertia])

@@ -35,7 +35,8 @@ class LevelledGain(NamedTuple):
     rate: float  # 1/s2
 
 
-# x (6) state, target (6).
+# x (6) state, target (6), both over ground. The distance's own rates are not needed here, so they
+# are 0.
 @kernel
 def see_target(x: Vector, target: Vector, k: Any) -> Seen:
     """Distance, velocity and acceleration of the target along and across the bow."""
@@ -54,6 +55,7 @@ def see_target(x: Vector, target: Vector, k: Any) -> Seen:
     )
 
 
+# gain [1/s]; kappa e is gain times a short distance, and s_max at a long one.
 @kernel
 def level_gain(gain: float, at: Seen, closing: float) -> LevelledGain:
     """kappa = gain/sqrt(1 + (gain |e|/s_max)^2); `closing` is e.e' [m2/s]."""
@@ -63,7 +65,10 @@ def level_gain(gain: float, at: Seen, closing: float) -> LevelledGain:
     return LevelledGain(kappa, -kappa * q2 * slope * closing)
 
 
-# x (6) state, `at` the target as `see_target` sees it, k_b [1/s].
+# x (6) state, `at` the target as `see_target` sees it, k_b [1/s]. d is the target's velocity less
+# the vessel's, T the part of the distance along the target's course, in a projection that the bow
+# fades into below V_m. V_c = t + kappa_across e + (kappa_along - kappa_across) T; its turn is the
+# target's alone.
 @kernel
 def guidance(x: Vector, at: Seen, along: LevelledGain, k_b: float, k: Any) -> Wanted:
     """V_c and its surge rate: the gain k_b across the target's course, and `along` along it.

@@ -56,7 +56,10 @@ def neutral(nominal: Vessel, thrust_lever: float | None) -> dict[str, float]:
 
 
 def pace_constants(m33: float, N_m: float, Q0: float, S0: float) -> dict[str, float]:
-    """The pace f, Q = f^2 Q0 [1/s2], S = f S0 [1/s] and Q/S, as constants of a law."""
+    """The pace f, Q = f^2 Q0 [1/s2], S = f S0 [1/s] and Q/S, as constants of a law.
+
+    `m33` [kg m2] is the told inertia in yaw, `N_m` [N m] the largest moment that is asked for.
+    """
     f = pace(m33, N_m, Q0)
     return {"pace": f, "Q": f * f * Q0, "S": f * S0, "Q_per_S": f * Q0 / S0}
 
@@ -69,6 +72,7 @@ def pace(m33: float, N_m: float, Q0: float) -> float:
     return min(1.0, math.sqrt(N_m / (ANGLE * m33 * Q0)))
 
 
+# distance [m], speed [m/s] of the target; `near` and `slow` go from 0 to 1.
 @kernel
 def resting_gain(distance: float, speed: float, k: Any) -> float:
     """k_p [1/s], or what a hull bears near a slow target.
@@ -83,6 +87,9 @@ def resting_gain(distance: float, speed: float, k: Any) -> float:
     return float(k.k_p + near * slow * (bearable - k.k_p))
 
 
+# turn [rad/s] of the target. Per lever, the yaw equation is added to the sway equation, see
+# `neutral`. The sway present is that of the loads and of yaw, as if at right angles; less of it
+# damps less.
 @kernel
 def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any) -> SwayResponse:
     """p and d of the nominal vessel at the speed V [m/s], sway v [m/s], load sway v_l [m/s].
@@ -110,6 +117,7 @@ def routh_gain(p: float, d: float, eta: float, k: Any) -> float:
     return float(d * room / (a_3 * a_3 * d + (p - 1.0) * room))
 
 
+# For p <= 1 yaw has no zero in the right half plane, so only the bandwidth limits the gain across.
 @kernel
 def schedule(at: SwayResponse, k: Any) -> GainSchedule:
     """eta and k_b; `trust` is by how much the true p may exceed the told one."""

@@ -112,10 +112,17 @@ class MomentumVector(VelocitySteering):
         return "Q0", self.Q0 / self.S0
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
-        """With the part of A that acts on the surge velocity; S is slower where N_m is small."""
+        """Key, gain [1/s] and observer's bandwidth [rad/s] of surge and yaw.
+
+        With the part of A that acts on the surge velocity; S is slower where N_m is small.
+        """
         S = self.S0 * pace(axes[1].told, self.N_m, self.Q0)
         return ("k_u", self.k_u + self.k_p, self.omega_u), ("S0", S, self.omega_r)
 
+    # x (6), memory and rate (10), target (6); writes tau (2) [N, N m], rate and signals (4). The
+    # wanted speed V sets the schedule, so it is formed with the gain along the course before the
+    # gain across is known. v_s is the sway that the bow is aimed with; `bend` lets the yaw rate
+    # level off at `fastest`.
     @staticmethod
     @kernel
     def law(

@@ -106,7 +106,7 @@ class Mss(LineOfSight):
         return "wn", 0.5 * self.wn / self.zeta
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Surge with its integral; yaw with heading and its integral."""
+        """Surge with its integral; yaw with heading and its integral, over the told inertia."""
         surge, yaw = axes
         square = self.wn * self.wn
         gains = np.array([-self.damping(), -square, -RESET * self.wn * square])
@@ -122,6 +122,8 @@ class Mss(LineOfSight):
             ),
         ]
 
+    # x (6), memory and rate (6), target (6); writes tau (2) [N, N m], rate and signals (4). The
+    # observer's two states, the angle and its lag, differ by its rate r_d.
     @staticmethod
     @kernel
     def law(

@@ -200,7 +200,8 @@ def weigh(count: int, W_u: Vector, W_r: Vector, phi: Vector) -> tuple[float, flo
     return f_u, f_r
 
 
-# weights, phi and rate are (count); writes rate.
+# weights, phi and rate are (count); writes rate. `drive` [kg m/s or kg m2 rad/s] is what the node
+# outputs are weighted with; leakage pulls the weights to `initial`.
 @kernel
 def adapt(
     count: int,
@@ -218,7 +219,7 @@ def adapt(
 
 
 def nearest(nu: Vector, centers: Vector, widths: Vector) -> Vector:
-    """Distance from velocities (n, 3) to the nearest of these centres, in widths."""
+    """Distance (n,) from velocities (n, 3) to the nearest of the centres (q, 3), in widths (3,)."""
     squares = np.full(len(nu), np.inf)
     for center in centers:  # one by one: a long log times all nodes is too large
         squares = np.minimum(squares, np.sum(((nu - center) / widths) ** 2, axis=1))

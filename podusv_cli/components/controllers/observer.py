@@ -116,7 +116,11 @@ class ObservingController(Controller):
 
 
 def _loop(axis: Axis, key: str, gain: float, omega: float) -> Loop:
-    """nu' = -d nu + g.(nu, nu_hat, b), with b the observed load per told inertia."""
+    """nu' = -d nu + g.(nu, nu_hat, b), with b the observed load per told inertia.
+
+    `gain` [1/s] is the law's, named `key`; `omega` [rad/s] is the observer's bandwidth. The law
+    cancels the damping, and the observer is told what acts.
+    """
     ratio, d = axis.told / axis.inertia, axis.damping
     return Loop(
         axis.name,

@@ -22,7 +22,10 @@ Keys = dict[str, float | str]
 
 
 def parameters(text: str) -> dict[str, float]:
-    """The parameters of a file by name. Raises ValueError for a line that is none."""
+    """The parameters of a file's text by name. Raises ValueError for a line that is none.
+
+    A name that comes twice must have the same number.
+    """
     found: dict[str, float] = {}
     for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
         cells = _cells(line.partition("#")[0])
@@ -157,7 +160,11 @@ def _direct(
 def _demand_keys(
     keys: Keys, given: Parameters, taken: set[str], groups: re.Pattern[str], remarks: list[str]
 ) -> tuple[Keys, list[str]]:
-    """Keys and remarks, with one on what has no key. Raises ValueError where nothing is taken."""
+    """Keys and remarks, with one on what has no key. Raises ValueError where nothing is taken.
+
+    `given` are the file's parameters, `taken` those that became keys; of `groups` the others are
+    named.
+    """
     if not keys:
         raise ValueError("has no parameter that this law has a key for")
     return keys, [*remarks, *filter(None, [untaken(given, taken, groups)])]

@@ -81,7 +81,9 @@ class PathPace(NamedTuple):
     across: float  # m
 
 
-# memory begins with TIMED; a_2 and b_2 are the curve's second derivatives along and across the bow.
+# t [s]; memory begins with TIMED; a_2 and b_2 [m/s2] are the curve's second derivatives along and
+# across the bow. `pace` [m/s] is the curve's speed by its own time, 1 where it stands; v_s is the
+# wanted speed over it, so it changes with the pace (`by_s`) and with the wanted speed (`by_t`).
 @kernel
 def path_pace(t: float, e: PoseErrors, a_2: float, b_2: float, memory: Vector, k: Any) -> PathPace:
     """The wanted rate, how it changes, and what the update adds to it, for a curve by its time."""

@@ -37,6 +37,7 @@ MEMORY = (
 )
 
 
+# target (6); returns m/s and rad/s. A target at rest has no yaw rate.
 @kernel
 def reference(e: Tracking, target: Vector, k: Any) -> tuple[float, float]:
     """(u_d, r_d): the virtual controls, or the target's speed and the yaw rate of its path."""
@@ -91,7 +92,10 @@ class Pid(TrackingController):
         return HELD + each(MEMORY) + self.swaying()
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """Integrals at zero, lagged errors at zero or at the error."""
+        """The memory: integrals at zero, lagged errors at zero or at the error.
+
+        `k` has the law's constants; the errors are those after the first sample.
+        """
         memory = super().begin(x, target, k)
         if self.lag_start == "error":
             u_d, r_d = reference(self.first_errors(x, memory, target, k), target, k)
@@ -118,6 +122,7 @@ class Pid(TrackingController):
             for axis, (key, K_P, K_I, K_D) in zip(axes, gains, strict=True)
         ]
 
+    # demand (2), tau (3) [N, N, N m]; the integrals are those of errors, so K_I divides out.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
@@ -125,6 +130,8 @@ class Pid(TrackingController):
         rate[INTEGRAL_U] += (tau[0] - demand[0]) / k.K_Pu
         rate[INTEGRAL_R] += (tau[2] - demand[1]) / k.K_Pr
 
+    # x (6), memory and rate (6 or more), target (6); writes tau (2) [N, N m], rate and signals (6).
+    # The direction that is held changes at samples alone, so its rates are 0.
     @staticmethod
     @kernel
     def law(

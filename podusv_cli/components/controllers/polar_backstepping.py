@@ -87,6 +87,9 @@ def compensation(memory: Vector, k: Any, rate: Vector) -> tuple[float, float]:
     return memory[at], memory[at + 1]
 
 
+# x (6), memory and rate as `slots`, target (6), work as `workspace`; writes tau (2) [N, N m], rate
+# and signals (8). Surge comes before yaw, whose differentiator may need tau_u. The direction that
+# is held changes at samples alone, so its rates are 0.
 @kernel
 def polar_backstepping(
     x: Vector,
@@ -209,7 +212,11 @@ class PolarBackstepping(TrackingController):
         return alpha_u * 0.0 + np.inf, alpha_r * 0.0 + np.inf
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """(26), (27) with a = W . Phi at frozen Phi: a' = Gamma (m |Phi|^2 e - sigma a)."""
+        """(26), (27) with a = W . Phi at frozen Phi: a' = Gamma (m |Phi|^2 e - sigma a).
+
+        `nu` (3,) is where Phi is frozen; `b.initial`/(4 partial) is the gain of the bound at its
+        start.
+        """
         power = float((activation(self.network, nu[None]) ** 2).sum())
         learnt = (
             ("u_e", "gamma_u", self.gamma_u, self.sigma_bu, self.b_hat_u0),
@@ -254,7 +261,7 @@ class PolarBackstepping(TrackingController):
         return {CENTER: self.network.center_array(), WIDTH: self.network.width_array()}
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """Bounds and weights at what leakage pulls them to."""
+        """The memory with bounds and weights at what leakage pulls them to; `k`: the constants."""
         memory = super().begin(x, target, k)
         memory[B_HAT_U], memory[B_HAT_R] = self.b_hat_u0, self.b_hat_r0
         memory[WEIGHTS : WEIGHTS + 2 * self.network.count] = self.network.initial_weight
@@ -273,7 +280,7 @@ class FilteredBackstepping(PolarBackstepping):
         return each(FILTERED)
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The filter at zero or settled on the virtual control."""
+        """The memory with the filter at zero, or settled on the virtual control."""
         memory = super().begin(x, target, k)
         if self.filter_start == "alpha":
             e = self.first_errors(x, memory, target, k)

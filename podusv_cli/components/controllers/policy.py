@@ -130,6 +130,8 @@ class Policy(Controller):
         """Room for the numbers before and after a layer."""
         return 2 * max(INPUTS, self.network().width)
 
+    # x (6), target (6), table as `table` lays it out, work as `workspace`; writes tau (2) [N, N m].
+    # A hidden layer's numbers replace its inputs, so two rooms will do for any number of layers.
     @staticmethod
     @kernel
     def law(x: Vector, target: Vector, k: Any, table: Vector, tau: Vector, work: Vector) -> None:

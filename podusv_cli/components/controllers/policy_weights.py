@@ -60,7 +60,7 @@ def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
 
     Raises ValueError.
     """
-    begin = LENGTH + int.from_bytes(data[:LENGTH], "little")
+    begin = LENGTH + int.from_bytes(data[:LENGTH], "little")  # where the numbers begin [bytes]
     try:
         header = Header.model_validate_json(data[LENGTH:begin] if begin <= len(data) else b"")
     except ValidationError:
@@ -69,6 +69,7 @@ def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
         ) from None
     numbers, entries = data[begin:], header.__pydantic_extra__
     arrays = {name: _numbers(name, tensor, numbers) for name, tensor in entries.items()}
+    # The tensors have to fill the file from end to end: each begins where the one before ends
     pieces = sorted(tensor.data_offsets for tensor in entries.values())
     if [0, *(end for _, end in pieces)] != [*(first for first, _ in pieces), len(numbers)]:
         raise ValueError("its header does not fit its numbers; save it again")
@@ -103,6 +104,8 @@ def network(content: str, inputs: int, outputs: int, names: tuple[str, ...]) -> 
     given = _normal(arrays, inputs)
     layers = list(_layers(arrays))
     _check_shapes(layers, inputs, outputs, names)
+    # All hidden layers get the width of the widest, so that one loop runs over them; zeros do
+    # nothing
     width = max((len(bias) for _, _, bias in layers[:-1]), default=0)
     sizes = [inputs, *[width] * (len(layers) - 1), outputs]
     filled = [
@@ -127,7 +130,10 @@ def _period(remarks: Mapping[str, str]) -> float | None:
 
 
 def _normal(arrays: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
-    """Mean and scale of the inputs, both (inputs,), taken out of the tensors."""
+    """Mean and scale of the inputs, both (inputs,), taken out of `arrays`; 0 and 1 without them.
+
+    Raises ValueError for another shape, and a scale that is not above 0.
+    """
     mean, scale = arrays.pop("mean", np.zeros(inputs)), arrays.pop("scale", np.ones(inputs))
     for name, vector in (("mean", mean), ("scale", scale)):
         if vector.shape != (inputs,):
@@ -138,7 +144,10 @@ def _normal(arrays: dict[str, Vector], inputs: int) -> tuple[Vector, Vector]:
 
 
 def _layers(arrays: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]]:
-    """Name, weight (outputs, inputs) and bias (outputs,) of every layer, in order."""
+    """Name, weight (outputs, inputs) and bias (outputs,) of every layer, in order.
+
+    Names may all begin with the same word, as "actor.". Raises ValueError for other tensors.
+    """
     named = {name: LAYER.fullmatch(name) for name in arrays}
     if strange := [name for name, match in named.items() if not match]:
         raise ValueError(
@@ -160,7 +169,10 @@ def _layers(arrays: Mapping[str, Vector]) -> Iterator[tuple[str, Vector, Vector]
 def _check_shapes(
     layers: list[tuple[str, Vector, Vector]], inputs: int, outputs: int, names: tuple[str, ...]
 ) -> None:
-    """Raises ValueError unless each layer (name, weight, bias) takes what the one before gives."""
+    """Raises ValueError unless each layer (name, weight, bias) takes what the one before gives.
+
+    The first takes the `inputs`, which `names` has; the last gives the `outputs`.
+    """
     before, who = inputs, f"the observation ({', '.join(names)})"
     for name, weight, bias in layers:
         if weight.ndim != 2 or weight.shape[1] != before:

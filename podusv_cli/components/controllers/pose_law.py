@@ -56,7 +56,10 @@ def _fed_forward(
 
 @cache
 def with_load(law: Law, at: int) -> Law:
-    """A kernel that feeds forward the loads at this place of the state; the same one for both."""
+    """A kernel of `law` less the loads at the place `at` of the estimator's state.
+
+    The same one for the same law and place.
+    """
     name = f"{law.__qualname__}_with_load"
     made: Law = specialise(_fed_forward, name, _inner=taking(law, LAW), LOAD_AT=at)
     return made

@@ -38,6 +38,7 @@ TURNS = 2  # position in the memory
 TURNING = Signal("turns", "1", "1 while it turns on the spot, else 0")
 
 
+# x (6) state, target (6), u_d [m/s]. A path further away than the reach is met at a right angle.
 @kernel
 def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     """Bearing of where a circle about the vessel meets the path, or of the path, less psi [rad]."""
@@ -125,6 +126,9 @@ class Px4(Rover):
         memory[THROTTLE_I] *= 1.0 - memory[TURNS]
         memory[STEERING_I] *= 0.0 if wanted_turn(off, k) == 0.0 else 1.0
 
+    # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (4). `room`
+    # is what the steering leaves of full scale; speeds below their thresholds count as 0, as in the
+    # firmware.
     @staticmethod
     @kernel
     def law(

@@ -61,7 +61,8 @@ def path_course(x: Vector, target: Vector) -> float:
     return direction(target[2], target[3])
 
 
-# x (6) state, target (6); in m/s.
+# x (6) state, target (6); in m/s. A target at rest has no course: all of the distance counts as
+# ahead.
 @kernel
 def approach_speed(x: Vector, target: Vector, gain: float, k: Any) -> float:
     """The target's speed, and `gain` [1/s] times how far it is ahead, within U."""
@@ -118,7 +119,7 @@ class Rover(Controller):
         return Most(self.U)
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Speed and yaw rate with their integrals."""
+        """Speed and yaw rate with their integrals; gains times the load at full scale."""
         scales = (("speed", self.surge), ("rate", self.yaw))
         return [
             Loop(

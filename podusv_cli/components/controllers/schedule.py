@@ -42,7 +42,10 @@ FEEDBACK_R = Signal("feedback_r", "N m", "yaw moment that departures from the mo
 
 @lru_cache(maxsize=4)
 def _read_recorded(text: str, *, held: bool) -> Recorded | None:
-    """Commands to single propellers, which the header has by number, as `n_1`; None for demands."""
+    """Commands to single propellers, which the header has by number, as `n_1`; None for demands.
+
+    `held`: between rows the last one's commands.
+    """
     header, _ = lines_of(text)
     numbered = any(NUMBERED.fullmatch(cell) for cell in header.cells) if header else False
     return Recorded(text, held) if numbered else None
@@ -141,9 +144,12 @@ class Schedule(Controller):
             return np.concatenate([times.ravel(), given.ravel()])
         demand, motion = np.split(given, [FULL if self.asks_sway() else TIMED - 1], axis=1)
         state, gains = np.split(motion, [STATES], axis=1)
-        rates = np.gradient(state, times.ravel(), axis=0)
+        rates = np.gradient(state, times.ravel(), axis=0)  # slopes of the cubics between rows
         return np.concatenate([times.ravel(), np.hstack([demand, state, rates, gains]).ravel()])
 
+    # t [s], x (6), table as `table` lays it out; writes tau (2, or 3 with a sway force) and signals
+    # (2). The width of a row tells what it has: demand alone, a motion with gains, either with a
+    # sway force.
     @staticmethod
     @kernel
     def law(t: float, x: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:

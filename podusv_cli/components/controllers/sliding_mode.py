@@ -56,6 +56,8 @@ def root(facts: Facts) -> float:
     return authority(facts) * math.sqrt(PHI0 / layer(facts))
 
 
+# z [m/s2] is what super-twisting has learnt; the root is rounded off within phi, where it is
+# steepest.
 @kernel
 def reach(s: float, z: float, k: Any) -> float:
     """Acceleration [m/s2] that drives the missing velocity s [m/s] to zero."""
@@ -102,7 +104,10 @@ class SlidingMode(HandController):
         return True
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Within the boundary layer at rest: nu' = -gain nu + z, z' = -(lambda_2/phi) nu."""
+        """Within the boundary layer at rest: nu' = -gain nu + z, z' = -(lambda_2/phi) nu.
+
+        The first order has no z, so only the first number of each row is kept.
+        """
         key, slope, learning = "eta", self.eta / self.phi, np.zeros((0, 1))
         if self.reaching == "super_twisting":
             key, slope = "lambda_1", self.lambda_1 / math.sqrt(self.phi)
@@ -128,6 +133,7 @@ class SlidingMode(HandController):
         rate[Z_A] *= k.eta * k.eta / (k.eta * k.eta + a * a)
         rate[Z_B] *= k.eta * k.eta / (k.eta * k.eta + b * b)
 
+    # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (3).
     @staticmethod
     @kernel
     def law(

@@ -109,7 +109,9 @@ def fold(psi_e: float, k: Any) -> float:
     return -math.pi if psi_e > 0.0 else math.pi
 
 
-# x (6) state, target (6); memory has what is held between samples.
+# x (6) state, target (6); memory has what is held between samples. P and Q [m/s] are the target's
+# velocity along and across psi_d. As printed (21) divides by cos psi_e, which folding keeps from
+# changing its sign.
 @kernel
 def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
     """Errors (18), (19) and virtual controls (21), (30) in the reading that `k` asks for."""
@@ -152,7 +154,8 @@ def track(x: Vector, memory: Vector, target: Vector, k: Any) -> Tracking:
     )
 
 
-# x (6) state, target (6); writes memory at PSI_D_HELD and PSI_D_RATE_HELD.
+# t [s], x (6) state, target (6); writes memory at PSI_D_HELD and PSI_D_RATE_HELD. At t = 0 there is
+# no sample before, so `first_difference` says what stands for it.
 @kernel
 def hold(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:
     """Remember psi_d and form its wrapped backward difference (Remark 5), once a sample."""

@@ -87,7 +87,10 @@ class Loop:
 
 
 def pi_loop(axis: Axis, key: str, w: float) -> Loop:
-    """A double pole at -w of a law that knows the inertia, tracked back with the time 1/w."""
+    """The PI loop of an axis, a double pole at -w [rad/s] of a law that knows the inertia.
+
+    `key` is the field that has w; back-calculation has the tracking time 1/w.
+    """
     to = axis.told / axis.inertia
     return Loop(
         axis.name,

@@ -49,6 +49,9 @@ def aim(wanted: Wanted, v_s: float, k: Any) -> Aim:
 
 
 # x (6) state, memory has the observed load. Reads tau[1] [N m], writes tau[0] [N]; returns m/s.
+# `forward` is the cosine of the angle that is left to turn, 1 where the vessel goes the wrong way
+# anyhow; a yaw moment above N_m slows surge down as much. The wanted velocity turns in the body
+# frame: r b.
 @kernel
 def surge_demand(x: Vector, memory: Vector, wanted: Wanted, at: Aim, k: Any, tau: Vector) -> float:
     """Write the surge demand, as far as the velocity points the right way; the wanted velocity.

@@ -30,7 +30,7 @@ from podusv_cli.core.elementary import cos_sin
 from podusv_cli.core.kernel import Vector, kernel
 
 
-# x (6) state, target (6).
+# x (6) state, target (6). rate_x and rate_y [m/s] are how the distance to the target changes.
 @kernel
 def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
     """V_c and its rate, as the hull sees them."""
@@ -85,6 +85,9 @@ class VelocityVector(VelocitySteering):
         surge, yaw = self.k_u + self.k_p, self.k_r + self.k_psi
         return ("k_u", surge, self.omega_u), ("k_r", yaw, self.omega_r)
 
+    # x (6), memory and rate (6), target (6); writes tau (2) [N, N m], rate and signals (4). r_d
+    # levels off at r_m for large angles; its derivative by chi_e has the third power of sigma. Near
+    # rest the angle counts for less, since its direction is uncertain.
     @staticmethod
     @kernel
     def law(

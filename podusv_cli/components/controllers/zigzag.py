@@ -19,7 +19,9 @@ MEMORY = (SIDE, HEADING, NEXT, LOOKED, RATE)
 AT_SIDE, AT_HEADING, AT_NEXT, AT_TIME, AT_RATE, SIZE = range(6)  # positions in the memory
 
 
-# left [rad], side 1 or -1, r [rad/s], t [s]; memory has time and yaw rate of the last instant.
+# left [rad], side 1 or -1, r [rad/s], t [s]; memory has time and yaw rate of the last instant. The
+# yaw rate is taken to change in the next step as in the last; a first guess of the share, by the
+# mean rate, is put in once more.
 @kernel
 def within(left: float, side: float, r: float, t: float, memory: Vector) -> float:
     """After which share of the step the heading will have turned by `left` more; 1 if not in it."""
@@ -63,6 +65,8 @@ class Zigzag(Steering):
         """As often as the heading is looked at."""
         return self.check_every
 
+    # t [s], x (6); changes memory (5). A look at a period finds the heading past `switch`, and
+    # reverses at once.
     @staticmethod
     @kernel
     def sample(t: float, x: Vector, memory: Vector, k: Any) -> None:
