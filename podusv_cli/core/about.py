@@ -188,6 +188,7 @@ class StudyAbout(StudyIdentity):
             raise ValueError(f"metrics: {wrong[0]} is called otherwise inside")
         if len({*self.measured} & {*self.metrics}) != len(self.measured):
             raise ValueError("measured: a metric is there twice, or not among the metrics")
+        # The identity has dotted keys such as `dsc[0].path.kind`: every law in every cell
         runs = {f"{law}[{cell}]" for law in self.laws for cell in range(len(self.cells))}
         if not runs <= {key.partition("]")[0] + "]" for key in self.identity}:
             raise ValueError("laws and cells: the identity has others")
@@ -265,7 +266,7 @@ class RunAbout(_PlainJson):
 
     @model_validator(mode="after")
     def _has_its_parts(self) -> Self:
-        """Raises ValueError where a part that readers ask for is missing."""
+        """Raises ValueError where a part that readers ask for is missing or is no mapping."""
         try:
             parts = [self.section(key) for key in ("vessel", "path", "controller", *self.said)]
         except (LookupError, TypeError, ValueError):
@@ -284,9 +285,8 @@ class RunAbout(_PlainJson):
 def at_target(numbers: Mapping[str, float], *, follows: bool, trial: bool, radius: float) -> bool:
     """Whether a run with these metrics ends at its target.
 
-    That is with `e_steady` within the settling radius [m], or with all legs of a path done that is
-    followed. A manoeuvring trial and recorded
-    commands have no target to be at.
+    That is with `e_steady` within the settling `radius` [m], or with all legs done of a path that
+    is followed. A manoeuvring trial and recorded commands (`trial`) have no target to be at.
     """
     if follows:
         return numbers.get("path_done", 1.0) >= 1.0

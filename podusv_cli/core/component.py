@@ -99,7 +99,10 @@ class Component(BaseModel):
         return self._with(new, self.model_fields_set - new.keys()) if new else self
 
     def by_default(self, name: str, facts: Any) -> float:
-        """The number of a rule. Raises SizingError where there is none above 0."""
+        """The number of the rule for the field `name`, rounded to DIGITS unless it is exact.
+
+        `facts` are `components.facts.Facts`. Raises SizingError where there is none above 0.
+        """
         rule = self.rules[name]
         try:
             number = rule.of(facts, type(self).model_fields[name].default)
@@ -167,7 +170,7 @@ class _Field(NamedTuple):
 
 @cache
 def _fields(kind: type[Component]) -> tuple[_Field, ...]:
-    """The fields of a component: name, allowed words, and whether it holds a float."""
+    """The fields of a kind of component, looked up once: a run asks for constants many times."""
     return tuple(
         _Field(
             name,
@@ -179,7 +182,10 @@ def _fields(kind: type[Component]) -> tuple[_Field, ...]:
 
 
 def _choices(component: Component) -> Iterator[str]:
-    """Names of the fields that select and count; those of a part after its own name."""
+    """Names of the fields that select and count; those of a part after its own name.
+
+    As `constants` names them; True and False are numbers of Python as well.
+    """
     for name, field in type(component).model_fields.items():
         content = getattr(component, name)
         if isinstance(content, Component):
@@ -219,7 +225,7 @@ else:
 def wrong_default(owner: Component) -> str:
     """What is wrong with a default that its own field does not allow; else empty.
 
-    pydantic checks given values only.
+    pydantic checks given values only, so all values of `owner` are given once more.
     """
     try:
         type(owner)(**dict(owner))

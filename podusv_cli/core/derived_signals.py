@@ -14,7 +14,7 @@ from podusv_cli.core.signal import Signal
 
 @cache
 def derived_with(plugins: Plugins) -> dict[str, Derived]:
-    """All derived signals by name, with those of these plug-ins."""
+    """All derived signals by name, with those of these plug-ins; laws and theory declare them."""
     return {
         name: derived
         for package in ("podusv_cli.components.controllers", "podusv_cli.theory")

@@ -42,7 +42,11 @@ class Plane:
         return s, c, across * c, across * (1.0 - E2) * s
 
     def north_east(self, lat: Vector, lon: Vector) -> tuple[Vector, Vector]:
-        """x and y [m] of places, arrays of latitudes and longitudes [deg], in any turn."""
+        """x and y (n,) [m] of latitudes and longitudes (n,) [deg], in any turn.
+
+        In axes of the earth that turn with the origin's longitude: outward from the axis, east, and
+        upward along it. North and the vertical follow by the origin's latitude.
+        """
         s, c, out, up = self._origin
         phi, away = np.radians(lat), np.radians(lon - self.lon)
         across = A / np.sqrt(1.0 - E2 * np.sin(phi) ** 2)
@@ -52,13 +56,13 @@ class Plane:
         return c * upward - s * outward, from_axis * np.sin(away)
 
     def places(self, north: Vector, east: Vector) -> tuple[Vector, Vector]:
-        """Latitudes and longitudes [deg, -180 to 180] of x and y [m]; NaN beyond the earth's rim.
+        """Latitudes and longitudes (n,) [deg, -180 to 180] of x and y (n,) [m]; NaN beyond the rim.
 
         The point of the ellipsoid under (x, y) is so far below the plane as the smaller root of a
         quadratic equation says.
         """
         s, c, out, up = self._origin
-        stretch = 1.0 / (1.0 - E2)
+        stretch = 1.0 / (1.0 - E2)  # makes a sphere of radius A of the ellipsoid's squares
         outward, upward = out - north * s, up + north * c
         square = c * c + s * s * stretch
         half = outward * c + upward * s * stretch
@@ -80,7 +84,11 @@ def error_at(distance: float) -> float:
 
 
 def add_places(recording: Recording, plane: Plane, allocate: Allocate) -> Recording:
-    """The recording with latitude and longitude of the vessel; `allocate` makes their arrays."""
+    """The recording with latitude and longitude (rows,) [deg] of the vessel.
+
+    `plane` has the origin of x and y; `allocate` makes the arrays. Block by block, as a log may
+    exceed memory.
+    """
     rows = len(recording["time"])
     added = {signal.name: allocate(rows) for signal in PLACE}
     for part in blocks(rows):

@@ -47,7 +47,10 @@ class Finding:
 
 
 def merge_findings(findings: Mapping[str, Sequence[Finding]]) -> list[Finding]:
-    """Findings of several runs (by label), each once, with its runs unless all runs have it."""
+    """Findings of several runs (by label), each once, with its runs unless all runs have it.
+
+    Equal findings are those with the same code, key and sentence.
+    """
     alike: dict[Finding, list[str]] = {}
     for label, several in findings.items():
         for finding in dict.fromkeys(several):
@@ -136,12 +139,13 @@ warn_before_run, warn_after_run = _decorator("before"), _decorator("after")
 
 
 def rows_where(log: Recording, test: Callable[[Recording], Mask]) -> Mask:
-    """The rows that pass a test; it is applied block by block, as logs may exceed memory."""
+    """Which rows pass a test (rows,); it is applied block by block, as logs may exceed memory."""
     return np.concatenate([test(log.part(rows)) for rows in blocks(len(log["time"]))])
 
 
 def times_of(log: Recording, mask: Mask) -> str:
     """`at 3.1 s`, `from 3.1 s to 4 s`, `3 times between 3.1 s and 80 s`; `mask` is (rows,)."""
+    # Spans of True begin at even changes and end just before odd ones
     changes = np.flatnonzero(np.diff(mask, prepend=False, append=False))
     begins, ends = changes[::2], changes[1::2] - 1
     first, last = log["time"][begins[0]], log["time"][ends[-1]]

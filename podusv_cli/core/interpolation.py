@@ -5,6 +5,8 @@ from __future__ import annotations
 from podusv_cli.core.kernel import Vector, kernel
 
 
+# t and times (count) in the same unit. The place lies in [low, high) all along; before the first
+# time `low` stays 0.
 @kernel
 def segment(t: float, count: int, times: Vector) -> int:
     """Index of the last of `count` increasing times at or before t, by bisection; 0 before all."""
@@ -31,6 +33,8 @@ def passing_place(level: float, before: float, after: float) -> float:
     return (level - before) / (after - before)
 
 
+# s in [0, 1] is the share of the way; slopes are rates [of `before` a second], hence times
+# `length`.
 @kernel
 def cubic(
     s: float, length: float, before: float, after: float, slope_before: float, slope_after: float

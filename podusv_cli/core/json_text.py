@@ -24,7 +24,7 @@ def plain(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A value that JSON can hold; NaN and infinity become null."""
+    """A value that JSON can hold: arrays as lists, numpy's numbers as Python's, NaN as null."""
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -53,7 +53,10 @@ def whole_numbers(function: Any) -> frozenset[str]:
 
 
 def _globals_read(code: Any) -> frozenset[str]:
-    """Names of globals that code reads; `dis.get_instructions` takes ten times as long."""
+    """Names of globals that code reads; `dis.get_instructions` takes ten times as long.
+
+    Byte code is pairs of operation and argument; an argument above 255 has its higher bits ahead.
+    """
     names, high = set(), 0
     for operation, low in zip(code.co_code[::2], code.co_code[1::2], strict=True):
         argument = low | high
@@ -65,7 +68,10 @@ def _globals_read(code: Any) -> frozenset[str]:
 
 @cache
 def _read_in(code: Any) -> tuple[frozenset[str], frozenset[str]]:
-    """Names of globals that code reads, and of attributes that it makes whole numbers of."""
+    """Names of globals that code reads, and of attributes that it makes whole numbers of.
+
+    The latter are those of the form `int(k.count)`: the name `int`, a variable, an attribute of it.
+    """
     read = _globals_read(code)
     if "int" not in read:
         return read, frozenset()
@@ -168,7 +174,8 @@ def absent(name: str) -> Callable[[], None]:
 def taking(function: Any, arguments: Sequence[str], named: Any = None) -> Any:
     """A kernel that takes all of these arguments and passes `function` those that it names.
 
-    With `named` it passes `named(k)` for the constants k. Raises LawError as `arguments_of`.
+    With `named` it passes `named(k)` for the constants k. Raises LawError as `arguments_of`. Its
+    source is written out: compiled code has no calls by name.
     """
     passed = ", ".join(
         "named(k)" if a == "k" and named else a for a in arguments_of(function, arguments)
@@ -192,8 +199,8 @@ def with_globals(function: Any, name: str, **replaced: Any) -> Any:
 def transplant(function: Any, parts: Mapping[Any, Any]) -> Any:
     """A copy of a kernel, and of all kernels it calls, with other objects in place of some.
 
-    `parts` says what stands for a kernel, a module or a builtin. So the copy computes with other
-    things than numbers.
+    `parts` says what stands for a kernel, a module or a builtin, by identity. So the copy computes
+    with other things than numbers, as with symbols or with numbers that count.
     """
     replaced = {}
     for name in _globals_read(function.__code__):

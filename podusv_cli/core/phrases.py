@@ -19,7 +19,7 @@ def quote(text: str) -> str:
 
 
 def describe_found(content: Any, text: str) -> str:
-    """A value as its writer would recognise it; `text` is a scalar as written."""
+    """A value as its writer would recognise it, for a message; `text` is a scalar as written."""
     if isinstance(content, dict):
         return "a mapping of keys" if content else "an empty mapping"
     if isinstance(content, tuple):
@@ -70,7 +70,10 @@ SYNONYMS = {
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """`; did you mean 'length'?`, or nothing where no known word is close."""
+    """`; did you mean 'length'?`, or nothing where no known word is close.
+
+    A word with other case or underscores first, then a synonym, then one that is spelt alike.
+    """
     words = list(known)
     alike = [other for other in words if without_case(other) == without_case(word)]
     meant = [other for other in words if other == SYNONYMS.get(word.casefold())]
@@ -79,9 +82,9 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def unknown_word(what: str, word: str, known: Iterable[str], listed: str = "") -> str:
-    """`unknown key; did you mean 'length'? (allowed: ...)`.
+    """`unknown key; did you mean 'length'? (allowed: ...)`; `what` is the kind of word.
 
-    Of many words the nearest, if there is a command that lists all of them.
+    Of many words the nearest, if there is a command (`listed`) that lists all of them.
     """
     words = list(known)
     allowed = ", ".join(words)
@@ -110,7 +113,11 @@ HINTS: dict[type, tuple[tuple[str, str], ...]] = {
 
 
 def hint(text: str, types: Iterable[type]) -> str:
-    """`; leave out the quotes`, or nothing where the text looks like none of the types."""
+    """`; leave out the quotes`, or nothing where the text looks like none of the types.
+
+    `text` is what was written, `types` those of which one was wanted. The first form that fits
+    counts.
+    """
     hints = (hint for kind, hints in HINTS.items() if kind in types for hint in hints)
     fitting = (advice for form, advice in hints if re.fullmatch(form, text.strip(), re.IGNORECASE))
     advice = next(fitting, "")

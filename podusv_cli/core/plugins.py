@@ -145,7 +145,7 @@ def _execute_module(whole: str, path: str, text: str) -> ModuleType:
     try:
         exec(compile(text, module.__file__, "exec", dont_inherit=True), vars(module))  # noqa: S102
     except BaseException as error:
-        del sys.modules[whole]
+        del sys.modules[whole]  # so that a mended file is read anew
         if not isinstance(error, (Exception, SystemExit)):
             raise
         raise LawError(f"cannot be imported: {_fault(error, module.__file__)}") from error
@@ -153,11 +153,12 @@ def _execute_module(whole: str, path: str, text: str) -> ModuleType:
 
 
 def _fault(error: BaseException, path: str) -> str:
-    """What was raised, and in which line of the file."""
+    """What was raised, and in which line of the plug-in's file at `path`."""
     if isinstance(error, SyntaxError):  # which names its place
         return visible(f"{type(error).__name__}: {error}")
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == path]
     place = f" ({Path(path).name}, line {lines[-1]})" if lines else ""
+    # pydantic ends its messages with a hint at a page of its own
     message = " ".join(str(error).split("\n\nFor further information")[0].split())
     return visible(f"{type(error).__name__}: {message}{place}")
 
@@ -215,7 +216,10 @@ def package_files(package: Plugin) -> dict[str, Path]:
 def _modules(
     points: Iterable[tuple[str, EntryPoint]],
 ) -> Iterator[tuple[str, bool, list[tuple[Path, Path]]]]:
-    """The modules that hold entry points: name, whether it is a folder, what is in it by name."""
+    """The modules that hold entry points: name, whether it is a folder, its files with their names.
+
+    `points` are rooms and entry points. A package may be spread over several folders.
+    """
     for top in sorted({point.module.partition(".")[0] for _, point in points}):
         spec = find_spec(top)
         folders = (spec and spec.submodule_search_locations) or ()

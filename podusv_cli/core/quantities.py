@@ -28,7 +28,10 @@ def raise_powers(unit: str) -> str:
 
 
 def letters_of_symbol(symbol: str) -> list[tuple[str, str]]:
-    """The symbol of a signal as text: what stands on the line, and what below it, in turns."""
+    """The symbol of a signal (LaTeX) as text: pairs of what stands on the line and below it.
+
+    Commands become letters, accents combining marks behind their letter, powers raised digits.
+    """
     plain = re.sub(
         r"\\([A-Za-z]+) ?", lambda m: ACCENTS.get(m[1], html5.get(f"{m[1]};", m[1])), symbol
     )

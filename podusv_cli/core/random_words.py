@@ -46,6 +46,7 @@ def gauss_markov(stream: tuple[int | str, ...], count: int, lag: float) -> Vecto
     `lag` is the time between two of its numbers in time constants. The steps are exact for any lag:
     x+ = exp(-lag) x + sqrt(1 - exp(-2 lag)) n.
     """
+    # The first number has variance 1 already; the others are noise until the loop adds what is kept
     kept, process = exponential(-lag), normals(stream, 0, count)
     process[1:] *= math.sqrt(1.0 - kept * kept)
     for i in range(1, count):

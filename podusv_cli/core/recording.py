@@ -53,7 +53,7 @@ class Recording:
         return replace(self, signals={n: a[rows] for n, a in self.signals.items()})
 
     def row_at(self, place: Mapping[str, float]) -> int | None:
-        """The first row that is at a place; None where none is, and in a log without such places.
+        """Index of the first row that is at a place; None where none is, or no log of such places.
 
         `place` has numbers of signals by name. A row is there where they are reached; the first
         that differs decides. See `Path.passed_by`.

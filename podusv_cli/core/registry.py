@@ -31,6 +31,8 @@ Named = TypeVar("Named")
 def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, type[Kind]]:
     """Every component class of `package` and the plug-ins that derives from `base`, by its `kind`.
 
+    Sorted by kind, so that schemas and pages do not depend on the order of files.
+
     Raises LawError for a module that cannot be imported and for a kind that is not unique.
     """
     by_kind: dict[str, type[Kind]] = {}
@@ -131,7 +133,10 @@ def _places_of_objects(package: str, plugins: Plugins) -> Iterator[tuple[str, An
 
 @cache
 def scan_package(package: str) -> tuple[tuple[str, Any], ...]:
-    """What podusv's own modules of a package define, each with its module; looked up once."""
+    """What podusv's own modules of a package define: names of modules, with each thing in them.
+
+    Looked up once. Things that a module imports are among them.
+    """
     return tuple(
         (module.name, thing)
         for module in iter_modules(import_module(package).__path__, f"{package}.")

@@ -17,7 +17,10 @@ NAME_IN_WORDS = "is at most 64 letters, digits and '_', starting with a letter"
 
 
 def check_words(kind: str, name: str, *texts: str) -> None:
-    """Raise ValueError where no log or table can hold the name, or a text beside it."""
+    """Raises ValueError where no log or table can hold the name, or a text beside it.
+
+    `kind` is what messages call it: signal or metric.
+    """
     if not NAME.fullmatch(name):
         raise ValueError(f"the name of a {kind} {NAME_IN_WORDS}, found {name!r}")
     for text in texts:
@@ -108,7 +111,9 @@ LOOP = (
 def by_name(declared: Iterable[tuple[Callable[[], str], Iterable[Signal]]]) -> dict[str, Signal]:
     """Signals of the parts of one log, by name.
 
-    Raises LawError where two have the same name; what a part is called is only asked then.
+    `declared` are pairs of what a part is called and its signals. Raises LawError where two have
+    the same name; what a part is called is only asked then. The numbers of one vector, which have
+    the same signal in the same part, come once.
     """
     owners: dict[str, tuple[Callable[[], str], Signal]] = {}
     for part, signals in declared:

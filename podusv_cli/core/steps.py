@@ -6,7 +6,10 @@ import math
 
 
 def whole_steps(duration: float, step: float) -> int | None:
-    """How many steps make `duration` (both in s), or None where it is no whole number of them."""
+    """How many steps make `duration` (both in s), or None where it is no whole number of them.
+
+    Up to rounding: 1e-9 of the duration.
+    """
     steps = duration / step
     if not math.isfinite(steps):
         return None

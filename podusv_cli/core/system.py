@@ -131,9 +131,10 @@ def relative_path(path: str | Path, folder: str | Path = ".") -> str:
 
 
 def rename_folder(folder: Path, final: Path) -> None:
-    """Give a folder another name, in place of an empty folder if there is one. Raises OSError.
+    """Give `folder` the name `final`, in place of an empty folder if there is one. Raises OSError.
 
-    Windows replaces no folder, and renames none while a file in it is open.
+    Windows replaces no folder, and renames none while a file in it is open: there it is tried
+    several times.
     """
     if os.name != "nt":
         os.rename(folder, final)

@@ -26,7 +26,7 @@ class TextLine(NamedTuple):
 
 
 def timed_rows(text: str, noun: str, layouts: Layouts, scales: ScaledUnits = NONE) -> Vector:
-    """The rows, each with as many numbers as one of `layouts`, in the order of its columns.
+    """The rows (rows, columns), as many columns as one of `layouts` has, in its order and units.
 
     The names in a header say which column is which, and in brackets its unit where that is another
     one, as `n_1 [rpm]`; `scales` are further units. `noun` is what the text is called. Raises
@@ -43,6 +43,7 @@ def timed_rows(text: str, noun: str, layouts: Layouts, scales: ScaledUnits = NON
         names = layouts[rows.shape[1]]
         header, units = _in_own_units(header, names, scales)
         named = rows[:, : len(units)]  # a header may leave the gains of a motion out
+        # In place, as `named` is a view: the rows themselves change
         named[:] = (named - [unit.zero for unit in units]) * [unit.factor for unit in units]
         rows = _in_order(rows, columns(header, names, noun), header, noun)
     late = np.flatnonzero(np.diff(rows[:, 0]) <= 0.0)
@@ -60,7 +61,7 @@ class NamedRows(NamedTuple):
 
 
 def named_rows(text: str, noun: str) -> NamedRows:
-    """The rows under the names in the first line; `noun` is what the text is called.
+    """The rows (rows, names) under the names in the first line; `noun` is what the text is called.
 
     Raises ValueError, which does not repeat the text but for names.
     """
@@ -102,7 +103,10 @@ def _is_number(cell: str) -> bool:
 
 
 def _check_counts(lines: list[TextLine], noun: str, layouts: Layouts) -> None:
-    """Raises ValueError for a line with another number of cells than a layout allows."""
+    """Raises ValueError for a line with another number of cells than a layout allows.
+
+    All lines must have the same number, that of one of the layouts.
+    """
     for number, cells in lines:
         if len(cells) not in layouts or len(cells) != len(lines[0].cells):
             wanted = " or ".join(f"{n} ({_list_names(names)})" for n, names in layouts.items())
@@ -127,7 +131,7 @@ def _numbers(lines: list[TextLine], noun: str) -> Vector:
 
 
 def _wrong_cell(lines: list[TextLine], noun: str) -> str:
-    """Where a cell is no number; empty where all are."""
+    """Where the first cell is that is no number, for a message; "" where all are."""
     for number, cells in lines:
         for column, cell in enumerate(cells, 1):
             if not _is_number(cell):
@@ -152,7 +156,8 @@ def _in_own_units(
 ) -> tuple[TextLine, list[Scale]]:
     """The header with the units that columns of these names have, and the scale to each.
 
-    `time`, as logs call it, is `t`.
+    `names` are podusv's, each with its unit; `scales` are further units by column and unit. A cell
+    with a unit that nobody knows stays, for `columns` to refuse. `time`, as logs call it, is `t`.
     """
     own = dict(map(_split_unit, names))
     cells = [re.sub(r"^time(?= \[|$)", "t", " ".join(cell.split())) for cell in header.cells]
@@ -173,7 +178,7 @@ def _split_unit(cell: str) -> tuple[str, str]:
 
 
 def columns(header: TextLine, names: Sequence[str], noun: str) -> list[int]:
-    """Where the header has these columns. A name stands with its unit, `b_u [N]`, or without.
+    """Positions in the header of these columns. A name stands with its unit, `b_u [N]`, or without.
 
     Raises ValueError where one is missing, unknown or given twice.
     """

@@ -122,7 +122,10 @@ def split_quantity(text: str) -> tuple[str, str] | None:
 
 
 def number(text: str, unit: str) -> int | float | None:
-    """A number with a unit in podusv's `unit`, rounded once; None where the unit does not fit."""
+    """A number with a unit in podusv's `unit`, rounded once; None where the unit does not fit.
+
+    A whole number in the own unit stays one, since a count may be wanted.
+    """
     parts = split_quantity(text)
     factor = units_allowed_for(unit).get(spell_unit(parts[1])) if parts else None
     if parts is None or factor is None or not math.isfinite(float(parts[0])):
@@ -134,7 +137,10 @@ def number(text: str, unit: str) -> int | float | None:
 
 
 def pattern(unit: str) -> str:
-    """What a number with a unit that fits matches, as a regular expression of JSON schemas."""
+    """A regular expression of JSON schemas that a number with a fitting unit matches.
+
+    With all spellings, and signs that the table has not.
+    """
     ways = [way for way in units_allowed_for(unit) if way != PURE]
     ways += [other for other, way in SPELLINGS.items() if way in ways]
     ways += [sign for sign, way in (("°", "deg"), ("°/s", "deg/s")) if way in ways]
@@ -143,7 +149,10 @@ def pattern(unit: str) -> str:
 
 
 def misfit(text: str, unit: str) -> str:
-    """Why a number with a unit is none in podusv's `unit`, and what would be; else empty."""
+    """Why a number with a unit is none in podusv's `unit`, and what would be; "" where it fits.
+
+    Also empty for a text that is no number with a unit.
+    """
     parts = split_quantity(text)
     if parts is None or number(text, unit) is not None:
         return ""

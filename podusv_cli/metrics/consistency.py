@@ -25,7 +25,8 @@ NOW = BEFORE + 2 * SIX
 SIZE = NOW + 2 * SIX
 
 
-# packed: the upper triangle, row by row, of a matrix (order, order). Writes lower (6, 6).
+# packed: the upper triangle, row by row, of a matrix (order, order). Writes lower (6, 6). Entry (j,
+# i) of the triangle stands at order j - j (j - 1)/2 + i - j.
 @kernel
 def factor(packed: Vector, order: int, lower: Vector) -> bool:
     """Cholesky factor of the first six rows of a packed upper triangle; whether there is one."""
@@ -40,7 +41,7 @@ def factor(packed: Vector, order: int, lower: Vector) -> bool:
     return True
 
 
-# error (6) is overwritten; lower (6, 6) as `factor` writes it.
+# error (6) is overwritten; lower (6, 6) as `factor` writes it. With P = L L^T it is |L^-1 error|^2.
 @kernel
 def normalised_square(error: Vector, lower: Vector) -> float:
     """error^T P^-1 error, with the factor of P."""
@@ -87,7 +88,7 @@ def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vecto
 
 
 def _size(layout: Measured) -> int:
-    """How many numbers are gathered: none where the estimator has no covariance."""
+    """How many numbers are gathered; none where the estimator has no covariance."""
     return SIZE if layout.plan.estimate and layout.loop.estimator.covariance[1] else 0
 
 

@@ -49,13 +49,14 @@ def add(seen: Vector, integrals: int, position: int, amount: float) -> None:
 
 
 def close_integrals(seen: Vector, integrals: int, step: float) -> Vector:
-    """The gathered numbers, with half a weight for the last instant of a run that was cut short.
+    """The gathered numbers (a copy), with half a weight for the last instant of a run cut short.
 
     The engine gives half a weight only to the last instant of the grid. `seen` (numbers,) is of a
     run, or (numbers, runs) of several; `step` in s.
     """
     whole, added = seen.copy(), seen[integrals : 2 * integrals]
     if integrals:
+        # The very first integral is the time, so its last amount tells the last instant's weight
         at_end = (whole[0] > added[0]) & (added[0] == 0.5 * step)
         sums = whole[:integrals]
         with np.errstate(all="ignore"):  # nothing was added, or the run diverged

@@ -122,9 +122,12 @@ setattr(Counted, "__array_ufunc__", _of_numpy)  # noqa: B010 - as the others
 
 @np.errstate(all="ignore")
 def operations(plan: Plan, recording: Recording) -> dict[str, float]:
-    """The metric of this run's law, by its name."""
+    """The metric of this run's law, by its name, counted at the middle row of the log.
+
+    Errors of numbers are let pass: a law may divide by 0.
+    """
     law, tally = plan.loop.controller, OperationTally()
-    rows = logged_rows(plan, recording, 3)
+    rows = logged_rows(plan, recording, 3)  # first, middle, last
     t, target, state, memory = np.split(rows[len(rows) // 2], ENDS)
     constants = plan.law_constants
     vectors = {

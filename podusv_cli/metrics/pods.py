@@ -13,7 +13,8 @@ TIME, ENERGY, SPEED, ANGLE, RATE, INTEGRALS = range(6)
 TRAVEL, LAST_DELTA = 2 * INTEGRALS, 2 * INTEGRALS + 1  # the last angle of every pod
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. The states of pods follow the vessel's
+# six: speeds, then angles. The energy is one of all pods, so its last amount is added up here.
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather energy, the travel of the angles, and the time at each limit."""

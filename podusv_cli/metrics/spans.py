@@ -50,7 +50,9 @@ def is_passed(s: Vector, at: int, least: float, then_at: int, then_least: float)
 
 
 # Arguments as those of `all_kernels`. seen begins with LATE and OVER, which say where on the path
-# the run is.
+# the run is. Until the last part of the way begins, the steady window is that of time; then it
+# begins anew, so a vessel that never comes there has the last part of the time. The instant at
+# which the path is over counts.
 @kernel
 def by_path(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Show every instant to all kernels, up to that at which the path is over."""
@@ -66,9 +68,10 @@ def by_path(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vecto
 
 
 def _mark(layout: Measured, share: float) -> dict[str, float]:
-    """A place of the path as constants of a kernel; none where the path has no end.
+    """A place of the path as constants of a kernel (`MARK`); none where the path has no end.
 
-    Raises LawError for what the path does not say in one or two of its places.
+    The `share` of the way lies behind it. Raises LawError for what the path does not say in one or
+    two of its places.
     """
     names = [signal.name for signal in layout.loop.path.places]
     place = layout.loop.passed_by(share)
@@ -77,12 +80,13 @@ def _mark(layout: Measured, share: float) -> dict[str, float]:
         what = f"passed_by({share:g}) returns {given}; at most two are allowed, of its places"
         raise LawError(f"{what} ({known})")
     marks = [(float(layout.plan.place + names.index(name)), x) for name, x in place.items()]
+    # A second number that is not given is always reached: anything is above minus infinity
     first, then = (*marks, *[(0.0, -math.inf)] * 2)[:2]
     return dict(zip(MARK, (*first, *then), strict=True)) if marks else {}
 
 
 def constants(layout: Measured) -> dict[str, float]:
-    """The constants of `by_time` or `by_path`."""
+    """The constants of `by_time` or `by_path`: where in time and on the path windows begin."""
     marks = {"late": 1.0 - layout.steady_fraction, "over": 1.0}
     return {"steady_from": layout.steady_from} | {
         f"{name}_{key}": number

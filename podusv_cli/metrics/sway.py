@@ -74,7 +74,10 @@ def _size_of_use(layout: Measured) -> int:
 
 
 def _limits(layout: Measured) -> dict[str, float]:
-    """The column of the loads, and the actuator's limits; 1 of one that has no sway force."""
+    """The column of the loads, and the actuator's limits [N, N, N m]; 1 of a sway force it lacks.
+
+    Limits come in the order of a demand, yaw before sway.
+    """
     u, r, v = (*layout.loop.actuator.limits(), 1.0)[:3]
     return {"tau": float(layout.plan.tau), "limit_u": u, "limit_v": v, "limit_r": r}
 

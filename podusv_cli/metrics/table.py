@@ -82,7 +82,8 @@ def call_both(
 def _watch(parts: Parts) -> Callable[..., None]:
     """One kernel that calls those of all parts, each with the numbers that follow the last's.
 
-    How many numbers the last part gathers is no part of the code.
+    It is nested, one level a part, because compiled code cannot loop over functions. How many
+    numbers the last part gathers is no part of the code.
     """
     if not parts:
         return first_kernel
@@ -161,7 +162,10 @@ class Metrics(Probe):
         return numbers
 
     def one(self, name: str, seen: Vector) -> Vector:
-        """The metric of this name (runs,) from `seen` (numbers, runs); NaN where undefined."""
+        """The metric of this name (runs,) from `seen` (numbers, runs); NaN where undefined.
+
+        All NaN for a metric that this probe does not gather.
+        """
         metric, begin = self.known[name], self.ahead
         for part, size in self.parts:
             if part is metric.accumulator:
@@ -186,9 +190,9 @@ class Metrics(Probe):
         return numbers
 
     def _close_integrals(self, seen: Vector) -> Iterator[tuple[Metric, Vector]]:
-        """Each metric with the gathered numbers of its accumulator, integrals closed, a row a run.
+        """Each metric with its accumulator's numbers (runs, size), integrals closed.
 
-        `seen` has a row a run, too.
+        `seen` is (runs, numbers).
         """
         begun = (seen != self._first).any(axis=1, keepdims=True)
         seen = np.where(begun, seen, np.nan)  # no instant at all: NaN
@@ -214,7 +218,8 @@ def metrics_probe(
 ) -> Metrics:
     """The probe of those of the known metrics that this loop has.
 
-    It serves all loops of the same structure: each has constants of its own. Raises LawError for a
+    `steady_fraction` is the last part of the run that counts as steady, `settling_radius` in m. It
+    serves all loops of the same structure: each has constants of its own. Raises LawError for a
     metric whose accumulator does not answer.
     """
     since = plan.grid.last_part(steady_fraction)
@@ -237,7 +242,7 @@ def metrics_probe(
         layout=layout,
         ahead=ahead,
     )
-    metrics.constants_for(plan.loop)
+    metrics.constants_for(plan.loop)  # for the errors that it raises, before any run
     return metrics
 
 
@@ -254,7 +259,7 @@ def _accumulators(known: Mapping[str, Metric]) -> dict[Accumulator, str]:
 
 
 def _asked_span(layout: Measured) -> dict[str, float]:
-    """The constants that tell which instants count."""
+    """The constants that tell which instants count. Raises LawError where the path fails."""
     try:
         return spans.constants(layout)
     except Exception as error:  # a plug-in's path may raise anything
@@ -267,7 +272,10 @@ def _asked_span(layout: Measured) -> dict[str, float]:
 def _ask_accumulator(
     part: Accumulator, metric: str, layout: Measured
 ) -> tuple[int, dict[str, float]]:
-    """How many numbers an accumulator gathers in a loop, and its constants; none for 0 numbers."""
+    """How many numbers an accumulator gathers in a loop, and its constants; none for 0 numbers.
+
+    `metric` names one that is computed from it, for messages. Raises LawError where it fails.
+    """
     if part.of_target and not layout.loop.has_target:
         return 0, {}
     try:

@@ -37,6 +37,7 @@ def begin(t: float, s: Vector, k: Any, seen: Vector) -> bool:
 
 
 # share of the step [1], t [s], before [m/s]; seen has the way and time of the last instant. In m.
+# The speed changes linearly over a step, so the mean of both ends serves.
 @kernel
 def last_part(share: float, t: float, before: float, seen: Vector) -> float:
     """Of the way of the last step what lies beyond a share of it; `before` is the speed before."""
@@ -44,7 +45,8 @@ def last_part(share: float, t: float, before: float, seen: Vector) -> float:
     return float(0.5 * (at + seen[SPEED]) * (1.0 - share) * (t - seen[LATEST]))
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. The numbers at 90 and 180 deg lie on
+# straight lines between the two instants around them.
 @kernel
 def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the way along and across the approach at turns by 90 and 180 degrees."""
@@ -64,7 +66,8 @@ def watch_turn(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
         seen[LATEST] = t
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. PHASE counts executes: after an even
+# number of reversals the heading goes to starboard.
 @kernel
 def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather how far the heading goes on after the second and third execute."""
@@ -115,7 +118,7 @@ def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Ve
 
 
 def _sizes(manoeuvre: str, size: int) -> Any:
-    """How many numbers are gathered: none in other trials."""
+    """A function of a loop: how many numbers are gathered, `size` in this trial, none in others."""
 
     def size_of(layout: Measured) -> int:
         """The size in a run of this manoeuvre, else 0."""
@@ -134,7 +137,10 @@ def _constants(layout: Measured) -> dict[str, float]:
 def _number(
     of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
 ) -> Metric:
-    """The number gathered at this position, first in tables; NaN where a trial got not so far."""
+    """The metric of the number gathered at a position, first in tables.
+
+    NaN where the trial did not get so far: then the number is still 0.
+    """
     per = math.degrees(1.0) if unit == "deg" else 1.0
     return Metric(
         name,

@@ -124,7 +124,7 @@ def _at(position: int) -> Callable[[Vector], float]:
 def _name_metric(
     template: Metric, name: str, meaning: str, of: Accumulator, result: Result, words: str
 ) -> Metric:
-    """A metric of a family under the name that a scenario asked for."""
+    """A metric of a family under the name that a scenario asked for; it replaces NAMED."""
     return replace(
         template,
         name=template.name.replace(NAMED, name),
@@ -136,7 +136,7 @@ def _name_metric(
 
 
 def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> tuple[Metric, ...]:
-    """The metrics of a window whose numbers stand at this place."""
+    """The metrics of the window `name`, from `start` to `to` [s], whose numbers stand at `at`."""
     span = f"from {start:g} s to {to:g} s"
     rms, largest, beyond = (_over(to, at, f) for f in (_rms, _at(LARGEST), _at(BEYOND)))
     return (
@@ -156,7 +156,7 @@ def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> 
 
 
 def _of_radius(name: str, radius: float, of: Accumulator, at: int) -> Metric:
-    """The metric of a radius whose numbers stand at this place."""
+    """The metric of the `radius` [m] called `name`, whose numbers stand at `at`."""
     meaning = f"time from which z_e stays within {radius:g} m"
     return _name_metric(
         SETTLED,
@@ -170,7 +170,8 @@ def _of_radius(name: str, radius: float, of: Accumulator, at: int) -> Metric:
 
 @cache  # a probe finds an accumulator's numbers by the accumulator itself
 def accumulator(windows: Windows, radii: Radii) -> Accumulator:
-    """What gathers for these windows and radii; also for none, so that the code is the same."""
+    """What gathers for these windows [s] and radii [m]; also for none, so the code is the same."""
+    # The first numbers carry the ends and the radii: they are data of the run, not of the code
     blank = [0.0] * EACH
     of_windows = [x for _, ends in windows for x in (*ends, *[0.0] * (WINDOW - 2))]
     of_radii = [x for _, radius in radii for x in (radius, *[0.0] * SETTLING)]
@@ -188,7 +189,7 @@ def accumulator(windows: Windows, radii: Radii) -> Accumulator:
 
 @cache
 def metrics_of_windows(windows: Windows, radii: Radii) -> dict[str, Metric]:
-    """The metrics of these windows and radii, by name."""
+    """The metrics of these windows and radii, by name, with places in `accumulator`'s numbers."""
     of, after = accumulator(windows, radii), EACH + WINDOW * len(windows)
     metrics = [
         metric
@@ -202,7 +203,10 @@ def metrics_of_windows(windows: Windows, radii: Radii) -> dict[str, Metric]:
 
 
 def find(name: str, known: Mapping[str, Metric]) -> Metric | None:
-    """The metric of this name, of which a scenario may have chosen a part; None for no metric."""
+    """The metric of this name; None for no metric.
+
+    A name that a scenario chose, as `error_approach_rms`, fits the family `error_NAME_rms`.
+    """
     word = "[a-z][a-z0-9_]*"
     fits = (m for m in known.values() if re.fullmatch(m.name.replace(NAMED, word), name))
     return known.get(name) or next(fits, None)

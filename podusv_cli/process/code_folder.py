@@ -33,7 +33,7 @@ MARKED = b"Signature: 8a477f597d28d172789f06886806bc55\n# Compiled code of podus
 def code_folder(name: str) -> Path | None:
     """The folder `name` in $PODUSV_CACHE, else in podusv under $XDG_CACHE_HOME or ~/.cache.
 
-    On Windows under %LOCALAPPDATA% in place of the last.
+    On Windows under %LOCALAPPDATA% in place of the last. It is made if it is not there.
 
     None where neither will do. A line on stderr says why a place was passed over, and what is used.
     """
@@ -86,8 +86,8 @@ def _roots() -> Iterator[Path]:
 
 
 def _make_folder(root: Path, name: str) -> Path:
-    """The folder, there, safe, marked, and rid of what is old. Raises OSError."""
-    _check(root)
+    """The folder `name` in `root`: there, safe, marked, and rid of what is old. Raises OSError."""
+    _check(root)  # before anything is made in a folder that is not the user's
     root.mkdir(parents=True, exist_ok=True, mode=0o700)
     folder = root / name
     folder.mkdir(exist_ok=True, mode=0o700)
@@ -101,7 +101,10 @@ def _make_folder(root: Path, name: str) -> Path:
 
 
 def _check(folder: Path) -> None:
-    """Raise PermissionError where somebody else owns this folder or can write into it."""
+    """Raises PermissionError where somebody else owns this folder or can write into it.
+
+    A folder that is not there yet will do.
+    """
     with suppress(FileNotFoundError):
         status = folder.stat()
         _demand(stat.S_ISDIR(status.st_mode), f"{folder} is not a folder")

@@ -53,7 +53,10 @@ class Extras:
         return None
 
     def attempt(self, what: str, work: Callable[[], Result]) -> Result | None:
-        """The same for work that an interrupt may end: None then, and nothing in `missing`."""
+        """The same for work that an interrupt may end: None then, and nothing in `missing`.
+
+        After an interrupt no further work is begun.
+        """
         if self.interrupted:
             return None
         with interrupts_caught() as here:

@@ -38,6 +38,7 @@ class Interrupts:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal."""
+        # A signal soon after the last belongs to the same interrupt
         if self.ending or time.monotonic() - self._last < SAME_INTERRUPT:
             return
         if self.number:
@@ -66,7 +67,11 @@ def _end_process(number: int) -> None:
 
 @contextmanager
 def interrupts_caught() -> Iterator[Interrupts]:
-    """Signals go to the `Interrupts` already installed, or else to a new one."""
+    """Signals go to the `Interrupts` already installed, or else to a new one for this block.
+
+    Nested blocks share one, so that a second interrupt is known as such. At the end the handlers of
+    before are back, unless the process is about to exit.
+    """
     handlers = (signal.getsignal(number) for number in SIGNALS)
     caught = (handler for handler in handlers if isinstance(handler, Interrupts))
     there = next((handler for handler in caught if not handler.ending), None)
@@ -110,7 +115,10 @@ def interrupts_enabled() -> AbstractContextManager[None]:
 
 @contextmanager
 def _deferring(deferred: bool) -> Iterator[None]:
-    """Defer interrupts, or not, inside the block; one that waits is raised at its ends."""
+    """Defer interrupts, or not, inside the block; one that waits is raised at its ends.
+
+    The state of before comes back, so blocks can be nested.
+    """
     with interrupts_caught() as here:
         before, here.deferred = here.deferred, deferred
         try:

@@ -17,7 +17,11 @@ class _JobPickler(cloudpickle.Pickler):  # type: ignore[misc]  # it has no types
     """Functions within functions go by value; what a plug-in file has, by its path and text."""
 
     def reducer_override(self, obj: Any) -> Any:
-        """How an object is made again in the other process, where its class leaves that open."""
+        """How `obj` is made again in the other process; as cloudpickle does it, but for plug-ins.
+
+        A class or function at the top of a plug-in's file is read from its text there. What lies
+        within a function has `<locals>` in its name, and goes by value.
+        """
         if isinstance(obj, (type, FunctionType)) and "<" not in obj.__qualname__:
             module = sys.modules.get(obj.__module__)
             if module and TEXT in vars(module):

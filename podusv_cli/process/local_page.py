@@ -70,7 +70,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(200, self.server.page, "text/html; charset=utf-8")
 
     def do_POST(self) -> None:
-        """An answer of the main thread."""
+        """An answer of the main thread, which the thread of this question waits for.
+
+        Only the page itself may ask: another page cannot send JSON without leave, nor our origin.
+        """
         if not self._is_known() or (size := self._size()) is None:
             return
         kind, origin = self.headers.get("Content-Type"), self.headers.get("Origin")
@@ -86,7 +89,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(*answer.get())
 
     def _is_known(self) -> bool:
-        """Whether it is asked under its own name, which a page elsewhere cannot do, and token."""
+        """Whether it is asked under its own name, which a page elsewhere cannot do, and token.
+
+        The token is compared in constant time. Else it is refused.
+        """
         base = self.server.base.encode()
         token = self.path.encode()[: len(base)]
         known = self.headers.get("Host") in self.server.hosts
@@ -141,7 +147,7 @@ def serve(
 
 
 def _answer_questions(server: _Server, answer: Answer) -> None:
-    """Answer what is asked, one question after the other, until Ctrl-C."""
+    """Answer what is asked, one question after the other, until Ctrl-C raises KeyboardInterrupt."""
     while True:
         try:
             name, asked, waiting = server.jobs.get(timeout=GLANCE)

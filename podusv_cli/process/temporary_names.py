@@ -49,7 +49,10 @@ def remove_abandoned_files(folder: Path) -> None:
 
 
 def _machine() -> str:
-    """The machine, or the container on it, within which process numbers are unique."""
+    """Eight digits for the machine, or the container on it, where process numbers are unique.
+
+    A container has a name space of process numbers of its own.
+    """
     names = [platform.node()]
     with suppress(OSError):
         names.append(str(os.stat("/proc/self/ns/pid").st_ino))

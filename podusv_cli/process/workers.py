@@ -90,10 +90,12 @@ def run_shares(
 ) -> list[Outcome]:
     """Run small jobs, several in a process, so that they share what it has loaded and cached.
 
-    `progress` is called with the fraction of jobs that are over. If a process is killed, each of
-    its jobs runs again in a process of its own. Jobs start with interrupts deferred.
+    The outcomes are in the order of the jobs. `progress` is called with the fraction of jobs that
+    are over. If a process is killed, each of its jobs runs again in a process of its own. Jobs
+    start with interrupts deferred.
     """
     count = min(workers or available_workers(), -(-len(jobs) // SHARE))
+    # Every count-th job: neighbours, which often take as long, go to different processes
     shares = [range(first, len(jobs), count) for first in range(count)]
     done = dict.fromkeys(range(count), 0.0)
 
@@ -245,7 +247,10 @@ def workers_inherit() -> bool:
 
 @contextmanager
 def _without_main() -> Iterator[None]:
-    """A spawned process would first run the user's script once more, which no job needs."""
+    """Hide the main module for as long as a process is spawned.
+
+    The process would first run the user's script once more, which no job needs.
+    """
     before = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
     try:
@@ -283,7 +288,10 @@ class _Pool:
         return bool(self.running)
 
     def receive(self, ready: Iterable[Any]) -> None:
-        """Read one message from each pipe: progress, an outcome, or the end of the pipe."""
+        """Read one message from each pipe: progress (a float), an outcome, or the end of the pipe.
+
+        A job whose process was killed runs once more, then has an outcome that says so.
+        """
         for pipe in ready:
             number, job, process = self.running[pipe]
             try:
@@ -304,7 +312,10 @@ class _Pool:
             self._done(number, message or Outcome(failure=killed, killed=True))
 
     def interrupt(self) -> None:
-        """Interrupt all processes and collect what they return within GRACE seconds."""
+        """Interrupt all processes and collect what they return within GRACE seconds.
+
+        Their outcomes count as interrupted, and no job is tried again.
+        """
         self._progress, done = lambda number, fraction: None, self._done
         self._done = lambda number, outcome: done(number, replace(outcome, interrupted=True))
         self._tries.update(dict.fromkeys((number for number, _, _ in self.running.values()), TRIES))
@@ -354,7 +365,10 @@ def _send_outcome(job: Job, pipe: Pipe, interrupts: Interrupts) -> None:
 
 
 def outcome_of(job: Job, progress: Progress, interrupts: Interrupts) -> Outcome:
-    """Run a job; its result, or why it has none."""
+    """Run a job; its result, or why it has none.
+
+    Raises BrokenPipeError where the parent has ended, since nobody waits for the outcome then.
+    """
     try:
         return Outcome(job(progress))
     except BrokenPipeError:

@@ -34,7 +34,7 @@ class Ranking:
 
 
 def ranking(estimates: Mapping[str, StepEstimate]) -> Ranking | None:
-    """The ranking by one metric; None where fewer than two runs have it."""
+    """The ranking by one metric, its estimates by label; None where fewer than two have it."""
     known = {label: e for label, e in estimates.items() if not e.undefined}
     if len(known) < 2:
         return None

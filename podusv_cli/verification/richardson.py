@@ -50,7 +50,7 @@ class StepEstimate:
         return self.relative <= tolerance
 
     def sufficient(self, tolerance: float) -> float:
-        """The part of the first step at which the error is within the tolerance, by the order.
+        """The part of the first step at which the error is within the tolerance: error ~ h^order.
 
         NaN without an order, 1 where it is within it already.
         """
@@ -76,7 +76,10 @@ def estimate(values: Sequence[float], floor: float = FLOOR) -> StepEstimate:
 
 
 def estimate_position(positions: Sequence[np.ndarray], length: float) -> StepEstimate:
-    """Order and error of a point; `values` are distances [m] to the point of the finest run."""
+    """Order and error of a point; `values` are distances [m] to the point of the finest run.
+
+    `positions` (2,) [m] are those at the three steps, `length` [m] the scale of the relative error.
+    """
     a, b, c = positions
     coarse, fine = math.dist(a, b), math.dist(b, c)
     return _estimate((math.dist(a, c), fine, math.dist(c, c)), coarse, fine, length)
@@ -91,6 +94,7 @@ def _estimate(
     """
     if not math.isfinite(coarse + fine):
         return StepEstimate(values, math.nan, math.inf, scale)
+    # Below this a difference is rounding; it also keeps the logarithm from a difference of 0
     negligible = ROUNDING * max(scale, coarse, fine)
     if max(coarse, fine) <= negligible:
         return StepEstimate(values, math.nan, max(coarse, fine), scale)

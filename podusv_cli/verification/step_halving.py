@@ -44,7 +44,10 @@ def refine_grid(scenario: Scenario, halvings: int) -> TimeGrid:
 
 
 def run_level(scenario: Scenario, halvings: int, progress: Progress | None = None) -> Level:
-    """Run a scenario of one law with its step halved `halvings` times."""
+    """Run a scenario of one law with its step halved `halvings` times.
+
+    A run that did not finish has no metrics and NaN for its end; no error is raised.
+    """
     plan = scenario.plan(refine_grid(scenario, halvings))
     out = to_end(plan, compiled=scenario.simulation.compiled, progress=progress)
     seen = out.seen if out.status == "finished" else None

@@ -77,6 +77,7 @@ class Verification:
         parts = [
             e.sufficient(self.tolerance) for r in self.runs.values() for e in r.estimates.values()
         ]
+        # NaN first: where one number has no order, none is known
         least = min(parts, key=lambda part: (not math.isnan(part), part), default=1.0)
         return first.levels[0].step * least if 0.0 < least < 1.0 else None
 
@@ -104,7 +105,11 @@ class Verification:
 def verify(
     scenario: Scenario, tolerance: float, progress: Callable[[str, float], None] | None = None
 ) -> Verification:
-    """Verify every run of a scenario: its one law, or all of `controllers`. Raises LawError."""
+    """Verify every run of a scenario: its one law, or all of `controllers`.
+
+    `tolerance` is that of the relative error; `progress` hears a run's label and the fraction done.
+    Raises LawError.
+    """
     singles = scenario.singles()
     for single in singles.values():
         single.ready()
@@ -123,7 +128,7 @@ def verify(
 
 
 def check(scenario: Scenario, progress: Progress | None = None) -> RunVerification:
-    """Verify one run."""
+    """Verify the run of a scenario of one law: three runs with ever smaller steps."""
     work = [2.0**n for n in range(LEVELS)]  # a halved step costs twice as much
     levels = [
         run_level(scenario, n, _part(progress, sum(work[:n]), work[n], sum(work)))
@@ -140,7 +145,10 @@ def check(scenario: Scenario, progress: Progress | None = None) -> RunVerificati
 
 
 def floor_of(unit: str, length: float, duration: float) -> float:
-    """Up to which an error in this unit is none, of a vessel's length [m] and a run's time [s]."""
+    """The size up to which an error in this unit is none, in that unit.
+
+    `length` [m] is the vessel's, `duration` [s] the run's: integrals grow with it.
+    """
     if unit == "rad":
         return NO_DISTANCE  # times the length it is how far the bow is off
     metres, seconds = DISTANCES.get(unit, (0, 0))
