@@ -43,9 +43,10 @@ def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
 
 
 def unmet(law: Controller, path: Path, actuator: Actuator, load_at: int) -> list[tuple[str, str]]:
-    """What a law wants of other parts that they have not: the part, and a sentence.
+    """What a law wants of other parts that they have not: pairs of the part and a sentence.
 
-    `load_at` is where in the state that it is given there are estimated loads; 0 without.
+    `load_at` is where in the state that it is given there are estimated loads; 0 without. Empty
+    where all fits.
     """
     texts = []
     if law.asks_sway() and not actuator.takes_sway:
@@ -178,13 +179,14 @@ class ClosedLoop:
         return None if other else self.controller.lyapunov()
 
     def check_seeing(self) -> None:
-        """Raise LawError for a measurement or an estimator that is not what it declares.
+        """Raises LawError for a measurement or an estimator that is not what it declares.
 
         In compiled code it would write beyond its vectors.
         """
         if not self.measured:
             return
         measurement, start = self.measurement, np.array(self.start)
+        # Its marks do not depend on the step, so any will do: 1 s
         known, first = measurement.measured(), measurement.first(start, 1.0)
         marks = first[KNOWN:OWN].tolist() == [float(flag) for flag in known]
         if len(known) != len(STATE) or not marks or len(measurement.signals) != sum(known):
@@ -200,7 +202,7 @@ class ClosedLoop:
             )
 
     def check_fit(self, step: float) -> None:
-        """Raise LawError for parts that do not fit each other, the vessel or the step [s].
+        """Raises LawError for parts that do not fit each other, the vessel or the step [s].
 
         Scenarios are checked when they are loaded; this is for loops that are put together.
         """
@@ -222,11 +224,15 @@ class ClosedLoop:
         return self.estimator.states if self.measured else ()
 
     def about(self) -> dict[str, Signal]:
-        """Every signal that the loop logs, by name. Raises LawError where two have one name."""
+        """Every signal that the loop logs, by name. Raises LawError where two have one name.
+
+        Parts are paired with functions that describe them, since describing looks up their source.
+        """
         self.check_seeing()
         law, actuator = self.controller, self.actuator
         own = (partial(describe, actuator), (*actuator.states, *actuator.signals_with))
         path = (partial(describe, self.path), (*self.path.places, *self.headings))
+        # Without a target the distance to it says nothing, and is not logged
         common = [logged for logged in LOOP if self.has_target or logged.name != "z_e"]
         loop = (lambda: "the closed loop", [*common, *self.sway_demand])
         others = (

@@ -9,7 +9,11 @@ from podusv_cli.core.signal import Signal
 
 
 def by_name(labels: list[str], table: Vector, about: Mapping[str, Signal]) -> dict[str, Vector]:
-    """A table's columns by name; those of a vector together, shape (rows, size)."""
+    """The columns of a table by name (rows,); those of a vector together (rows, size).
+
+    `labels` names every column; the numbers of a vector have one name and lie side by side. All are
+    views of the table.
+    """
     vectors = {name for name, part in about.items() if part.axes}
     columns: dict[str, list[int]] = {}
     for column, name in enumerate(labels):

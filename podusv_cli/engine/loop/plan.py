@@ -85,6 +85,7 @@ class Plan:
         """
         loop.check_fit(self.grid.step)
         plan = Plan(loop, self.grid, lambda plan: self.probe, self.recall)
+        # The same objects have the same structure; else the structures themselves are compared
         if plan.outline == self.outline:
             vars(plan).update((name, getattr(self, name)) for name in FOLLOWS)
         elif plan.structure != self.structure:
@@ -146,7 +147,7 @@ class Plan:
 
     @cached_property
     def layout(self) -> Layout:
-        """Sizes and offsets of the loop on this grid."""
+        """Sizes and offsets of the loop on this grid. Raises ValueError as `_sample_steps`."""
         loop, grid = self.loop, self.grid
         s, row, flow = _offsets(self.states), _offsets(self.row), self._of_sea(FLOW[0])
         return Layout(
@@ -183,7 +184,7 @@ class Plan:
 
     @cached_property
     def functions(self) -> tuple[Function, ...]:
-        """What the loop calls, in the order in which it takes them."""
+        """What the loop calls, in the order of `Parts`, in which it takes them."""
         loop, names = self.loop, self.constants
         law, path, seen, estimator = loop.controller, loop.path, loop.measurement, loop.estimator
         kernels = {
@@ -279,7 +280,10 @@ class Plan:
 
     @cached_property
     def first_target(self) -> Vector:
-        """The target (10,) at t = 0, with places for the distance and a heading."""
+        """The target (10,) at t = 0, with places for the distance and a heading.
+
+        Of a path that is followed, for the vessel at its start.
+        """
         path = self.loop.path
         if not path.follows:
             return np.asarray(self.recall(path.whole_targets, AT_START)[0])
@@ -300,7 +304,7 @@ class Plan:
     def vectors(self, rows: int = 1, allocate: Allocate = np.empty) -> Vectors:
         """The loop's vectors, ready for the march to begin, with room for so many logged rows.
 
-        Numbers beyond all limits are for the run to tell.
+        `allocate` gives the room for the log. Numbers beyond all limits are for the run to tell.
         """
         loop, grid, layout, recall = self.loop, self.grid, self.layout, self.recall
         law, start, estimator = loop.controller, np.array(loop.start), loop.estimator
@@ -354,7 +358,7 @@ def _numbers(constants: Mapping[str, float]) -> Vector:
 
 
 def _sample_steps(law: Controller, grid: TimeGrid) -> int:
-    """How many steps a sampled law holds its output; 0 for one that is continuous.
+    """How many steps lie between two samples of a law; 0 for one that takes none.
 
     Raises ValueError for a period that is no whole number of steps, or of the loop's own period.
     """

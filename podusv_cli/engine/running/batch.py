@@ -82,7 +82,10 @@ class MarchThread:
 
 
 def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
-    """The thread of one run, over vectors of its own."""
+    """The thread of one run, over vectors of its own; `march` is that of a run like this.
+
+    `bell` is rung when it ends.
+    """
     run = replace(run, vectors=_apart(run.vectors))
     grid, last = run.plan.grid, run.plan.grid.steps + 1
     function = partial(march(run.vectors, run.plan.layout, grid.step), 0, last)
@@ -100,7 +103,7 @@ def march_alone(run: BatchRun, march: Marcher, bell: Bell) -> MarchThread:
 def march_together(
     runs: list[BatchRun], advance: Callable[[Lanes, float], March], bell: Bell
 ) -> MarchThread:
-    """The thread of runs side by side."""
+    """The thread of at most LANES runs side by side, which `advance` makes the march of."""
     grid, last = runs[0].plan.grid, runs[0].plan.grid.steps + 1
     lanes = Lanes.of([run.vectors for run in runs], runs[0].plan.layout)
     work = Work(partial(advance(lanes, grid.step), 0, last), lanes.under_way, bell)
@@ -215,7 +218,8 @@ class _Runs:
     def march(self, workers: int) -> bool:
         """March over all runs; an interrupt or an error stops those that are under way.
 
-        Whether it was an interrupt.
+        Returns whether it was an interrupt. Runs are made while others march, so that the memory of
+        few is needed; what is left over for lanes comes last.
         """
         try:
             for position in range(len(self._loops)):
@@ -242,7 +246,7 @@ class _Runs:
             self._count()
 
     def _together(self, runs: list[BatchRun]) -> None:
-        """Have runs march side by side, or one by one where that takes no longer."""
+        """Have `runs` march side by side, or one by one where they are too few or may not."""
         if len(runs) >= FEWEST and self._lanes.advance:
             self._ready.append(march_together(runs, self._lanes.advance, self._bell))
         else:
@@ -255,7 +259,7 @@ class _Runs:
         return marcher(self._plan, True)
 
     def _start(self, workers: int, wait: Callable[[], None]) -> None:
-        """Start all threads that are ready, and wait while there are enough."""
+        """Start all threads that are ready; `wait` until a thread ends where `workers` are busy."""
         while self._ready:
             thread = self._ready.pop(0)
             thread.work.start()
@@ -287,7 +291,10 @@ class _Runs:
             raise InvalidLoop(str(error)) from error
 
     def _contain(self, position: int, make: Callable[[], BatchRun]) -> BatchRun | None:
-        """A run that is made; an exception is its own and no other's."""
+        """The run that `make` makes, or None: an exception costs this run and no other.
+
+        The batch gets the reason. Interrupts act meanwhile, since a law may take any time.
+        """
         try:
             with interrupts_enabled():
                 return make()
@@ -308,7 +315,10 @@ class _Runs:
             self._enter(thread)
 
     def _enter(self, thread: MarchThread) -> None:
-        """Enter how the runs of a thread ended; which of several hangs, shows each alone."""
+        """Enter how the runs of a thread ended.
+
+        Of several runs of which one hangs each marches again alone, which shows the one.
+        """
         if thread.work.result is None and len(thread.runs) > 1:
             thread.work.stop()
             again = (BatchRun.of(run.position, run.plan) for run in thread.runs)
@@ -324,7 +334,10 @@ class _Runs:
         self._progress(self._over / len(self._loops))
 
     def _stop(self) -> None:
-        """Stop all threads at their next instant, and note how far each run came."""
+        """Stop all threads at their next instant, and note how far each run came.
+
+        All are told first, so that they end at the same time.
+        """
         stopped = [thread for thread in self._busy if not thread.work.over]
         for thread in stopped:
             thread.work.stop()

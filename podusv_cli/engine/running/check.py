@@ -55,7 +55,10 @@ def check_law(plan: Plan) -> None:
 def ask_part(
     part: Callable[[], str], ask: Callable[[], object], left: tuple[type[Exception], ...] = ()
 ) -> None:
-    """Ask, and raise LawError for any exception but those that are `left` for the run to tell."""
+    """Ask, and raise LawError for any exception but those that are `left` for the run to tell.
+
+    `part` describes the component, for messages. In a thread, since a law may never return.
+    """
     work = Work(lambda: int(ask() is None))
     work.finish()
     if isinstance(work.error, NoKernel):
@@ -71,7 +74,10 @@ def ask_part(
 
 
 def _constant(error: BaseException | None) -> str:
-    """What is wrong where a kernel reads a constant that there is not; else empty."""
+    """What is wrong where a kernel reads a constant that there is not, and those there are; or "".
+
+    Constants are named tuples, which an AttributeError names.
+    """
     if not (isinstance(error, AttributeError) and hasattr(error.obj, "_fields")):
         return ""
     names = error.obj._fields
@@ -98,9 +104,11 @@ def _check_declared(plan: Plan) -> None:
 
 
 def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
-    """Demand (2,), rates and signals that the law writes at the start of a run.
+    """Demand (2,) or with a sway force (3,), rates (slots,) and signals that the law writes.
 
-    The arrays are full of `before` before that, so that one sees what it leaves unwritten.
+    At the start of a run, after a sample if it takes any. The arrays are full of `before` before
+    that, so that one sees what it leaves unwritten. Raises LawError where it writes what it may
+    only read.
     """
     law, memory, target = plan.loop.controller, plan.first_memory.copy(), plan.first_target.copy()
     x, k, table = np.array(plan.loop.start), bundle(plan.law_constants), plan.law_table.copy()
@@ -113,6 +121,7 @@ def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
     work = np.zeros(law.workspace())
     call(law.law, t=0.0, **read, k=k, tau=tau, rate=rate, signals=signals, work=work)
     for name, vector in read.items():
+        # NaN is not equal to itself, but unchanged
         same = (vector == before_it[name]) | (np.isnan(vector) & np.isnan(before_it[name]))
         if len(changed := np.flatnonzero(~same)):
             raise LawError(
@@ -122,7 +131,10 @@ def evaluate_law(plan: Plan, before: float) -> tuple[Vector, Vector, Vector]:
 
 
 def _ask(plan: Plan) -> None:
-    """Raises LawError for an output that the law does not write at the first instant."""
+    """Raises LawError for an output that the law does not write at the first instant.
+
+    A law that wants the loads is also called with them, all 0.
+    """
     law, (tau, rate, signals) = plan.loop.controller, evaluate_law(plan, UNWRITTEN)
     slots = [f"the rate of {name}" for name in plan.states["law"]]
     sway = [SWAY_DEMAND.name] if law.asks_sway() else []
@@ -145,7 +157,7 @@ def _ask(plan: Plan) -> None:
 
 
 def _check_signals(plan: Plan) -> None:
-    """LawError for what the log could not take, or would mix up."""
+    """Raises LawError for signals that the log could not take, or would mix up."""
     law = plan.loop.controller
     if isinstance(law.signals, str):
         raise LawError(f"{describe(law)}: its signals are no tuple; write (Signal(...),)")
@@ -157,7 +169,10 @@ def _check_signals(plan: Plan) -> None:
 
 
 def _check_axes(plan: Plan) -> None:
-    """Every logged array has as many values along each of its axes as all others have."""
+    """Raises LawError unless arrays with an axis in common have as many values along it.
+
+    Also for names and shapes that no log can hold.
+    """
     lengths: dict[str, tuple[int, str]] = {}
     names = {*plan.about, PROVENANCE}
     for part, shape in _shapes(plan.loop):

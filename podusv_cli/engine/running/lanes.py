@@ -30,7 +30,10 @@ MARCHING = -1.0  # stands for the instants that a lane has reached
 
 
 def shared_constants(plan: Plan) -> dict[str, frozenset[str]]:
-    """By component the constants that all lanes have to share: choices, sizes and positions."""
+    """By component the constants that all lanes have to share: choices, sizes and positions.
+
+    A kernel branches on them or counts with them, which all lanes have to do alike.
+    """
     loop, probe = plan.loop, plan.probe
     shared = {name: part.choices() for name, part in loop.parts.items()}
     shared["probe"] = frozenset(plan.constants["probe"]) - probe.differing
@@ -109,7 +112,10 @@ def pieces(plan: Plan) -> list[Any]:
 
 
 def places(plan: Plan) -> list[tuple[int, list[int]]]:
-    """Where the numbers that are alike lie: positions of vectors in `Vectors`, and in these."""
+    """Where the numbers that are alike lie: pairs of a vector's position in `Vectors`, and places.
+
+    Runs with the same numbers there may march side by side.
+    """
     loop = plan.loop
     positions = {
         owner: [i for i, name in enumerate(plan.constants[owner]) if name in names]
@@ -126,6 +132,7 @@ def places(plan: Plan) -> list[tuple[int, list[int]]]:
 
 def room(count: int) -> Vector:
     """Zeros (count,) that begin at a whole register, as vector loads need."""
+    # Up to LANES - 1 numbers in front are left out, until the address is a multiple of a register
     more = np.zeros(count + LANES)
     return more[-(more.ctypes.data // NUMBER) % LANES :][:count]
 
@@ -135,6 +142,7 @@ def _side_by_side(vectors: Sequence[Vector]) -> Vector:
 
     The lanes that are left repeat the first, so that they compute with sound numbers.
     """
+    # Number i of lane l stands at LANES i + l; a shorter vector is filled up with zeros
     together = room(LANES * max(map(len, vectors)))
     for lane in range(LANES):
         vector = vectors[lane if lane < len(vectors) else 0]
@@ -208,7 +216,11 @@ class LaneSorter:
         return self._instants >= WORTH or is_compiled(plan)
 
     def sort_in(self, vectors: Vectors, run: Any) -> list[Any]:
-        """The runs to start now that this one is ready."""
+        """The runs to start now that this one is ready: a whole register of its kind, or none yet.
+
+        `vectors` are the run's, by whose shared numbers it is sorted. Without lanes it starts
+        alone.
+        """
         if not self.advance:
             return [run]
         kind = tuple(float(vectors[at][i]) for at, inside in self._places for i in inside)
@@ -230,13 +242,14 @@ class LaneSorter:
 def prepare(plan: Plan, instants: int, compiling: Callable[[float], None] | None = None) -> str:
     """Compile the march of runs like this loop, if so many instants in all are worth it.
 
-    Why these runs cannot march side by side; empty where they can, or where it is not worth it.
+    Returns why these runs cannot march side by side; "" where they can, or where it is not worth
+    it. `compiling` hears the fraction compiled.
     """
     return why_alone(plan, compiling) if instants >= WORTH else ""
 
 
 def why_alone(plan: Plan, compiling: Callable[[float], None] | None = None) -> str:
-    """Why runs like this loop cannot march side by side; empty where they can."""
+    """Why runs like this loop cannot march side by side; "" where they can. Compiles the march."""
     try:
         places(plan)
         marcher(plan, compiling)

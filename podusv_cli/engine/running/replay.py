@@ -38,7 +38,8 @@ def replayer(
 ) -> Callable[[], float]:
     """A function that times one evaluation of the law [ns], as the mean of one replay.
 
-    A replay goes over at most `most` logged rows until it has `evaluations`, in machine code.
+    A replay goes over at most `most` logged rows until it has `evaluations`, in machine code. So
+    many that the clock's own time and resolution do not count.
     """
     from podusv_cli.engine.machine import compile  # a loop in plain Python needs no compiler
 
@@ -85,7 +86,7 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     of demands that reach the actuator in place of the law's.
     """
     layout, vectors = plan.layout._replace(hold_every=0, measured=0), plan.vectors()
-    vectors.delay_line[COUNT] = 0.0
+    vectors.delay_line[COUNT] = 0.0  # nothing is under way: a demand passes at once
     run = _rates_runner(plan, compiled)
 
     def at(rows: Vector, given: Vector | None = None) -> Vector:
@@ -128,7 +129,10 @@ def rates_replay(plan: Plan, *, compiled: bool = True) -> Callable[[Recording], 
 
 
 def _rates_runner(plan: Plan, compiled: bool) -> Callable[..., None]:
-    """`rk4.rates_along` of this loop less its functions."""
+    """`rk4.rates_along` with the functions of this loop given, in plain Python or compiled.
+
+    It takes count, logged rows, out, `Vectors` and `Layout`.
+    """
     if not compiled:
         bound = [signatures.bind(*part) for part in plan.functions]
         return lambda *rest: rk4.rates_along(*bound, *rest)

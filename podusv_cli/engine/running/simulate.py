@@ -76,7 +76,10 @@ def run(
 def begin_march(
     plan: Plan, compiled: bool, allocate: Allocate = np.empty
 ) -> tuple[Vectors, int, Callable[[], int]]:
-    """The vectors of a loop at its start, the instant after the last, and the march up to it."""
+    """The vectors of a loop at its start, the instant after the last, and the march up to it.
+
+    `allocate` gives room for the log. Raises LawError for parts that do not fit.
+    """
     plan.loop.check_fit(plan.grid.step)
     vectors, last = plan.vectors(plan.grid.rows, allocate), plan.layout.steps + 1
     advance = marcher(plan, compiled)(vectors, plan.layout, plan.grid.step)
@@ -125,7 +128,7 @@ def marcher(
 ) -> Marcher:
     """What makes the march of loops like the plan's over such vectors, with a step [s].
 
-    It is compiled if need be. A march keeps its vectors.
+    It is compiled if need be, and `compiling` hears the fraction. A march keeps its vectors.
     """
     if not compiled:
         p = Parts(*(signatures.bind(*part) for part in plan.functions))
@@ -157,7 +160,7 @@ def marcher(
 def recording_of(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
     """The recording of a march that ended so, its signals views of the log."""
     layout, law = plan.layout, plan.loop.controller
-    rows = -(-ending.reached // layout.log_every)
+    rows = -(-ending.reached // layout.log_every)  # rounded up: instant 0 is logged
     table = vectors.log.reshape(-1, layout.width)[:rows]
     named = by_name(plan.names, table, plan.about)
     signals = {name: column for name, column in named.items() if name in plan.about}
@@ -177,7 +180,10 @@ def why(plan: Plan, vectors: Vectors, ending: Ending) -> str:
 
 
 def _culprit(vectors: Vectors, labels: list[str], at: float) -> str:
-    """Which state or signal is the first that is not finite, or beyond `LARGEST`."""
+    """Which state or signal is the first that is not finite, or beyond `LARGEST`, in words.
+
+    `labels` are `Plan.names`, `at` [s] is the time. The estimate behind the row has no name.
+    """
     now = np.concatenate([[at], vectors.s, vectors.row[:-BEFORE]])
     named = zip(labels, now, strict=True)
     bad = next((name for name, x in named if not abs(x) <= rk4.LARGEST), "?")

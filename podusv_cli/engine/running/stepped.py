@@ -83,6 +83,7 @@ class SteppedRun:
         """
         if not 0 < self.reached <= self.grid.steps:
             return self.vectors.seen.copy()
+        # March over one instant as if it were the last, then put all numbers back
         with self._unchanged:
             self._advance(self.reached, self.reached + 1, self.reached)
             return self.vectors.seen.copy()
@@ -115,7 +116,10 @@ class SteppedRun:
         return self._target[PSI_D:].copy()
 
     def _path(self, part: tuple[Any, ...], compiled: bool) -> Callable[[float], None]:
-        """What writes the target at a time [s], as the loop calls it."""
+        """A function that writes the target at a time [s] into `_target`, as the loop calls it.
+
+        `part` is the loop's function of the path; what the law would be shown is thrown away.
+        """
         c, place = self.vectors, self.vectors.s[self._layout.place :]
         shown = np.zeros(TARGET_SIZE)
         vectors = (self._given, place, c.path, c.path_table, self._target, shown)
@@ -128,7 +132,7 @@ class SteppedRun:
         return lambda t: path(t, *pointers)
 
     def mark(self) -> MarchMark:
-        """Where the march is, to come back to it."""
+        """Where the march is, to come back to it: copies of what it writes to."""
         rows = -(-self.reached // self.grid.log_every)
         log = self.vectors.log[: rows * self._layout.width].copy()
         vectors = tuple(getattr(self.vectors, name).copy() for name in CHANGING)
@@ -180,7 +184,10 @@ class SteppedBatch:
         look: Any,
         size: int,
     ) -> None:
-        """For `size` runs; nothing is marched yet, and the plan is that of runs like these."""
+        """Nothing is marched yet; `plan` is that of runs like these, which `advance` marches.
+
+        `look` writes `size` numbers.
+        """
         layout, grid = plan.layout, plan.grid
         self.places = [run.position for run in runs]
         self.grid, self.reached, self.alive = grid, 0, np.ones(len(runs), bool)
@@ -208,7 +215,10 @@ class SteppedBatch:
         return vector.reshape(-1, LANES)[:, : len(self.places)]
 
     def advance(self, count: int) -> None:
-        """March over so many instants, or to the end; over the last with the step before it."""
+        """March over so many instants, or to the end; over the last with the step before it.
+
+        Behind the last instant there is no step to wait for, so it is counted in at once.
+        """
         last = min(self.reached + count, self.grid.steps)
         self.reached = self._march(self.reached, last + (last == self.grid.steps))
         self.alive = self._marching()

@@ -68,7 +68,10 @@ class Work:
             self._bell.get(timeout=seconds)
 
     def hangs(self) -> bool:
-        """Whether it has computed for `PATIENCE` at one instant. To be called again and again."""
+        """Whether it has computed for `PATIENCE` at one instant. To be called again and again.
+
+        By the thread's own processor time: a busy machine makes nothing hang.
+        """
         instant, used = float(self._under_way[0]), 0.0
         with suppress(OSError):  # the thread has ended
             used = self._clock()

@@ -24,7 +24,7 @@ DEMANDS = BEGAN + 1
 
 
 def delay_line(delay: float, grid: TimeGrid) -> Vector:
-    """The vector at the start of a run: zero demands are under way.
+    """The vector (n,) at the start of a run, laid out as above: zero demands are under way.
 
     Raises ValueError for a delay [s] that is no whole number of steps.
     """
@@ -50,7 +50,8 @@ def begin_step(k: int, t: float, line: Vector) -> None:
         line[NEXT] = STAGES * k % int(count)
 
 
-# demand (2) [N, N m]; changes `line` at GIVEN, and the place that NEXT points to.
+# demand (3) [N, N m, N]; changes `line` at GIVEN, and the place that NEXT points to. The demand of
+# a whole delay ago lies just where this one goes, so the ring needs no second pointer.
 @kernel
 def pass_on(demand: Vector, line: Vector) -> None:
     """Take this stage's demand, and give the actuator that of the same stage a delay before."""

@@ -23,6 +23,7 @@ def copy_lane(lane: int, count: int, vector: Any, out: Vector) -> None:
         out[i] = numbers[i * LANES + lane]
 
 
+# `vector` as in `copy_lane`.
 @kernel
 def follow_lane(lane: int, other: int, count: int, vector: Any) -> None:
     """Give a lane the numbers of another one."""

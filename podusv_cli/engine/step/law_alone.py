@@ -15,7 +15,8 @@ named_vectors, named_layout = unpacker(Vectors._fields), unpacker(Layout._fields
 
 
 # path, law, sample and after are compiled parts; vectors and layout as in `rk4.advance`. Leaves the
-# demand in the row.
+# demand in the row. The memory first goes on over the period that ends, in steps of h [s]; where
+# the law takes its sample into the memory first, `sample_and_hold` does that.
 @kernel
 def demand(
     path: Function,

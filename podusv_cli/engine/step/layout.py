@@ -41,7 +41,10 @@ SIGNATURES: dict[str, tuple[str, ...]] = {
 
 
 def spread(march: Any) -> Any:
-    """A kernel whose first argument are the parts, as machine code takes it: part by part."""
+    """A kernel whose first argument are the parts, as machine code takes it: part by part.
+
+    Machine code has no named tuples of functions, so the text of an adapter is written out.
+    """
     names, parts = march.__code__.co_varnames[1 : march.__code__.co_argcount], Parts._fields
     given = f"Parts({', '.join(parts)}), {', '.join(names)}"
     text = f"def {march.__name__}({', '.join((*parts, *names))}):\n    return march({given})"

@@ -95,7 +95,11 @@ def load(t: float, s: Vector, p: Parts, c: Vectors, n: Layout, again: bool, stag
         )
 
 
-# s (states); writes ds (states) and the row (columns).
+# t [s], s (states); writes ds (states) and the row (columns). c are the vectors, n says where
+# things lie. In turn: the target (again only where it depends on the state), the law, or with
+# sampled control its memory alone, which `update_first` leaves to the samples; the delay line; the
+# actuator; what the law makes of the loads that act; the estimator; and last the plant, which
+# overwrites ds up to 6.
 @kernel
 def rates(t: float, s: Vector, ds: Vector, p: Parts, c: Vectors, n: Layout, again: bool) -> None:
     """Right-hand side of the closed loop at time t, whose load is in the row; fills the row.
@@ -151,7 +155,8 @@ def measure(s: Vector, row: Vector) -> None:
     row[DISTANCE] = math.sqrt(x_e * x_e + y_e * y_e)
 
 
-# Changes c.s; c.stages (5, states) holds k1 to k4 and the state of a stage.
+# t, h [s]. Changes c.s; c.stages (5, states) holds k1 to k4 and the state of a stage. The third
+# stage is at the time of the second, so what depends on time alone is not computed `again`.
 @kernel
 def step(t: float, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Classical RK4 from t to t + h; the first stage has been evaluated already."""
@@ -172,6 +177,7 @@ def step(t: float, h: float, p: Parts, c: Vectors, n: Layout) -> None:
         s[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
+# Counts and compares, without a way out of the loop, so that the compiler makes vector code of it.
 @kernel
 def finite(count: int, vector: Vector) -> bool:
     """Whether all entries are numbers that can still be worked with."""
@@ -194,7 +200,9 @@ def write_row(k: int, t: float, c: Vectors, n: Layout) -> None:
         out[1 + n.states + i] = row[i]
 
 
-# h [s]; `first` is the instant at which this march began, before which no stage is known.
+# h [s]; `first` is the instant at which this march began, before which no stage is known. The load
+# comes before the measurement, which sees the waves; the place on the path before the samples,
+# which need the target.
 @kernel
 def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Measure, sample and evaluate instant k."""
@@ -213,6 +221,7 @@ def arrive(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> Non
     measure(c.s, c.row)
 
 
+# h [s]; trapezoidal sums, so the first and the last instant have half a weight.
 @kernel
 def show_probe(k: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     """Show instant k to the probe, with its weight in an integral."""
@@ -252,7 +261,9 @@ def advance(p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any
 def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: Layout) -> int:
     """`advance` as plain Python, whose `math` raises where machine code gives no number.
 
-    March from instant `first` to `last`, step `h` [s]; returns the instant that was reached.
+    March from instant `first` to `last`, step `h` [s]; returns the instant that was reached. An
+    error within an instant ends the march there; one within a step makes the next instant's state
+    NaN, as machine code would.
     """
     for k in range(first, last):
         try:

@@ -41,7 +41,8 @@ def held_rates(
         after(t, x, memory, demand, tau, c.law, c.law_table, rate)
 
 
-# Changes the law's memory in c.s. h and `passing` [s] differ where the law's own time stands still.
+# t [s]. Changes the law's memory in c.s, with c.stages as its room. h and `passing` [s] differ
+# where the law's own time stands still.
 @kernel
 def remember(
     t: float, passing: float, h: float, law: Function, after: Function, c: Vectors, n: Layout
@@ -62,7 +63,10 @@ def remember(
         memory[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
 
 
-# Changes the law's memory in c.s, and c.held: time, state, target, demand, signals.
+# k and t [s] are the instant, h [s] the step; changes the law's memory in c.s, and c.held: time,
+# state, target, demand, signals. The law's own sample comes first, then what is held, then with
+# `update_first` the period that ends, then the demand. The rate that the law writes here is not
+# used.
 @kernel
 def sample_and_hold(
     k: int,
@@ -105,7 +109,9 @@ def sample_and_hold(
         )
 
 
-# Writes c.sensed, the row and the estimate in c.s.
+# t [s]. Writes c.sensed, the row and the estimate in c.s. `before` keeps the estimate that the
+# metrics need from the other side of a jump; the row has those quantities only that are measured at
+# all.
 @kernel
 def perceive(
     k: int, t: float, measurement: Function, correct: Function, c: Vectors, n: Layout
