@@ -66,7 +66,10 @@ def _environment() -> Environment:
 
 
 def template_values(law: ExportedLaw) -> dict[str, Any]:
-    """What templates show of a law."""
+    """What templates show of a law: texts, sizes, and numbers as C has them, by name.
+
+    Vectors of the loop that the law alone does not have point at an `unused` number.
+    """
     vectors, layout = law.vectors, law.layout
     of_path = ("path", "path_table") if layout.shown else ()  # which shows the law another target
     shown = {name: f"(double *){name}" for name in of_path}
@@ -114,7 +117,7 @@ def _lines(numbers: Vector) -> list[list[str]]:
 
 
 def _assumed_loads(law: ExportedLaw) -> list[str]:
-    """The loads that act where nobody knows them: the demand, cut where the actuator cuts it.
+    """C for the loads that act where nobody knows them: the demand, cut where the actuator cuts it.
 
     Surge force, yaw moment, sway force, which is 0 where the law asks for none.
     """

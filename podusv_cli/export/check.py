@@ -106,7 +106,10 @@ def check(folder: Path, *, trusted: bool = True) -> list[Checked]:
 
 
 def _files_in_manifest(folder: Path) -> Collection[str]:
-    """The files of an exported law, which are as its manifest has them."""
+    """The names of the files of an exported law, which are as its manifest has them.
+
+    Raises UsageError for another folder, StorageError where a file was altered.
+    """
     for name in (ABOUT, manifest.NAME):
         if not (folder / name).is_file():
             raise UsageError(
@@ -119,7 +122,7 @@ def _files_in_manifest(folder: Path) -> Collection[str]:
 
 
 def _samples(folder: Path, about: About) -> Vector:
-    """The samples (samples, columns). Raises StorageError."""
+    """The samples (samples, columns) of check.csv. Raises UsageError for another table."""
     try:
         with (folder / SAMPLES).open(newline="") as lines:
             names, *rows = csv.reader(lines)
@@ -135,7 +138,11 @@ def _samples(folder: Path, about: About) -> Vector:
 
 
 def _compare_samples(what: str, samples: Vector, about: About, step: Step) -> Checked:
-    """Compare an exported law with its samples (n, columns) by bits, to the first difference."""
+    """Compare an exported law with its samples (n, columns) by bits, to the first difference.
+
+    `what` names it in messages; `step` gives what comes out for a row's time and inputs. By bits,
+    since NaN is not equal to itself, and -0 equals 0.
+    """
     given, names = 1 + len(about.inputs), about.columns
     whose = "the run" if about.of_run else "the law by itself in podusv"
     for row in samples:
@@ -148,7 +155,11 @@ def _compare_samples(what: str, samples: Vector, about: About, step: Step) -> Ch
 
 
 def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -> Step:
-    """The library for this machine, made from the folder's files."""
+    """The step of the library for this machine, made in `place` from the folder's files.
+
+    `listed` are the files of the manifest. Raises UsageError without object code for this machine,
+    or without a compiler.
+    """
     name = this_machine()
     code = f"{name}/law.o"
     if code not in listed:
@@ -180,7 +191,10 @@ def _vector(numbers: Vector) -> Any:
 
 
 def _fmu(path: Path, place: Path, about: About) -> Step:
-    """The FMU, unpacked here and stepped by FMPy."""
+    """The step of the FMU at `path`, unpacked into `place` and stepped by FMPy.
+
+    Raises UsageError where FMPy cannot read it, or it has no library for this machine.
+    """
     import fmpy  # is not installed with podusv
     from fmpy.fmi2 import FMU2Slave
 

@@ -55,7 +55,7 @@ def fmu(
     shown = variables(law, first)
     starts = [c.literal(float(variable.start)) for variable in shown if variable.start is not None]
     sources = c.sources(law)
-    content = "".join([text, *sources.values(), *starts])
+    content = "".join([text, *sources.values(), *starts])  # all that makes one FMU another
     about = {
         **c.template_values(law),
         "guid": hashlib.sha256(content.encode()).hexdigest()[:DIGITS],

@@ -112,7 +112,7 @@ class ExportedLaw:
 
     @classmethod
     def of(cls, scenario: Scenario) -> ExportedLaw:
-        """The law of a scenario with one. Raises UsageError where it takes no samples."""
+        """The law of a scenario with one. Raises UsageError for a law that cannot stand alone."""
         every = scenario.log.model_copy(update={"every": 1})
         scenario = scenario.model_copy(update={"log": every})
         plan = scenario.plan()
@@ -126,6 +126,7 @@ class ExportedLaw:
             raise UsageError(f"{scenario.name}: {OWN_TIME}")
         whole, signals = plan.layout, len(plan.loop.controller.signals)
         memory, demands = whole.states - whole.memory, len(demand_numbers(plan.loop))
+        # The row: target with a place for the distance, signals, demand, loads; then what is shown
         target = TARGET_SIZE if plan.loop.controller.wants_heading() else len(TARGET)
         first = max(target, PSI_D)
         end = first + signals + demands + len(LOAD_NUMBERS)
@@ -262,6 +263,7 @@ class ExportedLaw:
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)
         state = [log[number.name][rows] for number in self._given_state]
+        # Before the first sample nothing has acted
         loads = [np.where(rows > 0, log[number.name][before], 0.0) for number in LOAD_NUMBERS]
         said = [log[number.name][rows] for number in (*self.demands, *self.signals)]
         memory = [log[number.name][rows].reshape(len(rows), -1) for number, _ in self._slots]
@@ -291,14 +293,14 @@ class ExportedLaw:
         return step_law
 
     def by_itself(self, samples: Vector) -> Vector:
-        """These samples with what comes out of the law by itself."""
+        """These samples (samples, columns) with what comes out of the law by itself."""
         own, step = samples.copy(), self.stepper()
         for sample, (row, given) in enumerate(zip(own, self.inputs(samples), strict=True)):
             row[1 + len(given) :] = step(sample, given)
         return own
 
     def inputs(self, samples: Vector) -> Vector:
-        """What the law is given in each of these samples."""
+        """What the law is given in each of these samples (samples, columns): (samples, inputs)."""
         return samples[:, 1 : 1 + len(STATE) + len(self.targets) + len(LOAD_NUMBERS)]
 
     def _targets(self, log: Recording, rows: npt.NDArray[np.int_]) -> Vector:
@@ -311,4 +313,4 @@ class ExportedLaw:
             call(
                 path.evaluate, t=log["time"][row], x=x, place=place, k=k, table=table, target=target
             )
-        return np.delete(out, len(TARGET), axis=1)[:, : len(self.targets)]
+        return np.delete(out, len(TARGET), axis=1)[:, : len(self.targets)]  # without the distance

@@ -30,9 +30,10 @@ NO_ZIG = (
 
 
 def shared_library(files: Mapping[str, bytes], name: str, platform: Platform) -> bytes:
-    """A shared library of C files (*.c, with their headers) and object files (*.o).
+    """The bytes of a shared library of C files (*.c, with headers) and object files (*.o).
 
-    Raises UsageError where no linker is there, or it fails.
+    `files` are contents by name, `name` is the platform's in an FMU. Raises UsageError where no
+    linker is there, or it fails.
     """
     command = linker(name, platform)
     with TemporaryDirectory() as folder:

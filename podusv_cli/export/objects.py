@@ -74,9 +74,10 @@ PLATFORMS: Mapping[str, Platform] = {
 
 
 def together(pieces: Mapping[str, Piece]) -> str:
-    """One module of LLVM's language with these functions, and no other that is seen outside.
+    """One module as text of LLVM's language with these functions, by name.
 
-    Raises TypeError as `Piece.bitcode`.
+    No other function is seen from outside, or those of one name in two kernels would clash. Raises
+    TypeError as `Piece.bitcode`.
     """
     whole: Any = None
     for name, piece in pieces.items():
@@ -93,7 +94,10 @@ def together(pieces: Mapping[str, Piece]) -> str:
 
 
 def library_functions(text: str) -> list[str]:
-    """What a module calls of the mathematical library whose last bit is no standard."""
+    """Names of functions that a module calls of the mathematical library, but for exact ones.
+
+    Their last bit is no standard, so it may differ between machines.
+    """
     declared = re.findall(r"^declare [^@]*double>? @(?:llvm\.)?(\w+)", text, re.MULTILINE)
     return sorted(set(declared) - EXACT)
 
@@ -102,6 +106,7 @@ def object_file(text: str, platform: Platform) -> bytes:
     """Object code of a module for a platform; nothing that this machine has comes into it."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
+    # A module names the machine that it was made for, which is replaced
     text = re.sub(r"^target (datalayout|triple) = .*\n", "", text, flags=re.MULTILINE)
     machine = llvm.Target.from_triple(platform.triple).create_target_machine(
         cpu=platform.cpu, features=platform.features, opt=3, reloc="pic", codemodel="default"

@@ -34,8 +34,9 @@ def write(
 ) -> int:
     """Pack these files of a folder, and others that are `made`, below the folder's name.
 
-    An older archive is replaced; the bytes depend on names and contents alone. Returns the
-    archive's bytes. Raises StorageError, also for a name that would not be unpacked.
+    `names` are relative to the folder; `made` has contents by such names. An older archive is
+    replaced; the bytes depend on names and contents alone. Returns the archive's size in bytes.
+    Raises StorageError, also for a name that would not be unpacked.
     """
     remove_abandoned_files(out.parent)
     part, top = out.with_name(temporary_name()), folder.resolve().name
@@ -67,7 +68,7 @@ def name_fault(name: str) -> str:
     """
     parts = PurePosixPath(name).parts
     inside = len(parts) > 1 and not {"..", "/", "."} & {*parts} and "\\" not in name
-    inside = inside and stays_inside(name)
+    inside = inside and stays_inside(name)  # on Windows more than this leads elsewhere
     if str(PurePosixPath(name)) != name or not inside or not name.isprintable():
         return f"{name!r} is no file inside a folder"
     if any(part[0] in ".-" for part in parts):
@@ -152,11 +153,11 @@ class Archive:
         return StorageError(f"{self.path} is not unpacked: {why}")
 
     def _check(self, entry: zipfile.ZipInfo) -> None:
-        """Raise StorageError for what is no plain file below one folder."""
+        """Raises StorageError for what is no plain file below one folder."""
         name = entry.filename
         if why := name_fault(name):
             raise self.fault(why)
-        kind = stat.S_IFMT(entry.external_attr >> 16)
+        kind = stat.S_IFMT(entry.external_attr >> 16)  # 0 where it was packed without Unix modes
         if kind not in (0, stat.S_IFREG):
             raise self.fault(f"{name!r} is a link, folder or device")
         if entry.compress_type not in READ or entry.flag_bits & ENCRYPTED:

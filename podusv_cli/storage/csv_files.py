@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 def lines(rows: Iterable[Sequence[object]], digits: str | None = None) -> str:
-    """Rows of a short table, the headings first; numbers as `text` has them.
+    """Rows of a short table as CSV, the headings first; numbers as `text` has them.
 
-    With `digits` an unknown number is an empty cell, too.
+    With `digits`, a format such as `%.6g`, an unknown number is an empty cell, too.
     """
 
     def cell(content: object) -> object:

@@ -96,9 +96,9 @@ def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def check_places(paths: Iterable[Path]) -> None:
-    """Raise StorageError if these files cannot be written; nothing is left behind.
+    """Raises StorageError if these files cannot be written; nothing is left behind.
 
-    Their folders need not exist yet.
+    Their folders need not exist yet: a probe is written into the nearest one that does.
     """
     for path in paths:
         with storage_errors(f"cannot write {path}"):
@@ -111,7 +111,7 @@ def check_places(paths: Iterable[Path]) -> None:
 
 
 def _check_regular_file(path: Path) -> None:
-    """StorageError for a link, folder or device, which writing would replace by a file."""
+    """Raises StorageError for a link, folder or device, which writing would replace by a file."""
     if path.is_symlink() or (path.exists() and not path.is_file()):
         raise StorageError(f"cannot write {path}: it is there already and is not a file")
 
@@ -217,7 +217,7 @@ def _create(path: Path, content: bytes) -> None:
     """Write a new file and wait until it is on the disk; a file that is there is an OSError."""
     descriptor, rest = os.open(path, _CREATE, 0o666), memoryview(content)
     try:
-        while rest:
+        while rest:  # a call may write less than it is given
             rest = rest[os.write(descriptor, rest) :]
         os.fsync(descriptor)
     finally:

@@ -74,7 +74,7 @@ def dataset(group: h5py.h5g.GroupID, name: str) -> h5py.h5d.DatasetID:
 
 
 def check(file: h5py.File) -> None:
-    """Raise ValueError where any member of the file, in whatever group, has data elsewhere."""
+    """Raises ValueError where any member of the file, in whatever group, has data elsewhere."""
     names: list[bytes] = []
     file.id.links.visit(names.append)  # follows no link to elsewhere, and no link twice
     for name in map(bytes.decode, names):

@@ -23,7 +23,10 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def parse_json(text: str, path: Path) -> dict[str, Any]:
-    """As `read`, of the text of the file at `path`."""
+    """As `read`, of the text of the file at `path`, which messages name.
+
+    Python's json takes a key twice, NaN and numbers that become infinite; this does not.
+    """
     try:
         content = json.loads(
             text,
@@ -46,7 +49,7 @@ def read_as(path: Path, model: type[Model]) -> Model:
 
 
 def parsed_as(text: str, path: Path, model: type[Model]) -> Model:
-    """As `read_as`, of the text of the file at `path`."""
+    """As `read_as`, of the text of the file at `path`, which messages name."""
     try:
         return model.model_validate_json(
             json.dumps(parse_json(text, path))

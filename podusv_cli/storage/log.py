@@ -78,14 +78,17 @@ class LogLayout(io.RawIOBase):
         self._pages: dict[int, bytearray] = defaultdict(lambda: bytearray(self.PAGE))
 
     def write_to(self, out: BinaryIO) -> None:
-        """Make a file of the same size and content on the disk. Raises OSError."""
+        """Give the new file `out` this size and content. Raises OSError.
+
+        Pages that nobody wrote stay holes.
+        """
         out.truncate(self.size)
         for page, content in sorted(self._pages.items()):
             start = page * self.PAGE
             write_at(out, start, memoryview(content)[: max(0, self.size - start)])
 
     def write(self, content: Any) -> int:
-        """Write the content at the current position."""
+        """Write the content at the current position, which moves on; its bytes, as HDF5 asks."""
         given = memoryview(content).cast("B")
         for part, room in self._parts(len(given)):
             room[:] = given[part]
@@ -128,7 +131,10 @@ class LogLayout(io.RawIOBase):
 def _fill(
     file: h5py.File, recording: Recording, texts: Texts, compress: bool
 ) -> list[tuple[int, Vector]]:
-    """Create datasets and attributes; returns the arrays yet to be written, with their offsets."""
+    """Create datasets and attributes; returns the arrays yet to be written, with their offsets.
+
+    An offset is the byte of the file at which an array begins; a compressed log has none left.
+    """
     file.attrs.create("podusv_format", np.int32(FORMAT))
     describe(file, _facts(recording, texts))
     group = file.create_group(PROVENANCE, **UNDATED)
@@ -167,9 +173,10 @@ def _facts(recording: Recording, texts: Texts) -> dict[str, str]:
 def _scales(
     file: h5py.File, arrays: Mapping[str, Vector], about: Mapping[str, Signal]
 ) -> dict[str, h5py.Dataset]:
-    """The dimension scale of every axis but time. ValueError if lengths along an axis differ.
+    """The dimension scale of every axis but time, by axis, made in the file.
 
-    `arrays` and `about` are by the name of the signal.
+    `arrays` and `about` are by the name of the signal. Raises ValueError if lengths along an axis
+    differ.
     """
     lengths: dict[str, int] = {}
     for name, array in arrays.items():
@@ -225,7 +232,10 @@ def text(words: str) -> np.ndarray[tuple[()], np.dtype[np.bytes_]]:
 
 
 def _write_rows(out: BinaryIO, place: int, array: Vector, rows: slice) -> None:
-    """Write these rows of an array into the dataset that begins at byte `place` of the file."""
+    """Write these rows of an array into the dataset that begins at byte `place` of the file.
+
+    A shorter array has none of the later rows.
+    """
     part = np.ascontiguousarray(array[rows], dtype="<f8")
     if part.size:
         write_at(out, place + rows.start * part[0].nbytes, part.reshape(-1).data.cast("B"))

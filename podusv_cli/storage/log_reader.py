@@ -33,8 +33,8 @@ NUMBERS = np.dtype("<f8")
 def read_log(path: Path, largest: float = LARGEST_CONTENT) -> Recording:
     """The recording in a log file; contiguous arrays are mapped from the file.
 
-    `seen` is not logged and stays None. Raises StorageError, also if the file or its numbers take
-    more than `largest` bytes.
+    Datasets of other numbers, as scales, are left out. `seen` is not logged and stays None. Raises
+    StorageError, also if the file or its numbers take more than `largest` bytes.
     """
     with _open_log(path, largest) as (file, raw):
         datasets = {n: d for n, d in file.items() if isinstance(d, h5py.Dataset)}
@@ -67,7 +67,10 @@ def resolved_yaml(path: Path) -> str:
 def _open_log(
     path: Path, largest: float = LARGEST_FILE
 ) -> Iterator[tuple[h5py.File, BufferedReader]]:
-    """A log with the known format, and its open file; errors in the block become StorageError."""
+    """A log with the known format, and its open file; errors in the block become StorageError.
+
+    `largest` is the size [bytes] up to which a file is read.
+    """
     with open_regular(path) as raw:
         if file_size(raw) > largest:
             sizes = f"{file_size(raw)} bytes, at most {largest} allowed"
@@ -92,11 +95,11 @@ def _status(file: h5py.File) -> Status:
 
 
 def _signal(name: str, dataset: h5py.Dataset) -> Signal:
-    """What a log says of one of its signals; KeyError or ValueError where that is damaged."""
+    """What a log says of one of its signals. Raises KeyError or ValueError where it is damaged."""
     unit, meaning, symbol, axes = (
         _text(dataset.attrs[fact]) for fact in ("units", "long_name", "symbol", "axes")
     )
-    first, *beside = axes.split()
+    first, *beside = axes.split()  # as `log` writes them: time first, if it runs over time
     over_time = first == "time"
     axes_beside = tuple(beside) if over_time else (first, *beside)
     wrapped = "wrapped" in dataset.attrs
@@ -104,7 +107,7 @@ def _signal(name: str, dataset: h5py.Dataset) -> Signal:
 
 
 def _check_lengths(datasets: Mapping[str, h5py.Dataset], about: Mapping[str, Signal]) -> None:
-    """Raise ValueError where there is no time, or arrays differ in length along an axis."""
+    """Raises KeyError where there is no time, ValueError where lengths along an axis differ."""
     lengths = {"time": len(datasets["time"])}
     for name, dataset in datasets.items():
         for axis, size in zip(about[name].dimensions, dataset.shape, strict=True):
@@ -114,7 +117,11 @@ def _check_lengths(datasets: Mapping[str, h5py.Dataset], about: Mapping[str, Sig
 
 
 def _array(dataset: h5py.Dataset, content: npt.NDArray[np.uint8]) -> Vector:
-    """A dataset's numbers; uncompressed ones straight from `content`, the file's mapped bytes."""
+    """A dataset's numbers in its shape; uncompressed ones straight from `content`.
+
+    These are the mapped bytes of the file. Numbers that do not begin at a multiple of 8 bytes, as
+    other programs may write, are copied.
+    """
     place = dataset.id.get_offset()
     if place is None:  # compressed, or without numbers
         return np.asarray(dataset[()])

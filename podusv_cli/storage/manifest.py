@@ -53,7 +53,7 @@ def write(folder: Path, status: Status) -> Manifest:
 
 
 def demand(folder: Path) -> None:
-    """UsageError if a folder has no manifest, and so is no run folder and no comparison."""
+    """Raises UsageError if a folder has no manifest, and so is no run folder or comparison."""
     if not os.path.lexists(folder / NAME):
         why = f"it has no {NAME}" if os.path.lexists(folder) else "it does not exist"
         raise UsageError(f"{folder} is no run folder: {why}")
@@ -144,7 +144,10 @@ def _entry(path: Path) -> FileEntry:
 
 
 def place(folder: Path, name: str) -> Path:
-    """The path of a listed file; StorageError if it is not inside the folder."""
+    """The path of a listed file. Raises StorageError if it is not inside the folder.
+
+    A manifest may be somebody else's, so its names are not trusted.
+    """
     relative = PurePosixPath(name)
     plain = str(relative) == name and name.isprintable() and name not in (".", NAME)
     if not (plain and stays_inside(name)) or relative.is_absolute() or ".." in relative.parts:

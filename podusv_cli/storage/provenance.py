@@ -23,7 +23,10 @@ GIT_PATIENCE = 5.0  # s
 def collect(
     argv: Sequence[str], started: datetime, finished: datetime, plugins: Iterable[Plugin] = ()
 ) -> dict[str, Any]:
-    """The content of provenance.json; times are aware datetimes."""
+    """The content of provenance.json; `argv` is the command, times are aware datetimes.
+
+    A plug-in with neither version nor path, as one that is made in Python, is left out.
+    """
     return {
         **surroundings(),
         "plugins": [plugin.as_json() for plugin in plugins if plugin.version or plugin.path],
@@ -66,7 +69,10 @@ def times(started: datetime, finished: datetime) -> dict[str, Any]:
 
 @cache
 def source_tree(package: Path) -> dict[str, Any] | None:
-    """Commit of the checkout that `package` is part of, and whether the package differs from it."""
+    """Commit of the checkout that `package` is part of, and whether the package differs from it.
+
+    None where it is part of none, or nothing is committed there yet.
+    """
     # A package installed somewhere below an unrelated checkout is not tracked there.
     if _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
         return None
@@ -81,8 +87,8 @@ def source_tree(package: Path) -> dict[str, Any] | None:
 
 
 def _git(folder: Path, *words: str) -> str | None:
+    """What git says in a folder, or None where it fails, or says nothing within `GIT_PATIENCE`."""
     # Variables that git itself sets, in its hooks for instance, would point to another checkout.
-    """What git says in a folder, or None where it says nothing within `GIT_PATIENCE`."""
     environment = {key: word for key, word in os.environ.items() if not key.startswith("GIT_")}
     environment["GIT_OPTIONAL_LOCKS"] = "0"
     try:

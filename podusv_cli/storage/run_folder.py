@@ -81,7 +81,11 @@ class RunWriter:
         needed: float = 0.0,
         argv: Sequence[str] = (),
     ) -> None:
-        """Check that `final` can be made and `needed` bytes are free; make the hidden folder."""
+        """Check that `final` can be made and `needed` bytes are free; make the hidden folder.
+
+        `force` replaces an older run folder, but only one that the user `named`; `argv` is the
+        command, for provenance.json.
+        """
         self.final, self._force, self._named = final, force and named, named
         self._argv, self._began, self.extras = argv, datetime.now(UTC), Extras()
         remove_abandoned(final.parent)  # may put back a run folder that a killed run was replacing
@@ -173,7 +177,10 @@ class RunWriter:
 
 
 def _check_replaceable(final: Path, force: bool) -> None:
-    """StorageError if `final` exists and must not be replaced."""
+    """Raises StorageError if `final` exists and must not be replaced; Taken where it is there.
+
+    An empty folder may be replaced, a finished run folder with `force`.
+    """
     if final.name in ("", ".."):
         raise StorageError(f"cannot make {final}: a folder's own name is needed")
     with files.storage_errors(f"cannot make {final}"):
@@ -200,7 +207,10 @@ def _check_replaceable(final: Path, force: bool) -> None:
 
 
 def check_free_space(final: Path, needed: float, remedy: str) -> None:
-    """StorageError if fewer than `needed` bytes are free on the disk of `final`."""
+    """Raises StorageError if fewer than `needed` bytes are free on the disk of `final`.
+
+    `remedy` is what the message advises. The folder need not be there yet.
+    """
     with files.storage_errors(f"cannot make {final}"):
         place = final.absolute()  # as "." has no parents
         there = next(path for path in (place, *place.parents) if path.exists())
@@ -261,7 +271,11 @@ class RunFolder:
         return self.log.recording
 
     def as_run(self, label: str, about: RunAbout, plugins: Plugins = ()) -> PastRun:
-        """The run in it under a label; `about` may be made of the scenario, see `about`."""
+        """The run in it under a label, NaN for metrics that were not finite.
+
+        `about` may be made of the scenario where an older podusv wrote none. `plugins` are those
+        that the scenario names.
+        """
         numbers = {n: math.nan if x is None else float(x) for n, x in self.metrics.items()}
         return PastRun(
             label, about, self.log, numbers, plugins=plugins, folder=self.path, theory=self.theory

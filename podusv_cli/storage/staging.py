@@ -79,7 +79,11 @@ class Staging:
             raise Taken(text) from error
 
     def _replace(self) -> None:
-        """Put the folder in place of the old one, in one step where the system can."""
+        """Put the folder in place of the old one, in one step where the system can.
+
+        Else the old one waits in the box, from where `discard` brings it back if the second step
+        fails.
+        """
         if not self._exchange():
             with suppress(FileNotFoundError):
                 rename_folder(self.final, _old(self._box))
@@ -97,7 +101,10 @@ class Staging:
 
 
 def exchange(one: Path, other: Path) -> None:
-    """Exchange two paths by one system call. OSError, with ENOSYS where there is no such call."""
+    """Exchange two paths by one system call, which Python has not.
+
+    Raises OSError, with ENOSYS where there is no such call.
+    """
     own = ctypes.CDLL(None, use_errno=True) if os.name == "posix" else None
     rename = getattr(own, "renameat2", None)
     if rename is None:

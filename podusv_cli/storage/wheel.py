@@ -30,7 +30,7 @@ def _stem(package: str, version: str) -> str:
 
 
 def wheel(package: Plugin) -> bytes | None:
-    """The bytes of the wheel; None for a package with compiled modules.
+    """The bytes of the wheel of an installed package; None for one with compiled modules.
 
     They depend on the package's files and metadata alone.
     """
@@ -45,7 +45,7 @@ def wheel(package: Plugin) -> bytes | None:
     lines = [
         f"{place},sha256={_digest(content)},{len(content)}" for place, content in files.items()
     ]
-    files[record] = "\n".join([*lines, f"{record},,", ""]).encode()
+    files[record] = "\n".join([*lines, f"{record},,", ""]).encode()  # its own digest is left out
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
         for place, content in files.items():

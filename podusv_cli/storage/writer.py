@@ -43,6 +43,7 @@ def sole_writer(
     with storage_errors(f"cannot lock {folder}"), interrupts_enabled():
         lock = _lock_folder(path, patience, warn)
     try:
+        # Who holds the lock, for the message of others
         with suppress(OSError):  # a full disk, where only the message lacks these words
             path.write_text(f"{os.getpid()} {platform.node()}")
         yield
@@ -90,7 +91,10 @@ def _holder(path: Path) -> str:
 
 
 def _check_plain(folder: Path) -> None:
-    """Raise StorageError for anything in the folder but files and folders."""
+    """Raises StorageError for anything in the folder but files and folders.
+
+    Through a link podusv would write elsewhere; what goes meanwhile is another process's.
+    """
     for path in map(folder.joinpath, names_inside(folder)):
         with storage_errors(f"cannot read {path}"), suppress(FileNotFoundError):
             mode = path.lstat().st_mode

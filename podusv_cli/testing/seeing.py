@@ -43,13 +43,16 @@ def intact(vector: Vector) -> bool:
 
 
 def pose_at(t: float) -> Vector:
-    """State (6,) at t [s] of a vessel that moves in every quantity."""
+    """State (6,) at t [s] of a vessel that moves in every quantity, each at a rate of its own."""
     rates, places = np.linspace(0.3, 0.8, SIX), np.arange(1.0, SIX + 1.0)
     return np.sin(rates * t + places) * [9.0, 9.0, 3.0, 1.0, 0.3, 0.5]
 
 
 def watch_sensors(sensors: Measurement, steps: int = STEPS, table_of: int = STEPS) -> list[Vector]:
-    """What is seen at each instant, while nothing else is written."""
+    """What is seen at each instant, `seen` (numbers,) each; nothing else may be written.
+
+    A run of `steps` steps, with a table for `table_of` of them and no disturbance.
+    """
     k = bundle(sensors.constants_with(STEP, 0))
     table = sensors.table_for(STEP, table_of)
     seen, given, before = guard(sensors.first(pose_at(0.0), STEP)), np.zeros(3), table.copy()
@@ -119,7 +122,10 @@ class EstimatorUnderTest:
         self.rate[-MARGIN:] = BEYOND
 
     def step(self, t: float, seen: Vector, tau: Vector) -> Vector:
-        """Correct, follow, and go on by a step by Euler's method; the new estimate."""
+        """Correct, follow, and go on by a step by Euler's method; the new estimate (6,).
+
+        `seen` as `measurements.base` lays it out, `tau` (3,) [N, N, N m] are the actuator's loads.
+        """
         given = seen.copy(), tau.copy()
         call(self.estimator.correct, t=t, seen=seen, state=self.state, k=self.k, table=self.table)
         corrected = self.state.copy()
@@ -145,7 +151,10 @@ class EstimatorUnderTest:
 
 
 def delivery(x: Vector, known: tuple[bool, ...], fresh: float) -> Vector:
-    """What a measurement hands over: values, marks of delivery, marks of what is measured."""
+    """What a measurement hands over (18,): values, marks of delivery, marks of what is measured.
+
+    `fresh` is 1 where all that is `known` of x (6,) was delivered just now, else 0.
+    """
     marks = np.array(known, float)
     return np.concatenate([np.where(known, x, 0.0), fresh * marks, marks])
 
@@ -187,7 +196,10 @@ def takes_headings_by_the_nearest_turn(estimator: Estimator) -> None:
 
 
 def settle_estimate(tested: EstimatorUnderTest, place: Vector, known: tuple[bool, ...]) -> Vector:
-    """The estimate after `PATIENCE` with x = `place` measured at 10 Hz."""
+    """The estimate (6,) after `PATIENCE` with x = `place` (6,) measured at 10 Hz, no loads acting.
+
+    `known` says which quantities are measured.
+    """
     new, old = (delivery(place, known, fresh) for fresh in (1.0, 0.0))
     tau, steps = np.zeros(3), round(PATIENCE / STEP)
     for i in range(steps):

@@ -101,6 +101,7 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
     """Have the code of these pieces on the disk, compiled by as many processes as there are cores.
 
     Where processes begin empty this one compiles: a kernel is no thing that crosses as bytes.
+    Pieces go to processes largest first, each to that with the least to do.
 
     `tell` is called with the fraction that is compiled, if there is anything to compile. A piece
     that cannot be compiled is left to `compile_piece`, which says why. Raises KeyboardInterrupt.
@@ -136,7 +137,10 @@ def prepare(pieces: Sequence[Piece], tell: Callable[[float], None] | None = None
 
 
 def _keep(pieces: Sequence[Piece], tell: Callable[[float], None]) -> None:
-    """Compile pieces one by one, and tell the size of what is compiled so far."""
+    """Compile pieces one by one, and tell the size of what is compiled so far.
+
+    One that cannot be compiled is passed over, see `prepare`.
+    """
     done = 0
     for piece in pieces:
         with suppress(TypeError):
@@ -159,7 +163,10 @@ def adapter(part: str, inner: Any, names: tuple[str, ...]) -> Piece:
 
 @cache
 def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
-    """The same, compiled. Raises LawError also for a kernel that cannot be compiled."""
+    """The same, compiled. Raises LawError also for a kernel that cannot be compiled.
+
+    The message has what in its source has no machine code, else what the compiler says.
+    """
     try:
         return compile_piece(adapter(part, inner, names))
     except TypeError as error:

@@ -35,7 +35,7 @@ def tail_of(typing: Any, vector: Any, start: Any) -> Any:
     """`kernel.tail`."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        """The pointer moved on by so many numbers."""
+        """LLVM's code: the pointer moved on by so many numbers."""
         return builder.gep(arguments[0], [arguments[1]])
 
     return vector(vector, types.int64), code
@@ -97,7 +97,10 @@ SETTINGS = {"OPT": 0, "DISABLE_JIT": 0, "DEBUGINFO_DEFAULT": 0, "ENABLE_PROFILIN
 
 @contextmanager
 def plain_code() -> Iterator[None]:
-    """Have numba compile, and leave its code as it comes, whatever a user's NUMBA_* asks for."""
+    """Have numba compile, and leave its code as it comes, whatever a user's NUMBA_* asks for.
+
+    Its settings are global, so no other thread compiles meanwhile, and they are put back.
+    """
     with global_compiler_lock:
         before = {name: getattr(config, name) for name in SETTINGS}
         for name, number in SETTINGS.items():
@@ -118,7 +121,10 @@ def inline_kernel(function: Any) -> Any:
 
 
 def in_short(message: str) -> str:
-    """What numba says of the innermost place, and where that is."""
+    """What numba says of the innermost place in its `message`, in a line, and where that is.
+
+    Its messages tell every level of calls, with paths and hints; one line is for the user.
+    """
     reason = re.search(r"raised a specific error:\n +TypingError: (.*)", message)
     words = (
         reason[1]

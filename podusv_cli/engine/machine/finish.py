@@ -24,7 +24,7 @@ NEUTRAL = "x86_64-unknown-linux-gnu"  # its triple and layout are replaced by th
 
 @cache
 def neutral_machine() -> Any:
-    """What kernels are optimised for, once for all machines: vectors of four numbers.
+    """LLVM's machine that kernels are optimised for, once for all: vectors of four numbers.
 
     A machine that has none takes such a vector apart when its own code is emitted.
     """
@@ -36,7 +36,7 @@ def neutral_machine() -> Any:
 
 
 def optimise_module(made: Any, symbol: str) -> bytes:
-    """Bitcode of a module with one function, into which all kernels that it calls are inlined.
+    """Bitcode of a module with one function `symbol`, with all kernels that it calls inlined.
 
     Loops are first brought into the form that LLVM vectorises: without this the march is slower by
     up to 10 %. What numba would do about an error goes, where no kernel has any.
@@ -63,7 +63,10 @@ def optimise_module(made: Any, symbol: str) -> bytes:
 
 
 def bare(made: Any, symbol: str) -> bytes:
-    """Bitcode of a module, of which only one function is seen from outside, without names."""
+    """Bitcode of a module, of which only `symbol` is seen from outside, without other names.
+
+    So the same kernel gives the same bytes.
+    """
     _hide(made, symbol)
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
@@ -104,7 +107,10 @@ def _passes(machine: Any, speed: int) -> tuple[Any, Any]:
 
 
 def check_calls(module: Any, name: str) -> None:
-    """Refuse code that calls an unknown function: loading it would end the process silently."""
+    """Raises TypeError for code that calls an unknown function.
+
+    Loading it would end the process silently. `name` is the kernel's, for the message.
+    """
     declared = [f.name for f in module.functions if f.is_declaration]
     for wanted in declared:
         if not wanted.startswith("llvm.") and not C_FUNCTION.fullmatch(wanted):

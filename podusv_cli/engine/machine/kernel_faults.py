@@ -47,7 +47,10 @@ RETURNS_NOTHING = {ast.dump(ast.Return()), ast.dump(ast.Return(ast.Constant(None
 
 
 def check_kernel(function: Any) -> None:
-    """Look at a kernel from outside podusv, and at all kernels it calls. Raises LawError."""
+    """Look at a kernel from outside podusv, and at all kernels it calls.
+
+    Raises LawError with file, line and what to write, for the first fault.
+    """
     for called in _reached_kernels(function):
         node = _source(called)
         for line, text in faults(node, called.__globals__) if node else ():
@@ -56,7 +59,7 @@ def check_kernel(function: Any) -> None:
 
 
 def check_arguments(function: Any, names: Collection[str]) -> None:
-    """Raise LawError for a kernel that writes to one of these arguments, which it may only read."""
+    """Raises LawError for a kernel that writes to an argument in `names`, which are to be read."""
     node = None if str(function.__module__).startswith(OWN) else _source(function)
     for part in ast.walk(node) if node else ():
         match part:
@@ -87,7 +90,10 @@ def _source(function: Any) -> ast.FunctionDef | None:
 
 
 def faults(node: ast.FunctionDef, known: Mapping[str, Any]) -> Iterator[tuple[int, str]]:
-    """Line and sentence of every fault of a kernel with these globals."""
+    """Line and sentence of every fault of a kernel: negative indices, then variables without value.
+
+    `node` is its source, `known` are its globals.
+    """
     vectors = _vectors(node)
     for part in ast.walk(node):
         match part:
@@ -98,7 +104,10 @@ def faults(node: ast.FunctionDef, known: Mapping[str, Any]) -> Iterator[tuple[in
 
 
 def _vectors(node: ast.FunctionDef) -> set[str]:
-    """The names of a kernel that stand for vectors."""
+    """The names of a kernel that stand for vectors.
+
+    An argument may be one unless it is annotated as a tuple; of a number no index is taken anyhow.
+    """
     arguments = (a for a in node.args.args if "tuple" not in ast.unparse(a.annotation or a).lower())
     vectors = {argument.arg for argument in arguments}
     for part in ast.walk(node):
@@ -126,7 +135,7 @@ def unsupported_construct(function: Any) -> str:
 
 
 def _unsupported_in(function: Any) -> str:
-    """The same of one kernel alone, with file and line."""
+    """What of this kernel alone there is no machine code for, with file and line; else empty."""
     if function in named_kernels(function).values():
         return f"{function.__name__} calls itself; write a loop"
     node = _source(function)
@@ -147,7 +156,10 @@ def _body(node: ast.FunctionDef) -> Iterator[ast.AST]:
 
 
 def _without_code(part: ast.AST, known: Mapping[str, Any]) -> str:
-    """Why a part of a kernel cannot become machine code; "" where it can."""
+    """Why a part of a kernel's source cannot become machine code; "" where it can.
+
+    `known` are the kernel's globals.
+    """
     match part:
         case ast.Call(func=ast.Name(id=name)):
             called = known.get(name)
@@ -159,7 +171,10 @@ def _without_code(part: ast.AST, known: Mapping[str, Any]) -> str:
 
 
 def _of_numpy(part: ast.AST, known: Mapping[str, Any]) -> str:
-    """A function of numpy that works on arrays; those of single numbers have machine code."""
+    """What is wrong with a call of numpy that works on arrays; "" for any other part.
+
+    Its functions of single numbers (ufuncs) have machine code.
+    """
     match part:
         case ast.Call(func=ast.Attribute(value=ast.Name(id=name), attr=attr) as called):
             if known.get(name) is np and not isinstance(getattr(np, attr, None), np.ufunc):
@@ -170,7 +185,10 @@ def _of_numpy(part: ast.AST, known: Mapping[str, Any]) -> str:
 
 
 def _returns_at_times(node: ast.FunctionDef) -> int:
-    """The line of a value that a kernel returns which need not return one; else 0."""
+    """The line of the first value that a kernel returns which does not always return one; else 0.
+
+    Machine code has to return the same type whichever way it goes.
+    """
     returns = [part for part in ast.walk(node) if isinstance(part, ast.Return)]
     lines = [part.lineno for part in returns if ast.dump(part) not in RETURNS_NOTHING]
     always = len(lines) == len(returns) and Reads(node, {}).always_returns()

@@ -17,7 +17,10 @@ EVERYTHING = None  # the names that are set where control never comes
 
 
 def whole_number(node: ast.expr, known: Mapping[str, Any]) -> int | None:
-    """The whole number that an expression always is; None for any other."""
+    """The whole number that an expression always is; None for any other.
+
+    A literal, or a name among the globals `known`.
+    """
     if isinstance(node, ast.Name):
         number = known.get(node.id)
     else:
@@ -40,7 +43,7 @@ class Reads:
     """Follows a kernel's statements with the names that surely have a value."""
 
     def __init__(self, node: ast.FunctionDef, known: Mapping[str, Any]) -> None:
-        """`known` are the kernel's globals."""
+        """`node` is a kernel's source, `known` are its globals."""
         stores = (n for n in ast.walk(node) if isinstance(n, ast.Name))
         self._own = {name.id for name in stores if isinstance(name.ctx, ast.Store)}
         self._arguments = frozenset(p.arg for p in ast.walk(node.args) if isinstance(p, ast.arg))
@@ -120,6 +123,7 @@ class Reads:
         """What is set however the loop is left; its body counts only if it surely has a round."""
         self._read(node.iter, known)
         loop, last = self._round(node.body, known | _names_stored(node.target))
+        # A round ends at the body's end or at a `continue`; without any, what was known before is
         over = _both([last, *loop.again]) if self._has_rounds(node.iter) else known
         ended = EVERYTHING if over is EVERYTHING else self._block(node.orelse, over)
         return _both([ended, *loop.left])
@@ -154,7 +158,7 @@ class Reads:
                 self._read(part, known)
 
     def _note(self, name: ast.Name, known: Names) -> None:
-        """A fault at this name, where it is a local one that is not among those `known`."""
+        """Note a fault at this name, where it is a local one that is not among those `known`."""
         if name.id in self._own and name.id not in known:
             self._found[name.lineno, name.id] = (
                 f"{name.id} may have no value here, since it is set in a branch or a loop that "

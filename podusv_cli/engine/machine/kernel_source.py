@@ -31,7 +31,10 @@ def source(function: Any) -> ast.FunctionDef:
 
 
 def check_source(function: Any) -> None:
-    """Raises OtherSource where the file of a kernel has another one by now than what runs."""
+    """Raises OtherSource where the file of a kernel has another one by now than what runs.
+
+    The text is compiled again, and its byte code compared.
+    """
     code = function.__code__
     try:
         codes = _codes(_text(function), code.co_filename)
@@ -56,7 +59,7 @@ def _text(function: Any) -> str:
 
 @cache
 def _nodes(text: str) -> dict[Any, ast.FunctionDef]:
-    """Every function of a file by name and first line, as source."""
+    """Every function of a file by name and first line, as source; decorators count as lines."""
     functions = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]
     return {
         (node.name, min([node.lineno, *(d.lineno for d in node.decorator_list)])): node
@@ -66,7 +69,7 @@ def _nodes(text: str) -> dict[Any, ast.FunctionDef]:
 
 @cache
 def _codes(text: str, filename: str) -> dict[Any, CodeType]:
-    """The same as byte code."""
+    """Every function of a file's text by name and first line, as byte code."""
     codes: dict[Any, CodeType] = {}
     waiting = [compile(text, filename, "exec")]
     while waiting:

@@ -42,7 +42,10 @@ class Code(NamedTuple):
 
 
 def load_or_translate(prototype: Any, name: str, translate: Callable[[], Code]) -> Any:
-    """The function of this name as ctypes calls it: found on disk, or translated and kept there."""
+    """The function of this name as ctypes calls it: found on disk, or translated and kept there.
+
+    Raises TypeError with the reason where there is no object code.
+    """
     code = code_from_cache(name, translate)
     if not code.symbol:
         raise TypeError(code.content.decode())
@@ -89,7 +92,10 @@ def target() -> Any:
 
 
 def _load_code(prototype: Any, code: Code) -> Any:
-    """Object code as a function that ctypes calls with this prototype."""
+    """Object code as a function that ctypes calls with this prototype.
+
+    LLVM's engine wants a module to begin with; an empty one will do.
+    """
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code.content))
     engine.finalize_object()
@@ -157,8 +163,8 @@ def ingredients(
 ) -> Iterator[str]:
     """Everything that the machine code of a kernel depends on, the kernels it calls included.
 
-    `numbered` counts the functions and attributes of modules that have been told already, and
-    `alone` tells of a function by itself.
+    As texts, for a digest. `numbered` counts the functions and attributes of modules that came
+    before, so that each is described once; `alone` describes a function by itself.
     """
     numbered[function] = len(numbered)
     yield from alone(function)
@@ -182,10 +188,10 @@ def _codes(code: CodeType) -> Iterator[CodeType]:
 def _describe_thing(
     thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any
 ) -> Iterator[str]:
-    """What stands behind a name of a function that uses these names.
+    """What stands behind a name of a function that uses these `names`, as texts.
 
-    A class or a function of a library is told by what it is called. What has no name is told by its
-    address at worst, and then compiled by each process anew.
+    A class or a function of a library is described by its name. What has no name is described by
+    its address at worst, and then compiled by each process anew.
     """
     called = getattr(thing, "__qualname__", getattr(thing, "__name__", ""))
     members = getattr(thing, "__members__", ())  # of an enumeration

@@ -56,7 +56,10 @@ def digest(function: Any, prototype: Any, compiler: str) -> str:
 
 @cache
 def _kernels() -> Mapping[str, bytes]:
-    """All of them; none where the file is missing or damaged, or made by others than are here."""
+    """The bitcode of all kernels by digest.
+
+    None where the file is missing or damaged, or made by other files of podusv than are here.
+    """
     with suppress(OSError, lzma.LZMAError, ValueError, TypeError):
         head, _, body = lzma.decompress(FILE.read_bytes()).partition(b"\n")
         makers, version, sizes = json.loads(head)
@@ -77,7 +80,11 @@ def write(kernels: Mapping[str, bytes]) -> None:
 
 
 def source_of(function: Any) -> tuple[str, ...]:
-    """A function as its file has it; of one that podusv wrote out itself, the whole text."""
+    """Name and text of a function as its file has it.
+
+    Of one that podusv wrote out itself, name, line and the whole text. Raises OSError without a
+    file, OtherSource for one that was edited.
+    """
     code = function.__code__
     if (text := function.__globals__.get(TEXT)) is not None:
         return code.co_name, str(code.co_firstlineno), text
@@ -89,7 +96,7 @@ def source_of(function: Any) -> tuple[str, ...]:
 
 
 def _name_type(kind: Any) -> str:
-    """A type of ctypes, alike on all systems."""
+    """A type of ctypes in words that are alike on all systems, where ctypes' own names differ."""
     if kind is None:
         return "none"
     if issubclass(kind, ctypes._CFuncPtr):  # type: ignore[attr-defined]

@@ -94,7 +94,10 @@ def in_memory(alloca: Instruction) -> str:
 
 
 def is_cheap(row: list[Instruction]) -> bool:
-    """Whether a block may as well be computed where no lane is in it: few numbers, no memory."""
+    """Whether a block may as well be computed where no lane is in it: few numbers, no memory.
+
+    Divisions of whole numbers are not cheap: by zero they would end the process.
+    """
     harmless = LANEWISE - {*DIVISIONS} | {"select", "phi", "br"}
     return len(row) <= MOST_CHEAP and all(instruction.opcode in harmless for instruction in row)
 
@@ -134,7 +137,7 @@ class Instructions(Values):
         self.set(instruction, f"{words} {over} {', '.join(operands)}{to}")
 
     def _only_here(self, one: Instruction, value: str, kind: str, other: str) -> str:
-        """A value in the lanes that are in the block, and another one elsewhere."""
+        """`value` in the lanes that are in the block of `one`, and `other` elsewhere; its name."""
         if self.masks.of[one.block] == EVERY:
             return value
         over = lanes(kind)
@@ -158,7 +161,10 @@ class Instructions(Values):
         self.places.append(f"{instruction.name} = alloca {room(in_memory(instruction))}, align 64")
 
     def _getelementptr(self, instruction: Instruction) -> None:
-        """A place in memory; in that of all lanes, LANES numbers stand for one."""
+        """A place in memory; in that of all lanes, LANES numbers stand for one.
+
+        Where the place differs between lanes it is a vector of pointers.
+        """
         kind = instruction.words.split(", ptr ")[0].split(" ", 1)[1]
         kind = re.sub(r"^(inbounds|nuw|nusw| )+", "", kind)
         if self.masks.points_at(instruction.name) == LANES_MEMORY:
@@ -174,7 +180,10 @@ class Instructions(Values):
         self.set(instruction, f"getelementptr {kind}, {', '.join(parts)}")
 
     def _check_size(self, instruction: Instruction, pointer: str, kind: str) -> None:
-        """Refuse memory that is read as numbers of another size than it has: lanes would mix."""
+        """Raises NotForLanes for memory that is read as numbers of another size than it has.
+
+        Number i of every lane lies at i LANES sizes, so lanes would mix.
+        """
         root = self.masks.values.get(pointer)
         while root and root.opcode == "getelementptr":
             root = self.masks.values.get(root.operands[0])
@@ -186,7 +195,11 @@ class Instructions(Values):
             )
 
     def _addresses(self, instruction: Instruction, pointer: str, kind: str) -> list[str]:
-        """Where each lane's number lies; for lanes that are not in the block it is nowhere."""
+        """The names of the places of all lanes' numbers.
+
+        For lanes that are not in the block it is `%nowhere`, where they load and store without an
+        effect.
+        """
         nowhere = ""
         if self.masks.of[instruction.block] != EVERY:
             nowhere = self.everywhere("%nowhere", "ptr")
@@ -273,7 +286,11 @@ class Instructions(Values):
         self.put(f"call void {self.plain(instruction.operands[-1])}({given})")
 
     def _call_in_lanes(self, instruction: Instruction, name: str) -> None:
-        """A function without effects: one of exact results for all lanes, else lane by lane."""
+        """A function without effects: one of exact results for all lanes, else lane by lane.
+
+        Others may round otherwise in their vector form, and runs would not have the bits of one
+        that marches alone.
+        """
         operands = instruction.typed_operands[:-1]
         short = re.sub(r"(\.[if]\d+)+$", "", name.removeprefix("llvm."))
         if not name.startswith("llvm.") or short not in EXACT:

@@ -25,7 +25,10 @@ class Masks:
     """`memory` tells by argument whether what it points at has a number for every lane."""
 
     def __init__(self, function: IrFunction, memory: dict[str, str]) -> None:
-        """Raises NotForLanes for pointers that are computed in a way that cannot be followed."""
+        """Raises NotForLanes for pointers that are computed in a way that cannot be followed.
+
+        What differs makes masks differ, and these make more differ: until nothing new is found.
+        """
         self.function, self.order, self.memory = function, Order(function), dict(memory)
         self.values = function.values
         self.differing: set[str] = set()
@@ -54,7 +57,7 @@ class Masks:
         return self.memory.get(pointer, "") if pointer.startswith("%") else PLAIN_MEMORY
 
     def _follow_pointers(self) -> None:
-        """Which memory each pointer points at, found by going on until nothing new is known."""
+        """Note in `memory` what each pointer points at, going on until nothing new is known."""
         pointers = [value for value in self.values.values() if value.kind == "ptr"]
         while True:
             new = {p.name: self._kind(p) for p in pointers if p.name not in self.memory}
@@ -103,7 +106,11 @@ class Masks:
         return node in self.ragged if isinstance(node, BlockLoop) else self.splits(node)
 
     def _wait(self) -> None:
-        """By level and node, which nodes wait while control is there."""
+        """By level and node, which nodes wait while control is there.
+
+        Where lanes part, control goes to the first of the ways, and the others wait with what
+        waited before. A node that is skipped passes on what waits.
+        """
         self.waiting: dict[BlockLoop | None, dict[Node, set[Node]]] = {}
         for loop, level in self.order.levels.items():
             waiting: dict[Node, set[Node]] = {node: set() for node in level.place}
@@ -176,7 +183,10 @@ class Masks:
                     self._differ(instruction.name)
 
     def _is_mixed(self, phi: Instruction, joins: bool) -> bool:
-        """Whether lanes may get different numbers though each of these is the same in all."""
+        """Whether lanes may get different numbers though each of these is the same in all.
+
+        From several ways, or from different rounds of a loop that lanes leave one by one.
+        """
         if joins and len(set(phi.operands) - {*NOTHING}) > 1:
             return True
         computed = [self.values[o].block for o in phi.operands if o in self.values]
@@ -185,7 +195,10 @@ class Masks:
         )
 
     def _find_ragged(self) -> None:
-        """The loops that some lanes leave earlier than others."""
+        """Add the loops that some lanes leave earlier than others: at a way out that parts them.
+
+        Or where some still wait when control leaves.
+        """
         for loop in self.order.loops[::-1]:  # the inner ones first
             ways = [(b, s) for b in loop.blocks for s in self.function.successors[b]]
             leaving = [(begin, end) for begin, end in ways if end not in loop.blocks]

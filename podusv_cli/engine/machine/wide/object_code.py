@@ -82,7 +82,11 @@ def _memory(kind: Any) -> str:
 
 
 def _mark(name: str, result: Any = None) -> Any:
-    """A call that numba's code has for a primitive of `core.kernel`, and that widening replaces."""
+    """A call that numba's code has for a primitive of `core.kernel`, and that widening replaces.
+
+    Returns a function from the types given to the call's own type and code. It has the type of its
+    first argument, unless `result` is another.
+    """
 
     def type_mark(given: Any) -> Any:
         """Type and code of a call that stands for something until the IR is widened."""

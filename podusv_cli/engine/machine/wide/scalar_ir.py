@@ -50,7 +50,11 @@ class IrFunction:
 
 
 def prepare_function(module: Any, name: str, machine: Any) -> Any:
-    """The function with all that it calls inside it, its variables in registers."""
+    """The function with all that it calls inside it, its variables in registers.
+
+    Loops have one entry, one way back and exits of their own, which `order` counts on; switches
+    become branches, and every value has a name. It changes the module.
+    """
     for function in module.functions:
         if not function.is_declaration and function.name != name:
             function.linkage = "internal"
@@ -78,7 +82,10 @@ def prepare_function(module: Any, name: str, machine: Any) -> Any:
 
 
 def read(function: Any, unread: tuple[str, ...]) -> IrFunction:
-    """The function as values, without stores to arguments in `unread`. Raises NotForLanes."""
+    """The function as values, without stores to arguments in `unread`. Raises NotForLanes.
+
+    llvmlite tells opcodes, operands and types; flags and predicates stand in the text alone.
+    """
     kinds = _shorten_names(function)
     rows = [list(block.instructions) for block in function.blocks]
     lines = [line.strip() for line in str(function).splitlines() if line.startswith("  ")]
@@ -134,7 +141,7 @@ def _operand(operand: Any, kinds: dict[str, str]) -> tuple[str, str]:
     if what in ("instruction", "argument"):
         return f"%{operand.name}", kinds[operand.name]
     if what == "basic_block":
-        return operand.name, "label"
+        return operand.name, "label"  # b and its number, see `_shorten_names`
     if what in ("function", "global_variable", "global_alias"):
         return f'@"{operand.name}"', "ptr"
     kind = str(operand.type)
@@ -148,6 +155,7 @@ def _successors(last: Instruction) -> list[int]:
         return [RETURN]
     if last.opcode != "br":
         raise NotForLanes(f"a block that ends with {last.opcode}")
+    # LLVM has the operands of a branch the other way round: condition, false, true
     goals = [int(name[1:]) for name, kind in last.typed_operands if kind == "label"][::-1]
     if len(goals) > len(set(goals)):
         raise NotForLanes("a branch with one way")
@@ -155,7 +163,10 @@ def _successors(last: Instruction) -> list[int]:
 
 
 def _clean(blocks: list[list[Instruction]], unread: tuple[str, ...]) -> None:
-    """Drop stores to places that nobody reads, and then what is not used."""
+    """Drop stores to places that nobody reads, and then, round by round, what is not used.
+
+    Calls stay: a part of the loop has effects.
+    """
     for row in blocks:
         row[:] = [o for o in row if not (o.opcode == "store" and o.operands[1] in unread)]
     count = -1

@@ -88,7 +88,7 @@ class Values:
         return self.known[name]
 
     def wide(self, name: str, kind: str) -> str:
-        """An operand in every lane."""
+        """An operand in every lane, as text: a vector, made once a block where it is one number."""
         if self.differs(name):
             return self.plain(name)
         if name in (*NOTHING, "zeroinitializer"):
@@ -107,13 +107,13 @@ class Values:
         return ", ".join(f"{kind} {self.plain(o)}" for o, kind in operands)
 
     def everywhere(self, value: str, kind: str) -> str:
-        """A number in every lane."""
+        """The name of a vector with `value`, of type `kind`, in every lane."""
         first_lane = self.let(f"insertelement {lanes(kind)} poison, {kind} {value}, i32 0")
         order = f"<{LANES} x i32> zeroinitializer"
         return self.let(f"shufflevector {lanes(kind)} {first_lane}, {lanes(kind)} poison, {order}")
 
     def by_lane(self, instruction: Instruction, numbers: list[str]) -> None:
-        """Write the value of an instruction from the numbers of all lanes."""
+        """Write the value of an instruction from the names of the numbers of all lanes."""
         made, kind = "poison", instruction.kind
         for lane, number in enumerate(numbers[:-1]):
             made = self.let(f"insertelement {lanes(kind)} {made}, {kind} {number}, i32 {lane}")
@@ -138,7 +138,7 @@ class Values:
         return self.known[key]
 
     def edge(self, begin: int, way: int) -> str:
-        """The lanes that go one of the ways at the end of a block."""
+        """The mask of the lanes that go a way (0: true, 1: false) at the end of block `begin`."""
         here = self.mask(begin)
         if not self.masks.splits(begin):
             return here
@@ -169,7 +169,10 @@ class Values:
         )
 
     def pass_on(self, phi: Instruction, operand: str, mask: str | None) -> None:
-        """Leave an operand for a phi, in the lanes of a mask where there is one."""
+        """Leave an operand in memory for a phi, in the lanes of a mask where there is one.
+
+        An undefined one need not be left.
+        """
         kind, place = self.kind(phi), self._place(phi.name, "phi")
         if operand in NOTHING:
             return

@@ -25,7 +25,7 @@ NAME = "podusv_lanes"
 
 
 def widen_module(module: Any, name: str, memory: list[str], result: str, machine: Any) -> Any:
-    """An optimised module with the function `name` of a module for lanes, called NAME.
+    """An optimised module with the function `name` of `module` for lanes, called NAME.
 
     `memory` tells for every argument what it points at (`masks`); the function was compiled
     by numba, which hands over two more in front of them: where the result of type `result` (""
@@ -42,7 +42,7 @@ def widen_module(module: Any, name: str, memory: list[str], result: str, machine
     )
     made.verify()
     tuning = llvm.create_pipeline_tuning_options(3)
-    tuning.loop_vectorization = tuning.slp_vectorization = False
+    tuning.loop_vectorization = tuning.slp_vectorization = False  # registers hold lanes already
     builder = llvm.create_pass_builder(machine, tuning)
     builder.getModulePassManager().run(made, builder)
     return made
@@ -52,7 +52,10 @@ class Blocks(Instructions):
     """Writes blocks, and the ways between them."""
 
     def whole(self, result: str) -> str:
-        """All of the function; the numbers that it was asked for are what it returns."""
+        """The text of the function, declarations included; `result` is the type that it returns.
+
+        The blocks come first, as they find out which places in memory are needed.
+        """
         self._level(None)
         for block, mask in self.masks.of.items():
             if mask == block:
@@ -89,7 +92,10 @@ class Blocks(Instructions):
                 self._block(level, node)
 
     def _loop(self, level: NodeLevel, loop: BlockLoop) -> None:
-        """A loop; one that lanes leave in different rounds ends when none is left in it."""
+        """Write a loop; one that lanes leave in different rounds ends when none is left in it.
+
+        `%mask` has the lanes of this round, `%next` gathers those of the next one.
+        """
         header, ragged = loop.header, loop in self.masks.ragged
         self.label(f"at.loop.{header}")
         if ragged:
@@ -146,7 +152,11 @@ class Blocks(Instructions):
             self.put(f"store {MASK} {ALL_FALSE}, ptr {mask}")
 
     def _leave(self, level: NodeLevel, block: int) -> None:
-        """Go on from a block, with what every way takes along."""
+        """Go on from a block, with what every way takes along.
+
+        Where lanes part, to the first node of the ways and of what waits; where all go one way
+        there; else by a branch as in scalar code.
+        """
         targets, waiting = self.function.successors[block], self._waiting(level, block)
         if self.masks.splits(block):
             for way, target in enumerate(targets):
@@ -167,7 +177,10 @@ class Blocks(Instructions):
                 self.put(f"br label %{self._goal(level, waiting, target)}")
 
     def _goal(self, level: NodeLevel, waiting: set[Node], target: int) -> str:
-        """The label to go on at where all lanes of a block go to one target."""
+        """The label to go on at where all lanes of a block go to one target.
+
+        A way out of a loop that all lanes leave together is looked up in the level around it.
+        """
         loop = level.loop
         node = self.masks.order.node(loop, target)
         if node != END or loop is None or loop in self.masks.ragged:
@@ -178,7 +191,7 @@ class Blocks(Instructions):
         return self._goal(outer, self._waiting(outer, loop), target)
 
     def _take_along(self, begin: int, end: int, way: int) -> None:
-        """Leave numbers for the phis of a block, and tell it which lanes come."""
+        """Leave numbers for the phis of block `end`, and tell it which lanes come by this `way`."""
         if end == RETURN:
             return
         several = end in self.masks.joins and not self._is_first(begin, end)
