@@ -21,7 +21,10 @@ def times(words: str, factor: Callable[[Facts], float]) -> Rule:
 
 
 def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
-    """The rule for a pole of an observer, which a slow measurement limits."""
+    """The rule for a pole of an observer: times a `factor`, as far as a slow sampling allows.
+
+    `words` are the factor's formula, for `explain`.
+    """
 
     def of(facts: Facts, default: float) -> float:
         """The pole [1/s] that suits a boat; `default` is that of the model ship."""

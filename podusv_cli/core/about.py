@@ -285,8 +285,9 @@ class RunAbout(_PlainJson):
 def at_target(numbers: Mapping[str, float], *, follows: bool, trial: bool, radius: float) -> bool:
     """Whether a run with these metrics ends at its target.
 
-    That is with `e_steady` within the settling `radius` [m], or with all legs done of a path that
-    is followed. A manoeuvring trial and recorded commands (`trial`) have no target to be at.
+    `numbers` are metrics by name. It does with `e_steady` within the settling `radius` [m], or on a
+    path that is followed (`follows`) with all legs done. A manoeuvring trial and recorded commands
+    (`trial`) have no target to be at.
     """
     if follows:
         return numbers.get("path_done", 1.0) >= 1.0

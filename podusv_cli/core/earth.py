@@ -42,7 +42,7 @@ class Plane:
         return s, c, across * c, across * (1.0 - E2) * s
 
     def north_east(self, lat: Vector, lon: Vector) -> tuple[Vector, Vector]:
-        """x and y (n,) [m] of latitudes and longitudes (n,) [deg], in any turn.
+        """x and y (n,) [m] of latitudes `lat` and longitudes `lon` (n,) [deg], in any turn.
 
         In axes of the earth that turn with the origin's longitude: outward from the axis, east, and
         upward along it. North and the vertical follow by the origin's latitude.
@@ -56,7 +56,9 @@ class Plane:
         return c * upward - s * outward, from_axis * np.sin(away)
 
     def places(self, north: Vector, east: Vector) -> tuple[Vector, Vector]:
-        """Latitudes and longitudes (n,) [deg, -180 to 180] of x and y (n,) [m]; NaN beyond the rim.
+        """Latitudes and longitudes (n,) [deg, -180 to 180] of places in the plane.
+
+        `north` and `east` (n,) are x and y [m]; beyond the earth's rim the result is NaN.
 
         The point of the ellipsoid under (x, y) is so far below the plane as the smaller root of a
         quadratic equation says.

@@ -124,9 +124,9 @@ def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
         law: type[Any] = object,
         needs: tuple[str, ...] = (),
     ) -> Decorator:
-        """Make a kind of finding of a function.
+        """Make a kind of finding of a function; the arguments are the fields of `FindingKind`.
 
-        `before` a run it takes a `Case`, `after` a run the scenario and its recording.
+        `before` a run the function takes a `Case`, `after` a run the scenario and its recording.
         """
         return lambda search: FindingKind(
             name, about, meaning, when, search, law, condition, remedy, needs

@@ -240,7 +240,8 @@ def whole_lanes(count: int) -> int:
 def unpacker(names: tuple[str, ...], alike: Collection[str] = ()) -> Callable[[Vector], Any]:
     """A kernel from a vector to the named tuple of these constants; those in `alike` are `shared`.
 
-    Its source is written out, one index a field: compiled code has no calls of variable length.
+    `names` are the constants' in the order of the vector's numbers. Its source is written out, one
+    index a field: compiled code has no calls of variable length.
     """
     fields = ", ".join(
         f"shared(p[{i}])" if name in alike else f"p[{i}]" for i, name in enumerate(names)

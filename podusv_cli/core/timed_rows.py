@@ -131,7 +131,10 @@ def _numbers(lines: list[TextLine], noun: str) -> Vector:
 
 
 def _wrong_cell(lines: list[TextLine], noun: str) -> str:
-    """Where the first cell is that is no number, for a message; "" where all are."""
+    """Where the first cell of `lines` is that is no number, for a message; "" where all are.
+
+    `noun` is what the text is called, here and below.
+    """
     for number, cells in lines:
         for column, cell in enumerate(cells, 1):
             if not _is_number(cell):
@@ -178,7 +181,7 @@ def _split_unit(cell: str) -> tuple[str, str]:
 
 
 def columns(header: TextLine, names: Sequence[str], noun: str) -> list[int]:
-    """Positions in the header of these columns. A name stands with its unit, `b_u [N]`, or without.
+    """Positions in the header of the columns `names`, as `b_u [N]`; the unit may be left out.
 
     Raises ValueError where one is missing, unknown or given twice.
     """

@@ -271,9 +271,10 @@ class ExportedLaw:
         return np.column_stack([time, *state, self._targets(log, rows), *loads, *said, *memory])
 
     def stepper(self) -> Callable[[int, Vector], list[float]]:
-        """What steps the law in this process as its C files do.
+        """A function that steps the law in this process as its C files do.
 
-        It takes a sample's number and inputs, and returns demand, signals and memory.
+        It takes a sample's number and inputs (inputs,), and returns demand, signals and memory. It
+        begins with the memory at t = 0.
         """
         c, n = Vectors(*(vector.copy() for vector in self.vectors)), self.layout
         parts = [routine(self.pieces[name]) for name in PARTS.values()]

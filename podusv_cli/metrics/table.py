@@ -175,7 +175,7 @@ class Metrics(Probe):
         return np.full(seen.shape[1], np.nan)
 
     def summaries(self, seen: Vector) -> dict[str, Vector]:
-        """Metrics by name, with one number per run, from rows of gathered numbers (`Batch.seen`).
+        """Metrics by name (runs,), from rows of gathered numbers (runs, numbers), as `Batch.seen`.
 
         NaN where a run ended before a metric is defined; all NaN for a run that never began. Raises
         LawError for a metric that raises.

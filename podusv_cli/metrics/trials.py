@@ -137,7 +137,7 @@ def _constants(layout: Measured) -> dict[str, float]:
 def _number(
     of: Accumulator, position: int, name: str, unit: str, meaning: str, **words: Any
 ) -> Metric:
-    """The metric of the number gathered at a position, first in tables.
+    """The metric `name` [unit] of the number gathered at a position, first in tables.
 
     NaN where the trial did not get so far: then the number is still 0.
     """

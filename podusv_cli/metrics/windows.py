@@ -124,7 +124,7 @@ def _at(position: int) -> Callable[[Vector], float]:
 def _name_metric(
     template: Metric, name: str, meaning: str, of: Accumulator, result: Result, words: str
 ) -> Metric:
-    """A metric of a family under the name that a scenario asked for; it replaces NAMED."""
+    """The metric `template` of a family under the name that a scenario asked for."""
     return replace(
         template,
         name=template.name.replace(NAMED, name),

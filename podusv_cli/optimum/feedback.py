@@ -65,7 +65,10 @@ def _gains(problem: OptimumProblem, motion: Motion) -> Vector:
 
 
 def _slopes(problem: OptimumProblem, motion: Motion) -> tuple[Vector, Vector]:
-    """The rates' derivatives by state (times, 6, 6) and demand (times, 6, demands)."""
+    """The vessel's rates' derivatives by state (times, 6, 6) and demand (times, 6, demands).
+
+    Exact, along the motion, by CasADi.
+    """
     ca, rate = casadi(), dynamics(bundle(problem.loop.vessel.constants()), problem.demands)
     sizes = (STATES, problem.demands, 3)
     arguments: list[Any] = [ca.SX.sym(f"a{i}", size) for i, size in enumerate(sizes)]

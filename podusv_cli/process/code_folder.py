@@ -60,7 +60,10 @@ def _warn(text: str) -> None:
 
 
 def write(path: Path, content: bytes) -> None:
-    """Make or replace a file; it is whole, whoever else writes or reads it. Raises OSError."""
+    """Make or replace the file `path`; it is whole, whoever else writes or reads it.
+
+    Raises OSError. Renaming within a folder is one step.
+    """
     part = path.with_name(temporary_name())
     try:
         part.write_bytes(content)

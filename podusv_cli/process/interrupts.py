@@ -37,7 +37,7 @@ class Interrupts:
         self._last = -SAME_INTERRUPT
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Handle a signal."""
+        """Handle the signal `number`: raise KeyboardInterrupt, now or later, or end the process."""
         # A signal soon after the last belongs to the same interrupt
         if self.ending or time.monotonic() - self._last < SAME_INTERRUPT:
             return

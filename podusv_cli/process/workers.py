@@ -137,7 +137,7 @@ def run_each(
     progress: Report = lambda position, fraction: None,
     workers: int = 0,
 ) -> bool:
-    """The same for numbered jobs that are taken one by one as processes become free.
+    """Run numbered jobs, as `run_all`, that are taken one by one as processes become free.
 
     `done` is called with a job's number and outcome, and may add jobs to those that are still to be
     taken. False after an interrupt; jobs that did not return have no outcome then.
@@ -356,7 +356,10 @@ def _run_job_of_bytes(content: bytes, tell: Progress) -> Any:
 
 
 def _send_outcome(job: Job, pipe: Pipe, interrupts: Interrupts) -> None:
-    """Run a job and send its outcome. Raises BrokenPipeError where the parent has ended."""
+    """Run a job, which tells its progress through the pipe, and send its outcome there.
+
+    Raises BrokenPipeError where the parent has ended.
+    """
     outcome = outcome_of(job, pipe.send, interrupts)
     try:
         pipe.send(outcome)

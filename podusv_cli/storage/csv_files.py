@@ -41,7 +41,7 @@ def records(rows: Sequence[Mapping[str, object]], digits: str | None = None) -> 
 
 
 def text(frame: pd.DataFrame, digits: str | None = None) -> str:
-    """A table without its index; numbers in full precision, or in this format such as `%.6g`.
+    """A table as CSV without its index; numbers in full precision, or in `digits` such as `%.6g`.
 
     An infinite number is `inf`, an unknown one empty.
     """

@@ -142,7 +142,7 @@ def new_file(path: Path, size: int, *, sync: bool = True) -> Iterator[BinaryIO]:
 
 
 def disk_array(folder: Path, size: int) -> Vector:
-    """An array of `size` numbers in a nameless file of the folder, for logs larger than memory.
+    """An array (size,) of numbers in a nameless file of the folder, for logs larger than memory.
 
     Its disk space is reserved at once, so that a full disk is a StorageError here and not a signal
     (SIGBUS) when a number is stored; ZFS, macOS and Windows reserve nothing.

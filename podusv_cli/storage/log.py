@@ -53,7 +53,7 @@ class Texts(NamedTuple):
 
 
 def write(path: Path, recording: Recording, texts: Texts, *, compress: bool = False) -> None:
-    """Write a recording to a new log file; the same recording gives the same bytes.
+    """Write a recording with its `texts` to a new log file; the same gives the same bytes.
 
     A compressed log is made in memory. Raises StorageError; a part of the file may then exist.
     """
@@ -133,7 +133,8 @@ def _fill(
 ) -> list[tuple[int, Vector]]:
     """Create datasets and attributes; returns the arrays yet to be written, with their offsets.
 
-    An offset is the byte of the file at which an array begins; a compressed log has none left.
+    An offset is the byte of the file at which an array begins; of a log that is to `compress`
+    everything is written here.
     """
     file.attrs.create("podusv_format", np.int32(FORMAT))
     describe(file, _facts(recording, texts))
@@ -158,7 +159,7 @@ def _fill(
 
 
 def _facts(recording: Recording, texts: Texts) -> dict[str, str]:
-    """The attributes of the whole log."""
+    """The attributes of the whole log by name; a message only of a run that did not finish."""
     facts = {
         "Conventions": CONVENTIONS,
         "title": texts.title,

@@ -23,7 +23,9 @@ GIT_PATIENCE = 5.0  # s
 def collect(
     argv: Sequence[str], started: datetime, finished: datetime, plugins: Iterable[Plugin] = ()
 ) -> dict[str, Any]:
-    """The content of provenance.json; `argv` is the command, times are aware datetimes.
+    """The content of provenance.json; `argv` is the command that `started` and `finished` then.
+
+    Both are aware datetimes.
 
     A plug-in with neither version nor path, as one that is made in Python, is left out.
     """
@@ -59,7 +61,7 @@ def surroundings() -> Mapping[str, Any]:
 
 
 def times(started: datetime, finished: datetime) -> dict[str, Any]:
-    """When something began and ended, and how long it took."""
+    """When something began and ended, in UTC as ISO texts, and how long it took [s]."""
     return {
         "started": _utc(started),
         "finished": _utc(finished),

@@ -172,7 +172,7 @@ class RunWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Delete the folder if it was not finished."""
+        """Delete the folder if it was not finished; what was raised goes on."""
         self._staging.discard()
 
 

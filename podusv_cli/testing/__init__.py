@@ -369,7 +369,10 @@ def _actuator(actuator: Any, t: float, x: Vector, target: Vector, random: Any) -
 
 
 def _measurement(sensors: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    """All that a measurement's kernel writes at an instant that is drawn."""
+    """All that a measurement's kernel writes at an instant that is drawn: `seen` (numbers,).
+
+    At state x (6,), in calm water.
+    """
     seen = sensors.first(x, STEP)
     k, table = bundle(sensors.constants_with(STEP, 0)), sensors.table_for(STEP, STEPS)
     call(

@@ -196,7 +196,10 @@ def _corrected_bound(law: PolarBackstepping, axes: Axes, observed: Observed | No
 
 
 def _printed_bound(law: PolarBackstepping, axes: Axes, observed: Observed | None) -> Bound:
-    """The bound as the paper prints it, like the corrected one."""
+    """The bound as the paper prints it, with the arguments of `_corrected_bound`.
+
+    It leaves out inertia and adaptation gains in the rates, and the cross terms of the filters.
+    """
     surge, yaw = axes
     candidates = {
         "z_e": surge.k,
@@ -304,7 +307,9 @@ class SwayBound:
 
 
 def sway_push(vessel: Vessel, log: Recording, now: Replayed) -> tuple[Vector, Vector]:
-    """The sway force at every row [N]: without damping, and m11 |u| |r| + |b_v| of (51).
+    """The sway force at every row of a log (rows,) [N]: without damping, and that printed in (51).
+
+    The latter is m11 |u| |r| + |b_v|; `now` has rates and signals at the rows.
 
     The first is |m22 v' - (Y_v + Y_vv |v|) v|, with cross terms and the actuator's sway force. For
     the paper's vessel it never exceeds the second.

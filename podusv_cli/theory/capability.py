@@ -96,7 +96,7 @@ def _wind(vessel: Vessel, own: Disturbance) -> LoadOf:
 
 
 def _force(vessel: Vessel, own: Disturbance) -> LoadOf:
-    """Of a force through the body origin, whose size is in N."""
+    """Of a force through the body origin, whose size is in N; `vessel` and `own` do not matter."""
 
     def acting(size: float, angle: float) -> Acting:
         return Acting(-size * np.array([math.cos(angle), math.sin(angle), 0.0]), AT_REST)

@@ -37,9 +37,10 @@ class Course:
 
 
 def course(path: Path, duration: float, at: float | None = None) -> Course:
-    """The target's steady motion at a time [s], or at the last time where there is one.
+    """The target's steady motion `at` a time [s], or at the last time where there is one.
 
-    A straight line is preferred to a circle. Raises NotConvergedError where there is none.
+    `duration` [s] is that of the run. A straight line is preferred to a circle. Raises
+    NotConvergedError where there is none.
     """
     times = np.linspace(0.0, duration, INSTANTS + 1)[::-1] if at is None else [at]
     steady = [point for point in (_course(path, float(t)) for t in times) if point]

@@ -35,7 +35,8 @@ class IdealWeights:
 def unloaded_accelerations(loop: ClosedLoop, now: Replayed) -> tuple[Vector, Vector]:
     """f_u [m/s2] and f_r [rad/s2] (rows,): accelerations less those of actuator and disturbance.
 
-    For any vessel, with its full mass matrix, in which a sway force turns the hull as well.
+    `now` has rates and signals at the rows. For any vessel, with its full mass matrix, in which a
+    sway force turns the hull as well.
     """
     m, s, d = loop.vessel, now.signals, now.rates
     sway, yaw = s["tau_v"] + s["b_v"], s["tau_r"] + s["b_r"]
@@ -49,7 +50,10 @@ def node_outputs(network: Network, log: Recording) -> Vector:
 
 
 def exponents(network: Network, log: Recording) -> Vector:
-    """Exponents of the factors of Phi, shape (rows, factors): half squared distances in widths."""
+    """Exponents of the factors of Phi, shape (rows, factors): half squared distances in widths.
+
+    At (u, v, r) of the rows of `log`; a factor depends on u, or on v and r, see `Network.factors`.
+    """
     along, plane = network.factors
     centers, steep = network.table().reshape(2, 3, -1)[..., : along + plane]
     nu = np.column_stack([log["u"], log["v"], log["r"]])

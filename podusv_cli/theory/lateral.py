@@ -86,7 +86,10 @@ def velocity_vector_loop(
 
 
 def velocity_vector_polynomial(law: VelocityVector, at: SwayAnswer) -> Vector:
-    """Coefficients (5,) of its characteristic polynomial for m23 = m32 = 0 above V_m, s^4 first."""
+    """Coefficients (5,) of the characteristic polynomial of `velocity_vector`, s^4 first.
+
+    For m23 = m32 = 0 above V_m; `at` is how sway answers yaw.
+    """
     (p, d), a, b, T = at, law.k_psi, law.k_r, law.T_v
     q = law.k_p * (a + b)
     return np.array(

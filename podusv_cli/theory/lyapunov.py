@@ -51,8 +51,9 @@ def lyapunov(
 ) -> dict[str, Vector]:
     """V (46), its terms, and V' by the chain rule, named as in the log; each of shape (rows,).
 
-    The errors of the estimates are against the ideal weights and the true bounds `b`. An estimate
-    with adaptation gain 0 has no term in V.
+    Over the rows of `log`, with the loop's rates there (`now`) and the errors `e`. The errors of
+    the estimates are against the ideal weights and the true bounds `b`. An estimate with adaptation
+    gain 0 has no term in V.
     """
     m11, m33, rates = loop.vessel.m11, loop.vessel.m33, now.rates
     b_u, b_r = log["b_hat_u"] - b.u, log["b_hat_r"] - b.r
@@ -85,7 +86,8 @@ def remainders(
 
     m11 u_e' = -k_ue u_e - m11 What_u . Phi - b_hat_u phi(u_e) + b_u + s z_e cos psi_e + rho_u,
     and likewise for yaw. rho_u is m11 f_u for the nominal vessel without limits; saturation, wrong
-    nominal inertia and errors of the law's derivatives add to it.
+    nominal inertia and errors of the law's derivatives add to it. Both (rows,), over the rows of
+    `log`, with the loop's rates there (`now`) and the errors `e`.
     """
     s, m, nominal = now.signals, loop.vessel, loop.nominal
     sign = 1.0 if law.coupling == "corrected" else -1.0

@@ -60,7 +60,10 @@ class Cut:
         return np.asarray(np.take_along_axis(loci, np.argsort(np.abs(loci), axis=1), axis=1))
 
     def frequencies(self) -> Vector:
-        """Frequencies [rad/s] up to where L is below 1, with that of every resonance among them."""
+        """Frequencies (w,) [rad/s], rising, up to where L is far below 1.
+
+        Evenly spread over decades, with that of every pole, open and closed, among them.
+        """
         sizes = np.abs(np.concatenate([np.linalg.eigvals(m) for m in (self.A, self.open_matrix)]))
         sizes = BESIDE * sizes[sizes > SLOWEST]
         # At high frequency L is about C B/w, so it crosses 1 near |C B|

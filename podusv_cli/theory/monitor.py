@@ -131,7 +131,8 @@ def monitor_recording(
 
     V uses the disturbance's bound, and weights fitted to this run (`theory.ideal_weights`). With
     sampled control, sensors or a delay there is no V' and no bound of V: old measurements act.
-    `allocate` makes the arrays for the added signals.
+    `steady_fraction` is the last part of the run that counts as settled; `allocate` makes the
+    arrays for the added signals.
     """
     loop, grid = plan.loop, plan.grid
     law, count = loop.lyapunov(), len(recording["time"])
@@ -275,7 +276,10 @@ def _share_below_bound(bound: bounds.Bound, V: Vector, rate: Vector) -> float:
 def _fixed_arrays(
     windows: dict[str, Window], ideal: ideal_weights.IdealWeights
 ) -> dict[str, Vector]:
-    """The arrays of the monitor that are constant in time."""
+    """The arrays of the monitor that are constant in time, by name.
+
+    Ideal weights (nodes,), and numbers of each window (windows,).
+    """
     parts = windows.values()
     numbers = {
         "window_start": [part.since for part in parts],

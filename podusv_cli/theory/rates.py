@@ -126,7 +126,8 @@ def _alpha_u_rate(
 ) -> Vector:
     """Rate of alpha_u (21), (rows,) [m/s2]; the paper's X_1 (40) with the true accelerations.
 
-    By the chain rule through distance, target, sway and the angle psi_e, which turns at `spin`.
+    Over the rows of `log`, with the loop's rates there (`now`) and the line of sight. By the chain
+    rule through distance, target, sway and the angle psi_e, which turns at `spin`.
     """
     psi_e, alpha_u, v = now.signals["psi_e"], now.signals["alpha_u"], log["v"]
     (cos_e, sin_e), spin = cosine_and_sine(psi_e), sight.w - log["r"]

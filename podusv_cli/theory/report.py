@@ -39,7 +39,10 @@ def _condition(condition: GainCondition) -> dict[str, Any]:
 def _assumptions(
     loop: ClosedLoop, grid: TimeGrid, monitored: Monitored
 ) -> Iterator[dict[str, Any]]:
-    """Assumptions behind V' <= -2 lambda V + Delta: whether each held, and its number if any."""
+    """Assumptions behind V' <= -2 lambda V + Delta: whether each held in the monitored run.
+
+    Each as theory.json has it, with the number that decides it, if any.
+    """
     law, log, turn = loop.lyapunov(), monitored.recording, monitored.traces["turn"]
     # Largest difference of load and demand; -1 and 1 of `turn` change where psi_e is folded
     withheld = max(_withheld(monitored, "u"), _withheld(monitored, "r"))

@@ -193,7 +193,7 @@ class _Column(NamedTuple):
 
 
 def _place_of(names: Sequence[_Column], known: re.Pattern[str], what: str) -> int:
-    """The position of the column whose name `known` matches; of two the first has commands.
+    """The position of the one among `names` that `known` matches; of two the first has commands.
 
     `what` it is, command or thrust, is for the message. Raises ValueError.
     """

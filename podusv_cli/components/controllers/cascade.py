@@ -85,7 +85,9 @@ class Cascade(Controller):
         return 4
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The virtual ship's sway velocity (1,) [m/s] in a steady turn at the target's speed.
+        """The memory: the virtual ship's sway velocity (1,) [m/s] in a steady turn.
+
+        It goes at the target's speed with the turn of its course.
 
         By bisection of its sway force; where there is no such turn, an end of the range.
         """
@@ -99,7 +101,7 @@ class Cascade(Controller):
         return np.array([0.5 * (low + high)])
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Surge and yaw without their positions, which are slower."""
+        """Loops of the axes surge and yaw without their positions, which are slower."""
         surge, yaw = axes
         return [
             Loop(surge.name, "k_u", surge.damping, np.array([-self.k_u / surge.inertia]), ALONE),

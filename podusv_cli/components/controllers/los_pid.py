@@ -70,7 +70,9 @@ class LosPid(LineOfSight):
         return "omega_psi", self.omega_psi
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Surge with its integral; yaw with heading and integral; integrals per told inertia.
+        """Loops of the axes: surge with its integral, yaw with heading and integral.
+
+        Integrals are per told inertia.
 
         Yaw has a triple pole at -omega_psi, whose polynomial has the factors 3 w, 3 w^2, w^3.
         """

@@ -106,7 +106,10 @@ class Mss(LineOfSight):
         return "wn", 0.5 * self.wn / self.zeta
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Surge with its integral; yaw with heading and its integral, over the told inertia."""
+        """Loops of the axes: surge with its integral, yaw with heading and its integral.
+
+        By pole placement over the told inertia.
+        """
         surge, yaw = axes
         square = self.wn * self.wn
         gains = np.array([-self.damping(), -square, -RESET * self.wn * square])

@@ -136,7 +136,7 @@ def of_px4(text: str, beside: Collection[str]) -> tuple[Keys, list[str]]:
 def _direct(
     given: Parameters, table: Mapping[str, tuple[str, float]], beside: Collection[str]
 ) -> tuple[Keys, set[str], list[str]]:
-    """Keys that are a parameter times a factor, the parameters that they took, and remarks.
+    """Keys that are a parameter times a factor, as `table` says, what they took, and remarks.
 
     A limit of 0 or less is none for the firmware, and podusv's laws have one: this is said, but for
     keys `beside` that the scenario gives.

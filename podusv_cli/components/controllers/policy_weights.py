@@ -56,7 +56,7 @@ class Header(BaseModel, extra="allow"):
 
 
 def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
-    """The arrays of a safetensors file by name, each in its own shape, and its remarks.
+    """The arrays of a safetensors file's bytes by name, each in its own shape, and its remarks.
 
     Raises ValueError.
     """
@@ -77,7 +77,10 @@ def tensors(data: bytes) -> tuple[dict[str, Vector], dict[str, str]]:
 
 
 def _numbers(name: str, tensor: Tensor, numbers: bytes) -> Vector:
-    """The array of a tensor; `numbers` is the file behind its header. Raises ValueError."""
+    """The array of the tensor called `name`, in the tensor's shape, as float64.
+
+    `numbers` is the file behind its header. Raises ValueError.
+    """
     begin, end = tensor.data_offsets
     if tensor.dtype not in KINDS:
         raise ValueError(f"{name} has numbers {tensor.dtype}; save it as {' or '.join(KINDS)}")

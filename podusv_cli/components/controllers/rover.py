@@ -119,7 +119,10 @@ class Rover(Controller):
         return Most(self.U)
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Speed and yaw rate with their integrals; gains times the load at full scale."""
+        """Loops of the axes: speed and yaw rate with their integrals.
+
+        Gains are in parts of full scale, so they are multiplied with the load there.
+        """
         scales = (("speed", self.surge), ("rate", self.yaw))
         return [
             Loop(

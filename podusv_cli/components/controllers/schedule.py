@@ -138,7 +138,7 @@ class Schedule(Controller):
         return super().constants() | {"rows_count": float(rows), "row_width": float(width)}
 
     def table(self) -> Vector:
-        """The times, then the rows: demand; of those with a motion also state, rate, gains."""
+        """The times (rows,) [s], then flat rows: demand; with a motion also state, rate, gains."""
         times, given = np.split(_rows(self.rows), [1], axis=1)
         if given.shape[1] < WITH_MOTION - 1:
             return np.concatenate([times.ravel(), given.ravel()])

@@ -260,7 +260,7 @@ class TrackingController(Controller):
         return self.begin(x, target, bundle(self.constants_with(nominal)))
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The memory at t = 0 for the constants `k`, which are asked for once a start.
+        """The memory (slots,) at t = 0 for the constants `k`, which are asked for once a start.
 
         All zero but the held direction: to the target, or its course where it is right here.
         """

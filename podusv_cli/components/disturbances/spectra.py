@@ -211,7 +211,7 @@ def clear_sums(count: int, sums: Vector) -> None:
 
 
 def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
-    """Departures (count,) [rad] of the components from the mean direction.
+    """Departures (count,) [rad] of the components from the mean direction, drawn by `seed`.
 
     Their density is cos^(2 spreading) within a quarter turn to either side; spreading 0: none.
     With spreading 1 it is that of cybergalactic/MSS, waveDirectionalSpectrum.m.

@@ -204,7 +204,7 @@ class Waves(Disturbance):
         return self.components
 
     def by_default(self, name: str, facts: Any) -> int:
-        """Components for the run's duration, by `COMPONENTS`; a power of two times the fewest.
+        """Components for the run's duration (in `facts`), by `COMPONENTS`: FEWEST times 2^n.
 
         So studies that draw height or period have few different numbers.
         """

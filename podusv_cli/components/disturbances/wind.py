@@ -202,7 +202,7 @@ class Wind(Disturbance):
     def table(self) -> Vector:
         """Rows of rates [1/s], phases [turns] and amplitudes [m/s], filled up to whole groups.
 
-        One behind another; a single zero without gusts.
+        One behind another (3 lanes,); a single zero without gusts.
         """
         if self.gusts == "none":
             return np.zeros(1)

@@ -226,7 +226,7 @@ def round_to(number: float, resolution: float) -> float:
 
 
 def _steps(sensor: Sensor, step: float) -> tuple[int, int, int]:
-    """Period and delay in steps, and how many samples wait for their delivery at most.
+    """Period and delay of a sensor in steps, and how many samples wait for delivery at most.
 
     One more than whole periods in the delay: the one that is due is still there.
     """

@@ -43,7 +43,7 @@ def passed_by(path: Path, law: Controller, share: float) -> dict[str, float]:
 
 
 def unmet(law: Controller, path: Path, actuator: Actuator, load_at: int) -> list[tuple[str, str]]:
-    """What a law wants of other parts that they have not: pairs of the part and a sentence.
+    """What a law wants of path and actuator that they have not: pairs of the part and a sentence.
 
     `load_at` is where in the state that it is given there are estimated loads; 0 without. Empty
     where all fits.

@@ -304,7 +304,8 @@ class Plan:
     def vectors(self, rows: int = 1, allocate: Allocate = np.empty) -> Vectors:
         """The loop's vectors, ready for the march to begin, with room for so many logged rows.
 
-        `allocate` gives the room for the log. Numbers beyond all limits are for the run to tell.
+        Each vector is flat, see `Vectors`. `allocate` gives the room for the log. Numbers beyond
+        all limits are for the run to tell.
         """
         loop, grid, layout, recall = self.loop, self.grid, self.layout, self.recall
         law, start, estimator = loop.controller, np.array(loop.start), loop.estimator

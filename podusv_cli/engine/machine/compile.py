@@ -163,7 +163,7 @@ def adapter(part: str, inner: Any, names: tuple[str, ...]) -> Piece:
 
 @cache
 def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
-    """The same, compiled. Raises LawError also for a kernel that cannot be compiled.
+    """As `adapter`, compiled to a C function. Raises LawError also where that cannot be.
 
     The message has what in its source has no machine code, else what the compiler says.
     """

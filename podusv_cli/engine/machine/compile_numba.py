@@ -76,7 +76,10 @@ def object_code(function: Any, prototype: Any) -> Code:
 
 
 def bitcode(function: Any, prototype: Any) -> bytes:
-    """LLVM bitcode of the same, for any machine. Raises TypeError for what numba cannot type."""
+    """LLVM bitcode of a kernel as a C function with this prototype, for any machine.
+
+    Raises TypeError for what numba cannot type.
+    """
     linecache.checkcache()  # numba shows lines from there; a file may have been edited meanwhile
     try:
         typed = signature(prototype, from_ctypes)

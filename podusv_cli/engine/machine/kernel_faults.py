@@ -118,7 +118,7 @@ def _vectors(node: ast.FunctionDef) -> set[str]:
 
 
 def _is_vector(node: ast.expr, vectors: Collection[str]) -> bool:
-    """Whether an expression is a vector: one of these names, `tail(...)` or `scratch(...)`."""
+    """Whether an expression is a vector: a name in `vectors`, `tail(...)` or `scratch(...)`."""
     match node:
         case ast.Name(id=name):
             return name in vectors

@@ -42,7 +42,10 @@ def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
 
 @cache
 def digest(function: Any, prototype: Any, compiler: str) -> str:
-    """What a kernel is kept under; empty where its file is gone, or edited since it was loaded."""
+    """The digest of a kernel, its C prototype and its compiler, under which it is kept.
+
+    Empty where the kernel's file is gone, or edited since it was loaded.
+    """
     try:
         words = [
             compiler,

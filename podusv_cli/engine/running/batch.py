@@ -206,7 +206,11 @@ class _Runs:
         progress: Callable[[float], None] | None,
         lanes: bool | None,
     ) -> None:
-        """The arguments of `simulate_many`; nothing marches yet."""
+        """The arguments of `simulate_many`, and the `batch` that gets the results.
+
+        `like` is the plan of a loop like these, made of the first one if None; `lanes` is
+        `side_by_side`. Nothing marches yet.
+        """
         self._loops, self._grid, self._batch, self._probe = loops, grid, batch, probe
         self._plan, self._bell = like, Bell()
         self._progress = progress or (lambda fraction: None)

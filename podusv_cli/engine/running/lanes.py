@@ -53,7 +53,9 @@ def shared_constants(plan: Plan) -> dict[str, frozenset[str]]:
 def marcher(
     plan: Plan, compiling: Callable[[float], None] | None = None
 ) -> Callable[[Lanes, float], March]:
-    """What makes the compiled march of runs like this loop, side by side, with a step [s].
+    """What makes the compiled march of runs like the plan's loop, side by side, with a step [s].
+
+    `compiling` hears the fraction that is compiled.
 
     Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
     would read what is not there.
@@ -162,7 +164,7 @@ class Lanes:
 
     @classmethod
     def of(cls, runs: Sequence[Vectors], layout: Layout) -> Lanes:
-        """Side by side, ready for the march."""
+        """At most LANES runs of one layout side by side, ready for the march."""
         size = layout.states + layout.columns + len(runs[0].seen)
         under_way = np.zeros(REACHED + LANES)
         under_way[REACHED : REACHED + len(runs)] = MARCHING

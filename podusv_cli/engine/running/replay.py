@@ -21,7 +21,9 @@ from podusv_cli.engine.step.layout import Layout, Vectors
 
 
 def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
-    """At most `most` rows of a log, evenly spread: time, target, vessel's state, law's memory.
+    """At most `most` rows of the recording of a plan, evenly spread.
+
+    Time, target with a place for the distance and a heading, vessel's state, law's memory.
 
     Shape (rows, 1 + 10 + 6 + slots), as `rk4.evaluate_all` reads them.
     """

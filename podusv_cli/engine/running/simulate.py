@@ -43,7 +43,10 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     allocate: Allocate = np.empty,
 ) -> Recording:
-    """Plan the closed loop and integrate it over the grid; see `run`."""
+    """Plan the closed loop and integrate it over the grid; see `run` for the arguments.
+
+    The `probe` sees every instant, logged or not.
+    """
     plan = Plan.with_probe(loop, grid, probe or Probe())
     return run(plan, compiled=compiled, progress=progress, allocate=allocate)
 
@@ -78,7 +81,8 @@ def begin_march(
 ) -> tuple[Vectors, int, Callable[[], int]]:
     """The vectors of a loop at its start, the instant after the last, and the march up to it.
 
-    `allocate` gives room for the log. Raises LawError for parts that do not fit.
+    The march is `compiled` or plain Python; it takes no arguments, and returns the instant that it
+    reached. `allocate` gives room for the log. Raises LawError for parts that do not fit.
     """
     plan.loop.check_fit(plan.grid.step)
     vectors, last = plan.vectors(plan.grid.rows, allocate), plan.layout.steps + 1
@@ -87,9 +91,10 @@ def begin_march(
 
 
 def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Recording]:
-    """Integrate several loops at once, each in a thread of its own; the recordings of `run`.
+    """Integrate several loops at once, each in a thread of its own.
 
-    An interrupt ends all marches and keeps what was logged.
+    Returns for each of `plans` the recording that `run` gives. An interrupt ends all marches and
+    keeps what was logged.
     """
     begun = [begin_march(plan, compiled) for plan in plans]
     works = [Work(advance, vectors.under_way) for vectors, _, advance in begun]
@@ -104,7 +109,7 @@ def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Record
 def to_end(
     plan: Plan, *, compiled: bool = True, progress: Callable[[float], None] | None = None
 ) -> Recording:
-    """The same without an early end. Raises KeyboardInterrupt."""
+    """As `run`, without an early end: an interrupt raises KeyboardInterrupt."""
     recording = run(plan, compiled=compiled, progress=progress)
     if recording.status == "interrupted":
         raise KeyboardInterrupt
@@ -158,7 +163,10 @@ def marcher(
 
 
 def recording_of(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
-    """The recording of a march that ended so, its signals views of the log."""
+    """The recording of a march over these vectors that ended so, its signals views of the log.
+
+    A law that crashed or hung counts as diverged; the message says when and why.
+    """
     layout, law = plan.layout, plan.loop.controller
     rows = -(-ending.reached // layout.log_every)  # rounded up: instant 0 is logged
     table = vectors.log.reshape(-1, layout.width)[:rows]

@@ -157,8 +157,9 @@ def in_lanes(
 ) -> Callable[[float], None]:
     """A kernel, called as this part of the loop, for all lanes at a time [s].
 
-    `vectors` are its arguments by name, a number of every lane one by the other; those that are
-    left out it may not read.
+    `names` are those of its constants, `shared` those that are alike in all lanes. `vectors` are
+    its arguments by name, a number of every lane one by the other; those that are left out it may
+    not read.
     """
     from podusv_cli.engine.machine import compile  # only what marches side by side needs it
 

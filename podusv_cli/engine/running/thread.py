@@ -48,7 +48,10 @@ class Work:
     def __init__(
         self, function: Callable[[], int], under_way: Vector | None = None, bell: Bell | None = None
     ) -> None:
-        """Nothing runs before `start`."""
+        """`function` returns the instant that it reached; nothing runs before `start`.
+
+        Without `under_way` progress is unknown, without `bell` it has one of its own.
+        """
         self.started = self.over = False
         self.result: int | None = None
         self.error: BaseException | None = None

@@ -261,7 +261,8 @@ def advance(p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any
 def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: Layout) -> int:
     """`advance` as plain Python, whose `math` raises where machine code gives no number.
 
-    March from instant `first` to `last`, step `h` [s]; returns the instant that was reached. An
+    March from instant `first` to `last`, step `h` [s], over the vectors `c` laid out by `n`, with
+    the functions `p`; returns the instant that was reached. An
     error within an instant ends the march there; one within a step makes the next instant's state
     NaN, as machine code would.
     """

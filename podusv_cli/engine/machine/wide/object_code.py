@@ -52,7 +52,10 @@ def object_code(function: Any, prototype: Any) -> Code:
 
 
 def bitcode(function: Any, prototype: Any) -> bytes:
-    """The kernel for lanes, for any machine. Raises what `object_code` gives as a reason."""
+    """LLVM bitcode of a kernel for lanes, as a C function with this prototype, for any machine.
+
+    Raises what `object_code` gives as a reason.
+    """
     signature = compile_numba.signature(prototype, _type)
     with compile_numba.plain_code():  # which `widening` works on
         compiled = njit(**compile_numba.INNER)(_with_inlined(function))

@@ -207,7 +207,10 @@ class Blocks(Instructions):
             self.add_to_mask(f"%mask.{end}", self.edge(begin, way))
 
     def _is_first(self, begin: int, end: int) -> bool:
-        """Whether no other block leaves numbers for the phis of this one before."""
+        """Whether no other block leaves numbers for the phis of `end` before `begin` does.
+
+        Then it may store in all lanes: what is there of other lanes is nobody's yet.
+        """
         loop = self.masks.order.inner[end]
         if self.masks.order.inner[begin] is not loop:
             return False
