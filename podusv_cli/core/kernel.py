@@ -163,7 +163,10 @@ class NoKernel(LawError):
 
 
 def absent(name: str) -> Callable[[], None]:
-    """What stands for a kernel of this name until a component has one of its own."""
+    """What stands for a kernel of this name until a component has one of its own.
+
+    A function that raises NoKernel, with what to write.
+    """
 
     def none() -> None:
         raise NoKernel(f"no kernel `{name}`; write one below @staticmethod and @kernel")

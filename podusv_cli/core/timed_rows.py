@@ -143,9 +143,10 @@ def _wrong_cell(lines: list[TextLine], noun: str) -> str:
 
 
 def _in_order(rows: Vector, order: list[int], header: TextLine, noun: str) -> Vector:
-    """The rows with their columns in this order; behind a header that does not name each, as is.
+    """The rows (rows, columns) with their columns in `order`, the position of each in the text.
 
-    Shape (rows, columns) before and after.
+    Behind a header that does not name each column they have to be in order already. Raises
+    ValueError.
     """
     if order == sorted(order):
         return rows

@@ -132,7 +132,7 @@ def _assumed_loads(law: ExportedLaw) -> list[str]:
 
 
 def _texts(law: ExportedLaw) -> Mapping[str, str]:
-    """What the header says of each vector."""
+    """What the header says of each vector of the step, by its name in the template."""
     cut = any(map(math.isfinite, law.limits))
     assumed = ASSUMED[len(law.demands)] if cut else "the demand before acts"
     return {
@@ -147,7 +147,7 @@ def _texts(law: ExportedLaw) -> Mapping[str, str]:
 
 
 def _list(numbers: Sequence[ExportedNumber]) -> str:
-    """Names, units and meanings of numbers, for a comment in C."""
+    """Names, units and meanings of numbers, a line each, for a comment in C."""
     return ",\n           ".join(
         _comment(f"{number.name} [{number.unit}] {number.meaning}") for number in _few(numbers)
     )

@@ -215,6 +215,7 @@ def _fmu(path: Path, place: Path, about: About) -> Step:
     slave.setupExperiment(startTime=0.0)
     slave.enterInitializationMode()
     slave.exitInitializationMode()
+    # Both in the order of check.csv's columns, see `fmu.variables`
     given = [v.valueReference for v in description.modelVariables if v.causality == "input"]
     said = [v.valueReference for v in description.modelVariables if v.causality != "input"]
 

@@ -194,6 +194,7 @@ class Metrics(Probe):
 
         `seen` is (runs, numbers).
         """
+        # A run that saw an instant has changed a number: at least its time
         begun = (seen != self._first).any(axis=1, keepdims=True)
         seen = np.where(begun, seen, np.nan)  # no instant at all: NaN
         seen = seen[:, self.ahead :]

@@ -187,6 +187,7 @@ class _Program:
         own = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
         own |= {"ipopt.tol": TOLERANCE, "ipopt.max_iter": MOST_ITERATIONS}
         with interrupts_caught() as here, interrupts_deferred():
+            # IPOPT would swallow an interrupt, so `watch` asks for it between iterations
             watch = _watch(self._unknowns * (self.n + 1), STATES * self.n, self._look(here))
             options = own | {"iteration_callback": watch} | self.warm
             solver = ca.nlpsol("optimum", "ipopt", self._nlp, options)
@@ -204,8 +205,9 @@ class _Program:
         self.iterations = int(stats["iter_count"])
         if not stats["success"]:
             raise NotConvergedError(f"IPOPT: {stats['return_status']}")
-        self.warm = {"ipopt.mu_init": BARRIER, **WARM}
+        self.warm = {"ipopt.mu_init": BARRIER, **WARM}  # the next call begins near an optimum
         self._multipliers = {"lam_g0": solution["lam_g"], "lam_x0": solution["lam_x"]}
+        # IPOPT may leave bounds by its tolerance
         rows = np.array(solution["x"]).reshape(self.n + 1, self._unknowns).clip(low, high)
         return Motion(self.times, rows[:, :STATES], rows[:, STATES:])
 

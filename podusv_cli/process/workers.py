@@ -119,7 +119,10 @@ def run_shares(
 
 
 def _one_by_one(jobs: Sequence[Job], tell: Progress) -> list[Outcome]:
-    """The outcome of each job, in this process; `tell` hears which share is done."""
+    """The outcome of each job, in order, in this process; `tell` hears which share is done.
+
+    After an interrupt the jobs that are left count as interrupted.
+    """
     outcomes: list[Outcome] = []
     with interrupts_caught() as interrupts:
         for job in jobs:
@@ -146,7 +149,7 @@ def run_each(
     with interrupts_deferred():
         try:
             while pool.start(workers or available_workers()):
-                with interrupts_enabled():
+                with interrupts_enabled():  # only while waiting, so that no outcome is lost
                     ready = wait(pool.running)
                 pool.receive(ready)
         except KeyboardInterrupt:

@@ -147,7 +147,10 @@ class RunWriter:
         return self._staging.final
 
     def _publish_beside(self) -> Path:
-        """Publish under the first free number, and return that folder."""
+        """Publish under the first free number, and return that folder.
+
+        Another process may take a number meanwhile, so each is tried.
+        """
         for path in islice(_numbered_folders(self.final), 1, None):
             with suppress(Taken):
                 _check_replaceable(path, force=False)

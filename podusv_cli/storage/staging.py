@@ -123,7 +123,10 @@ def remove_abandoned(parent: Path) -> None:
 
 
 def _remove_box(box: Path, final: Path) -> None:
-    """Delete a box; an old folder in it that was not replaced is restored."""
+    """Delete a box; an old folder in it that was not replaced is restored to `final`.
+
+    It was replaced if something is at `final`.
+    """
     with suppress(OSError):
         if _old(box).exists():
             # Renamed before it is deleted, so that half of a folder is never restored.

@@ -123,7 +123,10 @@ def momentum_vector_polynomial(at: SwayAnswer, gains: MomentumGains) -> Vector:
 def momentum_vector_gains(
     law: MomentumVector, vessel: Vessel, V: float, v: float = 0.0
 ) -> tuple[SwayAnswer, MomentumGains]:
-    """What the law takes p and d for, and its gains at the speed V [m/s] and load sway v [m/s]."""
+    """What the law takes p and d for, and its gains at the speed V [m/s] and load sway v [m/s].
+
+    `vessel` is what the law is told. The target is reached (distance 0) and goes straight on at V.
+    """
     k = bundle(law.constants_with(vessel))
     answer = momentum_answer(V, v, v, 0.0, 0.0, k)
     eta, k_b = schedule(answer, k)

@@ -98,6 +98,7 @@ def loop_margins(
         )
     linear = linearise(loop, along, grid.step, compiled=compiled)
     axes = [axis for axis, letter in AXES.items() if f"tau_{letter}" in linear.loads]
+    # One loop is cut while the others are closed: a column of B and a row of C
     cuts = {axis: Cut(linear.A, linear.B[:, [i]], linear.C[[i]]) for i, axis in enumerate(axes)}
     return LoopMargins(
         linear,

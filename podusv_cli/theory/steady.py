@@ -221,6 +221,7 @@ class _Frame:
         """
         turn, count = self.course.turn, len(self.start)
         if turn:
+            # 1 for what turns with the course; rates of the run's end are nearly steady
             pace = self.row(self.start)[:count] / turn
             angles = [about[name].unit == "rad" for name in self.labels[1 : 1 + count]]
             self._drift[np.array(angles) & (abs(pace - 1.0) < 0.5)] = turn

@@ -134,6 +134,7 @@ def check(scenario: Scenario, progress: Progress | None = None) -> RunVerificati
         run_level(scenario, n, _part(progress, sum(work[:n]), work[n], sum(work)))
         for n in range(LEVELS)
     ]
+    # A metric that a level lacks is NaN there: its run did not finish
     positions = [level.position for level in levels]
     estimates = {POSITION: estimate_position(positions, scenario.vessel.length)}
     names = dict.fromkeys(name for level in levels for name in level.metrics)

@@ -101,7 +101,7 @@ class Cascade(Controller):
         return np.array([0.5 * (low + high)])
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Loops of the axes surge and yaw without their positions, which are slower."""
+        """Loops of the axes surge and yaw without their positions, which are slower; at any nu."""
         surge, yaw = axes
         return [
             Loop(surge.name, "k_u", surge.damping, np.array([-self.k_u / surge.inertia]), ALONE),

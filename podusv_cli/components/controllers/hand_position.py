@@ -48,7 +48,10 @@ class HandPosition(HandController):
         return True
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """nu' = -gain nu + I, I' = -k_i nu at rest, with I_b per `hand`."""
+        """nu' = -gain nu + I, I' = -k_i nu for the axes at rest (nu = 0), with I_b per `hand`.
+
+        The law cancels the damping, which is added here.
+        """
         return [
             Loop(
                 axis.name,

@@ -67,7 +67,7 @@ def coupling_saddle(case: Any) -> Sentences:
     law=PolarBackstepping,
 )
 def network_range(case: Any) -> Sentences:
-    """No node of the network within two widths of the velocities that keep up with the target."""
+    """Warn where no node is within two widths of the velocities that keep up with the target."""
     # (rows, 3): u, v, r along the path; where there is no such steady motion they are NaN
     nu = case.reference.nu[np.isfinite(case.reference.nu).all(axis=1)]
     if not len(nu):
@@ -93,7 +93,7 @@ def network_range(case: Any) -> Sentences:
     law=PolarBackstepping,
 )
 def off_network(scenario: Any, log: Recording) -> Sentences:
-    """No node of the network within two widths of (u, v, r)."""
+    """Warn of times at which no node of the network is within two widths of (u, v, r)."""
     name = NODE_DISTANCE.name
     distance = operator.itemgetter(name) if name in log else node_distance.compute
     off = rows_where(log, lambda part: distance(part) > FAR)
@@ -113,7 +113,7 @@ def off_network(scenario: Any, log: Recording) -> Sentences:
     law=PolarBackstepping,
 )
 def bound_growing(scenario: Any, log: Recording) -> Sentences:
-    """An estimated bound still grows at the end."""
+    """Warn where an estimated bound still grows at the end of a run: it has not settled."""
     time = log["time"]
     if log.status != "finished" or len(time) < 2:
         return
@@ -138,7 +138,7 @@ def bound_growing(scenario: Any, log: Recording) -> Sentences:
     law=TrackingController,
 )
 def start_astern(case: Any) -> Sentences:
-    """The target lies abaft the beam at t = 0 and the law does not fold line of sight and error.
+    """Warn of a target abaft the beam at t = 0 where the law does not fold line of sight and error.
 
     `case.first_signals` has what the law logs at t = 0; without psi_d nothing is said.
     """
@@ -163,7 +163,7 @@ def start_astern(case: Any) -> Sentences:
     law=TrackingController,
 )
 def start_kick(case: Any) -> Sentences:
-    """Remark 5's difference, started from psi_d = 0, is a kick of psi_d(0)/Delta t for a sample."""
+    """Warn of a kick: Remark 5's difference, started from 0, is psi_d(0)/Delta t for a sample."""
     law = case.scenario.controller
     if law.rate != "difference" or law.first_difference != "from_zero":
         return
@@ -186,7 +186,7 @@ def start_kick(case: Any) -> Sentences:
     needs=("z_e",),
 )
 def near_target(scenario: Any, log: Recording) -> Sentences:
-    """z_e comes near 0, where psi_d is not defined and w = psi_d' grows as 1/z_e.
+    """Warn where z_e comes near 0, where psi_d is not defined and w = psi_d' grows as 1/z_e.
 
     With standoff_reference: crab z_e is meant to vanish: the law points at a point beyond it.
     """
@@ -214,7 +214,7 @@ def near_target(scenario: Any, log: Recording) -> Sentences:
     law=TrackingController,
 )
 def crosswise(scenario: Any, log: Recording) -> Sentences:
-    """cos psi_e comes near 0, by which (21) divides."""
+    """Warn of times at which cos psi_e comes near 0, by which (21) divides."""
     if "psi_e" not in log:
         return
     across = rows_where(log, lambda part: np.abs(np.cos(part["psi_e"])) < CROSSWISE)
@@ -234,7 +234,10 @@ def crosswise(scenario: Any, log: Recording) -> Sentences:
     law=Pid,
 )
 def relay_gains(case: Any) -> Sentences:
-    """PID's defaults do not follow from hull and actuator, unlike those of later laws."""
+    """Warn where PID's gains are too large for the loop's delay.
+
+    Its defaults do not follow from hull and actuator, unlike those of later laws.
+    """
     law, hull, facts = case.scenario.controller, case.scenario.nominal, case.facts
     axes = (
         ("surge", law.K_Pu, law.K_Du, hull.m11, facts.T_u),
@@ -265,7 +268,7 @@ def relay_gains(case: Any) -> Sentences:
     remedy="set control.period to that of the training, or train anew with this one",
 )
 def policy_period(case: Any) -> Sentences:
-    """What the network has learned of its own delay belongs to another period.
+    """Warn where a policy acts at another period than in its training, which it has learned too.
 
     Nothing is said where the file has no such remark.
     """

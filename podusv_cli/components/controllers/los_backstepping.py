@@ -109,7 +109,7 @@ class LosBackstepping(Controller):
         return np.array([0.0, angle, 0.0, 0.0])
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Loops of the axes surge, and yaw without the heading, which is slower."""
+        """Loops of the axes surge, and yaw without the heading, which is slower; at any nu."""
         surge, yaw = axes
         braking = self.k3 + self.c * yaw.told
         return [

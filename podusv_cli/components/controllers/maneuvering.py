@@ -78,9 +78,9 @@ class Maneuvering(PathTimed):
         return self.gamma > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Surge and yaw, as of `pose_backstepping`: m nu' = -(k_d + gain of the position) m nu.
+        """As of `pose_backstepping`: m nu' = -(k_d + gain of the position) m nu, at any nu.
 
-        The law cancels the hull's damping, so it is added to what acts here.
+        For the axes surge and yaw. The law cancels the hull's damping, which is added here.
         """
         loops = []
         for axis, gain in zip(axes, (self.k_d + self.k_p, self.k_d + self.k_psi), strict=True):

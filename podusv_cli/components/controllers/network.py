@@ -128,7 +128,7 @@ class Network(KernelPart):
         return whole_lanes(sum(self.factors))
 
     def constants(self) -> dict[str, float]:
-        """Numbers of nodes, Gaussians and factors, and the initial weight."""
+        """Numbers of nodes, Gaussians and factors, and the initial weight, as kernels read them."""
         along, plane = self.factors
         counts = {"count": self.count, "bells": self.bells, "along": along, "plane": plane}
         return {name: float(n) for name, n in counts.items()} | {

@@ -103,7 +103,10 @@ class Pid(TrackingController):
         return memory
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """With e = -u_p: m e' = -K_P e + K_I i + K_D l', i' = -e, l' = (-e - l)/T_d."""
+        """Of each axis, with e = -u_p: m e' = -K_P e + K_I i + K_D l', i' = -e, l' = (-e - l)/T_d.
+
+        Linear at any nu; the derivative makes it fast.
+        """
         lag = 1.0 / self.T_d
         gains = (
             ("K_Du", self.K_Pu, self.K_Iu, self.K_Du),

@@ -52,7 +52,11 @@ class PoseBackstepping(PoseLaw):
         return self.k_i > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """m nu' = -(k_d + gain of the position) m nu in surge and yaw: damping is cancelled."""
+        """m nu' = -(k_d + gain of the position) m nu for the axes surge and yaw, at any nu.
+
+        The law cancels the hull's damping, so it is added to the feedback of a `Loop`, which has
+        it. Its inertia is the told one over the true one.
+        """
         gains = (("k_d", self.k_d + self.k_p), ("k_d", self.k_d + self.k_psi))
         return [
             Loop(

@@ -52,7 +52,10 @@ class PosePid(PoseLaw):
         return self.integral > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """m nu' = -d nu - 2 zeta w m nu in surge and yaw, without their slower positions."""
+        """m nu' = -d nu - 2 zeta w m nu for the axes surge and yaw, at any nu.
+
+        Without their positions, which are slower.
+        """
         gains = (("w_x", self.w_x), ("w_r", self.w_r))
         return [
             Loop(

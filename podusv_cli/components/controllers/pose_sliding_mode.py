@@ -46,7 +46,11 @@ class PoseSlidingMode(PoseLaw):
     phi_r: float = value(0.05, "rad/s", "boundary layer of the yaw rate", gt=0)
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
-        """Within the layer m nu' = -(k_d + gain of the error) m nu - load/phi nu, surge and yaw."""
+        """Within the layer m nu' = -(k_d + gain of the error) m nu - load/phi nu, at any nu.
+
+        For the axes surge and yaw. The law cancels the damping, which is added here; tanh has the
+        slope 1/phi at 0.
+        """
         layers = (("load_u", self.load_u / self.phi), ("load_r", self.load_r / self.phi_r))
         gains = (self.k_d + self.k_p, self.k_d + self.k_psi)
         return [

@@ -106,6 +106,8 @@ class SlidingMode(HandController):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Within the boundary layer at rest: nu' = -gain nu + z, z' = -(lambda_2/phi) nu.
 
+        For the axes surge and yaw, whose damping the law cancels.
+
         The first order has no z, so only the first number of each row is kept.
         """
         key, slope, learning = "eta", self.eta / self.phi, np.zeros((0, 1))

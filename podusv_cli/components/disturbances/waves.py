@@ -304,7 +304,7 @@ class Waves(Disturbance):
         return short_crested if self.spreading else self.evaluate
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
-        """A cut-off that the step [s] cannot resolve."""
+        """Key and message for a cut-off that the step [s] cannot resolve."""
         most = math.pi / step  # rad/s, two steps a wave
         if self.highest * self.peak > most:
             yield (

@@ -221,7 +221,7 @@ class Wind(Disturbance):
         return spectra.harris(frequency, self.speed, self.drag)
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
-        """What the kernel needs: mean wind, number of components, windage.
+        """What the kernel needs: mean wind [m/s], where it comes from, components, windage.
 
         Raises ValueError for a vessel without windage.
         """
@@ -239,7 +239,10 @@ class Wind(Disturbance):
         }
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
-        """A vessel without windage, or gusts that the step cannot resolve."""
+        """Key and message for a vessel without windage, or gusts that the step [s] cannot resolve.
+
+        A cosine takes two steps a period at least.
+        """
         if vessel.windage is None:
             yield "kind", NO_WINDAGE
         if self.gusts != "none" and self.highest > 0.5 / step:

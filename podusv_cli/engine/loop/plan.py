@@ -221,7 +221,11 @@ class Plan:
 
     @cached_property
     def outline(self) -> tuple[Any, ...]:
-        """Equal outlines mean equal structures, and are compared sooner."""
+        """Equal outlines mean equal structures, and are compared sooner.
+
+        Parts count by identity, since to compare their fields takes longer; both plans keep theirs
+        alive. Of a disturbance, which is often drawn anew, what the structure depends on counts.
+        """
         loop, sea = self.loop, self.loop.disturbance
         parts = (loop.path, loop.controller, loop.actuator, loop.measurement, loop.estimator)
         names = [[*constants] for constants in self.constants.values()]

@@ -22,7 +22,11 @@ class Recent:
         self._kept: dict[tuple[type, str], _Kept] = {}
 
     def __call__(self, method: Any, /, *given: Any) -> Any:
-        """What the method gives."""
+        """What the bound `method` gives for these arguments, which it may have given just before.
+
+        One result is kept for each class and method. Objects are compared by identity, since to
+        compare their fields could take as long as the method.
+        """
         objects, place = (method.__self__, *given), (type(method.__self__), method.__name__)
         kept = self._kept.get(place)
         if kept is None or not all(map(_same, kept.objects, objects)):

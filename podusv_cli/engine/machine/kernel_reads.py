@@ -76,7 +76,7 @@ class Reads:
         return after
 
     def _after_other(self, node: ast.stmt, known: Names) -> Names | None:
-        """Of a statement without branches: what it stores is set.
+        """Names that are set behind a statement without branches: `known` and what it stores.
 
         `return`, `break` and the like end the way: EVERYTHING.
         """
@@ -89,21 +89,21 @@ class Reads:
         return EVERYTHING if isinstance(node, ENDS) else known | _names_stored(node)
 
     def _after_AnnAssign(self, node: ast.AnnAssign, known: Names) -> Names:
-        """Of `x: float = ...`; without a value it sets nothing."""
+        """Names that are set behind `x: float = ...`; without a value it sets nothing."""
         if node.value is None:
             return known
         self._read(node.value, known)
         return known | _names_stored(node)
 
     def _after_AugAssign(self, node: ast.AugAssign, known: Names) -> Names:
-        """Of `x += ...`, which reads x as well."""
+        """Names that are set behind `x += ...`, which reads x as well."""
         if isinstance(node.target, ast.Name):
             self._note(node.target, known)
         self._read(node, known)
         return known
 
     def _after_If(self, node: ast.If, known: Names) -> Names | None:
-        """What both branches set; of a constant condition only the branch that runs."""
+        """Names that both branches set; of a constant condition only the branch that runs."""
         self._read(node.test, known)
         known |= _names_stored(node.test)
         if isinstance(node.test, ast.Constant):
@@ -111,7 +111,10 @@ class Reads:
         return _both([self._block(node.body, known), self._block(node.orelse, known)])
 
     def _after_While(self, node: ast.While, known: Names) -> Names | None:
-        """What is set however the loop is left: at its condition, or by a `break`."""
+        """Names that are set however the loop is left: at its condition, or by a `break`.
+
+        Its body need not run, so what it sets counts only at a `break`.
+        """
         self._read(node.test, known)
         known |= _names_stored(node.test)
         loop, _ = self._round(node.body, known)
@@ -120,7 +123,7 @@ class Reads:
         return _both([ended, *loop.left])
 
     def _after_For(self, node: ast.For, known: Names) -> Names | None:
-        """What is set however the loop is left; its body counts only if it surely has a round."""
+        """Names that are set however the loop is left; its body counts if it surely has a round."""
         self._read(node.iter, known)
         loop, last = self._round(node.body, known | _names_stored(node.target))
         # A round ends at the body's end or at a `continue`; without any, what was known before is

@@ -92,7 +92,7 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
     run = _rates_runner(plan, compiled)
 
     def at(rows: Vector, given: Vector | None = None) -> Vector:
-        """Rates and signals (rows, states + columns) at each state in `rows` (rows, states).
+        """Rates and signals (rows, states + columns) at each of `rows` (rows, 1 + states): t, s.
 
         `given` (rows, 2), or (rows, 3) with a sway force, are demands that act instead of those of
         the law.
