@@ -58,10 +58,9 @@ class Plane:
     def places(self, north: Vector, east: Vector) -> tuple[Vector, Vector]:
         """Latitudes and longitudes (n,) [deg, -180 to 180] of places in the plane.
 
-        `north` and `east` (n,) are x and y [m]; beyond the earth's rim the result is NaN.
-
-        The point of the ellipsoid under (x, y) is so far below the plane as the smaller root of a
-        quadratic equation says.
+        `north` and `east` (n,) are x and y [m]; beyond the earth's rim the result is NaN. The point
+        of the ellipsoid below (x, y) lies as far below the plane as the smaller root of a quadratic
+        equation.
         """
         s, c, out, up = self._origin
         stretch = 1.0 / (1.0 - E2)  # makes a sphere of radius A of the ellipsoid's squares

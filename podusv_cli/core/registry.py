@@ -31,9 +31,8 @@ Named = TypeVar("Named")
 def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, type[Kind]]:
     """Every component class of `package` and the plug-ins that derives from `base`, by its `kind`.
 
-    Sorted by kind, so that schemas and pages do not depend on the order of files.
-
-    Raises LawError for a module that cannot be imported and for a kind that is not unique.
+    Sorted by kind, so that schemas and pages do not depend on the order of files. Raises LawError
+    for a module that cannot be imported and for a kind that is not unique.
     """
     by_kind: dict[str, type[Kind]] = {}
     for thing in _members(package, plugins):
@@ -49,7 +48,10 @@ def kinds(package: str, base: type[Kind], plugins: Plugins = ()) -> dict[str, ty
 
 
 def _kind(component: type[Component]) -> str:
-    """The first word of `kind`; further ones are names of before, which a validator translates."""
+    """The first word of `kind`; further ones are earlier names, which a validator translates.
+
+    Raises LawError for a class whose `kind` is no fixed word.
+    """
     field = component.model_fields["kind"]
     words = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
     if not words or words[0] != field.default:

@@ -255,10 +255,10 @@ class ExportedLaw:
         }
 
     def samples(self, log: Recording) -> Vector:
-        """A row for each sample of a run: time, inputs, demand, signals, memory.
+        """A row for each sample of the run in `log`: time, inputs, demand, signals, memory.
 
-        Shape (samples, columns). The loads of a row are those in the row of the log before, after
-        which they do not change where the actuator has no states.
+        Shape (samples, columns). The loads of a row are those in the row of the log before: where
+        the actuator has no states they do not change between that row and the sample.
         """
         rows = np.arange(0, len(log["time"]), self.layout.hold_every)
         before = np.maximum(rows - 1, 0)

@@ -40,9 +40,8 @@ QUARTILES = [REPLAYS * quarter // 4 for quarter in (1, 2, 3)]  # positions in th
 def law_costs(runs: Sequence[tuple[Plan, Recording]]) -> list[dict[str, float]]:
     """Median time of one evaluation of each law [ns], and its quartiles, over repeated replays.
 
-    By name of the metric, one mapping for each of `runs`, which are plans and their recordings.
-
-    The laws are timed in turn, so that changes of the machine's speed affect all alike.
+    By name of the metric, one mapping for each of `runs`, which are plans and their recordings. The
+    laws are timed in turn, so that changes of the machine's speed affect all alike.
     """
     replays = [replayer(plan, recording) for plan, recording in runs]
     times = np.array([[replay() for replay in replays] for _ in range(REPLAYS)])

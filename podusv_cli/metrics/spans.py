@@ -36,6 +36,7 @@ def all_kernels(
     """Placeholder of all accumulators' kernels."""
 
 
+# Arguments as those of `all_kernels`.
 @kernel
 def by_time(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Show every instant to all kernels."""

@@ -56,6 +56,8 @@ def settle(t: float, z_e: float, radius: float, at: int, seen: Vector) -> None:
     seen[at + BEFORE], seen[at + DISTANCE_BEFORE] = t, z_e
 
 
+# Arguments as those of `spans.all_kernels`. Changes `seen`: time and z_e of the last instant, then
+# windows, then radii.
 @kernel
 def watch(t: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather over each window, and when z_e last came within each radius.
@@ -136,7 +138,10 @@ def _name_metric(
 
 
 def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> tuple[Metric, ...]:
-    """The metrics of the window `name`, from `start` to `to` [s], whose numbers stand at `at`."""
+    """The metrics of the window `name`, from `start` to `to` [s].
+
+    Its numbers stand from `at` on among those of the accumulator `of`.
+    """
     span = f"from {start:g} s to {to:g} s"
     rms, largest, beyond = (_over(to, at, f) for f in (_rms, _at(LARGEST), _at(BEYOND)))
     return (
@@ -156,7 +161,10 @@ def _of_window(name: str, start: float, to: float, of: Accumulator, at: int) -> 
 
 
 def _of_radius(name: str, radius: float, of: Accumulator, at: int) -> Metric:
-    """The metric of the `radius` [m] called `name`, whose numbers stand at `at`."""
+    """The metric of the `radius` [m] called `name`.
+
+    Its numbers stand from `at` on among those of the accumulator `of`.
+    """
     meaning = f"time from which z_e stays within {radius:g} m"
     return _name_metric(
         SETTLED,

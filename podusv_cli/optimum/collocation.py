@@ -151,7 +151,7 @@ class _Program:
         told: Callable[[int], None],
         warm: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
-        """The problem with `n` segments; `told` hears the number of each iteration.
+        """The program of a `problem` with `n` segments; `told` hears the number of each iteration.
 
         `warm` are IPOPT's options where the guess is nearly an optimum.
         """
@@ -160,7 +160,7 @@ class _Program:
         self.times: Vector = self.step * np.arange(n + 1, dtype=np.float64)
         self.problem, self.n, self.told, self.iterations = problem, n, told, 0
         self._unknowns = STATES + problem.demands
-        self.warm = dict(warm)  # IPOPT's options where the guess is nearly an optimum
+        self.warm = dict(warm)
         between = self.times[:-1] + 0.5 * self.step
         self._loads = [problem.loads(times.tolist()).T for times in (self.times, between)]
         self._places = [problem.places(times.tolist()).T for times in (self.times, between)]

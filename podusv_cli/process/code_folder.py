@@ -33,9 +33,8 @@ MARKED = b"Signature: 8a477f597d28d172789f06886806bc55\n# Compiled code of podus
 def code_folder(name: str) -> Path | None:
     """The folder `name` in $PODUSV_CACHE, else in podusv under $XDG_CACHE_HOME or ~/.cache.
 
-    On Windows under %LOCALAPPDATA% in place of the last. It is made if it is not there.
-
-    None where neither will do. A line on stderr says why a place was passed over, and what is used.
+    On Windows under %LOCALAPPDATA% in place of the last. It is made if it is not there; None where
+    no place will do. A line on stderr says why a place was passed over, and what is used.
     """
     refused = []
     for root in _roots():

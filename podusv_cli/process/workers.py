@@ -100,6 +100,7 @@ def run_shares(
     done = dict.fromkeys(range(count), 0.0)
 
     def advance(position: int, fraction: float) -> None:
+        """Note the fraction of a share of jobs that is over, and pass on that of all jobs."""
         done[position] = fraction * len(shares[position])
         progress(sum(done.values()) / len(jobs))
 
@@ -217,6 +218,7 @@ class Spawned:
         return pipe, process
 
     def _start(self) -> tuple[Pipe, BaseProcess]:
+        """A new process that waits for jobs, and the pipe to it."""
         ours, theirs = self._context.Pipe()
         process = self._context.Process(target=_serve, args=(theirs,))
         with _without_main():

@@ -129,9 +129,8 @@ def create(path: Path, content: bytes) -> None:
 def new_file(path: Path, size: int, *, sync: bool = True) -> Iterator[BinaryIO]:
     """A new file of `size` bytes, open for writing in the block and synced after it.
 
-    Without `sync` it is not, and whoever writes several files syncs them together.
-
-    Raises StorageError as `create` does, and for every OSError in the block.
+    Without `sync` it is not synced, and whoever writes several files syncs them together. Raises
+    StorageError as `create` does, and for every OSError in the block.
     """
     with storage_errors(f"cannot write {path} ({size} bytes)"):
         descriptor = os.open(path, _CREATE, 0o666)

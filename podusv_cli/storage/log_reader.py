@@ -117,10 +117,10 @@ def _check_lengths(datasets: Mapping[str, h5py.Dataset], about: Mapping[str, Sig
 
 
 def _array(dataset: h5py.Dataset, content: npt.NDArray[np.uint8]) -> Vector:
-    """A dataset's numbers in its shape; uncompressed ones straight from `content`.
+    """A dataset's numbers in its shape; uncompressed ones are a view of `content`.
 
-    These are the mapped bytes of the file. Numbers that do not begin at a multiple of 8 bytes, as
-    other programs may write, are copied.
+    `content` has all bytes of the file, mapped into memory. Numbers that do not begin at a multiple
+    of 8 bytes, as other programs may write, are copied.
     """
     place = dataset.id.get_offset()
     if place is None:  # compressed, or without numbers

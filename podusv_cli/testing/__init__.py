@@ -318,7 +318,7 @@ def _law(law: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vec
 
 
 def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    """All that a path's kernels write at time t [s]: target and place."""
+    """All that a path's kernels write at time t [s] and state x (6,): target, and place on it."""
     out, place = np.full(TARGET_SIZE, np.nan), np.zeros(len(path.places))
     out[len(TARGET) : PSI_D if path.heads else TARGET_SIZE] = 0.0  # what no path writes
     k, table = bundle(path.constants_with(0.0)), path.table()
@@ -329,7 +329,7 @@ def _path(path: Any, t: float, x: Vector, target: Vector, random: Any) -> list[V
 
 
 def _sea(sea: Any, t: float, x: Vector, target: Vector, random: Any) -> list[Vector]:
-    """All that a disturbance's kernel writes at time t [s] and state x (6,)."""
+    """All that a disturbance's kernel writes at time t [s] and state x (6,): load and signals."""
     out, hull = np.full(3 + len(sea.signals), np.nan), usual_vessel()
     call(
         sea.evaluate,

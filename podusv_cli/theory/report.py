@@ -95,7 +95,7 @@ def _window(window: Window) -> dict[str, Any]:
 
 
 def _bound(bound: Bound) -> dict[str, Any]:
-    """A bound as theory.json has it."""
+    """A bound, with the candidates and terms that it is made of, as theory.json has it."""
     return {
         "lambda": bound.lambda_,
         "Delta": bound.Delta,

@@ -261,7 +261,10 @@ class _Frame:
         return out
 
     def row(self, q: Vector) -> Vector:
-        """The same for one q (states,). Raises ArithmeticError where a rate is not finite."""
+        """`rows` for one q (states,): (states + columns,).
+
+        Raises ArithmeticError where a rate is not finite.
+        """
         row = np.asarray(self.rows(q[None])[0])
         if not np.isfinite(row).all():
             raise ArithmeticError("a rate is not finite")
@@ -283,6 +286,7 @@ class _Frame:
             atol=1e-9,
             jac=lambda _, q: self._central(q, STEPS[0])[: len(q)],
         )
+        # x and y of q are relative to the target, so this is the time [s] and the distance [m]
         way = [(0.0, math.hypot(*q[:2]))]
         while solver.status == "running" and solver.nfev < MOST_EVALUATIONS:
             solver.step()

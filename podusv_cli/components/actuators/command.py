@@ -98,6 +98,7 @@ def round_to(demand: float, resolution: float) -> float:
     return demand
 
 
+# Both in N or N m, the zone not below 0.
 @kernel
 def beyond(demand: float, zone: float) -> float:
     """What is beyond the dead zone, which starts at zero; what is no number stays so."""

@@ -15,6 +15,7 @@ class Ideal(Actuator):
     feels_motion: ClassVar[bool] = False
     cuts: ClassVar[bool] = True
 
+    # demand (2) [N, N m]; writes tau (3) [N, N, N m].
     @staticmethod
     @kernel
     def drive(demand: Vector, tau: Vector) -> None:

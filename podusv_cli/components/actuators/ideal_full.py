@@ -13,6 +13,7 @@ class IdealFull(FullActuator):
 
     kind: Literal["ideal_full"] = "ideal_full"
 
+    # demand (3) [N, N m, N]; writes tau (3) [N, N, N m].
     @staticmethod
     @kernel
     def drive(demand: Vector, tau: Vector) -> None:

@@ -126,6 +126,7 @@ def force(T: float, delta: float) -> tuple[float, float]:
     return T * cosine, T * sine
 
 
+# `pod` (WIDTH) is its row of the table.
 @kernel
 def on_hull(along: float, across: float, pod: Vector) -> tuple[float, float]:
     """Force [N] along and across the vessel of one along and across the pod as it is mounted."""

@@ -64,6 +64,8 @@ def slant(delta: float, pod: Vector) -> float:
     return float(direction(along, across))
 
 
+# `pod` (WIDTH) is its row of the table. Beyond the stall the force no longer grows, so the angle
+# ends there.
 @kernel
 def part_when_slanted(pod: Vector) -> float:
     """Force of thrust and rudder together at the largest angle, in parts of the thrust, at rest."""

@@ -28,6 +28,7 @@ class Saturated(Actuator):
         """As they are given."""
         return self.surge_limit, self.yaw_limit
 
+    # demand (2) [N, N m], limits in N and N m; writes tau (3) [N, N, N m] and signals (1).
     @staticmethod
     @kernel
     def drive(demand: Vector, k: Any, tau: Vector, signals: Vector) -> None:

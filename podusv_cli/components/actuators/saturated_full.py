@@ -32,6 +32,7 @@ class SaturatedFull(FullActuator):
         """As they are given."""
         return self.surge_limit, self.yaw_limit, self.sway_limit
 
+    # demand (3) [N, N m, N], limits in N and N m; writes tau (3) [N, N, N m] and signals (1).
     @staticmethod
     @kernel
     def drive(demand: Vector, k: Any, tau: Vector, signals: Vector) -> None:

@@ -165,7 +165,7 @@ class _Column(NamedTuple):
         return sized and bool(OF_PULSES.search(self.name))
 
     def factor_of_command(self) -> float:
-        """What one of its unit is in n. Raises ValueError."""
+        """What a command of 1 in the column's unit is in that of n. Raises ValueError."""
         known = {
             "": 1.0,
             "1": 1.0,

@@ -87,9 +87,8 @@ class Cascade(Controller):
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
         """The memory: the virtual ship's sway velocity (1,) [m/s] in a steady turn.
 
-        It goes at the target's speed with the turn of its course.
-
-        By bisection of its sway force; where there is no such turn, an end of the range.
+        The ship goes at the target's speed with the turn of its course. By bisection of its sway
+        force; where there is no such turn, an end of the range. `nominal` has its coefficients.
         """
         k, speed = bundle(nominal.constants()), math.hypot(target[2], target[3])
         turn = turn_rate(Moving(*target[2:6]), SLOWEST)

@@ -58,6 +58,7 @@ class LosPid(LineOfSight):
         """Always, for anti-windup."""
         return True
 
+    # demand (2) [N, N m], tau (3) [N, N, N m]; changes rate (2), of integrals that are loads.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:
@@ -72,9 +73,8 @@ class LosPid(LineOfSight):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Loops of the axes: surge with its integral, yaw with heading and integral.
 
-        Integrals are per told inertia.
-
-        Yaw has a triple pole at -omega_psi, whose polynomial has the factors 3 w, 3 w^2, w^3.
+        Integrals are per told inertia. Yaw has a triple pole at -omega_psi = -w, whose polynomial
+        has the coefficients 3 w, 3 w^2, w^3.
         """
         surge, yaw = axes
         to_r, w = yaw.told / yaw.inertia, self.omega_psi

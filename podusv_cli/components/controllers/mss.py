@@ -95,6 +95,7 @@ class Mss(LineOfSight):
         """Always, for the integral of the speed."""
         return True
 
+    # demand (2) [N, N m], tau (3) [N, N, N m]; changes rate at FORCE, whose integral is a load.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:

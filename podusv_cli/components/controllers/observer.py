@@ -40,6 +40,7 @@ OBSERVED = (
 )
 
 
+# Two equations for two unknowns; k.by_yaw is m23/m33, k.by_sway m32/m22.
 @kernel
 def sway_yaw_rates(sway: float, yaw: float, k: Any) -> tuple[float, float]:
     """(v', r') under a sway force [N] and a yaw moment [N m], by the nominal mass matrix."""
@@ -89,6 +90,7 @@ class ObservingController(Controller):
         """Always: the observer has to know the loads that act."""
         return True
 
+    # demand (2) [N, N m], tau (3) [N, N, N m]; changes rate at U_HAT, V_HAT and R_HAT.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:

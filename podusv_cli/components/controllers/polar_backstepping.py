@@ -196,6 +196,7 @@ class PolarBackstepping(TrackingController):
         at = sum(size for _, size in self.slots()) - 2 if self.wants_loads() else 0
         return super().constants() | {"auxiliary": float(at)}
 
+    # demand (2) [N, N m], tau (3) [N, N, N m]; changes the rates of xi_u and xi_r at k.auxiliary.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:

@@ -50,6 +50,7 @@ def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     return wrap(course + arctangent(-across, ahead) - x[2])
 
 
+# off [rad]; in rad/s.
 @kernel
 def wanted_turn(off: float, k: Any) -> float:
     """Wanted yaw rate for a heading error [rad/s]; 0 below the threshold."""
@@ -116,6 +117,8 @@ class Px4(Rover):
         """yaw_P."""
         return "yaw_P", self.yaw_P
 
+    # x (6) state, target (6); changes memory (3). It begins to turn at k.stops_at and ends at
+    # k.drives_at.
     @staticmethod
     @kernel
     def sample(x: Vector, memory: Vector, target: Vector, k: Any) -> None:

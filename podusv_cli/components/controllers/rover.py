@@ -121,7 +121,8 @@ class Rover(Controller):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Loops of the axes: speed and yaw rate with their integrals.
 
-        Gains are in parts of full scale, so they are multiplied with the load there.
+        Gains are in parts of full scale, so they are multiplied by the load at full scale, the same
+        at any `nu`.
         """
         scales = (("speed", self.surge), ("rate", self.yaw))
         return [

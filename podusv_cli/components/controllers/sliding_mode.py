@@ -66,6 +66,7 @@ def reach(s: float, z: float, k: Any) -> float:
     return float(k.k_v * s + k.eta * min(max(s / k.phi, -1.0), 1.0))
 
 
+# s [m/s] is the velocity that is missing; in m/s3. It is 0 with any other reaching.
 @kernel
 def twist(s: float, k: Any) -> float:
     """Rate of z: lambda_2 with the sign of s, rounded off within phi."""
@@ -106,9 +107,8 @@ class SlidingMode(HandController):
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:
         """Within the boundary layer at rest: nu' = -gain nu + z, z' = -(lambda_2/phi) nu.
 
-        For the axes surge and yaw, whose damping the law cancels.
-
-        The first order has no z, so only the first number of each row is kept.
+        For the axes surge and yaw, whose damping the law cancels. Reaching of first order has no z,
+        so only the first number of each row is kept.
         """
         key, slope, learning = "eta", self.eta / self.phi, np.zeros((0, 1))
         if self.reaching == "super_twisting":
@@ -127,6 +127,7 @@ class SlidingMode(HandController):
             for axis, gain in zip(axes, self.rate_gains(), strict=True)
         ]
 
+    # demand (2) [N, N m], tau (3) [N, N, N m]; changes rate at Z_A and Z_B.
     @staticmethod
     @kernel
     def after_saturation(demand: Vector, tau: Vector, k: Any, rate: Vector) -> None:

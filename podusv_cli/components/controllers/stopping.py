@@ -29,6 +29,7 @@ class Stopping(Manoeuvre):
         """Nothing is steered."""
         return ManoeuvreTrial("stopping", self.execute)
 
+    # t [s], x (6) state; changes memory (1): 0 ahead, 1 astern, 2 when the hull lies still.
     @staticmethod
     @kernel
     def sample(t: float, x: Vector, memory: Vector, k: Any) -> None:
@@ -38,6 +39,7 @@ class Stopping(Manoeuvre):
         if memory[0] == 1.0 and x[3] <= 0.0:
             memory[0] = 2.0
 
+    # memory and rate (1); writes tau (2) [N, N m].
     @staticmethod
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector) -> None:

@@ -248,6 +248,7 @@ class TrackingController(Controller):
         needed = self.rate == "difference" or self.hold_below > 0
         return self.difference_step if needed else 0.0
 
+    # t [s], x (6) state, target (6); changes memory at PSI_D_HELD and PSI_D_RATE_HELD.
     @staticmethod
     @kernel
     def sample(t: float, x: Vector, memory: Vector, target: Vector, k: Any) -> None:

@@ -27,12 +27,14 @@ class TurningCircle(Steering):
         """Nothing is reversed."""
         return ManoeuvreTrial("turning circle", self.execute)
 
+    # t [s]; writes memory (1): 1 once the trial has begun.
     @staticmethod
     @kernel
     def sample(t: float, memory: Vector, k: Any) -> None:
         """Begin."""
         memory[0] = 1.0 if has_begun(t, k) else 0.0
 
+    # memory and rate (1); writes tau (2) [N, N m] and signals[0], the angle [rad].
     @staticmethod
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:

@@ -40,6 +40,8 @@ class Aim(NamedTuple):
     chi_e: float  # angle that the velocity vector has to turn by [rad]
 
 
+# With `astern: shorter` the vessel backs up (side -1) where V_c points against the target's course,
+# and abaft the beam.
 @kernel
 def aim(wanted: Wanted, v_s: float, k: Any) -> Aim:
     """The angle to V_c less the sway velocity v_s [m/s] that the hull settles to."""

@@ -87,6 +87,8 @@ class Zigzag(Steering):
             memory[AT_SIDE] = side * (2.0 * share - 1.0) if left > 0.0 else -side
         memory[AT_TIME], memory[AT_RATE] = t, x[5]
 
+    # memory and rate (5); writes tau (2) [N, N m] and signals[0], the angle [rad]. The memory
+    # changes at samples alone.
     @staticmethod
     @kernel
     def law(memory: Vector, k: Any, tau: Vector, rate: Vector, signals: Vector) -> None:

@@ -108,6 +108,9 @@ class Current(Disturbance):
         if not self._steady() and (fault := misfit(self.interval, step)):
             yield "interval", fault
 
+    # t [s], x (6) state; table: the index of the last piece, then V_c [m/s] and beta_c [rad] every
+    # k.interval [s]. Writes b (5): the load [N, N, N m], then both. Beyond the end the last pair
+    # holds.
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:

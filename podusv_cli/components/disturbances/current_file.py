@@ -73,6 +73,8 @@ class CurrentFile(Disturbance):
         """The times, then speed and direction row by row."""
         return flow_table(read_flow(self.rows, FASTEST))
 
+    # t [s], x (6) state; table as `flow_table` has it. Writes b (5): the load [N, N, N m], then
+    # speed [m/s] and direction [rad] of the flow.
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:

@@ -65,6 +65,8 @@ class FromFile(Disturbance):
         u, v, r = np.abs(_rows(self.rows)[:, 1:]).max(axis=0).tolist()
         return u, v, r
 
+    # t [s]; table: `count` times [s], then as many loads (3). Writes b (3) [N, N, N m]; beyond the
+    # rows the nearest one's.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, table: Vector, b: Vector) -> None:

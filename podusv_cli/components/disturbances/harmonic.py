@@ -136,9 +136,10 @@ class HarmonicDisturbance(Disturbance):
         return rows.ravel()
 
     def bounds(self) -> tuple[float, float, float]:
-        """The bound of every axis [N, N, N m], scaled; fixed to earth, either force may turn fully.
+        """What |b_u|, |b_v|, |b_r| never exceed [N, N, N m].
 
-        Then surge and sway each may have the whole horizontal force.
+        Of a load that is fixed to earth, surge and sway may each get the whole horizontal force, as
+        the vessel turns.
         """
         u, v, r = (self.scale * axis.bound() for axis in (self.b_u, self.b_v, self.b_r))
         return (u, v, r) if self.frame == "body" else (math.hypot(u, v), math.hypot(u, v), r)

@@ -35,6 +35,7 @@ class Step(Disturbance):
         """The same without a ramp."""
         return 0.0 if self.ramp else self.time
 
+    # t, k.time and k.ramp [s]; writes b (3) [N, N, N m].
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, b: Vector) -> None:

@@ -248,10 +248,11 @@ class Waves(Disturbance):
         return np.array([self.peak]) if self.components == 1 else drawn
 
     def table_for(self, vessel: Vessel, duration: float) -> Vector:
-        """Eight rows, one number a component, one behind another and filled up to whole groups.
+        """Eight rows of a number per component, one behind another: (8 * components,).
 
         Rate [1/s], phase [turns], wave number [rad/m], amplitude [m], cosine and sine of the
-        direction it goes to, reflected shares of bow and stern and of the sides.
+        direction it goes to, reflected shares of bow and stern and of the sides. Zeros fill each
+        row up to whole groups.
         """
         count, stream = self.components, (self.seed, STREAM)
         drawn = spectra.cosines(self._variance(), self._edges(), *stream, self.amplitudes)
@@ -314,6 +315,7 @@ class Waves(Disturbance):
                 f"{most:.4g} rad/s at most; give a smaller `highest` or `simulation.step`",
             )
 
+    # Arguments and outputs as those of `long_crested`.
     @staticmethod
     @kernel
     def evaluate(

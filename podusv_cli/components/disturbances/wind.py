@@ -253,6 +253,8 @@ class Wind(Disturbance):
                 "`simulation.step`",
             )
 
+    # t [s], x (6) state; table as `_gust` has it. Writes b (5): the load [N, N, N m], then speed
+    # [m/s] and direction [rad]. With `again`, b has the speed at this t already.
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float) -> None:

@@ -103,6 +103,8 @@ class WindFile(Disturbance):
         if vessel.windage is None:
             yield "kind", NO_WINDAGE
 
+    # t [s], x (6) state; table as `flow_table` has it. Writes b (5): the load [N, N, N m], then
+    # speed [m/s] and direction [rad].
     @staticmethod
     @kernel
     def evaluate(t: float, x: Vector, k: Any, table: Vector, b: Vector) -> None:

@@ -245,6 +245,8 @@ class ExtendedKalmanFilter(Estimator):
         without = {} if self.bias else dict.fromkeys(("q_b", "q_b_psi"), 0.0)
         return super().constants() | without
 
+    # seen as the sensors write it (VALUE, FRESH); changes state (66). `sigma` are the deviations of
+    # what is measured; the heading's innovation is taken by the nearest turn.
     @staticmethod
     @kernel
     def correct(seen: Vector, state: Vector, k: Any) -> None:
@@ -258,6 +260,7 @@ class ExtendedKalmanFilter(Estimator):
                 innovation = seen[VALUE + i] - (state[i] - late)
                 take_in(i, h, wrap(innovation) if i == 2 else innovation, sigma[i], state)
 
+    # tau (3) [N, N, N m], state (66); writes rate (66). `f` is room for F (6, 9).
     @staticmethod
     @kernel
     def follow(tau: Vector, state: Vector, k: Any, rate: Vector) -> None:

@@ -49,6 +49,7 @@ class LowPass(Estimator):
     def correct() -> None:
         """Nothing jumps."""
 
+    # seen as the sensors write it (VALUE), state (6) the estimate; writes rate (6).
     @staticmethod
     @kernel
     def follow(seen: Vector, state: Vector, k: Any, rate: Vector) -> None:

@@ -14,6 +14,7 @@ class NoEstimator(Estimator):
 
     kind: Literal["none"] = "none"
 
+    # seen as the sensors write it; changes state (6).
     @staticmethod
     @kernel
     def correct(seen: Vector, state: Vector) -> None:

@@ -139,6 +139,7 @@ class PassiveObserver(Estimator):
             "K_4_psi": moment,
         }
 
+    # seen as the sensors write it (VALUE, FRESH); changes state at SEEN (3) [m, m, rad].
     @staticmethod
     @kernel
     def correct(seen: Vector, state: Vector) -> None:
@@ -150,6 +151,9 @@ class PassiveObserver(Estimator):
             expected = state[2] + state[WAVE + 2]
             state[SEEN + 2] = expected + wrap(seen[VALUE + 2] - expected)
 
+    # tau (3) [N, N, N m]; writes rate, as long as the state. e [m, m, rad] is what was measured
+    # less what is expected with the wave motion; the load is fixed to the earth, and turned for the
+    # plant.
     @staticmethod
     @kernel
     def follow(tau: Vector, state: Vector, k: Any, rate: Vector) -> None:

@@ -191,6 +191,9 @@ class Sensors(Measurement):
             for key, text in sensor.conflicts(step) if sensor else ():
                 yield f"{name}.{key}", text
 
+    # `instant` counts steps, x (6) is the state, b has the waves' motion from k.motion on; table as
+    # `table_for` has it. Writes seen: values, marks, and samples that wait for their delivery, in a
+    # ring of its own for each quantity.
     @staticmethod
     @kernel
     def sense(instant: float, x: Vector, b: Vector, k: Any, table: Vector, seen: Vector) -> None:

@@ -87,9 +87,9 @@ class Path(KernelPart):
         return self.whole_targets(times)[:, : len(TARGET)]
 
     def whole_targets(self, times: Iterable[float]) -> Vector:
-        """The same (n, 10): behind `TARGET` the distance, left 0, and psi_d with two rates.
+        """The targets at these `times` [s], (n, 10), with what stands behind `TARGET`.
 
-        The heading [rad] is 0 of a path that has none.
+        That is the distance, left 0, and psi_d [rad] with its two rates, 0 of a path without them.
         """
         times = list(times)
         rows, k, table = np.zeros((len(times), TARGET_SIZE)), bundle(self.constants()), self.table()

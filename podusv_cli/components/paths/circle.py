@@ -36,6 +36,7 @@ class Circle(Path):
     )
     turn: Literal["starboard", "port"] = value("starboard", "", "sense of rotation seen from above")
 
+    # t [s]; writes target (6): position [m], velocity, acceleration, each north and east.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, target: Vector) -> None:

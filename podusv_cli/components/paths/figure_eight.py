@@ -25,6 +25,7 @@ class FigureEight(Path):
     breadth: float = value(10.0, "m", "extent to east and west together, B", gt=0)
     period: float = value(200.0, "s", "time for both lobes", gt=0)
 
+    # t [s]; writes target (6): position [m], velocity, acceleration, each north and east.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, target: Vector) -> None:

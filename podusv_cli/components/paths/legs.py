@@ -124,6 +124,8 @@ class Legs(Path):
         """The points, north and east in turn."""
         return np.asarray(self.points, float).ravel()
 
+    # x (6) is what the law sees, s (6) the state; changes place (3): leg, distance across [m] and
+    # along [m]. table: corners (n, 2) [m].
     @staticmethod
     @kernel
     def locate(x: Vector, s: Vector, place: Vector, k: Any, table: Vector) -> None:
@@ -139,6 +141,7 @@ class Legs(Path):
         leg_frame(s, min(leg, last), table, at)
         place[LEG], place[E_CT], place[ALONG] = leg, at[4], at[3]
 
+    # x (6) as the law sees it, place (3), table: corners (n, 2) [m]; writes target (6).
     @staticmethod
     @kernel
     def evaluate(x: Vector, place: Vector, k: Any, table: Vector, target: Vector) -> None:

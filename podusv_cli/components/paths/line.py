@@ -19,6 +19,7 @@ class Line(Path):
     course: float = value(0.0, "rad", "direction of travel, from north towards east")
     speed: float = value(0.5, "m/s", "speed of the target", ge=0)
 
+    # t [s]; writes target (6): position [m], velocity, acceleration, each north and east.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, target: Vector) -> None:

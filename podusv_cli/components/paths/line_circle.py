@@ -72,6 +72,7 @@ class LineCircle(Path):
     )
     rate: float = value(0.03, "rad/s", "angular rate of the second branch", gt=0)
 
+    # t [s]; writes target (6), as `circle.on_circle` does.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, target: Vector) -> None:

@@ -70,6 +70,8 @@ class Poses(Path):
         """Where the poses are."""
         return tuple((x, y) for x, y, _ in self.poses)
 
+    # t [s]; table: poses (count, 3); writes target (10), as `between_poses` does. A period is the
+    # stay at pose i, then the way to the next one.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, table: Vector, target: Vector) -> None:

@@ -25,6 +25,7 @@ class Sinusoid(Path):
     amplitude: float = value(3.0, "m", "largest distance from the axis", ge=0)
     wavelength: float = value(30.0, "m", "length of a period along the axis", gt=0)
 
+    # t [s]; writes target (6): position [m], velocity, acceleration, each north and east.
     @staticmethod
     @kernel
     def evaluate(t: float, k: Any, target: Vector) -> None:

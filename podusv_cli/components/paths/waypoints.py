@@ -195,7 +195,7 @@ class Waypoints(Path):
         return np.concatenate([knots, rows.ravel(), *([fillet.rows()] if fillet else [])])
 
     def _cubic(self) -> Any:
-        """Piecewise cubic polynomials of the time through the points."""
+        """The course through the points: scipy's piecewise cubic polynomials of the time [s]."""
         from scipy.interpolate import CubicSpline, PPoly
 
         knots, course = self._knots(), self._course()

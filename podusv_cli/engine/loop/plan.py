@@ -126,7 +126,10 @@ class Plan:
 
     @cached_property
     def row(self) -> dict[str, list[str]]:
-        """Names of what is computed at every instant, by part in the order of the row."""
+        """Names of what is computed at every instant, by part in the order of the row.
+
+        "shown" has names only for a law that is shown a target with rounded corners.
+        """
         loop = self.loop
         return {
             "target": [*TARGET, "z_e", *_names(loop.headings)],

@@ -148,7 +148,7 @@ class Batch:
     interrupted: bool = False
 
     def note(self, run: BatchRun, ending: Ending) -> None:
-        """Enter how a run ended."""
+        """Enter how a run ended: instants reached, status, last state and metrics, and cause."""
         i, vectors = run.position, run.vectors
         self.reached[i], self.status[i] = ending.reached, ending.status
         self.state[i], self.seen[i] = vectors.s[: len(STATE)], vectors.seen

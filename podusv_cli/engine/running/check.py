@@ -74,9 +74,9 @@ def ask_part(
 
 
 def _constant(error: BaseException | None) -> str:
-    """What is wrong where a kernel reads a constant that there is not, and those there are; or "".
+    """What is wrong where a kernel reads a constant that is missing, and which ones there are.
 
-    Constants are named tuples, which an AttributeError names.
+    "" for an error of another kind. Constants are named tuples, to which an AttributeError refers.
     """
     if not (isinstance(error, AttributeError) and hasattr(error.obj, "_fields")):
         return ""

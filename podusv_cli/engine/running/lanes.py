@@ -165,6 +165,7 @@ class Lanes:
     @classmethod
     def of(cls, runs: Sequence[Vectors], layout: Layout) -> Lanes:
         """At most LANES runs of one layout side by side, ready for the march."""
+        # Where a run that diverges leaves its state, row and metrics, while the others go on
         size = layout.states + layout.columns + len(runs[0].seen)
         under_way = np.zeros(REACHED + LANES)
         under_way[REACHED : REACHED + len(runs)] = MARCHING
@@ -172,14 +173,17 @@ class Lanes:
         return cls(runs, vectors, layout, under_way, np.zeros(LANES * size))
 
     def endings(self, reached: int, last: int) -> list[Ending]:
-        """How each run ended, where the march stopped at `reached`; its vectors are filled in."""
+        """How each run ended, where the march stopped at the instant `reached`.
+
+        `last` is the instant that it was to stop at. The vectors of every run are filled in.
+        """
         return [self._ending(lane, reached, last) for lane in range(len(self.runs))]
 
     def _ending(self, lane: int, reached: int, last: int) -> Ending:
         """How the run in a lane ended; its state, row and metrics go back to its own vectors.
 
-        `reached` is the instant that the others came to. A run that diverged stopped earlier, and
-        its numbers of that instant were put aside in `ends`.
+        `reached` is the instant that the others came to, of those up to `last`. A run that diverged
+        stopped earlier, and its numbers of that instant were put aside in `ends`.
         """
         own, ended, n = self.runs[lane], self.under_way[REACHED + lane], self.layout
         together = Vectors(*self.vectors)
@@ -198,7 +202,10 @@ class LaneSorter:
     """Sorts the runs of a batch by what they have to have in common to march side by side."""
 
     def __init__(self, instants: int, wanted: bool | None) -> None:
-        """`instants` are those of all runs; `wanted` says whether to march side by side at all."""
+        """`instants` counts those of all runs together, which tell whether compiling pays.
+
+        `wanted` says whether to march side by side at all; None leaves it to that count.
+        """
         self.advance: Callable[[Lanes, float], March] | None = None
         self._instants, self._wanted = instants, wanted
         self._places: list[tuple[int, list[int]]] = []
@@ -215,6 +222,7 @@ class LaneSorter:
                     self.advance = marcher(plan)
 
     def _is_worth(self, plan: Plan) -> bool:
+        """Whether the batch is long enough to compile code for lanes, or has it compiled."""
         return self._instants >= WORTH or is_compiled(plan)
 
     def sort_in(self, vectors: Vectors, run: Any) -> list[Any]:

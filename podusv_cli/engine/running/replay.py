@@ -48,6 +48,7 @@ def replayer(
     rows, loop = logged_rows(plan, recording, most), plan.loop
     count, width = rows.shape
     rounds = -(-evaluations // count)
+    # Rate and signals at multiples of the width, then scratch; the last may be longer than that
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
     constants = plan.law_constants
     p = np.array(list(constants.values()))

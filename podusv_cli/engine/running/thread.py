@@ -97,7 +97,7 @@ class Work:
         self._under_way[STOP] = 1.0
 
     def stop_and_count(self) -> int:
-        """Stop the march, wait a moment until it has, and count the good instants."""
+        """Stop the march, wait a moment until it has, and return how many instants are good."""
         self.stop()
         end = time.monotonic() + LAST_CHANCE
         while self.started and not self.over and time.monotonic() < end:

@@ -128,6 +128,7 @@ HELD_SIGNALS = HELD_DEMAND + DEMAND_SIZE
 STOP = 1  # in `under_way`
 
 
+# All (count); h [s].
 @kernel
 def shift_state(count: int, s: Vector, h: float, ds: Vector, out: Vector) -> None:
     """out = s + h ds."""

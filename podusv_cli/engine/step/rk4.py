@@ -229,6 +229,7 @@ def show_probe(k: int, h: float, p: Parts, c: Vectors, n: Layout) -> None:
     p.probe(k * h, weight, c.s, c.row, c.probe, c.seen)
 
 
+# h [s]; `first` is the instant at which this march began.
 @kernel
 def instant(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> bool:
     """Evaluate, probe and log instant k; whether all its numbers are finite."""
@@ -242,6 +243,7 @@ def instant(k: int, first: int, h: float, p: Parts, c: Vectors, n: Layout) -> bo
     return True
 
 
+# h [s]; `vectors` and `layout` as machine code takes them. Behind instant n.steps there is no step.
 @spread
 @kernel
 def advance(p: Parts, first: int, last: int, h: float, vectors: Any, layout: Any) -> int:
@@ -262,9 +264,8 @@ def advance_plainly(p: Parts, first: int, last: int, h: float, c: Vectors, n: La
     """`advance` as plain Python, whose `math` raises where machine code gives no number.
 
     March from instant `first` to `last`, step `h` [s], over the vectors `c` laid out by `n`, with
-    the functions `p`; returns the instant that was reached. An
-    error within an instant ends the march there; one within a step makes the next instant's state
-    NaN, as machine code would.
+    the functions `p`; returns the instant that was reached. An error within an instant ends the
+    march there; one within a step makes the next instant's state NaN, as machine code would.
     """
     for k in range(first, last):
         try:
@@ -314,6 +315,8 @@ def evaluate_all(
             )
 
 
+# logged (count, 1 + states), out (count, states + columns). Each row stands alone, so nothing is
+# known of a stage before.
 @spread
 @kernel
 def rates_along(

@@ -80,7 +80,10 @@ MOST_CHEAP = 12  # instructions of a block that takes no longer than to jump ove
 
 
 def room(kind: str) -> str:
-    """The type of memory that has this for every lane."""
+    """LLVM's type of memory that has a value of the type `kind` for every lane.
+
+    As [4 x double] for double, or [3 x [4 x double]] for [3 x double]. Raises NotForLanes.
+    """
     if array := re.fullmatch(r"\[(\d+) x (.*)\]", kind):
         return f"[{array[1]} x {room(array[2])}]"
     if kind not in SIZES:

@@ -106,7 +106,7 @@ class Masks:
         return node in self.ragged if isinstance(node, BlockLoop) else self.splits(node)
 
     def _wait(self) -> None:
-        """By level and node, which nodes wait while control is there.
+        """Find, by level and node, which nodes wait while control is there: `waiting`.
 
         Where lanes part, control goes to the first of the ways, and the others wait with what
         waited before. A node that is skipped passes on what waits.

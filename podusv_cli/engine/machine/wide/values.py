@@ -71,7 +71,10 @@ class Values:
         return lanes(instruction.kind) if self.differs(instruction.name) else instruction.kind
 
     def set(self, instruction: Instruction, text: str) -> None:
-        """Write the value of an instruction."""
+        """Write the line that gives an instruction its value, which `text` computes.
+
+        Also into memory, where another block reads it.
+        """
         self.put(f"{instruction.name} = {text}")
         self.known[instruction.name] = instruction.name
         if instruction.name in self.read_elsewhere:
@@ -129,7 +132,7 @@ class Values:
         return self.mask_named(self.masks.of[block])
 
     def mask_named(self, name: Any) -> str:
-        """The lanes of a mask."""
+        """The mask of this name in `Masks`, as an operand with a bit for every lane."""
         if name == EVERY:
             return ALL_TRUE
         key = f"mask {name}"
@@ -138,7 +141,10 @@ class Values:
         return self.known[key]
 
     def edge(self, begin: int, way: int) -> str:
-        """The mask of the lanes that go a way (0: true, 1: false) at the end of block `begin`."""
+        """The mask of the lanes that go this `way` (0: true, 1: false) at the end of `begin`.
+
+        As an operand; `begin` is the number of a block.
+        """
         here = self.mask(begin)
         if not self.masks.splits(begin):
             return here

@@ -83,7 +83,7 @@ class Blocks(Instructions):
         )
 
     def _level(self, loop: BlockLoop | None) -> None:
-        """Write the nodes of a loop, None for the whole function."""
+        """Write what lies directly in a loop, blocks and loops; None is the whole function."""
         level = self.masks.order.levels[loop]
         for node in level.nodes:
             if isinstance(node, BlockLoop):
@@ -92,7 +92,9 @@ class Blocks(Instructions):
                 self._block(level, node)
 
     def _loop(self, level: NodeLevel, loop: BlockLoop) -> None:
-        """Write a loop; one that lanes leave in different rounds ends when none is left in it.
+        """Write a `loop` that lies directly in `level`.
+
+        One that lanes leave in different rounds (ragged) ends when none is left in it.
 
         `%mask` has the lanes of this round, `%next` gathers those of the next one.
         """
@@ -112,17 +114,21 @@ class Blocks(Instructions):
             self.put(f"br i1 {self.any(mask)}, label %at.{header}, label %{then}")
 
     def _waiting(self, level: NodeLevel, node: Node) -> set[Node]:
+        """The nodes of a level at which lanes may wait once `node` is done."""
         return self.masks.waiting[level.loop][node]
 
     def _first(self, level: NodeLevel, targets: set[Node]) -> str:
-        """The label of the node that comes first."""
+        """The label of the one among `targets` that comes first in the order of the level."""
         node = level.first(targets)
         if node == END:
             return f"round.{level.loop.header}" if level.loop else "end"
         return f"at.loop.{node.header}" if isinstance(node, BlockLoop) else f"at.{node}"
 
     def _block(self, level: NodeLevel, block: int) -> None:
-        """Write a block; it is jumped over where no lane comes to it, unless it is cheap."""
+        """Write a block that lies directly in `level`.
+
+        It is jumped over where no lane comes to it, unless it is cheap.
+        """
         row, waiting = self.function.blocks[block], self._waiting(level, block)
         self.label(f"at.{block}")
         begins = block not in level.parent
@@ -140,11 +146,15 @@ class Blocks(Instructions):
         self._leave(level, block)
 
     def _is_cheap(self, block: int) -> bool:
+        """Whether to run a block even for no lane, which costs less than to jump over it.
+
+        Not one whose mask other blocks share: a jump passes over all of them.
+        """
         shared = [*self.masks.of.values(), *self.masks.entering.values()].count(block) > 1
         return not shared and is_cheap(self.function.blocks[block])
 
     def _begin(self, level: NodeLevel) -> None:
-        """No lane is in any block of a level yet, but in the first one."""
+        """Write that no lane is in any block of a level yet, but in the first one."""
         masks = [f"%mask.{b}" for b in level.nodes[1:] if self.masks.of.get(b) == b]
         if level.loop in self.masks.ragged:
             masks.append(f"%next.{level.loop.header}")
@@ -152,7 +162,7 @@ class Blocks(Instructions):
             self.put(f"store {MASK} {ALL_FALSE}, ptr {mask}")
 
     def _leave(self, level: NodeLevel, block: int) -> None:
-        """Go on from a block, with what every way takes along.
+        """Write how to go on from a `block` of `level`, with what every way takes along.
 
         Where lanes part, to the first node of the ways and of what waits; where all go one way
         there; else by a branch as in scalar code.
