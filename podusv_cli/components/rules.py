@@ -35,7 +35,7 @@ def _observer(words: str, factor: Callable[[Facts], float]) -> Rule:
 
 
 def noise(place: int) -> Rule:
-    """The noise of the sensor of this number of the state."""
+    """The rule for a noise: what the sensor has of the state's number `place`, in its unit."""
     return Rule(
         "noise and bias of the sensor itself, {:g} where it has none",
         lambda facts, default: facts.noise[place] or default,

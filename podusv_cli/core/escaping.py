@@ -73,13 +73,16 @@ def _spelt(text: str, name: Callable[[str], str]) -> str:
 
 
 def _shows(letter: str) -> bool:
+    """Whether a letter is seen by a reader, as itself or as a space."""
     return letter.isprintable() or unicodedata.category(letter) == "Zs"  # spaces of any width
 
 
 def _entity_name(letter: str) -> str:
+    r"""A letter as Python names it, as `\u200b`."""
     return letter.encode("unicode_escape").decode()
 
 
 def _json_named(letter: str) -> str:
+    r"""A letter as JSON names it, `\u` and four hexadecimal digits; two of these beyond 16 bits."""
     units = letter.encode("utf-16-be", "surrogatepass").hex()
     return "".join(f"\\u{units[i : i + 4]}" for i in range(0, len(units), 4))

@@ -115,7 +115,7 @@ def cosine_and_sine(angle: Vector) -> tuple[Vector, Vector]:
 
 
 def arctangents(y: Vector, x: Vector) -> Vector:
-    """Angles [rad] of vectors (x, y) from the x axis (n,), in the bits of `arctangent`.
+    """Angles [rad] of vectors (x, y) from the x axis (n,), with the bits of `arctangent`.
 
     The angle from the nearer axis or diagonal, for which the series serves, then the way back.
     """

@@ -84,7 +84,10 @@ def belongs_to_user(status: os.stat_result) -> bool:
 
 
 def name_refused(name: str) -> str:
-    """Why no folder can have this name on Windows; "" where it can. Results go to others."""
+    """Why no folder can have this name on Windows; "" where it can.
+
+    For every system, since folders of results are passed on to others.
+    """
     if name.partition(".")[0].rstrip().lower() in DEVICES:
         return f"{name} is a device on Windows, so no folder can have this name; take another one"
     if name.endswith((".", " ")):

@@ -48,6 +48,7 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 
 
 def _size(layout: Measured) -> int:
+    """How many numbers are gathered in a loop: none without poses to go to."""
     loop = layout.loop
     return SIZE if loop.path.heads and loop.has_target else 0
 

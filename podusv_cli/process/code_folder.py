@@ -73,6 +73,7 @@ def write(path: Path, content: bytes) -> None:
 
 
 def _demand(true: bool, otherwise: str) -> None:
+    """Raises PermissionError with the text `otherwise` unless something is `true`."""
     if not true:
         raise PermissionError(0, otherwise)
 

@@ -61,7 +61,7 @@ class _Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True  # else each answer waits 40 ms for an acknowledgement
 
     def do_GET(self) -> None:
-        """The page."""
+        """Answer with the page, and with nothing at other addresses."""
         if not self._is_known():
             return
         if self.path != self.server.base:
@@ -113,6 +113,7 @@ class _Handler(BaseHTTPRequestHandler):
         return None
 
     def _refuse(self, code: int, sentence: str) -> None:
+        """Answer with an HTTP status `code` of 400 or more and a sentence, and close."""
         self.close_connection = True  # what is left of the question is not read
         self._send(code, sentence.encode(), TEXT)
 

@@ -82,5 +82,6 @@ def _finite(digits: str) -> float:
 
 
 def _whole(digits: str) -> int:
+    """A whole number from its text. Raises ValueError for one too large for a float."""
     # Whatever reads the number may want it as a float.
     return int(digits) if len(digits) < LONGEST else int(_finite(digits))

@@ -54,5 +54,6 @@ def wheel(package: Plugin) -> bytes | None:
 
 
 def _digest(content: bytes) -> str:
+    """The SHA-256 of a file's content as RECORD has it: in base64 without padding."""
     digest = hashlib.sha256(content).digest()
     return base64.urlsafe_b64encode(digest).decode().rstrip("=")

@@ -113,7 +113,7 @@ class EstimatorUnderTest:
     """An estimator's kernels with vectors of the declared sizes, from the state x."""
 
     def __init__(self, estimator: Estimator, x: Vector) -> None:
-        """Begin at x."""
+        """The estimator with its state and rates at the true state `x` (6,), guarded behind."""
         nominal = usual_vessel()
         self.estimator, self.table = estimator, estimator.table()
         self.k = bundle(estimator.constants_with(nominal))

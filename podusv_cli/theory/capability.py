@@ -69,6 +69,7 @@ def _current(vessel: Vessel, own: Disturbance) -> LoadOf:
     """Of a current, whose size is its speed [m/s]; the angle is where it comes from."""
 
     def acting(speed: float, angle: float) -> Acting:
+        """The load of a current of this speed [m/s] from this angle [rad], on a hull at rest."""
         flow = Current(speed=speed, direction=angle + math.pi)
         # A hull at rest goes through the water against the flow
         x = np.array([0.0, 0.0, 0.0, speed * math.cos(angle), speed * math.sin(angle), 0.0])
@@ -89,6 +90,7 @@ def _wind(vessel: Vessel, own: Disturbance) -> LoadOf:
         raise UsageError(fault[1])
 
     def acting(speed: float, angle: float) -> Acting:
+        """The load of a wind of this speed [m/s] from this angle [rad], on a hull at rest."""
         wind = Wind(speed=speed, direction=angle, at=one.at, density=one.density)
         return Acting(wind.loads(vessel, [0.0], [AT_REST])[0], AT_REST)
 

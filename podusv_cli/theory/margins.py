@@ -150,6 +150,7 @@ def _crossings(cut: Cut, omega: Vector) -> tuple[Vector, Vector]:
     """
 
     def size(w: float, i: int) -> float:
+        """The logarithm of the magnitude of locus number i at w [rad/s], which is 0 there."""
         return float(np.log(np.abs(cut.loci(np.array([w]))[0, i])))
 
     sizes, roots = np.log(np.abs(cut.loci(omega))), list[tuple[float, int]]()

@@ -237,7 +237,10 @@ def late_failure(case: Any) -> Sentences:
     remedy="take a shorter delay, or simulate longer",
 )
 def late_command(case: Any) -> Sentences:
-    """Warn where the run ends before the first command arrives; `case` is the run's case."""
+    """Warn where the run ends before the first command reaches the actuator.
+
+    `case` is the run's case.
+    """
     delay, end = case.scenario.actuator.delay(), case.scenario.simulation.duration
     if delay >= end:
         yield (

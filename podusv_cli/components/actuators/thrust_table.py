@@ -153,6 +153,7 @@ class _Column(NamedTuple):
 
     @classmethod
     def of(cls, cell: str) -> Self:
+        """The column of a cell of the header: its name, and behind it its unit, if any."""
         match = UNIT.fullmatch(cell.strip())
         unit = " ".join((match[2] or match[3] or "").split()) if match else ""
         return cls(cell, match[1].strip() if match else cell.strip(), unit)
@@ -182,7 +183,7 @@ class _Column(NamedTuple):
         return known[self.unit.lower()]
 
     def factor_of_force(self) -> float:
-        """What one of its unit is in N. Raises ValueError."""
+        """What a thrust of 1 in the column's unit is in N. Raises ValueError."""
         factor = FORCES.get(self.unit.lower() or "n")
         if factor is None:
             weight = "; write kgf for the weight of so many kg" if self.unit in WEIGHTS else ""

@@ -108,6 +108,7 @@ class Schedule(Controller):
     @field_validator("rows")
     @classmethod
     def _readable(cls, rows: str) -> str:
+        """The text as it is. Raises ValueError where it cannot be read as rows."""
         _rows(rows)
         return rows
 

@@ -41,6 +41,7 @@ class FromFile(Disturbance):
     @field_validator("rows")
     @classmethod
     def _readable(cls, rows: str) -> str:
+        """The text as it is. Raises ValueError where it cannot be read as rows of loads."""
         _rows(rows)
         return rows
 

@@ -178,11 +178,10 @@ def even_edges(low: float, high: float, count: int) -> Vector:
 def sea_edges(density: Density, low: float, high: float, count: int) -> Vector:
     """Edges (count + 1,) [rad/s] of bins that elevation, velocity and acceleration share evenly.
 
-    From `low` to `high` [rad/s]; `density` is the elevation's spectrum [m2 s].
-
-    Each bin has the same share of S/m0 + rate^2 S/m2 + rate^4 S/m4. By the energy S alone the few
-    bins of the tail would be so wide that velocities, and the drift of hulls that reflect short
-    waves only, scatter twice as much as a sea's.
+    From `low` to `high` [rad/s]; `density` is the elevation's spectrum [m2 s]. Each bin has the
+    same share of S/m0 + rate^2 S/m2 + rate^4 S/m4. By the energy S alone the few bins of the tail
+    would be so wide that velocities, and the drift of hulls that reflect short waves only, scatter
+    twice as much as a sea's.
     """
     fine = np.linspace(low, high, FINE + 1)
     rate = (fine[:-1] + fine[1:]) / 2.0

@@ -57,7 +57,7 @@ class Total(Disturbance):
     def _places(self) -> Iterator[tuple[int, ...]]:
         """For each part the places of its signals among those of the sum.
 
-        A signal that parts before it have already shares their place, so that it adds up there.
+        A signal that an earlier part has already shares its place, so that both add up there.
         """
         known, behind = self.signals, 0
         for part, own in self.told():
@@ -83,7 +83,7 @@ class Total(Disturbance):
         )
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
-        """Those of all parts, each with the part's position in front."""
+        """The constants of all parts by name, each with the part's position in front."""
         return {
             self.constant_of(i, name): number
             for i, part in enumerate(self.parts)
@@ -113,7 +113,7 @@ class Total(Disturbance):
             yield from ((f"parts[{i}].{key}", text) for key, text in part.conflicts(vessel, step))
 
     def bounds(self) -> tuple[float, float, float] | None:
-        """The sum of the bounds, which the sum need not reach."""
+        """The sum of the parts' bounds, which their sum need not reach; None if a part has none."""
         each = [part.bounds() for part in self.parts]
         if None in each:
             return None

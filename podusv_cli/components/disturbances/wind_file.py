@@ -64,6 +64,7 @@ class WindFile(Disturbance):
     @field_validator("rows")
     @classmethod
     def _readable(cls, rows: str) -> str:
+        """The text as it is. Raises ValueError where it cannot be read as a flow."""
         read_flow(rows, FASTEST)
         return rows
 

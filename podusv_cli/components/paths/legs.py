@@ -79,10 +79,12 @@ class Legs(Path):
 
     @model_validator(mode="after")
     def _check_way(self) -> Self:
+        """Raises ValueError for points of which no way can be made."""
         self._traveller()
         return self
 
     def _traveller(self) -> Waypoints:
+        """The path of a target with a timetable on the same legs."""
         return Waypoints(points=self.points, speed=self.speed, legs="straight")
 
     def waypoints(self) -> tuple[Point, ...]:

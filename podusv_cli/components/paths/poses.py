@@ -54,6 +54,7 @@ class Poses(Path):
 
     @model_validator(mode="after")
     def _some(self) -> Self:
+        """Raises ValueError for a path without a pose."""
         if not self.poses:
             raise ValueError("poses is empty; give at least one [x, y, psi]")
         return self

@@ -49,10 +49,12 @@ class Stations(Path):
 
     @model_validator(mode="after")
     def _check_poses(self) -> Self:
+        """Raises ValueError for a path without a pose."""
         self._traveller()
         return self
 
     def _traveller(self) -> Poses:
+        """The path of a target that leaves each pose by the clock, after `keep` [s]."""
         return Poses(poses=self.poses, travel=self.travel, dwell=self.keep)
 
     def whole_targets(self, times: Iterable[float]) -> Vector:

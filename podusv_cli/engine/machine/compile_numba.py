@@ -32,7 +32,7 @@ INNER = OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # call
 # An intrinsic gives numba the signature of a primitive of `core.kernel`, and its LLVM code.
 @intrinsic
 def tail_of(typing: Any, vector: Any, start: Any) -> Any:
-    """`kernel.tail`."""
+    """The signature and the code of `kernel.tail`."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         """LLVM's code: the pointer moved on by so many numbers."""
@@ -43,9 +43,10 @@ def tail_of(typing: Any, vector: Any, start: Any) -> Any:
 
 @intrinsic(prefer_literal=True)
 def scratch_of(typing: Any, count: Any) -> Any:
-    """`kernel.scratch`."""
+    """The signature and the code of `kernel.scratch`, whose `count` is a literal."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """LLVM's code: room on the stack, made once a call of the kernel."""
         kind, size = context.get_value_type(types.float64), count.literal_value
         return cgutils.alloca_once(builder, kind, size)  # type: ignore[no-untyped-call]
 
@@ -54,9 +55,10 @@ def scratch_of(typing: Any, count: Any) -> Any:
 
 @intrinsic
 def widest(typing: Any) -> Any:
-    """`kernel.widest`, for which llvmlite has no name."""
+    """The signature and the code of `kernel.widest`, for which llvmlite has no name."""
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        """LLVM's code: none; the kernel that calls it gets the attribute."""
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
         return context.get_dummy_value()
 

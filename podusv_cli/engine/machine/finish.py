@@ -102,6 +102,10 @@ def module(bitcode: bytes, name: str) -> Any:
 
 
 def _passes(machine: Any, speed: int) -> tuple[Any, Any]:
+    """A pass manager for a machine at the optimisation level `speed`, and its builder.
+
+    Passes need the builder for as long as they run.
+    """
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed))
     return builder.getModulePassManager(), builder
 

@@ -151,6 +151,7 @@ def _unsupported_in(function: Any) -> str:
 
 
 def _body(node: ast.FunctionDef) -> Iterator[ast.AST]:
+    """Every part of a function's body, without its arguments and decorators."""
     for line in node.body:
         yield from ast.walk(line)
 

@@ -170,6 +170,7 @@ class Reads:
 
 
 def _names_stored(node: ast.AST) -> Names:
+    """The names that a part of a source gives a value to."""
     names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
     return frozenset(name.id for name in names if isinstance(name.ctx, ast.Store))
 

@@ -205,6 +205,7 @@ def _describe_thing(
 def _(
     thing: FunctionType, names: Iterable[str], numbered: dict[Any, int], alone: Any
 ) -> Iterator[str]:
+    """A function: by its number where it came before, else by all that it depends on."""
     if thing in numbered:
         yield str(numbered[thing])
     else:
@@ -226,6 +227,7 @@ def _(
 
 @_describe_thing.register(tuple)
 def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) -> Iterator[str]:
+    """A tuple, by its type and each item."""
     yield repr((type(thing).__qualname__, getattr(thing, "_fields", ()), len(thing)))
     for item in thing:
         yield from _describe_thing(item, names, numbered, alone)
@@ -234,6 +236,7 @@ def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) ->
 @_describe_thing.register(np.ndarray)
 @_describe_thing.register(np.generic)
 def _(thing: Any, names: Iterable[str], numbered: dict[Any, int], alone: Any) -> Iterator[str]:
+    """An array or number of numpy, by type, shape and bytes."""
     yield f"{thing.dtype}{thing.shape}{thing.tobytes().hex()}"
 
 

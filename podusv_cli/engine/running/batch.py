@@ -334,6 +334,7 @@ class _Runs:
             self._count()
 
     def _count(self) -> None:
+        """Count one more run as over, and tell the progress."""
         self._over += 1
         self._progress(self._over / len(self._loops))
 

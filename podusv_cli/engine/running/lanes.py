@@ -55,10 +55,8 @@ def marcher(
 ) -> Callable[[Lanes, float], March]:
     """What makes the compiled march of runs like the plan's loop, side by side, with a step [s].
 
-    `compiling` hears the fraction that is compiled.
-
-    Raises TypeError where a part cannot go another way in every lane, LawError for a kernel that
-    would read what is not there.
+    `compiling` hears the fraction that is compiled. Raises TypeError where a part cannot go another
+    way in every lane, LawError for a kernel that would read what is not there.
     """
     from podusv_cli.engine.machine import compile  # only what marches side by side needs it
 

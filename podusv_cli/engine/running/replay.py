@@ -21,11 +21,10 @@ from podusv_cli.engine.step.layout import Layout, Vectors
 
 
 def logged_rows(plan: Plan, recording: Recording, most: int) -> Vector:
-    """At most `most` rows of the recording of a plan, evenly spread.
+    """At most `most` rows of the recording of a plan, evenly spread: (rows, 1 + 10 + 6 + slots).
 
-    Time, target with a place for the distance and a heading, vessel's state, law's memory.
-
-    Shape (rows, 1 + 10 + 6 + slots), as `rk4.evaluate_all` reads them.
+    Time, target with a place for the distance and a heading, vessel's state, law's memory, as
+    `rk4.evaluate_all` reads them.
     """
     times = recording["time"]
     chosen = np.linspace(0, len(times) - 1, min(most, len(times))).astype(int)

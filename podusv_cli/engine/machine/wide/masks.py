@@ -94,6 +94,10 @@ class Masks:
 
     @staticmethod
     def _passes_on(reader: Instruction) -> bool:
+        """Whether an instruction's value differs between lanes if what it reads does.
+
+        Not where it has none, or calls a part of the loop, or what gives all lanes the same.
+        """
         called = reader.operands[-1].strip('@"') if reader.opcode == "call" else ""
         return bool(reader.name) and not called.startswith(("%", *SAME))
 
