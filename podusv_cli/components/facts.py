@@ -97,10 +97,12 @@ class Facts:
         return _rises_to(lambda u: self._drag(u) - self._ahead(u), 0.0, fastest, ASKED)
 
     def _drag(self, u: float) -> float:
+        """The surge damping at the speed u [m/s], as a force [N] that has to be held."""
         return -surge_force(u, 0.0, 0.0, self._k)
 
     @cached_property
     def _k(self) -> Any:
+        """The nominal vessel's constants, for the kernels of forces."""
         return bundle(self.nominal.constants())
 
     def _speed(self, force: float) -> float:
@@ -169,11 +171,12 @@ class Facts:
 
     @cached_property
     def T_r(self) -> float:
-        """Delay of the yaw loop [s]."""
+        """Delay of the yaw loop [s]: as `T_u`, with the actuator's lag in yaw."""
         return self.actuator.lags()[1] + self._late
 
     @property
     def _late(self) -> float:
+        """What both loops wait for [s]: the command, half a period, and the age of what is seen."""
         return self.actuator.delay() + 0.5 * self.period + self.age
 
     @cached_property
@@ -247,6 +250,7 @@ class Facts:
 
 
 def _over(number: float, delay: float) -> float:
+    """A number over a delay [s]; infinite without a delay."""
     return number / delay if delay > 0.0 else math.inf
 
 

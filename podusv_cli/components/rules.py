@@ -16,7 +16,7 @@ OBSERVED = 0.5  # of 1/period, the largest bandwidth of an observer
 
 
 def times(words: str, factor: Callable[[Facts], float]) -> Rule:
-    """The model ship's number times a factor."""
+    """The rule: the model ship's number times a factor, whose formula is `words`."""
     return Rule(f"{{:g}} times {words}", lambda facts, default: default * factor(facts))
 
 

@@ -256,7 +256,7 @@ class RunAbout(_PlainJson):
 
     @property
     def name(self) -> str:
-        """Of the scenario."""
+        """The scenario's name."""
         return str(self.values["name"])
 
     def section(self, key: str) -> Any:

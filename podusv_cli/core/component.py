@@ -81,7 +81,7 @@ class Component(BaseModel):
 
     @property
     def label(self) -> str:
-        """Its kind."""
+        """The word that stands for it as `kind` in a scenario."""
         return str(type(self).model_fields["kind"].default)
 
     @property

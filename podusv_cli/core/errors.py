@@ -30,7 +30,7 @@ class ScenarioError(PodusvError):
         super().__init__("\n".join(self.lines()))
 
     def lines(self) -> list[str]:
-        """A line a fault."""
+        """One line for each fault."""
         return [str(fault) for fault in self.faults]
 
 

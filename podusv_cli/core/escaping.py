@@ -30,7 +30,7 @@ def markdown(text: str) -> str:
 
 
 def markdown_cell(text: str) -> str:
-    """The same in a cell of a table."""
+    """Text in one line in a cell of a table: as `markdown`, and no | ends the cell."""
     return markdown(text).replace("|", "\\|")
 
 
@@ -47,7 +47,7 @@ def csv(text: str) -> str:
 
 
 def latex(text: str) -> str:
-    """Text outside of formulas."""
+    """Text in one line that is nothing but text in LaTeX, outside of formulas."""
     return visible(text).translate(LATEX)
 
 

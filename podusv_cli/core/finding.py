@@ -105,6 +105,7 @@ class FindingKind:
             yield Finding(self.name, self.about, text)
 
     def _has_all(self, *seen: Any) -> bool:
+        """Whether the log, the last of `seen`, has all signals that the search needs."""
         return all(name in seen[-1] for name in self.needs)
 
 

@@ -123,6 +123,7 @@ def _signals(thing: Any) -> Iterator[Signal]:
 
 
 def _members(package: str, plugins: Plugins) -> Iterator[Any]:
+    """Everything in the modules of a package and in the plug-ins."""
     yield from (thing for _, thing in _places_of_objects(package, plugins))
 
 

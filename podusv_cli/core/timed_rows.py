@@ -94,6 +94,7 @@ def lines_of(text: str) -> tuple[TextLine | None, list[TextLine]]:
 
 
 def _cells(line: str) -> list[str]:
+    """The cells of a line, without blanks and quotes around them."""
     return [cell.strip(' \t"') for cell in line.split(",")]
 
 
@@ -115,6 +116,7 @@ def _check_counts(lines: list[TextLine], noun: str, layouts: Layouts) -> None:
 
 
 def _list_names(names: Sequence[str]) -> str:
+    """The names of columns in a list, without their units."""
     return ", ".join(name.partition(" [")[0] for name in names)
 
 
@@ -198,4 +200,5 @@ def columns(header: TextLine, names: Sequence[str], noun: str) -> list[int]:
 
 
 def _forms(name: str) -> tuple[str, str]:
+    """The two ways to write the name of a column: with its unit, and without."""
     return name, name.partition(" [")[0]

@@ -187,6 +187,7 @@ def _library(folder: Path, place: Path, about: About, listed: Collection[str]) -
 
 
 def _vector(numbers: Vector) -> Any:
+    """Numbers (n,) as an array of C."""
     return (ctypes.c_double * len(numbers))(*numbers.tolist())
 
 

@@ -68,6 +68,7 @@ class ExportedNumber(NamedTuple):
 
 
 def _number(signal: Signal) -> ExportedNumber:
+    """A signal as the files of an export name it."""
     return ExportedNumber(signal.name, signal.unit, signal.meaning)
 
 
@@ -190,6 +191,7 @@ class ExportedLaw:
 
     @property
     def _slots(self) -> Slots:
+        """The parts of the law's memory."""
         return self.loop.controller.slots()
 
     @property

@@ -36,6 +36,7 @@ def _variation(position: int) -> Result:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """Where the demand stands in the row."""
     return {"demand": float(layout.plan.demand)}
 
 

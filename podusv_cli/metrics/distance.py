@@ -77,6 +77,7 @@ def _rmse(seen: Vector, step: float) -> float:
 
 
 def _settling_time(seen: Vector, step: float) -> float:
+    """When z_e last came within the settling radius [s]; NaN where it is beyond at the end."""
     return settled_from(seen[RADIUS + CROSSED])
 
 

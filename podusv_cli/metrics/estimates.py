@@ -40,6 +40,7 @@ def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
 
 
 def _size(layout: Measured) -> int:
+    """How many numbers are gathered; none where the law is given the state itself."""
     return SIZE if layout.plan.estimate else 0
 
 

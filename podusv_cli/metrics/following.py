@@ -68,7 +68,7 @@ def _rms(seen: Vector, step: float) -> float:
 
 
 def _size(layout: Measured) -> int:
-    """What does not aim at a target leaves the path aside."""
+    """How many numbers are gathered; none where no law follows a path with a cross-track error."""
     places = layout.loop.path.places[: len(PLACES)]
     follows = places == PLACES and layout.loop.controller.aims()
     return SIZE if follows else 0

@@ -128,10 +128,10 @@ class Metric(MetricAbout):
 
 
 def gathered(position: int) -> Result:
-    """The gathered number at this position."""
+    """The result that is the number gathered at this position."""
     return lambda seen, step: float(seen[position])
 
 
 def ratio(position: int, whole: int) -> Result:
-    """The number gathered at `position` over that at `whole`; NaN over 0."""
+    """The result that is the number gathered at `position` over that at `whole`; NaN over 0."""
     return lambda seen, step: float(seen[position] / seen[whole]) if seen[whole] else math.nan

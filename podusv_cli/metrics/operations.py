@@ -44,7 +44,7 @@ class OperationTally:
         return partial(self.apply, member) if callable(member) else member
 
     def apply(self, operation: Callable[..., Any], *operands: Any) -> Counted:
-        """One operation."""
+        """Apply an operation to operands, and count one."""
         self.count += 1
         return self.number(operation(*map(_plain, operands)))
 
@@ -75,6 +75,7 @@ class Counted:
 
 
 def _plain(number: Any) -> Any:
+    """The number that a counted one stands for; any other as it is."""
     return number.number if type(number) is Counted else number
 
 
@@ -84,7 +85,7 @@ def _forward(operation: Callable[..., Any]) -> Callable[..., Counted]:
 
 
 def _backward(operation: Callable[..., Any]) -> Callable[..., Counted]:
-    """The same with the other operand first, as `2.0 * x` calls it."""
+    """As `_forward`, with the other operand first, as `2.0 * x` calls it."""
     return lambda self, other: self.tally.apply(operation, other, self)
 
 
@@ -94,6 +95,7 @@ def _comparison(operation: Callable[..., Any]) -> Callable[..., bool]:
 
 
 def _conversion(kind: Callable[[Any], Any]) -> Callable[..., Any]:
+    """A conversion to a plain number, which counts nothing."""
     return lambda self: kind(self.number)
 
 
@@ -114,6 +116,7 @@ for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
 
 
 def _of_numpy(self: Counted, function: Callable[..., Any], _: str, *operands: Any) -> Counted:
+    """One operation for a function of numpy that is called with a counted number."""
     return self.tally.apply(function, *operands)
 
 

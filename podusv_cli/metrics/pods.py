@@ -34,10 +34,12 @@ def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector)
 
 
 def _count(layout: Measured) -> int:
+    """How many pods the actuator has."""
     return layout.loop.actuator.states.count(DELTA)
 
 
 def _size(layout: Measured) -> int:
+    """How many numbers are gathered, with the last angle of each pod; none without pods."""
     return LAST_DELTA + _count(layout) if _count(layout) else 0
 
 

@@ -54,6 +54,7 @@ def _size(layout: Measured) -> int:
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """The radius [m] within which a pose counts as reached."""
     return {"settling_radius": layout.settling_radius}
 
 

@@ -60,15 +60,17 @@ def watch_thrust(weight: float, row: Vector, k: Any, seen: Vector) -> None:
 
 
 def _size(layout: Measured) -> int:
+    """How many numbers are gathered; none without a sway force."""
     return SIZE if layout.loop.actuator.takes_sway else 0
 
 
 def _constants(layout: Measured) -> dict[str, float]:
+    """Where the demand and the loads stand in the row."""
     return {"demand": float(layout.plan.demand), "tau": float(layout.plan.tau)}
 
 
 def _size_of_use(layout: Measured) -> int:
-    """None where the actuator has no constant limit of a load."""
+    """How many numbers are gathered; none without a sway force or a constant limit of a load."""
     limited = np.isfinite(layout.loop.actuator.limits()).all()
     return 2 * USES if layout.loop.actuator.takes_sway and limited else 0
 
@@ -83,7 +85,7 @@ def _limits(layout: Measured) -> dict[str, float]:
 
 
 def _size_of_thrust(layout: Measured) -> int:
-    """None without a sway force, or without thrusters."""
+    """How many numbers are gathered; none without a sway force or thrusters."""
     actuator = layout.loop.actuator
     return 2 * THRUSTS if actuator.takes_sway and actuator.full_thrust() > 0.0 else 0
 

@@ -144,6 +144,7 @@ class Metrics(Probe):
 
     @cached_property
     def _accumulators(self) -> dict[Accumulator, str]:
+        """Every accumulator of the probe's metrics, with one of them."""
         return _accumulators(self.known)
 
     def summary(self, seen: Vector, failed: Failed | None = None) -> dict[str, float]:
@@ -207,6 +208,7 @@ class Metrics(Probe):
 
 
 def _fault(metric: Metric, error: Exception) -> LawError:
+    """The error that says which metric failed, and how."""
     return LawError(f"metric {metric.name}: {in_a_line(error)}")
 
 

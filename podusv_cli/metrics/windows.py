@@ -115,6 +115,7 @@ def _over(to: float, at: int, number: Callable[[Vector], float]) -> Result:
 
 
 def _rms(own: Vector) -> float:
+    """The root of the mean square [m] of a window's own numbers; NaN for one of no length."""
     return math.sqrt(own[SQUARE] / own[LENGTH]) if own[LENGTH] else math.nan
 
 

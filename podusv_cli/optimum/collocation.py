@@ -297,16 +297,20 @@ def _watch(unknowns: int, gaps: int, look: Callable[[], bool]) -> Any:
             self.construct("watch", {})
 
         def get_n_in(self) -> int:
+            """How many arguments CasADi passes: all that the solver knows."""
             return int(ca.nlpsol_n_out())
 
         def get_n_out(self) -> int:
+            """One result: whether to stop."""
             return 1
 
         def get_sparsity_in(self, i: int) -> Any:
+            """The shape of argument number i, empty where it is not needed."""
             size = sizes.get(ca.nlpsol_out(i), 0)
             return ca.Sparsity.dense(size) if size else ca.Sparsity(0, 0)
 
         def eval(self, arguments: Any) -> list[float]:
+            """1 where the solver is to stop, else 0."""
             return [float(look())]
 
     return Watch()

@@ -55,6 +55,7 @@ def code_folder(name: str) -> Path | None:
 
 
 def _warn(text: str) -> None:
+    """Warn the user, in one line."""
     logging.getLogger("podusv").warning("podusv: %s", visible(text))
 
 

@@ -168,17 +168,17 @@ class Crew(Protocol):
         """The pipe of a process that does a job now, and the process; `others` are under way."""
 
     def end(self, pipe: Pipe, process: BaseProcess) -> None:
-        """A process has sent its outcome, or has ended."""
+        """To be called when a process has sent its outcome, or has ended."""
 
     def dismiss(self) -> None:
-        """No job comes any more."""
+        """Let all processes go, as no job comes any more."""
 
 
 class Forked:
     """A process a job: it inherits the job, and all code that is imported and compiled."""
 
     def __init__(self) -> None:
-        """Nothing is shared between two jobs."""
+        """A crew that forks a process for every job, so that jobs share nothing."""
         self._context: Any = multiprocessing.get_context("fork")
 
     def begin(self, job: Job, others: Iterable[Pipe]) -> tuple[Pipe, BaseProcess]:
@@ -196,7 +196,7 @@ class Forked:
         process.join()
 
     def dismiss(self) -> None:
-        """Nobody waits."""
+        """Nothing is left to do: each process had one job, and has ended with it."""
 
 
 class Spawned:

@@ -35,7 +35,7 @@ def lines(rows: Iterable[Sequence[object]], digits: str | None = None) -> str:
 
 
 def records(rows: Sequence[Mapping[str, object]], digits: str | None = None) -> str:
-    """The same of rows by the names of their columns, which all rows have; without a row, none."""
+    """As `lines`, of rows by the names of their columns, the same in all of them."""
     heads = list(rows[0]) if rows else []
     return lines([heads, *(list(row.values()) for row in rows)], digits)
 
@@ -48,6 +48,7 @@ def text(frame: pd.DataFrame, digits: str | None = None) -> str:
     escaped = cache(escaping.csv)  # a column of a long table repeats few words
 
     def cell(content: Any) -> Any:
+        """A cell, escaped where it is a text."""
         return escaped(content) if isinstance(content, str) else content
 
     words = [name for name in frame.columns if frame[name].dtype.kind not in "biuf"]

@@ -243,7 +243,7 @@ def _write_rows(out: BinaryIO, place: int, array: Vector, rows: slice) -> None:
 
 
 def write_at(out: BinaryIO, place: int, content: memoryview | bytes) -> None:
-    """Write all of it at a place of an unbuffered file. Raises OSError."""
+    """Write all of `content` at a place [bytes] of an unbuffered file. Raises OSError."""
     out.seek(place)
     while content:
         content = content[out.write(content) :]

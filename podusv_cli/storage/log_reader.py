@@ -83,6 +83,7 @@ def _open_log(
 
 
 def _text(words: Any) -> str:
+    """A text as HDF5 gives it, decoded."""
     return bytes(words).decode()
 
 

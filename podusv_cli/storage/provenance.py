@@ -129,4 +129,5 @@ def _version(package: str) -> str | None:
 
 
 def _utc(time: datetime) -> str:
+    """A time in UTC as ISO 8601 writes it, to milliseconds."""
     return time.astimezone(UTC).isoformat(timespec="milliseconds")

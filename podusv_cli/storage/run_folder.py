@@ -118,7 +118,7 @@ class RunWriter:
 
     @property
     def status(self) -> Status:
-        """As the manifest has it of a folder that is no run."""
+        """How the manifest says that the work ended, of a folder that is no run."""
         return "interrupted" if self.extras.interrupted else "finished"
 
     def finish(self, status: Status | None = None, missing: str = "") -> Path:

@@ -135,4 +135,5 @@ def _remove_box(box: Path, final: Path) -> None:
 
 
 def _old(box: Path) -> Path:
+    """Where a folder waits that is being replaced."""
     return box / "old"

@@ -26,6 +26,7 @@ def name_of(package: str, version: str) -> str:
 
 
 def _stem(package: str, version: str) -> str:
+    """The beginning of the names of a package's wheel and of its metadata's folder."""
     return f"{re.sub(r'[-_.]+', '_', package)}-{version}"
 
 

@@ -101,6 +101,7 @@ def checks(component: Component) -> tuple[Check, ...]:
 
 
 def _members(own: Plugin, room: str, kind: type[Any]) -> list[Any]:
+    """What a plug-in offers to a room that is of this kind."""
     return [thing for thing in own.members(room) if isinstance(thing, kind)]
 
 
@@ -191,7 +192,7 @@ def gathered_number(metric: Metric, compiled: bool) -> float:
 
 
 def draws_any_number_of_runs(sheet: Sheet) -> None:
-    """One run and three, one column wide and two."""
+    """A figure of one run or three, one column wide or two, can be drawn."""
     for count, columns in ((1, 1), (1, 2), (3, 1), (3, 2)):
         assert picture(sheet, count, columns)
 
@@ -255,7 +256,7 @@ def loop_with(component: Component) -> ClosedLoop:
 
 
 def run_with(component: Component, compiled: bool) -> Recording:
-    """A short run."""
+    """A short run of a loop with this component, compiled or in plain Python."""
     return simulate(loop_with(component), TimeGrid(STEP, STEPS), compiled=compiled)
 
 

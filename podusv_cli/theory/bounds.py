@@ -262,10 +262,12 @@ def _best(
 
 
 def _least(candidates: dict[str, float]) -> float:
+    """The least of the candidates for lambda [1/s]; NaN where one is."""
     return float(np.min([*candidates.values()]))  # NaN where one is, unlike Python's min
 
 
 def _half_square(x: float) -> float:
+    """x^2/2; infinite where that is beyond all numbers."""
     return x * x / 2.0  # x**2 would raise on overflow
 
 

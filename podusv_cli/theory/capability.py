@@ -101,6 +101,7 @@ def _force(vessel: Vessel, own: Disturbance) -> LoadOf:
     """Of a force through the body origin, whose size is in N; `vessel` and `own` do not matter."""
 
     def acting(size: float, angle: float) -> Acting:
+        """The force from this angle [rad], on a hull at rest."""
         return Acting(-size * np.array([math.cos(angle), math.sin(angle), 0.0]), AT_REST)
 
     return acting

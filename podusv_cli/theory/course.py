@@ -32,7 +32,7 @@ class Course:
 
     @property
     def speed(self) -> float:
-        """In m/s."""
+        """The target's speed [m/s]."""
         return math.hypot(*self.velocity)
 
 

@@ -70,7 +70,7 @@ def outputs(network: Network, factors: Vector) -> Vector:
 
 
 def node_distance(network: Network, factors: Vector) -> Vector:
-    """Distance of (u, v, r) to the nearest centre in widths, from the `exponents`."""
+    """Distance (rows,) of (u, v, r) to the nearest centre in widths, from the `exponents`."""
     plane = network.factors[1]
     nearest = factors[:, plane:].min(axis=1) + factors[:, :plane].min(axis=1)
     return np.asarray(np.sqrt(2.0 * nearest))

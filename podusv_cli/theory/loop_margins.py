@@ -34,7 +34,7 @@ class LoopMargins:
 
     @property
     def poles(self) -> Complex:
-        """Of the closed loop [1/s], the slowest to decay first."""
+        """The poles of the closed loop [1/s], the slowest to decay first."""
         return poles(self.linear.A)
 
     @property

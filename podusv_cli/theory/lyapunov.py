@@ -32,6 +32,7 @@ TERMS = (
 
 
 def _dot(a: Vector, b: Vector) -> Vector:
+    """The products a . b at every row (rows,) of arrays (rows, n)."""
     return total((a * b).T)
 
 
@@ -76,6 +77,7 @@ def lyapunov(
 
 
 def _inverse(gain: float) -> float:
+    """1 over an adaptation gain; 0 for a gain of 0, whose estimate has no term in V."""
     return 1.0 / gain if gain else 0.0
 
 

@@ -172,6 +172,7 @@ def _disturbance_bound(loop: ClosedLoop, log: Recording) -> bounds.Pair:
 
 
 def _largest(values: Vector) -> float:
+    """The largest magnitude in a trace (rows,), block by block; NaN without any."""
     return largest(len(values), lambda rows: values[rows])
 
 

@@ -62,7 +62,7 @@ def _assumptions(
 
 
 def _withheld(monitored: Monitored, axis: str) -> float:
-    """Largest difference between the load on the hull and the demand [N], [N m]."""
+    """Largest difference between load on the hull and demand, on the axis `u` [N] or `r` [N m]."""
     log = monitored.recording
     load, demand = log[f"tau_{axis}"], log[f"tau_{axis}_cmd"]
     return largest(len(load), lambda rows: load[rows] - demand[rows])

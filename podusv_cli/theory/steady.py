@@ -387,4 +387,5 @@ class _Frame:
 
 
 def _size(q: Vector) -> Vector:
+    """The size of each state, at least 1, by which steps and moves are scaled."""
     return np.maximum(abs(q), 1.0)

@@ -23,5 +23,5 @@ class FullActuator(Actuator):
 
     @property
     def takes_sway(self) -> bool:
-        """Always."""
+        """Whether a demand has a sway force: always."""
         return True

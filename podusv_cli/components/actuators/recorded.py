@@ -54,6 +54,7 @@ def rows_of(
 
 
 def _column(signal: Signal) -> str:
+    """What the column of a signal is called in a file, as `n_1 [1/s]`."""
     return f"{signal.name} [{signal.unit}]"
 
 

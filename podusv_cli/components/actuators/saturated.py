@@ -21,11 +21,11 @@ class Saturated(Actuator):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """The flag."""
+        """The flag that tells whether a limit is reached."""
         return (SATURATION,)
 
     def limits(self) -> tuple[float, ...]:
-        """As they are given."""
+        """The limits of surge force [N] and yaw moment [N m], as they are given."""
         return self.surge_limit, self.yaw_limit
 
     # demand (2) [N, N m], limits in N and N m; writes tau (3) [N, N, N m] and signals (1).

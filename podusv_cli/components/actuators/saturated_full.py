@@ -25,11 +25,11 @@ class SaturatedFull(FullActuator):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """The flag."""
+        """The flag that tells whether a limit is reached."""
         return (SATURATION,)
 
     def limits(self) -> tuple[float, ...]:
-        """As they are given."""
+        """The limits of surge force [N], yaw moment [N m] and sway force [N], as they are given."""
         return self.surge_limit, self.yaw_limit, self.sway_limit
 
     # demand (3) [N, N m, N], limits in N and N m; writes tau (3) [N, N, N m] and signals (1).

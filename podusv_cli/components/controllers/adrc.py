@@ -33,11 +33,11 @@ class Adrc(HandController, ObservingController):
     rules: ClassVar[dict[str, Rule]] = HandController.rules | by.OBSERVER
 
     def slots(self) -> Slots:
-        """The observer and the lagged heading."""
+        """The memory: the observer's, and the lagged heading."""
         return super().slots() + each((PSI_F,))
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
-        """Of a hull at rest."""
+        """Key, gain [1/s] and observer's bandwidth [rad/s] of surge and yaw, for a hull at rest."""
         surge, yaw = self.rate_gains()
         return ("k_v", surge, self.omega_u), ("k_v", yaw, self.omega_r)
 

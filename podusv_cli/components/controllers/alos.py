@@ -97,15 +97,15 @@ class Alos(LineOfSight, ObservingController):
     N_m: Ruled = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
     def most(self) -> Most:
-        """U and N_m."""
+        """The speed U [m/s] and the moment N_m [N m] that the law keeps within."""
         return Most(self.U, moment=self.N_m)
 
     def slots(self) -> Slots:
-        """The observer, then crab angle and offset."""
+        """The memory: the observer's, then crab angle and offset."""
         return (*super().slots(), *each(LEARNT))
 
     def steering(self) -> tuple[str, float]:
-        """k_psi."""
+        """Key and gain [1/s] with which it turns the hull."""
         return "k_psi", self.k_psi
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:

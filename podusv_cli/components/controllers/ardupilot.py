@@ -116,7 +116,7 @@ class ArduPilot(Rover):
     l1_I: float = value(0.02, "1/s", "gain of the cross-track integral (NAVL1_XTRACK_I)", ge=0)
 
     def slots(self) -> Slots:
-        """With the cross-track integral."""
+        """The memory: that of all rovers, and the cross-track integral."""
         return (*super().slots(), *each((LEARNT,)))
 
     # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (4).

@@ -77,11 +77,11 @@ class Cascade(Controller):
     )
 
     def slots(self) -> Slots:
-        """The virtual ship's sway velocity."""
+        """The memory: the virtual ship's sway velocity."""
         return each((V_R,))
 
     def workspace(self) -> int:
-        """Two positions."""
+        """How many numbers of scratch the law needs: two positions."""
         return 4
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:

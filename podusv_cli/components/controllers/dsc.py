@@ -51,5 +51,5 @@ class DynamicSurface(FilteredBackstepping):
     )
 
     def filter_decay(self, alpha_u: Any, alpha_r: Any) -> tuple[Any, Any]:
-        """1/T, whatever the virtual control."""
+        """Rates [1/s] at which both filters forget: 1/T, whatever the virtual control."""
         return alpha_u * 0.0 + 1.0 / self.T_u, alpha_r * 0.0 + 1.0 / self.T_r

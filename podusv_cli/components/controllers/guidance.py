@@ -111,5 +111,5 @@ class LineOfSight(Controller):
     chi_m: Ruled = value(0.3, "rad/s", "largest turn of the course used ahead", gt=0)
 
     def most(self) -> Most:
-        """U."""
+        """The speed U [m/s] that the law keeps within."""
         return Most(self.U)

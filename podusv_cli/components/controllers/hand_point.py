@@ -123,13 +123,13 @@ class HandController(Controller):
     k_v: Ruled = value(1.0, "1/s", "gain of the velocity that the hand point lacks", gt=0)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The lagged heading, which comes last in the memory, as the heading is."""
+        """The memory: the lagged heading, which comes last, is the vessel's; all else is 0."""
         memory = super().start(x, target, nominal)
         memory[-1] = x[2]
         return memory
 
     def most(self) -> Most:
-        """U."""
+        """The speed U [m/s] that the law keeps within, and how fast it nears a target as fast."""
         return Most(self.U, NEARS)
 
     def rate_gains(self) -> tuple[float, float]:

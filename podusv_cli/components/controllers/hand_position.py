@@ -40,11 +40,11 @@ class HandPosition(HandController):
     k_i: Ruled = value(0.25, "1/s2", "gain of the integral of the missing velocity", ge=0)
 
     def slots(self) -> Slots:
-        """Integrals and the lagged heading."""
+        """The memory: the integrals and the lagged heading."""
         return each((*INTEGRALS, PSI_F))
 
     def wants_loads(self) -> bool:
-        """Always, for anti-windup."""
+        """Whether it has to know the loads that act: always, for anti-windup."""
         return True
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

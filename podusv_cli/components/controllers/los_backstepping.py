@@ -99,7 +99,7 @@ class LosBackstepping(Controller):
     )
 
     def slots(self) -> Slots:
-        """alpha_2, then the filter."""
+        """The memory: alpha_2, then the filter's angle and its derivatives."""
         return each(MEMORY)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:

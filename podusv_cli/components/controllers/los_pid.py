@@ -51,11 +51,11 @@ class LosPid(LineOfSight):
     omega_psi: Ruled = value(1.2, "rad/s", "bandwidth of the heading loop, a triple pole", gt=0)
 
     def slots(self) -> Slots:
-        """The integrals."""
+        """The memory: the integrals."""
         return each(INTEGRALS)
 
     def wants_loads(self) -> bool:
-        """Always, for anti-windup."""
+        """Whether it has to know the loads that act: always, for anti-windup."""
         return True
 
     # demand (2) [N, N m], tau (3) [N, N, N m]; changes rate (2), of integrals that are loads.
@@ -67,7 +67,7 @@ class LosPid(LineOfSight):
         rate[MOMENT] += k.omega_psi * (tau[2] - demand[1])
 
     def steering(self) -> tuple[str, float]:
-        """omega_psi."""
+        """Key and gain [1/s] with which it turns the hull."""
         return "omega_psi", self.omega_psi
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

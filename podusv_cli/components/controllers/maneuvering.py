@@ -58,23 +58,23 @@ class Maneuvering(PathTimed):
     )
 
     def asks_sway(self) -> bool:
-        """Always."""
+        """Whether its demand has a sway force: always."""
         return True
 
     def wants_heading(self) -> bool:
-        """Always."""
+        """Whether it reads a heading: always."""
         return True
 
     def slots(self) -> Slots:
-        """The path's time, then the learnt load."""
+        """The memory: the path's time with its rate's filtered part and speed, then the load."""
         return each((*TIMED, *LEARNT_LOAD))
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The path from its beginning, at the wanted speed, without a load."""
+        """The memory (6,): the path's beginning, at the wanted speed, and no load."""
         return np.array([0.0, 0.0, self.speed, 0.0, 0.0, 0.0])
 
     def wants_loads(self) -> bool:
-        """For anti-windup."""
+        """Whether it has to know the loads that act: for anti-windup, where it learns a load."""
         return self.gamma > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

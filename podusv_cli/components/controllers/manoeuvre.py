@@ -60,7 +60,10 @@ class Manoeuvre(Controller):
     )
 
     def takes_samples(self) -> bool:
-        """How far the trial is, is a part of the memory, which changes at instants only."""
+        """Whether `sample` is called: always.
+
+        How far the trial is, is a part of the memory, which changes at instants only.
+        """
         return True
 
 

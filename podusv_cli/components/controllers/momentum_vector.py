@@ -91,24 +91,24 @@ class MomentumVector(VelocitySteering):
     )
 
     def slots(self) -> Slots:
-        """The observer, then the loads' sway and what is learnt of sway's answer."""
+        """The memory: the observer's, the loads' sway, and what is learnt of sway's answer."""
         return super().slots() + each((V_L, *LEARNT))
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The velocities as they are; the sway is taken for the loads'."""
+        """The memory: velocities as they are, no loads; the sway is taken for that of the loads."""
         memory = super().start(x, target, nominal)
         memory[LOAD_SWAY] = memory[V_HAT]
         return memory
 
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
-        """With the neutral point, the gains at its pace and the yaw rate that N_m allows."""
+        """The constants, with neutral point, gains at its pace and the yaw rate N_m allows."""
         own = neutral(nominal, self.thrust_lever)
         own |= pace_constants(nominal.m33, self.N_m, self.Q0, self.S0)
         own["fastest"] = min(self.r_m, math.sqrt(self.N_m / nominal.m33))
         return super().constants_with(nominal) | own
 
     def steering(self) -> tuple[str, float]:
-        """Q0 over S0."""
+        """Key and gain [1/s] with which it turns the hull: Q0 over S0."""
         return "Q0", self.Q0 / self.S0
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:

@@ -84,15 +84,15 @@ class Mss(LineOfSight):
         return 2.0 * self.zeta * self.wn - 1.0 / self.T
 
     def slots(self) -> Slots:
-        """What is learnt, the integrals, the observer."""
+        """The memory: what is learnt, the integrals, the observer."""
         return each(MEMORY)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The observer at the vessel's heading, at rest."""
+        """The memory (6,): zeros, and the observer at the vessel's heading, at rest."""
         return np.array([0.0, 0.0, 0.0, 0.0, x[2], x[2]])
 
     def wants_loads(self) -> bool:
-        """Always, for the integral of the speed."""
+        """Whether it has to know the loads that act: always, for the integral of the speed."""
         return True
 
     # demand (2) [N, N m], tau (3) [N, N, N m]; changes rate at FORCE, whose integral is a load.
@@ -103,7 +103,7 @@ class Mss(LineOfSight):
         rate[FORCE] += k.omega_u * (tau[0] - demand[0])
 
     def steering(self) -> tuple[str, float]:
-        """wn, at the slow end of the heading's loop."""
+        """Key and gain [1/s] with which it turns: wn/(2 zeta), the slow end of its loop."""
         return "wn", 0.5 * self.wn / self.zeta
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

@@ -239,6 +239,7 @@ def _node_distance(log: Recording) -> Vector:
 
 
 def _activation(log: Recording) -> Vector:
+    """The Gaussian of the distance to the nearest node, over the rows of a log (rows,)."""
     return np.asarray(np.exp(-0.5 * _node_distance(log) ** 2))
 
 

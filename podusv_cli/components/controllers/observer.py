@@ -77,11 +77,11 @@ class ObservingController(Controller):
     omega_r: Ruled = value(1.2, "rad/s", "bandwidth of the observer in yaw", gt=0)
 
     def slots(self) -> Slots:
-        """Velocities and loads."""
+        """The memory: observed velocities and loads."""
         return each(OBSERVED)
 
     def start(self, x: Vector, target: Vector, nominal: Vessel) -> Vector:
-        """The velocities as they are, and no load."""
+        """The memory: velocities as they are, and no loads."""
         memory = super().start(x, target, nominal)
         memory[: V_HAT + 2] = x[3:6]
         return memory
@@ -101,7 +101,7 @@ class ObservingController(Controller):
         rate[R_HAT] += r_rate
 
     def constants_with(self, nominal: Vessel) -> dict[str, float]:
-        """With what sway and yaw take from each other in the mass matrix."""
+        """The law's constants, with what sway and yaw take from each other in the mass matrix."""
         coupling = {"by_yaw": nominal.m23 / nominal.m33, "by_sway": nominal.m32 / nominal.m22}
         return super().constants_with(nominal) | coupling
 

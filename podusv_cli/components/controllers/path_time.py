@@ -62,11 +62,11 @@ class PathTimed(Controller):
         return self
 
     def keeps_path_time(self) -> bool:
-        """Always."""
+        """Whether the path is read at the law's own time: always."""
         return True
 
     def wants_path_speed(self) -> bool:
-        """Where one is given."""
+        """Whether it goes along the path at a speed of its own: where one is given."""
         return self.speed > 0.0
 
 

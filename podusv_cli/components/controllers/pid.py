@@ -88,7 +88,7 @@ class Pid(TrackingController):
         return self
 
     def slots(self) -> Slots:
-        """Held direction, integrals and lagged errors."""
+        """The memory: held direction, integrals and lagged errors."""
         return HELD + each(MEMORY) + self.swaying()
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:

@@ -181,14 +181,14 @@ class PolarBackstepping(TrackingController):
     network: Network = value(Network(), "", "nodes and widths of the two networks")
 
     def slots(self) -> Slots:
-        """Held direction, bounds, weights, the filter's output, and what anti-windup needs."""
+        """The memory: held direction, bounds, weights, filters, and what anti-windup needs."""
         count = self.network.count
         learnt = each(BOUNDS) + each(W_HAT, count)
         shortfall = each(SHORTFALL) if self.wants_loads() else ()
         return HELD + learnt + self.filter_slots() + self.swaying() + shortfall
 
     def filter_slots(self) -> Slots:
-        """The filter's output, where there is a filter."""
+        """The part of the memory with the filters' output; none without a filter."""
         return ()
 
     def constants(self) -> dict[str, float]:
@@ -250,11 +250,11 @@ class PolarBackstepping(TrackingController):
         return None if self.swaying() else self
 
     def workspace(self) -> int:
-        """The nodes' outputs and their factors."""
+        """How many numbers of scratch the law needs: the nodes' outputs and their factors."""
         return self.network.count + self.network.bells
 
     def table(self) -> Vector:
-        """The network's centres."""
+        """The network's centres and exponents, see `Network.table`."""
         return self.network.table()
 
     def fixed_signals(self) -> dict[Signal, Vector]:
@@ -277,7 +277,7 @@ class FilteredBackstepping(PolarBackstepping):
     )
 
     def filter_slots(self) -> Slots:
-        """(beta_u, beta_r)."""
+        """The part of the memory with the filters' output: beta_u and beta_r."""
         return each(FILTERED)
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:

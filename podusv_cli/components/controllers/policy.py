@@ -66,6 +66,7 @@ def layer(inputs: int, outputs: int, given: Vector, weights: Vector, out: Vector
 
 @lru_cache(maxsize=4)  # the same weights are read a dozen times in a run
 def _network(content: str) -> PolicyNetwork:
+    """The network in a law's `content`, the base64 of a file. Raises ValueError for none."""
     return network(content, INPUTS, OUTPUTS, OBSERVED)
 
 
@@ -98,7 +99,7 @@ class Policy(Controller):
     @field_validator("content")
     @classmethod
     def _readable(cls, content: str | None) -> str | None:
-        """Raises ValueError for a file that holds no network."""
+        """The content as it is. Raises ValueError for a file that holds no network."""
         if content is not None:
             _network(content)
         return content
@@ -113,7 +114,7 @@ class Policy(Controller):
         return self
 
     def network(self) -> PolicyNetwork:
-        """The weights as the kernel takes them."""
+        """The network's weights and sizes, as the kernel takes them."""
         assert self.content is not None  # else there is no such law
         return _network(self.content)
 
@@ -127,7 +128,7 @@ class Policy(Controller):
         return self.network().table
 
     def workspace(self) -> int:
-        """Room for the numbers before and after a layer."""
+        """How many numbers of scratch the law needs: those before and after a layer."""
         return 2 * max(INPUTS, self.network().width)
 
     # x (6), target (6), table as `table` lays it out, work as `workspace`; writes tau (2) [N, N m].

@@ -44,11 +44,11 @@ class PoseBackstepping(PoseLaw):
     k_d: float = value(0.5, "1/s", "gain of the velocity errors, times the inertia", gt=0)
 
     def slots(self) -> Slots:
-        """The integrals."""
+        """The memory: the integrals."""
         return each(INTEGRALS)
 
     def wants_loads(self) -> bool:
-        """For anti-windup."""
+        """Whether it has to know the loads that act: for anti-windup, with integral action."""
         return self.k_i > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

@@ -75,17 +75,17 @@ class PoseLaw(Controller):
     )
 
     def asks_sway(self) -> bool:
-        """Always."""
+        """Whether its demand has a sway force: always."""
         return True
 
     def wants_heading(self) -> bool:
-        """Always."""
+        """Whether it reads a heading: always."""
         return True
 
     def wants_load_estimate(self) -> bool:
-        """Where the key says so."""
+        """Whether the loads that an estimator finds are taken off: with `load: estimated`."""
         return self.load == "estimated"
 
     def without_load_estimate(self) -> Self:
-        """With an unknown load."""
+        """The same law with `load: unknown`."""
         return self.model_copy(update={"load": "unknown"})

@@ -44,11 +44,11 @@ class PosePid(PoseLaw):
     integral: float = value(SLOW, "1", "frequency of the integrals over that of the axis", ge=0)
 
     def slots(self) -> Slots:
-        """The integrals."""
+        """The memory: the integrals."""
         return each(INTEGRALS)
 
     def wants_loads(self) -> bool:
-        """For anti-windup."""
+        """Whether it has to know the loads that act: for anti-windup, with integral action."""
         return self.integral > 0.0
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

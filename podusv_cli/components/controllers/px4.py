@@ -106,15 +106,15 @@ class Px4(Rover):
     )
 
     def slots(self) -> Slots:
-        """With whether it turns on the spot."""
+        """The memory: that of all rovers, and whether it turns on the spot."""
         return (*super().slots(), *each((TURNING,)))
 
     def takes_samples(self) -> bool:
-        """At every instant at which it acts."""
+        """Whether `sample` is called: always, at every instant at which the law acts."""
         return True
 
     def steering(self) -> tuple[str, float]:
-        """yaw_P."""
+        """Key and gain [1/s] with which it turns the hull."""
         return "yaw_P", self.yaw_P
 
     # x (6) state, target (6); changes memory (3). It begins to turn at k.stops_at and ends at

@@ -111,11 +111,11 @@ class Rover(Controller):
     rate_I: Ruled = value(0.0462, "1/rad", "rate of the steering per missing yaw rate", ge=0)
 
     def slots(self) -> Slots:
-        """The integrals."""
+        """The memory: the integrals."""
         return each(INTEGRALS)
 
     def most(self) -> Most:
-        """U."""
+        """The speed U [m/s] that the law keeps within."""
         return Most(self.U)
 
     def velocity_loops(self, axes: tuple[Axis, Axis], nu: Vector) -> list[Loop]:

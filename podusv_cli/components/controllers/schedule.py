@@ -120,15 +120,15 @@ class Schedule(Controller):
         return self
 
     def asks_sway(self) -> bool:
-        """Where rows have one."""
+        """Whether its demand has a sway force: where the rows have one."""
         return _rows(self.rows).shape[1] in (WITH_SWAY, WITH_BOTH)
 
     def commands(self) -> Recorded | None:
-        """The rows, where their columns are commands to propellers."""
+        """The rows, where their columns are commands to propellers; None for demands."""
         return _read_recorded(self.rows, held=self.between == "hold")
 
     def optimum_of(self) -> str:
-        """What `minimises` says."""
+        """The metric that its motion minimises, as `minimises` says; empty for `nothing`."""
         return "" if self.minimises == "nothing" else self.minimises
 
     def constants(self) -> dict[str, float]:

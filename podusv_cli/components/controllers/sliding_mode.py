@@ -97,7 +97,7 @@ class SlidingMode(HandController):
     lambda_2: Ruled = value(0.08, "m/s3", "bound of the loads' rate (super-twisting)", ge=0)
 
     def slots(self) -> Slots:
-        """What super-twisting has learnt, and the lagged heading."""
+        """The memory: what super-twisting has learnt, and the lagged heading."""
         return each((*TWISTED, PSI_F))
 
     def wants_loads(self) -> bool:

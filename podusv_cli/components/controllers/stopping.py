@@ -22,11 +22,11 @@ class Stopping(Manoeuvre):
     astern: Ruled = value(2.0, "N", "thrust astern, a positive number", gt=0)
 
     def slots(self) -> Slots:
-        """The stage of the trial."""
+        """The memory: the stage of the trial."""
         return each((STAGE,))
 
     def trial(self) -> ManoeuvreTrial:
-        """Nothing is steered."""
+        """The stopping trial, in which nothing is steered."""
         return ManoeuvreTrial("stopping", self.execute)
 
     # t [s], x (6) state; changes memory (1): 0 ahead, 1 astern, 2 when the hull lies still.

@@ -240,11 +240,11 @@ class TrackingController(Controller):
         return super().constants() | {"crab_at": float(at)}
 
     def wants_loads(self) -> bool:
-        """With anti-windup only."""
+        """Whether it has to know the loads that act: with anti-windup only."""
         return self.anti_windup == "auxiliary"
 
     def sample_period(self) -> float:
-        """The difference's step where a difference or a held direction is used."""
+        """The step [s] of the difference, where one or a held direction is used; else 0."""
         needed = self.rate == "difference" or self.hold_below > 0
         return self.difference_step if needed else 0.0
 

@@ -20,11 +20,11 @@ class TurningCircle(Steering):
     )
 
     def slots(self) -> Slots:
-        """Whether it steers."""
+        """The memory: whether it steers."""
         return each((SIDE,))
 
     def trial(self) -> ManoeuvreTrial:
-        """Nothing is reversed."""
+        """The turning circle, in which nothing is reversed."""
         return ManoeuvreTrial("turning circle", self.execute)
 
     # t [s]; writes memory (1): 1 once the trial has begun.

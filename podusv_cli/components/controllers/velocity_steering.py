@@ -112,5 +112,5 @@ class VelocitySteering(ObservingController):
     N_m: Ruled = value(2.5, "N m", "moment beyond which surge yields to yaw", gt=0)
 
     def most(self) -> Most:
-        """U and N_m."""
+        """U [m/s] and N_m [N m] that it keeps within, and how fast it nears a target as fast."""
         return Most(self.U, NEARS, self.N_m)

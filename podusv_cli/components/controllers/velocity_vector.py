@@ -77,11 +77,14 @@ class VelocityVector(VelocitySteering):
     chi_m: Ruled = value(0.3, "rad/s", "largest turn of the wanted velocity used ahead", gt=0)
 
     def steering(self) -> tuple[str, float]:
-        """k_psi."""
+        """Key and gain [1/s] with which it turns the hull."""
         return "k_psi", self.k_psi
 
     def axis_gains(self, axes: tuple[Axis, Axis]) -> tuple[tuple[str, float, float], ...]:
-        """With the parts of A and of the angle's rate that act on the velocities."""
+        """Key, gain [1/s] and observer's bandwidth [rad/s] of surge and yaw.
+
+        The gains have the parts of A and of the angle's rate that act on the velocities.
+        """
         surge, yaw = self.k_u + self.k_p, self.k_r + self.k_psi
         return ("k_u", surge, self.omega_u), ("k_r", yaw, self.omega_r)
 

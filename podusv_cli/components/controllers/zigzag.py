@@ -54,15 +54,15 @@ class Zigzag(Steering):
     )
 
     def slots(self) -> Slots:
-        """The side, the heading of the approach, the side at the end of the step, the last look."""
+        """The memory: side, heading of the approach, side at the end of the step, the last look."""
         return each(MEMORY)
 
     def trial(self) -> ManoeuvreTrial:
-        """With the change of heading at which steering is reversed."""
+        """The zig-zag, with the change of heading at which steering is reversed."""
         return ManoeuvreTrial("zig-zag", self.execute, self.switch)
 
     def sample_period(self) -> float:
-        """As often as the heading is looked at."""
+        """Seconds between two looks at the heading."""
         return self.check_every
 
     # t [s], x (6); changes memory (5). A look at a period finds the heading past `switch`, and

@@ -21,5 +21,5 @@ class Calm(Disturbance):
         b[0] = b[1] = b[2] = 0.0
 
     def bounds(self) -> tuple[float, float, float]:
-        """Zero."""
+        """The bounds of the load: zero."""
         return 0.0, 0.0, 0.0

@@ -72,7 +72,7 @@ class Current(Disturbance):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Speed and direction."""
+        """Speed and direction of the flow, written behind the load."""
         return FLOW
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
@@ -91,6 +91,7 @@ class Current(Disturbance):
         return np.concatenate([[count - 2.0], np.column_stack([speed, direction]).ravel()])
 
     def _steady(self) -> bool:
+        """Whether neither speed nor direction wanders."""
         return self.speed_std == self.direction_std == 0.0
 
     def _wandering(self, quantity: str, count: int) -> Vector:

@@ -62,7 +62,7 @@ class CurrentFile(Disturbance):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Speed and direction."""
+        """Speed and direction of the flow, written behind the load."""
         return FLOW
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
@@ -71,7 +71,7 @@ class CurrentFile(Disturbance):
         return vessel.constants() | self.constants() | {"count": float(count)}
 
     def table(self) -> Vector:
-        """The times, then speed and direction row by row."""
+        """The times [s], then speed [m/s] and direction [rad] row by row: (3 rows,)."""
         return flow_table(read_flow(self.rows, FASTEST))
 
     # t [s], x (6) state; table as `flow_table` has it. Writes b (5): the load [N, N, N m], then

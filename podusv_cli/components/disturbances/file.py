@@ -53,7 +53,7 @@ class FromFile(Disturbance):
         return self
 
     def constants(self) -> dict[str, float]:
-        """How many rows there are."""
+        """How many rows there are, for the kernel."""
         return {"count": float(len(_rows(self.rows)))}
 
     def table(self) -> Vector:
@@ -62,7 +62,7 @@ class FromFile(Disturbance):
         return np.concatenate([rows[:, 0], rows[:, 1:].ravel()])
 
     def bounds(self) -> tuple[float, float, float]:
-        """The largest recorded magnitudes."""
+        """The largest magnitudes that are recorded [N, N, N m]."""
         u, v, r = np.abs(_rows(self.rows)[:, 1:]).max(axis=0).tolist()
         return u, v, r
 

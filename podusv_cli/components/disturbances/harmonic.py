@@ -112,11 +112,11 @@ class HarmonicDisturbance(Disturbance):
 
     @property
     def of_time(self) -> bool:  # type: ignore[override]
-        """In the hull's axes."""
+        """Whether its load depends on time alone: in the hull's axes."""
         return self.frame == "body"
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
-        """One for each frame."""
+        """The kernel for the axes that `frame` names, the hull's or the earth's."""
         return self.evaluate if self.frame == "body" else fixed_to_earth
 
     def constants(self) -> dict[str, float]:

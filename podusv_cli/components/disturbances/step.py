@@ -24,15 +24,15 @@ class Step(Disturbance):
     b_r: float = value(0.0, "N m", "yaw moment afterwards")
 
     def bounds(self) -> tuple[float, float, float]:
-        """The load afterwards."""
+        """The bounds [N, N, N m]: the load that has set in."""
         return abs(self.b_u), abs(self.b_v), abs(self.b_r)
 
     def sets_in(self) -> float:
-        """When the load sets in."""
+        """When the load sets in [s]."""
         return self.time
 
     def jumps(self) -> float:
-        """The same without a ramp."""
+        """When the load jumps [s]: as it sets in; 0 with a ramp."""
         return 0.0 if self.ramp else self.time
 
     # t, k.time and k.ramp [s]; writes b (3) [N, N, N m].

@@ -47,7 +47,7 @@ class Peak(NamedTuple):
         return _whole(self)
 
     def density(self, rate: Vector) -> Vector:
-        """Density [m2 s] at `rate` [rad/s]."""
+        """Density [m2 s] of this peak at `rate` [rad/s], both (n,)."""
         per_rate = self.period / (2.0 * math.pi)
         scale = self.height**2 / 16.0 * per_rate / self.whole
         return np.asarray(scale * self.shape(np.maximum(rate * per_rate, 1e-3)))
@@ -55,6 +55,7 @@ class Peak(NamedTuple):
 
 @lru_cache(maxsize=16)
 def _whole(peak: Peak) -> float:
+    """The integral of a peak's shape over the ratio to its frequency, by bins."""
     return math.fsum(spectra.in_bins(peak.shape, WHOLE))
 
 
@@ -64,11 +65,12 @@ def _power(x: float, exponent: float) -> float:
 
 
 def _e(x: float) -> float:
+    """e^x by podusv's own exponential, with the same bits on all machines."""
     return float(exponential(np.array([max(x, SMALLEST)]))[0])
 
 
 def _gamma(height: float, steepness: float) -> float:
-    """Peakedness; 1 of a sea so low that the fit would leave a dip."""
+    """Peakedness by height [m] and steepness; 1 of a sea so low that the fit would leave a dip."""
     return max(35.0 * (1.0 + 3.5 * _e(-height)) * _power(steepness, 0.857), 1.0)
 
 

@@ -39,12 +39,12 @@ class Total(Disturbance):
 
     @property
     def of_time(self) -> bool:  # type: ignore[override]
-        """Whether none of them looks at the state."""
+        """Whether no part looks at the state."""
         return all(part.of_time for part in self.parts)
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Those of all parts, in their order; once where several parts add up to one."""
+        """The signals of all parts, in their order; once where several parts add up to one."""
         return tuple(signal for _, signals in self.told() for signal in signals)
 
     def told(self) -> Iterator[tuple[Disturbance, tuple[Signal, ...]]]:
@@ -70,7 +70,7 @@ class Total(Disturbance):
         return self.parts
 
     def constant_of(self, position: int, name: str) -> str:
-        """The part's position in front."""
+        """What the sum calls a part's constant: with the part's position in front."""
         return f"part{position}_{name}"
 
     def kernel_with(self, vessel: Vessel) -> Callable[..., None]:
@@ -103,12 +103,12 @@ class Total(Disturbance):
         return list(range(len(self.parts)))
 
     def choices(self) -> frozenset[str]:
-        """Those of all parts, named as the constants are."""
+        """The choices of all parts, by the names of `constant_of`."""
         each = ((i, name) for i, part in enumerate(self.parts) for name in part.choices())
         return frozenset(self.constant_of(*place) for place in each)
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:
-        """Those of all parts, with the part's position in front of the key."""
+        """Key and message of all parts' conflicts, with the part's position in front of the key."""
         for i, part in enumerate(self.parts):
             yield from ((f"parts[{i}].{key}", text) for key, text in part.conflicts(vessel, step))
 

@@ -192,7 +192,7 @@ class Waves(Disturbance):
         return TURN / (self.period * to_peak)
 
     def sea(self) -> tuple[float, float]:
-        """Height and peak."""
+        """Significant height [m] and the peak's angular frequency [rad/s]."""
         return self.height, self.peak
 
     def full_scale(self) -> str:
@@ -200,7 +200,7 @@ class Waves(Disturbance):
         return "spectrum" if self.spectrum == "torsethaugen" else ""
 
     def cosines(self) -> int:
-        """The components."""
+        """How many cosines it sums: one for each component."""
         return self.components
 
     def by_default(self, name: str, facts: Any) -> int:
@@ -228,6 +228,7 @@ class Waves(Disturbance):
         return self.lowest * self.peak, self.highest * self.peak
 
     def _density(self, rate: Vector) -> Vector:
+        """Density [m2 s] of the elevation at `rate` [rad/s], both (n,), by the spectrum chosen."""
         return DENSITY[self.spectrum](self, rate)
 
     def _share_between_cutoffs(self) -> float:
@@ -236,11 +237,11 @@ class Waves(Disturbance):
         return math.fsum(spectra.in_bins(self._density, edges)) / (self.height / 4.0) ** 2
 
     def _edges(self) -> Vector:
-        """Edges of the components' bins [rad/s]."""
+        """Edges (components + 1,) of the components' bins [rad/s]."""
         return spectra.sea_edges(self._density, *self._band, self.components)
 
     def _variance(self) -> Vector:
-        """The variance in each bin [m2]."""
+        """The variance of the elevation in each bin (components,) [m2]."""
         return spectra.in_bins(self._density, self._edges())
 
     def _rates(self, drawn: Vector) -> Vector:
@@ -277,7 +278,7 @@ class Waves(Disturbance):
 
     @property
     def _travel(self) -> float:
-        """Where the waves go."""
+        """Where the waves go, opposite to where they come from [rad]."""
         return self.direction + math.pi
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
@@ -332,14 +333,17 @@ class Waves(Disturbance):
 
 
 def _jonswap(sea: Waves, rate: Vector) -> Vector:
+    """Density [m2 s] of the elevation at `rate` [rad/s], both (n,), by JONSWAP."""
     return spectra.jonswap(rate, sea.height, sea.peak, sea.gamma)
 
 
 def _ittc(sea: Waves, rate: Vector) -> Vector:
+    """Density [m2 s] of the elevation at `rate` [rad/s], both (n,), by the ITTC's spectrum."""
     return spectra.jonswap(rate, sea.height, sea.peak, 1.0)
 
 
 def _torsethaugen(sea: Waves, rate: Vector) -> Vector:
+    """Density [m2 s] of the elevation at `rate` [rad/s], both (n,), by Torsethaugen."""
     return torsethaugen(rate, sea.height, sea.peak)
 
 

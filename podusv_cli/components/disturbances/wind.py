@@ -107,7 +107,7 @@ def _logarithmic(wind: Wind) -> float:
 
 
 def _norsok(wind: Wind) -> float:
-    """C of NORSOK N-003."""
+    """C of NORSOK N-003, by the mean speed at 10 m."""
     return 0.0573 * math.sqrt(1.0 + 0.15 * wind.speed)
 
 
@@ -174,7 +174,7 @@ class Wind(Disturbance):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Speed and direction."""
+        """Speed and direction of the wind, written behind the load."""
         return SPEED, FROM
 
     def full_scale(self) -> str:
@@ -182,7 +182,7 @@ class Wind(Disturbance):
         return "" if self.gusts == "none" else "gusts"
 
     def cosines(self) -> int:
-        """Those of the gusts."""
+        """How many cosines it sums: the components of the gusts, if there are any."""
         return self.components if self.full_scale() else 0
 
     def resolving(self, duration: float) -> int:
@@ -197,6 +197,7 @@ class Wind(Disturbance):
         return spectra.resolving(variance, edges, duration)
 
     def _edges(self) -> Vector:
+        """Edges (components + 1,) of the components' bins [Hz]."""
         return spectra.growing_edges(self.lowest, self.highest, self.components)
 
     def table(self) -> Vector:

@@ -78,7 +78,7 @@ class WindFile(Disturbance):
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """Speed and direction."""
+        """Speed and direction of the wind, written behind the load."""
         return SPEED, FROM
 
     def constants_with(self, vessel: Vessel) -> dict[str, float]:
@@ -96,7 +96,7 @@ class WindFile(Disturbance):
         }
 
     def table(self) -> Vector:
-        """The times, then speed and direction row by row."""
+        """The times [s], then speed [m/s] and direction [rad] row by row: (3 rows,)."""
         return flow_table(read_flow(self.rows, FASTEST))
 
     def conflicts(self, vessel: Vessel, step: float) -> Iterator[tuple[str, str]]:

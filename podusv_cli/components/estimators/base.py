@@ -55,7 +55,7 @@ class Estimator(KernelPart):
 
     @property
     def covariance(self) -> tuple[int, int]:
-        """Where in its state the covariance of its errors begins, and of how many numbers it is.
+        """Where in its state the covariance of its errors begins, and the matrix's order.
 
         The upper triangle by rows, the six of the estimate first; behind it, for each of x, y, psi,
         u, v, r, the sum of all squared innovations over their variances, then their numbers. 0, 0

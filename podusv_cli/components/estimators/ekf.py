@@ -223,12 +223,12 @@ class ExtendedKalmanFilter(Estimator):
 
     @property
     def load_at(self) -> int:
-        """Behind the estimate, with `bias`."""
+        """Where the loads begin in the state: behind the estimate; 0 without `bias`."""
         return len(ESTIMATE) if self.bias else 0
 
     @property
     def covariance(self) -> tuple[int, int]:
-        """Behind the loads."""
+        """Where in the state the covariance begins, behind the loads, and its order."""
         return N, N
 
     def assumed_noise(self) -> tuple[tuple[str, float], ...]:
@@ -237,11 +237,11 @@ class ExtendedKalmanFilter(Estimator):
         return tuple((name, getattr(self, name)) for name in names)
 
     def assumed_delay(self) -> tuple[str, float]:
-        """`delay_p`."""
+        """The key and value [s] of the age that positions are taken to have."""
         return "delay_p", self.delay_p
 
     def constants(self) -> dict[str, float]:
-        """Without a load, one that is 0 and does not wander."""
+        """The fields' numbers; without `bias` the load does not wander, so it stays 0."""
         without = {} if self.bias else dict.fromkeys(("q_b", "q_b_psi"), 0.0)
         return super().constants() | without
 
@@ -269,11 +269,11 @@ class ExtendedKalmanFilter(Estimator):
         predict(tau, state, k, f, rate)
 
     def start(self, x: Vector, nominal: Vessel) -> Vector:
-        """The truth; of the load nothing is known but how large it may be."""
+        """The state (66,) at t = 0: the truth; of the load only how large it may be is known."""
         force, moment = (self.sigma_b, self.sigma_b_psi) if self.bias else (0.0, 0.0)
         unsure = np.diag(np.square([0.0] * MOVING + [force, force, moment]))
         return np.concatenate([x, np.zeros(3), unsure[np.triu_indices(N)], np.zeros(12)])
 
     def needs(self) -> tuple[bool, ...]:
-        """The pose; velocities are taken in where they are measured."""
+        """What has to be measured: the pose. Velocities are taken in where they are."""
         return POSE_ALONE

@@ -64,9 +64,9 @@ class LowPass(Estimator):
         rate[5] = lagging(5, turning, k.T_nu, seen, state)
 
     def needs(self) -> tuple[bool, ...]:
-        """The pose."""
+        """What has to be measured: the pose."""
         return POSE_ALONE
 
     def shortest_lag(self) -> float:
-        """The smallest of its time constants."""
+        """The smallest of its time constants [s]."""
         return min(self.T_p, self.T_psi, self.T_nu)

@@ -176,11 +176,11 @@ class PassiveObserver(Estimator):
         axis(2, state[5], e_psi, k.K_3_psi, state, k, rate)
 
     def start(self, x: Vector, nominal: Vessel) -> Vector:
-        """The truth, no waves, no loads."""
+        """The state at t = 0: the truth, no waves, no loads, the pose as predicted measurement."""
         return np.concatenate([x, np.zeros(SEEN - len(ESTIMATE)), x[:3]])
 
     def needs(self) -> tuple[bool, ...]:
-        """The pose."""
+        """What has to be measured: the pose."""
         return POSE_ALONE
 
     def shortest_lag(self) -> float:

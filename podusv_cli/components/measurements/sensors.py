@@ -125,7 +125,7 @@ class Sensors(Measurement):
         )
 
     def outages_of_each(self) -> tuple[tuple[Span, ...], ...]:
-        """Those of the sensors."""
+        """Times [from, to] [s] without samples, of each of x, y, psi, u, v, r."""
         sensors = self.instruments().values()
         return tuple(
             sensor.outages if sensor else () for sensor, count in sensors for _ in range(count)
@@ -140,16 +140,16 @@ class Sensors(Measurement):
         return tuple(noise for noise, count in each for _ in range(count))
 
     def delay_of_position(self) -> float:
-        """That of the sensor."""
+        """Age of a position when it is delivered [s]."""
         return self.position.delay
 
     def age(self) -> float:
-        """The compass's delay and half its period."""
+        """Mean age of the heading that the law sees [s]: delay and half a period."""
         return self.heading.delay + 0.5 * self.heading.period
 
     @property
     def signals(self) -> tuple[Signal, ...]:
-        """What is measured, as it was delivered last."""
+        """The measured values that are logged, as they were delivered last."""
         return tuple(part for part, has in zip(MEASURED, self.measured(), strict=True) if has)
 
     def constants_with(self, step: float, motion: int) -> dict[str, float]:
@@ -176,7 +176,7 @@ class Sensors(Measurement):
         return np.concatenate([*heads, *errors]).astype(float)
 
     def shared_places(self) -> list[int]:
-        """All of the heads but the resolutions."""
+        """Places in the table that runs side by side share: the heads but for the resolutions."""
         heads = range(HEAD * len(STATE))
         return [place for place in heads if place % HEAD != RESOLUTION]
 
@@ -186,7 +186,7 @@ class Sensors(Measurement):
         return np.concatenate([super().first(start, step), np.zeros(sum(rooms))])
 
     def conflicts(self, step: float) -> Iterator[tuple[str, str]]:
-        """Those of the sensors."""
+        """Key and message of each sensor's conflicts with the step [s]."""
         for name, (sensor, _) in self.instruments().items():
             for key, text in sensor.conflicts(step) if sensor else ():
                 yield f"{name}.{key}", text

@@ -21,7 +21,7 @@ class Hold(Path):
     psi: float = value(0.0, "rad", "heading")
 
     def waypoints(self) -> tuple[Point, ...]:
-        """Where it is."""
+        """The point at which the target stays [m]."""
         return ((self.x, self.y),)
 
     # target (10): position [m], its rates, the distance, which is not this kernel's, heading [rad].

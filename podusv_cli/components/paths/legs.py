@@ -96,7 +96,7 @@ class Legs(Path):
         return self._traveller().whole_targets(times)
 
     def circles(self) -> tuple[tuple[float, float, float], ...]:
-        """Every waypoint but the first, with the acceptance radius."""
+        """Where waypoints count as reached: each but the first, with the acceptance radius [m]."""
         return tuple((x, y, self.acceptance) for x, y in self.points[1:])
 
     def passed_by(self, share: float) -> dict[str, float]:
@@ -115,15 +115,15 @@ class Legs(Path):
         return {"leg": float(leg), "along_leg": float(way - begins[leg])}
 
     def constants(self) -> dict[str, float]:
-        """With the number of legs."""
+        """The fields' numbers, and how many legs there are."""
         return super().constants() | {"legs": float(len(self.points) - 1)}
 
     def constants_with(self, standoff: float) -> dict[str, float]:
-        """With the distance ahead of the vessel on the leg at which the law sees its target."""
+        """The constants, and how far ahead of the vessel on its leg the law sees its target [m]."""
         return self.constants() | {"lead": standoff}
 
     def table(self) -> Vector:
-        """The points, north and east in turn."""
+        """The points [m], north and east in turn: (2 points,)."""
         return np.asarray(self.points, float).ravel()
 
     # x (6) is what the law sees, s (6) the state; changes place (3): leg, distance across [m] and

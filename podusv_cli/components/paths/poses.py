@@ -60,15 +60,15 @@ class Poses(Path):
         return self
 
     def constants(self) -> dict[str, float]:
-        """How many poses there are, too."""
+        """Times of a way and a stay [s], and how many poses there are."""
         return {"travel": self.travel, "dwell": self.dwell, "count": float(len(self.poses))}
 
     def table(self) -> Vector:
-        """The poses."""
+        """The poses [m, m, rad], one behind another: (3 poses,)."""
         return np.array(self.poses, float).ravel()
 
     def waypoints(self) -> tuple[Point, ...]:
-        """Where the poses are."""
+        """Where the poses are [m]."""
         return tuple((x, y) for x, y, _ in self.poses)
 
     # t [s]; table: poses (count, 3); writes target (10), as `between_poses` does. A period is the

@@ -62,7 +62,7 @@ class Stations(Path):
         return self._traveller().whole_targets(times)
 
     def waypoints(self) -> tuple[Point, ...]:
-        """Where the poses are."""
+        """Where the poses are [m]."""
         return self._traveller().waypoints()
 
     def passed_by(self, share: float) -> dict[str, float]:
@@ -70,11 +70,11 @@ class Stations(Path):
         return {"station": float(int(np.clip(share, 0.0, 1.0) * len(self.poses) + NEAR))}
 
     def constants(self) -> dict[str, float]:
-        """How many poses there are, too."""
+        """The fields' numbers, and how many poses there are."""
         return super().constants() | {"count": float(len(self.poses))}
 
     def table(self) -> Vector:
-        """The poses."""
+        """The poses [m, m, rad], one behind another: (3 poses,)."""
         return self._traveller().table()
 
     # x (6) as the law sees it; changes place (3).

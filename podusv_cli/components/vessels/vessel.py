@@ -15,6 +15,7 @@ INERTIA = ("m11", "m22", "m23", "m32", "m33")
 
 
 def _damping(unit: str, meaning: str, **limits: Any) -> Any:
+    """A field for a damping derivative of this unit, 0 where a vessel gives none."""
     return value(0.0, unit, f"damping derivative: {meaning} (negative when it brakes)", **limits)
 
 

@@ -98,7 +98,7 @@ class Probe:
         return {"nothing": 0.0}
 
     def first(self) -> Vector:
-        """What is gathered before the first instant."""
+        """What is gathered before the first instant (size,)."""
         return np.zeros(self.size)
 
     def summary(

@@ -57,7 +57,7 @@ class Function(NamedTuple):
 
 
 def no_probe(plan: Plan) -> Probe:
-    """Nobody sees the run."""
+    """The probe of a run that nobody sees."""
     return Probe()
 
 
@@ -75,7 +75,7 @@ class Plan:
 
     @classmethod
     def with_probe(cls, loop: ClosedLoop, grid: TimeGrid, probe: Probe) -> Plan:
-        """With a probe that is there already."""
+        """The plan of a loop with a probe that is there already."""
         return cls(loop, grid, lambda plan: probe)
 
     def like(self, loop: ClosedLoop) -> Plan:
@@ -259,7 +259,7 @@ class Plan:
 
     @property
     def path_constants(self) -> dict[str, float]:
-        """The path's constants for this law."""
+        """The path's constants, for the standoff that this law keeps."""
         approach = self.loop.controller.approach()
         standoff = approach.standoff if approach else 0.0
         constants: dict[str, float] = self.recall(self.loop.path.constants_with, standoff)
@@ -267,7 +267,7 @@ class Plan:
 
     @property
     def law_constants(self) -> dict[str, float]:
-        """The law's constants."""
+        """The law's constants, with those of the nominal vessel."""
         constants: dict[str, float] = self.recall(
             self.loop.controller.constants_with, self.loop.nominal
         )
@@ -275,13 +275,13 @@ class Plan:
 
     @property
     def path_table(self) -> Vector:
-        """The path's table."""
+        """The path's table (n,), asked for once."""
         table: Vector = self.recall(self.loop.path.table)
         return table
 
     @property
     def law_table(self) -> Vector:
-        """The law's table."""
+        """The law's table (n,), asked for once."""
         table: Vector = self.recall(self.loop.controller.table)
         return table
 
@@ -353,6 +353,7 @@ def _kinds(loop: ClosedLoop) -> str:
 
 
 def _names(signals: tuple[Signal, ...]) -> list[str]:
+    """The names of signals, in order."""
     return [signal.name for signal in signals]
 
 
@@ -362,6 +363,7 @@ def _offsets(parts: Mapping[str, list[str]]) -> dict[str, int]:
 
 
 def _numbers(constants: Mapping[str, float]) -> Vector:
+    """Constants as the vector that kernels read; one zero where there are none."""
     return np.array(list(constants.values()) or [0.0])
 
 

@@ -35,4 +35,5 @@ class Recent:
 
 
 def _same(one: Any, other: Any) -> bool:
+    """Whether two arguments are the same: one object, or equal numbers."""
     return one is other or (isinstance(one, float) and one == other)

@@ -182,7 +182,7 @@ def entry(part: str, inner: Any, names: tuple[str, ...]) -> Any:
 
 @cache
 def lane_adapter(part: str, inner: Any, names: tuple[str, ...], alike: frozenset[str]) -> Piece:
-    """The same with a run in every lane; constants in `alike` are the same in all of them."""
+    """As `adapter`, with a run in every lane; constants in `alike` are the same in all of them."""
     check_kernel(inner)
     label = f"lanes_{part}_entry_{inner.__module__}_{inner.__qualname__}"
     bound = signatures.bind(part, inner, names, alike)

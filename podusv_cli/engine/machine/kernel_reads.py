@@ -70,7 +70,7 @@ class Reads:
         return known
 
     def _statement(self, node: ast.stmt, known: Names) -> Names | None:
-        """The same of one statement, by the method for its type."""
+        """Names that are set behind one statement, by the method for its type; as `_block`."""
         follow = getattr(self, f"_after_{type(node).__name__}", self._after_other)
         after: Names | None = follow(node, known)
         return after

@@ -126,6 +126,7 @@ def _seal(path: Path, rest: bytes) -> bytes:
 
 
 def _digest(content: bytes) -> str:
+    """The beginning of the SHA-256 in hex, long enough for a name."""
     return hashlib.sha256(content).hexdigest()[:16]
 
 
@@ -144,7 +145,7 @@ def _circumstances() -> tuple[str, ...]:
 
 
 def numba_version() -> str:
-    """That of the numba that is installed; empty without one, which podusv's kernels need not."""
+    """The version of numba; empty without one, which podusv's own kernels do not need."""
     with suppress(PackageNotFoundError):
         return version("numba")
     return ""

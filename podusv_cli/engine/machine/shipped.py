@@ -36,7 +36,7 @@ MAKERS = (
 
 
 def bitcode(function: Any, prototype: Any, compiler: str) -> bytes | None:
-    """That of this kernel as a C function with this prototype, if it came with podusv."""
+    """The bitcode of this kernel as a C function with this prototype, if it came with podusv."""
     return _kernels().get(digest(function, prototype, compiler)) if _kernels() else None
 
 

@@ -77,5 +77,5 @@ def pointers(vectors: Sequence[Vector], kind: Any = VECTOR) -> Any:
 
 
 def whole_numbers(numbers: Sequence[int]) -> Any:
-    """These numbers, one by the other."""
+    """These whole numbers, one by the other, as machine code reads them."""
     return (WHOLE * len(numbers))(*numbers)

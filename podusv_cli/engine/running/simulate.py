@@ -182,7 +182,7 @@ def recording_of(plan: Plan, vectors: Vectors, ending: Ending) -> Recording:
 
 
 def why(plan: Plan, vectors: Vectors, ending: Ending) -> str:
-    """When and why a march that nobody interrupted did not reach its last instant."""
+    """When and why a march that nobody interrupted did not reach its last instant, in words."""
     at = ending.reached * plan.grid.step
     return f"at t = {at:.6g} s: {ending.cause or _culprit(vectors, plan.names, at)}"
 

@@ -42,7 +42,7 @@ class Unchanged:
     """A context after which vectors have the numbers that they had before it."""
 
     def __init__(self, vectors: Sequence[Vector]) -> None:
-        """These vectors, which stay where they are."""
+        """These vectors, which stay where they are, are to be put back."""
         self._kept = [(vector, vector.copy()) for vector in vectors]
 
     def __enter__(self) -> None:
@@ -51,7 +51,7 @@ class Unchanged:
             numbers[:] = vector
 
     def __exit__(self, *failure: object) -> None:
-        """Put them back."""
+        """Put the numbers back, whatever was raised."""
         for vector, numbers in self._kept:
             vector[:] = numbers
 
@@ -101,7 +101,7 @@ class SteppedRun:
         return self._given[: len(STATE)].copy()
 
     def loads(self) -> Vector:
-        """(tau_u, tau_v, tau_r) that acted as the step before the next instant ended."""
+        """(tau_u, tau_v, tau_r) [N, N, N m] that acted at the end of the step before."""
         first = self._layout.tau
         return self.vectors.row[first : first + 3].copy()
 
@@ -213,6 +213,7 @@ class SteppedBatch:
         self._unchanged = Unchanged([*changing, self._lanes.under_way])
 
     def _by_run(self, vector: Vector) -> Vector:
+        """A view (numbers, runs) of a vector of all lanes, without lanes that have no run."""
         return vector.reshape(-1, LANES)[:, : len(self.places)]
 
     def advance(self, count: int) -> None:

@@ -277,6 +277,7 @@ class Instructions(Values):
             self.set(instruction, f'call {instruction.kind} @"{name}"({operands})')
 
     def _declare(self, name: str, kind: str, kinds: list[str]) -> None:
+        """Have a function without effects declared, by its result and arguments."""
         self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'
 
     def _call_part(self, instruction: Instruction) -> None:
@@ -321,7 +322,7 @@ class Instructions(Values):
         )
 
     def _call_shared(self, instruction: Instruction) -> None:
-        """`kernel.shared`: the number of the first lane."""
+        """Write `kernel.shared`: the number of the first lane, for all."""
         number, kind = instruction.operands[0], instruction.kinds[0]
         if self.differs(number):
             self.set(instruction, f"extractelement {lanes(kind)} {self.plain(number)}, i32 0")
@@ -329,15 +330,15 @@ class Instructions(Values):
             self.set(instruction, f"freeze {kind} {self.plain(number)}")
 
     def _call_lanes_any(self, instruction: Instruction) -> None:
-        """`kernel.lanes_any`."""
+        """Write `kernel.lanes_any`: whether a condition is true in any lane."""
         whole = self.let(f"bitcast {MASK} {self.wide(instruction.operands[0], 'i1')} to i{LANES}")
         self.set(instruction, f"icmp ne i{LANES} {whole}, 0")
 
     def _call_lane_true(self, instruction: Instruction) -> None:
-        """`kernel.lane_true`."""
+        """Write `kernel.lane_true`: the condition of one lane."""
         mask, lane = self.wide(instruction.operands[0], "i1"), self.plain(instruction.operands[1])
         self.set(instruction, f"extractelement {MASK} {mask}, i64 {lane}")
 
     def _call_lane_numbers(self, instruction: Instruction) -> None:
-        """`kernel.lane_numbers`."""
+        """Write `kernel.lane_numbers`: the same place, read as plain memory."""
         self.set(instruction, f"getelementptr i8, ptr {self.plain(instruction.operands[0])}, i64 0")

@@ -51,7 +51,7 @@ class Masks:
             self._find_ragged()
 
     def points_at(self, pointer: str) -> str:
-        """The kind of memory that a pointer points at."""
+        """The kind of memory that a pointer points at; "" while that is unknown."""
         if pointer in NOTHING:
             return ""
         return self.memory.get(pointer, "") if pointer.startswith("%") else PLAIN_MEMORY
@@ -107,6 +107,7 @@ class Masks:
         return len(targets) > 1 and last.operands[0] in self.differing
 
     def _parts(self, node: Node) -> bool:
+        """Whether lanes may go on from a node in several ways."""
         return node in self.ragged if isinstance(node, BlockLoop) else self.splits(node)
 
     def _wait(self) -> None:
@@ -128,7 +129,7 @@ class Masks:
                     waiting[first] |= goals - {first}
 
     def edge(self, begin: int, end: int) -> Any:
-        """The mask of all lanes that go this way, or None where a branch picks them."""
+        """The mask of the lanes that go from `begin` to `end`; None where a branch picks them."""
         ragged = any(loop in self.ragged for loop in self.order.around(begin, end))
         return None if ragged or self.splits(begin) else self.of[begin]
 
@@ -139,7 +140,7 @@ class Masks:
         return [begin for begin in self.order.leads[block] if begin not in back]
 
     def _find_masks(self) -> None:
-        """By block its mask."""
+        """Find the mask of every block (`of`), and of those that enter each loop (`entering`)."""
         self.of: dict[int, Any] = {}
         self.entering: dict[BlockLoop, Any] = {}
         self._find_masks_in(None)

@@ -78,7 +78,7 @@ def _type(kind: Any) -> Any:
 
 
 def _memory(kind: Any) -> str:
-    """What an argument points at."""
+    """The kind of memory that an argument of this type points at; "" for a number."""
     if kind is LANE_VECTOR:
         return LANES_MEMORY
     return PLAIN_MEMORY if issubclass(kind, (ctypes._Pointer, ctypes._CFuncPtr)) else ""

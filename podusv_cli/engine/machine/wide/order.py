@@ -41,7 +41,7 @@ class NodeLevel:
     later: dict[Node, set[Node]] = field(default_factory=dict)  # what every way from it comes to
 
     def first(self, targets: Iterable[Node]) -> Node:
-        """Which of these comes first."""
+        """Which of these nodes comes first in the order of the level."""
         return min(targets, key=self.place.__getitem__)
 
 

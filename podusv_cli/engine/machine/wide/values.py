@@ -17,7 +17,7 @@ ALL_TRUE, ALL_FALSE = "splat (i1 true)", "zeroinitializer"
 
 
 def lanes(kind: str) -> str:
-    """The type with one of these a lane."""
+    """LLVM's type of a vector with one value of type `kind` for each lane."""
     return f"<{LANES} x {kind}>"
 
 
@@ -45,6 +45,7 @@ class Values:
 
     @staticmethod
     def _place(name: str, what: str = "of") -> str:
+        """The name of the memory of a value, `what` says which of its memories."""
         return f"%{what}.{name[1:]}"
 
     def put(self, text: str) -> None:
@@ -52,13 +53,13 @@ class Values:
         self.text.append(f"  {text}")
 
     def let(self, text: str) -> str:
-        """Write a new value; its name."""
+        """Write the line of a new value, which `text` computes; returns its name."""
         self._count += 1
         self.put(f"%t.{self._count} = {text}")
         return f"%t.{self._count}"
 
     def label(self, name: str, known: dict[str, str] | None = None) -> None:
-        """Begin a block in which these values are in registers."""
+        """Begin a block of LLVM; `known` are the values that are in registers there."""
         self.text.append(f"{name}:")
         self.known = dict(known or {})
 
@@ -124,11 +125,11 @@ class Values:
         self.set(instruction, f"insertelement {lanes(kind)} {made}, {last}")
 
     def number(self, vector: str, kind: str, lane: int) -> str:
-        """The number of one lane."""
+        """The name of the number that a vector has in one lane."""
         return self.let(f"extractelement {lanes(kind)} {vector}, i32 {lane}")
 
     def mask(self, block: int) -> str:
-        """The lanes that are in a block."""
+        """The mask of the lanes that are in a block, as an operand."""
         return self.mask_named(self.masks.of[block])
 
     def mask_named(self, name: Any) -> str:
@@ -158,7 +159,7 @@ class Values:
         return self.known[key]
 
     def any(self, mask: str) -> str:
-        """Whether a mask is true in any lane."""
+        """The name of the truth whether a mask has any lane."""
         whole = self.let(f"bitcast {MASK} {mask} to i{LANES}")
         return self.let(f"icmp ne i{LANES} {whole}, 0")
 
