@@ -42,6 +42,7 @@ def factor(packed: Vector, order: int, lower: Vector) -> bool:
 
 
 # error (6) is overwritten; lower (6, 6) as `factor` writes it. With P = L L^T it is |L^-1 error|^2.
+# It is solved from the first row on.
 @kernel
 def normalised_square(error: Vector, lower: Vector) -> float:
     """error^T P^-1 error, with the factor of P."""
@@ -54,7 +55,8 @@ def normalised_square(error: Vector, lower: Vector) -> float:
     return square
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. Squares of innovations are sums over
+# the run, so those at the window's start (BEFORE) are taken off at the end.
 @kernel
 def watch(t: float, weight: float, steady: float, s: Vector, k: Any, seen: Vector) -> None:
     """Gather squared errors and squared innovations over the steady window.

@@ -27,7 +27,8 @@ RADIUS = 2 * INTEGRALS
 ACROSS, ALONG, SETTLED = range(3, 6)
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. TIMED is for errors weighted with the
+# time.
 @kernel
 def watch(t: float, weight: float, row: Vector, k: Any, seen: Vector) -> None:
     """Gather integrals of z_e and |z_e - standoff|, and when z_e came within a radius."""

@@ -24,7 +24,8 @@ def square_errors(given: Vector, s: Vector, square: Vector) -> None:
     square[3] = r * r
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. before and after (4) are the squares on
+# both sides of a jump.
 @kernel
 def watch(weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the squared errors of the estimate, where it jumps the mean of both sides.

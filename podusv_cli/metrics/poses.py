@@ -20,7 +20,8 @@ STANDS = (2, 3, 4, 5, PSI_D + 1, PSI_D + 2)  # what is 0 of a target that stays
 
 
 # Arguments as those of `spans.all_kernels`; changes `seen`. A stay begins when all rates of the
-# target are 0 and ends when one is not; SINCE is when the vessel last came within the radius.
+# target are 0 and ends when one is not; SINCE is when the vessel last came within the radius. A
+# pose that was left before the vessel came counts as MISSED.
 @kernel
 def watch(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the heading error, and at poses the distance and when it came within the radius."""

@@ -20,7 +20,7 @@ PHASE, LARGEST, INITIAL, FIRST, SECOND, RATE, REACHED, ZIGZAGGED = range(OWN, OW
 TRACK, HEAD, STOPPED, SURGE, AHEAD, STILL = range(OWN, OWN + 6)
 
 
-# s (states); seen is laid out as above.
+# s (states); seen is laid out as above. WAY [m] is the length of the track since.
 @kernel
 def begin(t: float, s: Vector, k: Any, seen: Vector) -> bool:
     """Whether the trial is under way; notes the state at its start."""
@@ -97,7 +97,8 @@ def watch_zigzag(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: 
             seen[LARGEST] = 0.0
 
 
-# Arguments as those of `spans.all_kernels`; changes `seen`.
+# Arguments as those of `spans.all_kernels`; changes `seen`. The hull stops within a step, where the
+# surge speed, a straight line over the step, is zero.
 @kernel
 def watch_stop(t: float, weight: float, s: Vector, row: Vector, k: Any, seen: Vector) -> None:
     """Gather the way until the surge speed passes zero."""

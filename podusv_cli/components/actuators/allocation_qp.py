@@ -72,7 +72,8 @@ def nearest(p_x: float, p_y: float, sector: Vector, side: float, out: Vector) ->
 
 # C (count, 3, 2) gives the axes' forces for those of the pods, tau (3) are the forces wanted, sides
 # (count) are 1 or -1, sectors (count, SECTOR) as `allocation.shape` writes them; `eps` weighs the
-# thrust.
+# thrust. p is where the pod's force would be without a sector; the nearest point of the sector is
+# g.
 @kernel
 def pull(
     count: int,
@@ -110,7 +111,8 @@ def pull(
                 ] * (xy * c[2 * b] + yy * c[2 * b + 1])
 
 
-# Reads curve (6) and slope (3) as `pull` writes them; writes out (3).
+# Reads curve (6) and slope (3) as `pull` writes them; writes out (3). l00 to l22 are the factor's
+# entries.
 @kernel
 def ascent(curve: Vector, slope: Vector, out: Vector) -> None:
     """Newton's direction curve^-1 slope by Cholesky; curve is at least the unit matrix."""
@@ -193,6 +195,7 @@ def along(
 
 
 # Arguments as those of `pull`; y starts at 0. Settled is relative to the size of what is wanted.
+# The cost is what is short of `tau`, squared, and `eps` times the forces squared.
 @kernel
 def on_these_sides(
     count: int, C: Vector, tau: Vector, sides: Vector, sectors: Vector, eps: float, g: Vector

@@ -19,7 +19,8 @@ def within(number: float, low: float, high: float) -> float:
 
 # Writes out (2): thrust [N], angle [rad]. All is turned by `side` first, so that thrust astern is a
 # force ahead in the mirrored plane. Yaw first: across is cut at the most that the sector gives,
-# then along follows. Surge first: along is cut at the arc, then across.
+# then along follows. Surge first: along is cut at the arc, then across. `priority` is YAW or else
+# surge.
 @kernel
 def one_pod(
     X: float,

@@ -101,7 +101,8 @@ def turning(n: float, pod: Vector) -> float:
     return 0.0 * n
 
 
-# n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table.
+# n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table. `carried` [N] is the
+# term of the flow.
 @kernel
 def thrust(n: float, flow: float, pod: Vector, k: Any) -> float:
     """Thrust [N] at the propeller speed n: T_nn |n| n + T_nV flow |n|, or as printed flow n.
@@ -136,7 +137,8 @@ def on_hull(along: float, across: float, pod: Vector) -> tuple[float, float]:
     return along * cosine - across * sine, along * sine + across * cosine
 
 
-# n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table.
+# n is in 1/s, flow [m/s] the advance speed; `pod` is its row of the table. `turns` is how fast it
+# turns, of which DEAD and STRETCH make the command.
 @kernel
 def speed_for(T: float, flow: float, pod: Vector, k: Any) -> float:
     """A propeller speed n with thrust(n) = T [N]: never astern for T >= 0, never ahead for T < 0.

@@ -10,7 +10,8 @@ from podusv_cli.core.interpolation import linear, segment
 from podusv_cli.core.kernel import Vector, kernel, tail
 
 
-# `n` is the command's size; curve is (1 + 2 rows).
+# `n` is the command's size; curve is (1 + 2 rows). It has the number of rows, then all commands,
+# then all thrusts [N].
 @kernel
 def thrust_at(n: float, curve: Vector) -> float:
     """Thrust [N] at a command, in straight lines between rows; beyond the last row its thrust."""
@@ -23,9 +24,9 @@ def thrust_at(n: float, curve: Vector) -> float:
     return linear(s, thrusts[i], thrusts[i + 1])
 
 
-# `gain` [N] is what one of the command changes in the thrust, in the water's flow. Pieces are tried
-# from the last to the first, so the first on the way up is kept. Adding 0 T keeps what is no
-# number.
+# `gain` [N] is what a command of 1 changes in the thrust, in the water's flow; curve is (1 + 2
+# rows). Pieces are tried from the last to the first, so the first on the way up is kept. Adding 0 T
+# keeps what is no number.
 @kernel
 def command_for(T: float, gain: float, curve: Vector) -> float:
     """The least command from 0 up whose thrust is T >= 0 [N]; the last row's where none is.

@@ -114,7 +114,7 @@ class Alos(LineOfSight, ObservingController):
 
     # x (6), memory and rate (8), target (6); writes tau (2) [N, N m], rate and signals (4). Yaw
     # comes first, since surge yields where its moment is large, or the bow is off. The loads that
-    # the observer finds are taken off.
+    # the observer finds are taken off. `yaw` [rad/s2] is the yaw acceleration that is asked for.
     @staticmethod
     @kernel
     def law(

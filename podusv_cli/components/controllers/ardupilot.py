@@ -62,7 +62,8 @@ def by_position(x: Vector, target: Vector, k: Any) -> tuple[float, float]:
 
 # x (6) state, target (6), angle_i [rad] the integral; returns m/s, rad/s, rad/s. The lateral
 # acceleration is 4 zeta^2 V^2/L_1 sin(off), of which the yaw rate is the share over the speed, with
-# its sign, so that a boat going astern is turned the other way.
+# its sign, so that a boat going astern is turned the other way. `sight` is the angle from the path
+# to the point on it that is L_1 away.
 @kernel
 def by_l1(x: Vector, target: Vector, angle_i: float, k: Any) -> tuple[float, float, float]:
     """Wanted speed and yaw rate of L1 guidance, and the rate of the integral's angle."""
@@ -120,6 +121,7 @@ class ArduPilot(Rover):
         return (*super().slots(), *each((LEARNT,)))
 
     # x (6), memory and rate (3), target (6); writes tau (2) [N, N m], rate and signals (4).
+    # Throttle and steering are parts of full scale, each cut to 1.
     @staticmethod
     @kernel
     def law(

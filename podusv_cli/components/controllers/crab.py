@@ -63,7 +63,8 @@ def on_path(x: Vector, memory: Vector, target: Vector, k: Any) -> OnPath:
     return OnPath(speed, side, sine, cosine, sway_rate, turn - side * crab_rate)
 
 
-# x (6) state, target (6); reads memory and writes rate, three numbers at crab_at.
+# x (6) state, target (6); reads memory and writes rate, three numbers at crab_at. The observer has
+# a double pole at -omega_v.
 @kernel
 def observe_sway(x: Vector, memory: Vector, target: Vector, k: Any, rate: Vector) -> None:
     """Rates of the observer of the sway load, and of v_s; nothing without this option."""
@@ -77,7 +78,8 @@ def observe_sway(x: Vector, memory: Vector, target: Vector, k: Any, rate: Vector
 
 
 # x (6) state, target (6); `room` (6) is where another target is put. Returns which of both is aimed
-# at.
+# at. The point turns with psi_c, so its velocity and acceleration differ from the target's by those
+# of a turn.
 @kernel
 def take_aim(x: Vector, memory: Vector, target: Vector, k: Any, room: Vector) -> Vector:
     """What the law points at: the target itself, or the standoff ahead along psi_c.

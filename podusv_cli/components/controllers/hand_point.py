@@ -52,7 +52,8 @@ def hand_target(psi_f: float, rate: float, bend: float, target: Vector, k: Any) 
 
 # x (6) state, target (6); psi_f [rad] is the filtered heading, which follows psi behind the lag T_f
 # and turns with the target's course, so that a steady turn leaves no lag. A is seen in the body
-# frame, where a velocity at rest over ground turns: hence r w and -r u.
+# frame, where a velocity at rest over ground turns: hence r w and -r u. w [m/s] is the sway
+# velocity of the hand point.
 @kernel
 def hand_errors(x: Vector, psi_f: float, target: Vector, k: Any) -> Hand:
     """What the hand point lacks to the velocity of constant-bearing guidance."""
@@ -82,7 +83,8 @@ def hand_errors(x: Vector, psi_f: float, target: Vector, k: Any) -> Hand:
     )
 
 
-# x (6) state; along and across [m/s2], loads [N, N, N m]. Writes tau (2) [N, N m].
+# x (6) state; along and across [m/s2], loads [N, N, N m]. Writes tau (2) [N, N m]. Across, the hand
+# point moves by v' + l r': r' makes up for what the hull's own sway leaves.
 @kernel
 def push(
     x: Vector, along: float, across: float, b_u: float, b_v: float, b_r: float, k: Any, tau: Vector

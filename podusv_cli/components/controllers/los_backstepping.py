@@ -119,7 +119,7 @@ class LosBackstepping(Controller):
 
     # x (6), memory and rate (4), target (6); writes tau (2) [N, N m], rate and signals (5).
     # `faster` [m/s2] is the target's acceleration along its course, `turn` the rate of alpha_3 =
-    # r_f - c z1.
+    # r_f - c z1. memory: alpha_2, the filtered angle and its two derivatives.
     @staticmethod
     @kernel
     def law(

@@ -91,7 +91,8 @@ class LosPid(LineOfSight):
             ),
         ]
 
-    # x (6), memory and rate (2), target (6); writes tau (2) [N, N m], rate and signals (4).
+    # x (6), memory and rate (2), target (6); writes tau (2) [N, N m], rate and signals (4). Gains
+    # are those of a double pole at -omega_u and a triple one at -omega_psi.
     @staticmethod
     @kernel
     def law(

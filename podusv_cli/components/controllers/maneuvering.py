@@ -101,6 +101,8 @@ class Maneuvering(PathTimed):
         rate[LOAD + 2] -= k.gamma * (tau[2] - demand[1]) / (k.m33 * k.k_d)
 
     # x (6,), memory (6,), target (10,) at the path's time; writes tau (3,), rate and signals (6,).
+    # z_1 is the error of the pose, z_2 (z_u, z_v, z_r) that of the velocity to alpha; (rate_u,
+    # rate_v, rate_r) is alpha'. Demands are surge, yaw, sway.
     @staticmethod
     @kernel
     def law(

@@ -38,6 +38,7 @@ def answer_force(r: float, memory: Vector, k: Any) -> float:
 
 # x (6) state. Reads memory and changes rate at V_HAT, R_HAT, PHI, LAG and MORE. phi = s/(s +
 # omega)^2 r has two states, phi and its integral. What is learnt may only come back at its limit.
+# The rate is normalised by phi, so that fast turns do not learn too fast.
 @kernel
 def adapt(x: Vector, memory: Vector, k: Any, rate: Vector) -> None:
     """Rates of what is learnt, within +-0.2 U; the observer is told the force that is known of."""

@@ -72,7 +72,8 @@ def pace(m33: float, N_m: float, Q0: float) -> float:
     return min(1.0, math.sqrt(N_m / (ANGLE * m33 * Q0)))
 
 
-# distance [m], speed [m/s] of the target; `near` and `slow` go from 0 to 1.
+# distance [m], speed [m/s] of the target; `near` and `slow` go from 0 to 1. Both fall from 1, at
+# NEAR or SLOW times V_m, to 0 at twice that, so the gain has no jump.
 @kernel
 def resting_gain(distance: float, speed: float, k: Any) -> float:
     """k_p [1/s], or what a hull bears near a slow target.
@@ -89,7 +90,8 @@ def resting_gain(distance: float, speed: float, k: Any) -> float:
 
 # turn [rad/s] of the target. Per lever, the yaw equation is added to the sway equation, see
 # `neutral`. The sway present is that of the loads and of yaw, as if at right angles; less of it
-# damps less.
+# damps less. `from_yaw` [kg m/s] is the derivative by r of sway force and moment over the lever,
+# but for m11 V.
 @kernel
 def sway_answer(V: float, v: float, v_l: float, turn: float, more: float, k: Any) -> SwayResponse:
     """p and d of the nominal vessel at the speed V [m/s], sway v [m/s], load sway v_l [m/s].
@@ -118,6 +120,7 @@ def routh_gain(p: float, d: float, eta: float, k: Any) -> float:
 
 
 # For p <= 1 yaw has no zero in the right half plane, so only the bandwidth limits the gain across.
+# Each bound on k_b is a share of what stability or the bandwidth allows.
 @kernel
 def schedule(at: SwayResponse, k: Any) -> GainSchedule:
     """eta and k_b; `trust` is by how much the true p may exceed the told one."""

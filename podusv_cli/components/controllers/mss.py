@@ -127,7 +127,8 @@ class Mss(LineOfSight):
         ]
 
     # x (6), memory and rate (6), target (6); writes tau (2) [N, N m], rate and signals (4). The
-    # observer's two states, the angle and its lag, differ by its rate r_d.
+    # observer's two states, the angle and its lag, differ by its rate r_d. held and damped [rad/s2]
+    # are the PID's parts over the inertia.
     @staticmethod
     @kernel
     def law(

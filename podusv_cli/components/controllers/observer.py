@@ -49,6 +49,8 @@ def sway_yaw_rates(sway: float, yaw: float, k: Any) -> tuple[float, float]:
 
 
 # x (6) state, tau (2) [N, N m]. Reads memory and writes rate at U_HAT, V_HAT, R_HAT, B_U, B_V, B_R.
+# Every axis has a double pole at -omega; the loads' rates go through the mass matrix, hence m23 and
+# m32.
 @kernel
 def observe(x: Vector, memory: Vector, tau: Vector, k: Any, rate: Vector) -> None:
     """Rates of the observer as if the demand `tau` acted; `after_saturation` adds what differs."""

@@ -78,7 +78,8 @@ class PoseBackstepping(PoseLaw):
         rate[1] -= (tau[1] - demand[2]) / (1.0 + k.m22 * k.k_d * k.k_p)
         rate[2] -= (tau[2] - demand[1]) / (1.0 + k.m33 * k.k_d * k.k_psi)
 
-    # x (6,), memory (3,), target (10,); writes tau (3,), rate (3,) and signals (3,).
+    # x (6,), memory (3,), target (10,); writes tau (3,), rate (3,) and signals (3,). (rate_u,
+    # rate_v, rate_r) is alpha', (p, q, w) alpha' - K_d z_2. Demands are surge, yaw, sway.
     @staticmethod
     @kernel
     def law(

@@ -35,7 +35,7 @@ class PoseErrors(NamedTuple):
     r_d_rate: float
 
 
-# x (6), target (10).
+# x (6), target (10). The rates are those in axes that turn with the hull, hence the terms with r.
 @kernel
 def pose_errors(x: Vector, target: Vector) -> PoseErrors:
     """Errors of the pose at x = (x, y, psi, u, v, r)."""

@@ -79,7 +79,8 @@ class PosePid(PoseLaw):
         rate[1] -= (s * a + c * b) / (k.m22 * k.w_y * k.w_y)
         rate[2] -= (tau[2] - demand[1]) / (k.m33 * k.w_r * k.w_r)
 
-    # x (6,), memory (3,), target (10,); writes tau (3,), rate (3,) and signals (3,).
+    # x (6,), memory (3,), target (10,); writes tau (3,), rate (3,) and signals (3,). Demands are
+    # surge, yaw, sway.
     @staticmethod
     @kernel
     def law(

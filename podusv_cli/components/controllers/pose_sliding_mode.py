@@ -64,7 +64,8 @@ class PoseSlidingMode(PoseLaw):
             for axis, (key, steep), gain in zip(axes, layers, gains, strict=True)
         ]
 
-    # x (6,), target (10,); writes tau (3,) and signals (6,).
+    # x (6,), target (10,); writes tau (3,) and signals (6,). (p, q, w) is nu_r' - k_d s. Demands
+    # are surge, yaw, sway.
     @staticmethod
     @kernel
     def law(x: Vector, target: Vector, k: Any, tau: Vector, signals: Vector) -> None:

@@ -39,6 +39,7 @@ TURNING = Signal("turns", "1", "1 while it turns on the spot, else 0")
 
 
 # x (6) state, target (6), u_d [m/s]. A path further away than the reach is met at a right angle.
+# across [m] is the vessel to starboard of the path, `ahead` the way along it to the circle.
 @kernel
 def heading_error(x: Vector, target: Vector, u_d: float, k: Any) -> float:
     """Bearing of where a circle about the vessel meets the path, or of the path, less psi [rad]."""

@@ -150,7 +150,8 @@ class Schedule(Controller):
 
     # t [s], x (6), table as `table` lays it out; writes tau (2, or 3 with a sway force) and signals
     # (2). The width of a row tells what it has: demand alone, a motion with gains, either with a
-    # sway force.
+    # sway force. `state` is where a row has the motion, and `g` where the surge gain of state j
+    # stands.
     @staticmethod
     @kernel
     def law(t: float, x: Vector, k: Any, table: Vector, tau: Vector, signals: Vector) -> None:

@@ -31,6 +31,7 @@ from podusv_cli.core.kernel import Vector, kernel
 
 
 # x (6) state, target (6). rate_x and rate_y [m/s] are how the distance to the target changes.
+# Returns V_c along and across the bow, its surge rate, its turn, and whether it points back.
 @kernel
 def guidance(x: Vector, target: Vector, k: Any) -> Wanted:
     """V_c and its rate, as the hull sees them."""
@@ -90,7 +91,8 @@ class VelocityVector(VelocitySteering):
 
     # x (6), memory and rate (6), target (6); writes tau (2) [N, N m], rate and signals (4). r_d
     # levels off at r_m for large angles; its derivative by chi_e has the third power of sigma. Near
-    # rest the angle counts for less, since its direction is uncertain.
+    # rest the angle counts for less, since its direction is uncertain. `yaw` [rad/s2] is the yaw
+    # acceleration that is asked for.
     @staticmethod
     @kernel
     def law(

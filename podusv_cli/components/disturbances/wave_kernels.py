@@ -55,7 +55,7 @@ def _wave(t: float, way: float, i: int, count: int, table: Vector) -> tuple[floa
 
 
 # Reads x (6). Writes b: drift load (3) [N, N, N m], then the motion's signals and the elevation
-# [m].
+# [m]. In a stage only the load is asked for, which saves most of the arithmetic.
 @kernel
 def long_crested(
     t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0, stage: float = 0.0
@@ -153,7 +153,7 @@ def _long_motion(
     return _square(sums, 0), _square(sums, 2)
 
 
-# Arguments and outputs as those of `long_crested`.
+# Arguments and outputs as those of `long_crested`. In a stage the drift load is enough.
 @kernel
 def short_crested(
     t: float, x: Vector, k: Any, table: Vector, b: Vector, again: float = 0.0, stage: float = 0.0
@@ -169,8 +169,9 @@ def short_crested(
         _short_motion(t, x, c_psi, s_psi, k, table, b)
 
 
-# c and s are component i's cosine and sine, (c_gamma, s_gamma) its direction against the bow.
-# Changes sums (8, LANES) in lane j.
+# c and s are component i's cosine and sine, (c_gamma, s_gamma) the direction in which it goes, seen
+# from the bow: `ahead` is a following sea. Changes sums (8, LANES) in lane j. Each side reflects
+# what comes against it, in parts of the direction's cosine or sine.
 @kernel
 def _facing(
     j: int,
@@ -197,8 +198,8 @@ def _facing(
     sums[7 * LANES + j] += left * s
 
 
-# The mean drift load b (3) [N, N, N m] from the envelopes: what comes from ahead less what comes
-# from astern, likewise from port and starboard.
+# The mean drift load b (3) [N, N, N m] from the envelopes: of what goes ahead, which comes from
+# astern and pushes ahead, less of what goes astern; likewise to starboard and to port.
 @kernel
 def _drift(sums: Vector, k: Any, b: Vector) -> None:
     b[0] = k.drift_u * (_square(sums, 0) - _square(sums, 2))

@@ -44,7 +44,7 @@ def _gust(t: float, count: int, table: Vector) -> float:
     return total
 
 
-# u_r and v_r [m/s]; writes b (3) [N, N, N m].
+# u_r and v_r [m/s]; writes b (3) [N, N, N m]. c and s are cosine and sine of gamma.
 @kernel
 def blendermann(u_r: float, v_r: float, k: Any, b: Vector) -> None:
     """Load of the wind on a hull that moves by (u_r, v_r) through the air.

@@ -107,7 +107,7 @@ def spread(f: Vector, packed: Vector, q: Vector, rate: Vector) -> None:
 
 # h (6) is the derivative, `innovation` measured less expected, sigma its deviation. Changes state:
 # estimate (9), then packed P (45), then sums of squared innovations (6) and their numbers (6). A
-# value that is late depends on several states, so all of h counts.
+# value that is late depends on several states, so all of h counts. ph (9) is P h.
 @kernel
 def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -> float:
     """Correct estimate and covariance by the measured value i, whose derivative is h.
@@ -137,7 +137,8 @@ def take_in(i: int, h: Vector, innovation: float, sigma: float, state: Vector) -
     return variance
 
 
-# delay [s]; reads the estimate in state (9); writes h (6).
+# delay [s]; reads the estimate in state (9); writes h (6). A late position is that of now less the
+# way over the delay, so it depends on heading and velocities.
 @kernel
 def derivative(i: int, delay: float, state: Vector, h: Vector) -> float:
     """h of the measured value i, and by how much a late position is ahead of the one measured."""

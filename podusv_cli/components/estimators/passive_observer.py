@@ -139,7 +139,8 @@ class PassiveObserver(Estimator):
             "K_4_psi": moment,
         }
 
-    # seen as the sensors write it (VALUE, FRESH); changes state at SEEN (3) [m, m, rad].
+    # seen as the sensors write it (VALUE, FRESH); changes state at SEEN (3) [m, m, rad], which
+    # between deliveries goes on as predicted.
     @staticmethod
     @kernel
     def correct(seen: Vector, state: Vector) -> None:

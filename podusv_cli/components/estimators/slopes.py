@@ -56,7 +56,8 @@ def accelerate_column(
     f[5 * WIDTH + column] = (k.m22 * yaw - k.m32 * sway) / determinant
 
 
-# state (6 or more), b (3) [N, N, N m]; (cosine, sine) is the heading. Writes f (6, WIDTH).
+# state (6 or more), b (3) [N, N, N m]; (cosine, sine) is the heading. Writes f (6, WIDTH). Columns
+# 6 to 8 are those of the loads, which are fixed to the earth.
 @kernel
 def slopes(
     state: Vector,

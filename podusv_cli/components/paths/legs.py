@@ -143,7 +143,8 @@ class Legs(Path):
         leg_frame(s, min(leg, last), table, at)
         place[LEG], place[E_CT], place[ALONG] = leg, at[4], at[3]
 
-    # x (6) as the law sees it, place (3), table: corners (n, 2) [m]; writes target (6).
+    # x (6) as the law sees it, place (3), table: corners (n, 2) [m]; writes target (6). It has no
+    # acceleration: a leg is straight.
     @staticmethod
     @kernel
     def evaluate(x: Vector, place: Vector, k: Any, table: Vector, target: Vector) -> None:

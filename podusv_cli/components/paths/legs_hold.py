@@ -30,6 +30,7 @@ on_legs, seek_leg = Legs.evaluate, Legs.locate
 
 # Reads (x[0], x[1]) and the waypoint [m]; `course` [rad] holds while the vessel is within the
 # radius. Writes target (6). The law steers by the target's velocity, so it never rests altogether.
+# Its place is a little ahead of the vessel, so that the direction to it is defined.
 @kernel
 def drift(x: Vector, course: float, waypoint: Vector, k: Any, target: Vector) -> None:
     """A target at the vessel that goes back to the waypoint, as fast as it is beyond the radius."""
@@ -46,7 +47,8 @@ def drift(x: Vector, course: float, waypoint: Vector, k: Any, target: Vector) ->
 
 
 # Arguments as those of `drift`. The angle is that of the vessel seen from the waypoint; a growing
-# one goes round clockwise.
+# one goes round clockwise. Writes target (6); `inwards` [m/s2] is its acceleration towards the
+# waypoint.
 @kernel
 def go_round(x: Vector, waypoint: Vector, k: Any, target: Vector) -> None:
     """The point of the circle beside the vessel, or ahead of it by the lead, clockwise."""

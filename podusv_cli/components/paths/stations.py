@@ -77,7 +77,8 @@ class Stations(Path):
         """The poses [m, m, rad], one behind another: (3 poses,)."""
         return self._traveller().table()
 
-    # x (6) as the law sees it; changes place (3).
+    # x (6) as the law sees it; changes place (3). While the target is still on its way here, being
+    # near does not count.
     @staticmethod
     @kernel
     def locate(t: float, x: Vector, place: Vector, k: Any, table: Vector) -> None:

@@ -21,7 +21,7 @@ LOOP = 2.0  # the place of "loop" among the choices of `after`, as kernels know 
 
 
 # table: `count` times [s], then the four coefficients of north and of east for each stretch. Writes
-# target (6), as `circle.on_circle` does.
+# target (6), as `circle.on_circle` does. s [s] is the time since the stretch began.
 @kernel
 def along(t: float, k: Any, table: Vector, target: Vector) -> None:
     """The spline and its derivatives, by Horner's rule."""

@@ -60,6 +60,7 @@ def end_lanes(k: int, lost: Any, c: Any, n: Any, size: int, under_way: Vector, e
 
 
 # `under_way` holds the instant, a flag to stop and where each lane ended; `ends` as in `end_lanes`.
+# The first time a lane is lost, its numbers are put aside by `end_lanes`.
 @spread
 @kernel
 def advance_lanes(

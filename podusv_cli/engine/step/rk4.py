@@ -55,7 +55,7 @@ def through_water(s: Vector, flow: Vector, x: Vector) -> None:
 
 
 # s (states); writes ds from 6 on, and the row from n.tau on. c are the vectors, n says where things
-# lie.
+# lie. The states of the actuator follow the vessel's six.
 @kernel
 def drive(t: float, s: Vector, ds: Vector, demand: Vector, p: Parts, c: Vectors, n: Layout) -> None:
     """The actuator's loads, rates and signals, from the vessel's motion through the water."""

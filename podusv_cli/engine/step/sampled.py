@@ -17,7 +17,8 @@ from podusv_cli.engine.step.layout import (
 )
 
 
-# Reads memory; writes rate, both as long as the law's memory. c are the vectors, n the layout.
+# Reads memory; writes rate, both as long as the law's memory. c are the vectors, n the layout. What
+# else the law writes goes into c.held, where nobody reads it.
 @kernel
 def held_rates(
     t: float, memory: Vector, rate: Vector, law: Function, after: Function, c: Vectors, n: Layout
@@ -42,7 +43,8 @@ def held_rates(
 
 
 # t [s]. Changes the law's memory in c.s, with c.stages as its room. h and `passing` [s] differ
-# where the law's own time stands still.
+# where the law's own time stands still. k1 to k4 and y, the state of a stage, are (states -
+# memory,).
 @kernel
 def remember(
     t: float, passing: float, h: float, law: Function, after: Function, c: Vectors, n: Layout
