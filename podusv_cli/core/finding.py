@@ -125,9 +125,10 @@ def _decorator(when: Literal["before", "after"]) -> Callable[..., Decorator]:
         law: type[Any] = object,
         needs: tuple[str, ...] = (),
     ) -> Decorator:
-        """Make a kind of finding of a function; the arguments are the fields of `FindingKind`.
+        """A decorator that makes a kind of finding of a function.
 
-        `before` a run the function takes a `Case`, `after` a run the scenario and its recording.
+        The arguments are the fields of `FindingKind`. `before` a run the function takes a `Case`,
+        `after` a run the scenario and its recording.
         """
         return lambda search: FindingKind(
             name, about, meaning, when, search, law, condition, remedy, needs

@@ -43,8 +43,8 @@ def uniforms(stream: tuple[int | str, ...], first: int, count: int) -> Vector:
 def gauss_markov(stream: tuple[int | str, ...], count: int, lag: float) -> Vector:
     """A first-order Gauss-Markov process (count,) of variance 1, from its steady distribution on.
 
-    `lag` is the time between two of its numbers in time constants. The steps are exact for any lag:
-    x+ = exp(-lag) x + sqrt(1 - exp(-2 lag)) n.
+    `stream` names its random numbers; `lag` is the time between two of its numbers in time
+    constants. The steps are exact for any lag: x+ = exp(-lag) x + sqrt(1 - exp(-2 lag)) n.
     """
     # The first number has variance 1 already; the others are noise until the loop adds what is kept
     kept, process = exponential(-lag), normals(stream, 0, count)

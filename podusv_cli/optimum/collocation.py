@@ -297,7 +297,7 @@ def _watch(unknowns: int, gaps: int, look: Callable[[], bool]) -> Any:
             self.construct("watch", {})
 
         def get_n_in(self) -> int:
-            """How many arguments CasADi passes: all that the solver knows."""
+            """How many arguments CasADi passes: all results of the solver."""
             return int(ca.nlpsol_n_out())
 
         def get_n_out(self) -> int:

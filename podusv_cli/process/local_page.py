@@ -61,7 +61,7 @@ class _Handler(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True  # else each answer waits 40 ms for an acknowledgement
 
     def do_GET(self) -> None:
-        """Answer with the page, and with nothing at other addresses."""
+        """Answer with the page, or refuse another address."""
         if not self._is_known():
             return
         if self.path != self.server.base:

@@ -35,7 +35,7 @@ def lines(rows: Iterable[Sequence[object]], digits: str | None = None) -> str:
 
 
 def records(rows: Sequence[Mapping[str, object]], digits: str | None = None) -> str:
-    """As `lines`, of rows by the names of their columns, the same in all of them."""
+    """As `lines`, of rows by the names of their columns, the same in all; none without a row."""
     heads = list(rows[0]) if rows else []
     return lines([heads, *(list(row.values()) for row in rows)], digits)
 

@@ -196,7 +196,7 @@ def _scale(file: h5py.File, axis: str, size: int) -> h5py.Dataset:
 
 
 def _dataset(file: h5py.File, name: str, array: Vector, compress: bool) -> h5py.Dataset:
-    """The dataset of an array; if it is not compressed, empty room that is filled later.
+    """The dataset `name` of an array; without `compress` empty room that is filled later.
 
     Its place in the file is fixed at once, so that rows can be written past HDF5; it notes no
     times, so that equal logs have equal bytes.

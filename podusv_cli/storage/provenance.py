@@ -61,7 +61,7 @@ def surroundings() -> Mapping[str, Any]:
 
 
 def times(started: datetime, finished: datetime) -> dict[str, Any]:
-    """When something began and ended, in UTC as ISO texts, and how long it took [s]."""
+    """When something `started` and `finished`, in UTC as ISO texts, and how long it took [s]."""
     return {
         "started": _utc(started),
         "finished": _utc(finished),

@@ -371,7 +371,7 @@ class _Frame:
         return np.asarray(((above - below) / (2.0 * steps[:, None])).T)
 
     def _no_derivative(self, q: Vector, state: int) -> str:
-        """Why there is no derivative by one of the states, for the user."""
+        """Why there is no derivative at `q` (states,) by state number `state`, for the user."""
         distance = math.hypot(*q[:2])
         why = (
             "a limit, dead zone or step of law or actuator lies there, or damping with |r| or |v| "

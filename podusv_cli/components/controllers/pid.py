@@ -92,9 +92,10 @@ class Pid(TrackingController):
         return HELD + each(MEMORY) + self.swaying()
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The memory: integrals at zero, lagged errors at zero or at the error.
+        """The memory (slots,): integrals at zero, lagged errors at zero or at the error.
 
-        `k` has the law's constants; the errors are those after the first sample.
+        `x` (6,) and `target` (6,) are those at t = 0, `k` has the law's constants; the errors are
+        those after the first sample.
         """
         memory = super().begin(x, target, k)
         if self.lag_start == "error":

@@ -262,7 +262,10 @@ class PolarBackstepping(TrackingController):
         return {CENTER: self.network.center_array(), WIDTH: self.network.width_array()}
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The memory with bounds and weights at what leakage pulls them to; `k`: the constants."""
+        """The memory (slots,), with bounds and weights at what leakage pulls them to.
+
+        `x` (6,) and `target` (6,) are those at t = 0, `k` has the law's constants.
+        """
         memory = super().begin(x, target, k)
         memory[B_HAT_U], memory[B_HAT_R] = self.b_hat_u0, self.b_hat_r0
         memory[WEIGHTS : WEIGHTS + 2 * self.network.count] = self.network.initial_weight
@@ -281,7 +284,10 @@ class FilteredBackstepping(PolarBackstepping):
         return each(FILTERED)
 
     def begin(self, x: Vector, target: Vector, k: Any) -> Vector:
-        """The memory with the filter at zero, or settled on the virtual control."""
+        """The memory (slots,) with the filter at zero, or settled on the virtual control.
+
+        `x` (6,) and `target` (6,) are those at t = 0, `k` has the law's constants.
+        """
         memory = super().begin(x, target, k)
         if self.filter_start == "alpha":
             e = self.first_errors(x, memory, target, k)

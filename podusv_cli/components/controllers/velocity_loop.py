@@ -75,7 +75,7 @@ class Loop:
 
     @property
     def growth(self) -> float:
-        """Largest real part of an eigenvalue [1/s]."""
+        """Largest real part of an eigenvalue [1/s]; above 0 the loop grows."""
         return float(np.linalg.eigvals(self.matrix).real.max())
 
     @property

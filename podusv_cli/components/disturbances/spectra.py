@@ -128,9 +128,10 @@ def as_given(count: int, seed: int, stream: str) -> Vector:
 def rayleigh(count: int, seed: int, stream: str) -> Vector:
     """Factors (count,) on the variance of components whose amplitudes are Rayleigh-distributed.
 
-    They are exponential variates of mean 1. With them a sum of cosines is a sample of a Gaussian
-    process, and its variance scatters from seed to seed as that of a sea does; with the same
-    amplitudes for every seed it hardly does (Tucker, Challenor and Carter 1984).
+    `stream` names the random numbers of `seed`. They are exponential variates of mean 1. With them
+    a sum of cosines is a sample of a Gaussian process, and its variance scatters from seed to seed
+    as that of a sea does; with the same amplitudes for every seed it hardly does (Tucker, Challenor
+    and Carter 1984).
     """
     return np.asarray(-logarithm(1.0 - uniforms((seed, stream, "amplitude"), 0, count)))
 
@@ -212,7 +213,8 @@ def clear_sums(count: int, sums: Vector) -> None:
 def directions(spreading: int, count: int, seed: int, stream: str) -> Vector:
     """Departures (count,) [rad] of the components from the mean direction, drawn by `seed`.
 
-    Their density is cos^(2 spreading) within a quarter turn to either side; spreading 0: none.
+    `stream` names the random numbers of `seed`. Their density is cos^(2 spreading) within a quarter
+    turn to either side; spreading 0: none.
     With spreading 1 it is that of cybergalactic/MSS, waveDirectionalSpectrum.m.
     """
     if spreading == 0:

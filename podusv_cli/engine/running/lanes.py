@@ -257,7 +257,10 @@ def prepare(plan: Plan, instants: int, compiling: Callable[[float], None] | None
 
 
 def why_alone(plan: Plan, compiling: Callable[[float], None] | None = None) -> str:
-    """Why runs like this loop cannot march side by side; "" where they can. Compiles the march."""
+    """Why runs like this loop cannot march side by side; "" where they can.
+
+    Compiles the march to find out; `compiling` hears the fraction that is compiled.
+    """
     try:
         places(plan)
         marcher(plan, compiling)

@@ -47,7 +47,7 @@ def replayer(
     rows, loop = logged_rows(plan, recording, most), plan.loop
     count, width = rows.shape
     rounds = -(-evaluations // count)
-    # Rate and signals at multiples of the width, then scratch; the last may be longer than that
+    # Rate, signals and scratch begin at multiples of the width, see `rk4.evaluate_all`
     room = max(width, len(loop.controller.signals)) * 2 + loop.controller.workspace()
     constants = plan.law_constants
     p = np.array(list(constants.values()))
@@ -113,7 +113,7 @@ def rates_at(plan: Plan, *, compiled: bool = True) -> Callable[..., Vector]:
 def rates_replay(plan: Plan, *, compiled: bool = True) -> Callable[[Recording], Replayed]:
     """A function that gives the loop's right-hand side at every row of a recording of it.
 
-    As `rates_at` has it.
+    As `rates_at` has it, in machine code if `compiled`.
     """
     labels, split, about = plan.names, 1 + plan.layout.states, plan.about
     state = list(dict.fromkeys(labels[:split]))

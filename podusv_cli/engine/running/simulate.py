@@ -109,7 +109,7 @@ def run_together(plans: Sequence[Plan], *, compiled: bool = True) -> list[Record
 def to_end(
     plan: Plan, *, compiled: bool = True, progress: Callable[[float], None] | None = None
 ) -> Recording:
-    """As `run`, without an early end: an interrupt raises KeyboardInterrupt."""
+    """As `run`, for work that needs the whole run: an interrupt raises KeyboardInterrupt."""
     recording = run(plan, compiled=compiled, progress=progress)
     if recording.status == "interrupted":
         raise KeyboardInterrupt

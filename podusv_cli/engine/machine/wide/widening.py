@@ -114,7 +114,7 @@ class Blocks(Instructions):
             self.put(f"br i1 {self.any(mask)}, label %at.{header}, label %{then}")
 
     def _waiting(self, level: NodeLevel, node: Node) -> set[Node]:
-        """The nodes of a level at which lanes may wait once `node` is done."""
+        """The nodes of a level at which lanes may wait while control is at `node`."""
         return self.masks.waiting[level.loop][node]
 
     def _first(self, level: NodeLevel, targets: set[Node]) -> str:
