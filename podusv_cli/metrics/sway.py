@@ -91,7 +91,7 @@ def _size_of_thrust(layout: Measured) -> int:
 
 
 def _thrusters(layout: Measured) -> dict[str, float]:
-    """How many there are, the column of the first one's thrust, and full thrust [N]."""
+    """How many thrusters there are, the column of the first one's thrust, and full thrust [N]."""
     names = [signal.name for signal in layout.loop.actuator.signals]
     return {
         "thrusters": float(names.count(THRUST)),

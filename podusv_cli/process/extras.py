@@ -53,7 +53,7 @@ class Extras:
         return None
 
     def attempt(self, what: str, work: Callable[[], Result]) -> Result | None:
-        """The same for work that an interrupt may end: None then, and nothing in `missing`.
+        """As `make_or_record`, for work that an interrupt may end: then None, without a failure.
 
         After an interrupt no further work is begun.
         """

@@ -100,7 +100,7 @@ class Archive:
     """
 
     def __init__(self, path: Path, archive: zipfile.ZipFile) -> None:
-        """Raises StorageError for an archive that must not be unpacked."""
+        """The content of an `archive` at `path`; StorageError for one that must not be unpacked."""
         self.path, self._archive = path, archive
         entries = archive.infolist()
         if len(entries) > MOST_FILES:
@@ -117,7 +117,7 @@ class Archive:
         self._check_whole(len(entries))
 
     def text(self, name: str) -> str:
-        """A file as text. Raises StorageError."""
+        """The file `name` as text. Raises StorageError if it is missing, too long or no UTF-8."""
         if name not in self.sizes:
             raise self.fault(f"it has no {name}")
         if self.sizes[name] > files.LARGEST_TEXT:

@@ -31,7 +31,7 @@ class Staging:
     """An unfinished folder: `folder` is where to fill it, `final` its later path."""
 
     def __init__(self, final: Path) -> None:
-        """Make the hidden folder and its parents. Raises StorageError."""
+        """Make the hidden folder beside the `final` path, and its parents. Raises StorageError."""
         self.final = final
         self._box = final.with_name(temporary_name(final.name))
         try:

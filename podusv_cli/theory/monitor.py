@@ -233,7 +233,7 @@ class _Bounds:
     continuous: bool
 
     def window(self, since: float) -> Window:
-        """The part of the run from a time [s] on, with its largest values and bounds."""
+        """The part of the run from the time `since` [s] on, with its largest values and bounds."""
         # 1e-9 s: times of a log are rounded
         rows = slice(int(np.searchsorted(self.log["time"], since - 1e-9)), None)
         value, rate = self.traces["V"][rows], self.traces["V_dot"][rows]

@@ -47,7 +47,7 @@ RETURNS_NOTHING = {ast.dump(ast.Return()), ast.dump(ast.Return(ast.Constant(None
 
 
 def check_kernel(function: Any) -> None:
-    """Look at a kernel from outside podusv, and at all kernels it calls.
+    """Check a kernel from outside podusv, and all kernels it calls.
 
     Raises LawError with file, line and what to write, for the first fault.
     """

@@ -220,7 +220,7 @@ class _Runs:
         self._over, self._settled = 0, False
 
     def march(self, workers: int) -> bool:
-        """March over all runs; an interrupt or an error stops those that are under way.
+        """March over all runs, `workers` at a time; an interrupt or an error stops all of them.
 
         Returns whether it was an interrupt. Runs are made while others march, so that the memory of
         few is needed; what is left over for lanes comes last.

@@ -110,7 +110,7 @@ class Work:
         return int(self._under_way[0]) if self.result is None else self.result
 
     def ending(self, last: int) -> Ending:
-        """How a march up to this instant ended; one that hangs is abandoned."""
+        """How a march up to the instant `last` ended; one that hangs is abandoned."""
         if self.result is None:
             self.stop()  # should the law return one day
             return Ending(

@@ -109,7 +109,7 @@ class Instructions(Values):
     """Writes instructions."""
 
     def __init__(self, masks: Masks) -> None:
-        """Nothing is written yet."""
+        """Nothing is written yet; `masks` are those of the function that is to be widened."""
         super().__init__(masks)
         self.declared: dict[str, str] = {}
         self.sizes = {
@@ -129,7 +129,7 @@ class Instructions(Values):
             raise NotForLanes(instruction.words)
 
     def _lanewise(self, instruction: Instruction) -> None:
-        """An operation on the numbers of every lane, as it is on one."""
+        """Write an operation on the numbers of every lane, as it is on one."""
         kind, differs = instruction.kinds[0], self.differs(instruction.name)
         operands = [self.wide(o, kind) if differs else self.plain(o) for o in instruction.operands]
         if differs and instruction.opcode in DIVISIONS:  # by zero, one would end the process
@@ -147,7 +147,7 @@ class Instructions(Values):
         return self.let(f"select {MASK} {self.mask(one.block)}, {over} {value}, {over} {other}")
 
     def _select(self, instruction: Instruction) -> None:
-        """A choice in each lane, or one for all where the condition is the same in all of them."""
+        """Write a choice in each lane, or one for all where the condition is the same in all."""
         (condition, *_), differs = instruction.operands, self.differs(instruction.name)
         chosen = self.operands_with_types(
             instruction.typed_operands[:1], differs and self.differs(condition)
@@ -164,7 +164,7 @@ class Instructions(Values):
         self.places.append(f"{instruction.name} = alloca {room(in_memory(instruction))}, align 64")
 
     def _getelementptr(self, instruction: Instruction) -> None:
-        """A place in memory; in that of all lanes, LANES numbers stand for one.
+        """Write a place in memory; in that of all lanes, LANES numbers stand for one.
 
         Where the place differs between lanes it is a vector of pointers.
         """
@@ -213,7 +213,10 @@ class Instructions(Values):
         return [self.let(f"getelementptr {kind}, ptr {p}, i64 {i}") for i, p in enumerate(begins)]
 
     def _load(self, instruction: Instruction) -> None:
-        """A whole register from memory of all lanes; one number a lane where places differ."""
+        """Write the reading of a whole register from memory of all lanes.
+
+        It reads one number a lane where places differ.
+        """
         pointer = instruction.operands[0]
         if "volatile" in instruction.words or "atomic" in instruction.words:
             raise NotForLanes(instruction.words)
@@ -232,7 +235,7 @@ class Instructions(Values):
         self.set(instruction, f"load {self.kind(instruction)}, ptr {where}{aligned}")
 
     def _store(self, instruction: Instruction) -> None:
-        """Into memory of all lanes, only where the mask is set.
+        """Write the storing of a number into memory of all lanes, only where the mask is set.
 
         A number into plain memory has to be the same in all lanes, or it is NotForLanes.
         """
@@ -258,7 +261,7 @@ class Instructions(Values):
         self.put(f"store {lanes(kind)} {new}, {where}")
 
     def _call(self, instruction: Instruction) -> None:
-        """A call: a mark of podusv, a compiled part, or a function of the mathematical library."""
+        """Write a call: a mark of podusv, a compiled part, or a function of mathematics."""
         called = instruction.operands[-1]
         name = called.strip('@"')
         if name.startswith(SPOKEN_TO_COMPILER):
@@ -281,7 +284,10 @@ class Instructions(Values):
         self.declared[name] = f'declare {kind} @"{name}"({", ".join(kinds)}) #1'
 
     def _call_part(self, instruction: Instruction) -> None:
-        """A part of the loop, which has its own code for lanes."""
+        """Write the call of a part of the loop, which has its own code for lanes.
+
+        Raises NotForLanes where not every lane calls it, or arguments differ between lanes.
+        """
         if self.masks.of[instruction.block] != EVERY or any(
             map(self.differs, instruction.operands)
         ):
@@ -290,7 +296,7 @@ class Instructions(Values):
         self.put(f"call void {self.plain(instruction.operands[-1])}({given})")
 
     def _call_in_lanes(self, instruction: Instruction, name: str) -> None:
-        """A function without effects: one of exact results for all lanes, else lane by lane.
+        """Write the call of the function `name`, without effects: lane by lane if it is not exact.
 
         Others may round otherwise in their vector form, and runs would not have the bits of one
         that marches alone.

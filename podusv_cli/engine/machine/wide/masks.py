@@ -25,7 +25,7 @@ class Masks:
     """`memory` tells by argument whether what it points at has a number for every lane."""
 
     def __init__(self, function: IrFunction, memory: dict[str, str]) -> None:
-        """Raises NotForLanes for pointers that are computed in a way that cannot be followed.
+        """The masks of a `function`. Raises NotForLanes for pointers that cannot be followed.
 
         What differs makes masks differ, and these make more differ: until nothing new is found.
         """

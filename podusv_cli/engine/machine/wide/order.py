@@ -85,7 +85,10 @@ class Order:
     """Loops and levels of a function."""
 
     def __init__(self, function: IrFunction) -> None:
-        """Raises NotForLanes for a loop with several ways in."""
+        """Loops and order of the blocks of a `function`; `leads` has by block those before it.
+
+        Raises NotForLanes for a loop with several ways in.
+        """
         self.successors = dict(enumerate(function.successors))
         self.leads: dict[int, list[int]] = defaultdict(list)
         for block, targets in self.successors.items():

@@ -25,7 +25,7 @@ class Values:
     """What has been written, and the values that are known in the block under way."""
 
     def __init__(self, masks: Masks) -> None:
-        """Nothing is written yet."""
+        """Nothing is written yet; `masks` are those of the function that is to be widened."""
         self.masks, self.function = masks, masks.function
         self.places: list[str] = []
         self.text: list[str] = []
