@@ -71,7 +71,7 @@ def as_markdown(made: pd.DataFrame) -> str:
 
 
 def _table(made: pd.DataFrame) -> str:
-    """The leaderboard as a table of Markdown."""
+    """The leaderboard of one vessel as a table in Markdown; `made` has its rows."""
     head, *rows = leaderboard_rows(made)
     lines = [head, *([markdown(law), *texts] for law, *texts in rows)]
     joined = [f"| {' | '.join(line)} |\n" for line in lines]
@@ -88,7 +88,7 @@ def _grids(optima: Sequence[Least]) -> dict[str, Any]:
 
 
 def _heat(made: pd.DataFrame, laws: Sequence[str]) -> Iterator[tuple[str, list[Any]]]:
-    """For every vessel the rows of its table: task, condition, a cell a law, least IAE."""
+    """For every vessel the rows of its heat map: task, condition, a cell a law, IAE of `_least`."""
     for vessel, cases in by_vessel(made).items():
         rows = [
             (task, condition, _cells(case, laws), _least(case))
@@ -103,7 +103,11 @@ def _cells(case: pd.DataFrame, laws: Sequence[str]) -> list[PageCell]:
 
 
 def _cell(ratio: float, why: str) -> PageCell:
-    """A cell of the heat map; the colour goes with the logarithm of the ratio to the best."""
+    """A cell of the heat map for a `ratio` of IAE to the best law's; inf is a failure, due to
+    `why`.
+
+    The colour goes with the ratio's logarithm, from PALE at 1 to DARK at DARKEST.
+    """
     if not math.isfinite(ratio):
         return PageCell(CROSS, "#f6d5c3", "#7a2b00", why)
     depth = min(math.log(ratio) / math.log(DARKEST), 1.0)

@@ -62,7 +62,8 @@ class Statistic:
         return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
 
     def as_json(self) -> dict[str, object]:
-        """Plain data; what is infinite or undefined is None."""
+        """Plain data; what is infinite or undefined is None, and the cell is left out if it is "".
+        """
         return {k: _plain(v) for k, v in vars(self).items() if v != "" or k != "cell"}
 
 
@@ -103,7 +104,8 @@ class StudyVerdict(Verdict):
         return "; ".join([*(part.in_words() for part in self.parts), *self.reasons()])
 
     def reasons(self) -> Iterator[str]:
-        """What a reader has to know beside the numbers."""
+        """Sentences that a reader needs beside the numbers: level, missing draws, open answer,
+        broken runs."""
         yield f"intervals at {100 * self._inside:.4g} %"
         if self.preliminary:
             yield f"preliminary: {self.draws} of {self.wanted} draws"
@@ -120,7 +122,10 @@ class StudyVerdict(Verdict):
         return self.parts[0].level if self.parts else self.level
 
     def _doubt(self) -> str:
-        """Why the answer is "cannot tell", and what would change that."""
+        """Why the answer is "cannot tell", and what would change that.
+
+        The reasons come in the order in which they explain: without runs nothing else matters.
+        """
         if not self.draws:
             return "no draw has runs of all laws in the claim"
         if None not in self.by_cell.values():
