@@ -62,8 +62,8 @@ class Statistic:
         return f"{self.statistic}{at} = {interval:.4g} ({', '.join(counts)})"
 
     def as_json(self) -> dict[str, object]:
-        """Plain data; what is infinite or undefined is None, and the cell is left out if it is "".
-        """
+        """Plain data; what is infinite or undefined is None. A study without a grid has
+        no `cell`."""
         return {k: _plain(v) for k, v in vars(self).items() if v != "" or k != "cell"}
 
 

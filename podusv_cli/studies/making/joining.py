@@ -43,7 +43,7 @@ class SeenRuns:
         self._stores: list[Store] = []
 
     def add(self, store: Store) -> None:
-        """See all runs of a folder. Raises StorageError where one was seen with other numbers."""
+        """Note all runs of a folder. Raises StorageError where one was seen with other numbers."""
         self._stores.append(store)
         for new in store.results():
             place, rows = (new.unit.law, new.unit.cell), slice(new.unit.first, new.unit.draws.stop)
@@ -52,6 +52,7 @@ class SeenRuns:
             other = (origins != NOWHERE) & (known != new_digests)
             if other.any():
                 self._refuse(new, other, self._stores[origins[np.argmax(other)]])
+            # Views of rows: this writes into the tables of digests and origins.
             known[:], origins[:] = new_digests, len(self._stores) - 1
 
     def _refuse(self, new: UnitResult, other: Mask, earlier: Store) -> None:
@@ -69,9 +70,14 @@ class SeenRuns:
 
 
 def digests(result: UnitResult) -> Any:
-    """A digest of each run of a unit; NaN is one number, whatever its bits."""
+    """A digest of 64 bits for each run of a unit (count,).
+
+    It covers metrics by name, end time, status and cause, so that the order of metrics does not
+    matter.
+    """
     columns = [*(result.metrics[name] for name in sorted(result.metrics)), result.until]
     table = np.column_stack([*columns, result.status])
+    # NaN has many bit patterns; all count as the same number.
     table[np.isnan(table)] = np.nan
     run_digests = (
         hashlib.blake2b(row.tobytes() + cause.encode(), digest_size=SIZE).digest()
@@ -81,7 +87,8 @@ def digests(result: UnitResult) -> Any:
 
 
 def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
-    """The names of what is different of one run."""
+    """What the same run (number `draw`) has with other values in `earlier`: names of metrics, or
+    status, until, cause."""
     old = next(
         result
         for result in earlier.results()
@@ -95,7 +102,7 @@ def _differing(new: UnitResult, earlier: Store, draw: int) -> Iterator[str]:
 
 
 def _run(result: UnitResult, draw: int) -> dict[str, Any]:
-    """All numbers of one draw of a unit, by name."""
+    """Everything that is known of one draw of a unit, by name; `draw` counts in the study."""
     row = draw - result.unit.first
     arrays: dict[str, Any] = {**result.metrics, "status": result.status, "until": result.until}
     return {name: array[row] for name, array in arrays.items()} | {"cause": result.causes[row]}
@@ -115,6 +122,7 @@ def mixture(folder: Path) -> str:
 def _machines(folder: Path) -> list[str]:
     # A session that was killed has no end, and does not know how many runs it made.
     """The machines that made a study's runs, each once, in the order of sessions."""
+    # A session without runs, such as one that only wrote a report, says nothing of the numbers.
     made = (
         session for session in sessions(folder) if session["runs"] or session["finished"] is None
     )
@@ -157,7 +165,7 @@ def _few(words: Sequence[str]) -> str:
 
 
 def _ranges(mask: Mask, first: int = 0) -> str:
-    """`draw 9`, or `draws 3, 8 to 12`, where a mask is true."""
+    """`draw 9`, or `draws 3, 8 to 12`, where `mask` (n,) is true; its entry 0 is draw `first`."""
     ranges = [range(r.start + first, r.stop + first) for r in stretches(mask)]
     words = [f"{r.start} to {r[-1]}" if len(r) > 1 else str(r.start) for r in ranges]
     return f"draw{'s' if np.sum(mask) > 1 else ''} {_few(words)}"

@@ -44,6 +44,7 @@ def _place_plan(recipe: StudyText) -> tuple[StudyPlan, TemporaryDirectory[str]]:
     for name, text in recipe.plugins:
         place = Path(folder.name, name)
         place.parent.mkdir(exist_ok=True)
+        # Plug-ins are files to the scenario, so they are written as files here as well.
         place.write_text(text, encoding="utf-8")
     source = str(Path(folder.name, "scenario.yaml"))
     return plan(load_text(recipe.text, source, plugged=of_files(trusted=True))), folder
@@ -78,7 +79,8 @@ def report(text: str, plugins: Plugins) -> Report:
 
 
 def differing(ours: Report, theirs: Report) -> str:
-    """What is different in a worker's report, and a remedy; "" where nothing is."""
+    """What differs in a worker's report (`theirs`) from ours, with a remedy; "" where
+    nothing does."""
     differences = [
         f"{name} is {theirs.get(name, 'not there')}, not {word}"
         for name, word in ours.items()
@@ -108,7 +110,12 @@ def make_unit(
     expected: str,
     variant: tuple[Any, ...] | None = None,
 ) -> Reply:
-    """Make a unit (law, cell, first draw, number of draws) of a study or a variant, on a worker."""
+    """Make one unit (law, cell, first draw, number of draws) on a worker of the cluster.
+
+    `text` and `plugins` are the study, `variant` the fields of a `Variant`, if any: plain data
+    alone, since objects of another podusv could not be read. No unit is made where the digest of
+    the worker's report is not `expected`.
+    """
     from distributed import get_worker
 
     facts, outcome, recipe = report(text, plugins), None, StudyText(text, plugins)

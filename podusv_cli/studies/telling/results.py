@@ -118,7 +118,8 @@ class Results:
         return replace(self, parsed=(), verdicts=(), contradicted=contradicted)
 
     def cells(self) -> tuple[list[str], list[list[str]]]:
-        """Head and rows of the table of the answer: failures and medians of every law."""
+        """Head and rows of the answer's table as text: share of failures and medians
+        for every law."""
         several, about = (
             len(self.runs.cells) > 1,
             [self.known_metrics[name] for name in self.shown_metrics],
@@ -140,7 +141,10 @@ class Results:
         return [failed, *self.medians(mine)]
 
     def medians(self, mine: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        """Medians of the shown metrics in these rows, by metric; a dash where there is none."""
+        """Medians of the shown metrics as text, a dash where there is none.
+
+        `mine` are the summary rows of one law and cell, by metric.
+        """
         return [
             digits(number, infinite=self.known_metrics[name].infinite)
             for name in self.shown_metrics
@@ -159,12 +163,14 @@ class Results:
 
 
 def judge_study(about: StudyAbout, runs: RunsTable) -> Results:
-    """All tables and verdicts of a study's runs."""
+    """All tables and verdicts of a study's runs; without intervals where draws are not
+    independent."""
     level, known = about.level, about.metrics
     parsed = [
         claims.ParsedStudyClaim(name, claim, claims.parse(claim.expect, about.laws, known))
         for name, claim in about.claims.items()
     ]
+    # The size of a seed means nothing, so it correlates with nothing.
     numbers = {
         q: values for q, values in runs.drawn_quantities.items() if not about.quantities[q].is_seed
     }

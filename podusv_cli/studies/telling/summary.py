@@ -20,7 +20,10 @@ Rows = list[dict[str, Any]]  # of a table, each by the names of the columns
 
 
 def summary(runs: StudyRuns, level: float, metrics: Known) -> Rows:
-    """For every law, cell and metric: failures and quantiles over all draws, with intervals."""
+    """For every law, cell and metric: failures and quantiles over all draws, with intervals.
+
+    `level` is the confidence of each interval, as 0.95.
+    """
     return [
         {
             **_failures(runs, law, cell, level),
@@ -58,6 +61,7 @@ def pairs(
             **_pair(sign * of_a[used], sign * of_b[used], margin, level),
         }
         for name in _names(runs, metrics)
+        # More is better: the negated metric is compared.
         for sign in [-1.0 if metrics[name].margin else 1.0]
         for cell in range(len(runs.cells))
         for read in [{a: column_of(runs, law, cell, metrics[name]) for a, law in laws.items()}]
@@ -71,8 +75,9 @@ def pairs(
 def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics: Known) -> Rows:
     """Spearman's rank correlation of every metric with every drawn number, by law and cell.
 
-    Of the `n` draws in which the metric is known. `by_chance` is what unrelated quantities stay
-    within. Words that are drawn have no ranks.
+    `draws` are the drawn quantities (draws,) by name; words have no ranks and are left out. Column
+    `n` counts draws with the metric; `by_chance` is what unrelated quantities stay within at
+    `level`.
     """
     drawn = {name: np.asarray(values) for name, values in draws.items()}
     numbers = {name: values for name, values in drawn.items() if values.dtype.kind in "fiub"}
@@ -97,7 +102,7 @@ def sensitivity(runs: StudyRuns, draws: Mapping[str, Any], level: float, metrics
 
 
 def without_intervals(rows: Rows) -> Rows:
-    """The table with nothing in all columns that need independent draws."""
+    """The table with NaN in all columns that need independent draws."""
     return [
         {
             name: np.nan if name.endswith(ENDS) or name == "by_chance" else cell
@@ -113,7 +118,7 @@ def _names(runs: StudyRuns, metrics: Known) -> list[str]:
 
 
 def column_of(runs: StudyRuns, law: str, cell: int, about: MetricAbout) -> Vector | None:
-    """A metric of every draw of a cell, the `worst` for a run that failed; None where it has none.
+    """A metric (draws,) of a cell, the `worst` for a run that failed; None where the law has none.
 
     It has the metric where a run that succeeded has it, or where there is no such run.
     """
@@ -153,7 +158,11 @@ def _quantiles(values: Vector, level: float) -> dict[str, Any]:
 
 
 def _pair(a: Vector, b: Vector, margin: float, level: float) -> dict[str, Any]:
-    """Two laws in the same draws (n,): wins, ties and ratio; less than `margin` apart is a tie."""
+    """Two laws in the same draws (n,): wins, ties and ratio.
+
+    Values within `margin` of each other, relative to the larger, are a tie; `level` is the
+    confidence.
+    """
     compared = statistics.pairs(a, b, margin)
     ratio = statistics.quantile(statistics.ratios(a, b), statistics.MEDIAN, level)
     return {

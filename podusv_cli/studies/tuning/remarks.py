@@ -17,7 +17,8 @@ BETTER = 0.8  # of the others' error: a law that ought to be noticed
 
 
 def remarks(results: SearchResults) -> list[str]:
-    """The answer first, then what it hangs on, and what a user may want to change."""
+    """Sentences on the result: the answer, what it depends on, and what a user may want
+    to change."""
     return [
         *_answer(results),
         *_power(results),
@@ -145,7 +146,8 @@ def _few(results: SearchResults) -> Iterator[str]:
 
 
 def _remark_overfitted(results: SearchResults) -> Iterator[str]:
-    """Laws whose chosen search is not the best one on fresh draws."""
+    """Laws of which another search than the chosen one does better on fresh draws, by
+    over MARGIN."""
     for law in results.winners:
         reached = results.spread(law)
         taken = reached[results.winners[law].index(results.winner(law))]
@@ -159,7 +161,7 @@ def _remark_overfitted(results: SearchResults) -> Iterator[str]:
 
 
 def _beyond(results: SearchResults) -> Iterator[str]:
-    """Inequalities that gains hold on the training draws, and not on the fresh ones."""
+    """Inequalities that the found gains hold on the training draws, and not on the fresh ones."""
     table = results.limits
     after: Any = table[table["when"] == "after"].to_dict("records")
     for row in after:

@@ -102,7 +102,8 @@ def ratio(row: Any) -> str:
 
 
 def spread(row: Any) -> str:
-    """The median, the least and the largest objective of the searches' winners."""
+    """The objective of the searches' winners: median (least to largest); a dash for a single
+    search."""
     middle, low, high = (row[f"repeats_{end}"] for end in ("median", "low", "high"))
     if math.isnan(low) or low == high:
         return "-"
@@ -118,7 +119,7 @@ def place(row: Any) -> str:
 
 
 def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
-    """Every pair of laws with its numbers before and after."""
+    """Every pair of laws with its numbers before and after, for the first metric."""
     table = results.pairs
     table = table[table.metric.isin(results.shown_metrics[:1])]
     by = {when: rows.to_dict("records") for when, rows in table.groupby("when")}
@@ -135,7 +136,10 @@ def _pairs(results: SearchResults) -> Iterator[dict[str, Any]]:
 
 
 def _order_change(before: Any, after: Any) -> str:
-    """Whether the search turned the order of two laws, beyond doubt."""
+    """Which law overtakes the other by the search, with both intervals clear of 1; else empty.
+
+    `before` and `after` are rows of the same pair.
+    """
     if before["ratio_low"] > 1.0 > after["ratio_high"]:
         return f"{before['a']} overtakes"
     if before["ratio_high"] < 1.0 < after["ratio_low"]:

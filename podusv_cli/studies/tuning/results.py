@@ -134,7 +134,8 @@ class SearchResults:
 
     @cached_property
     def pairs_of_laws(self) -> LawRatios:
-        """Every pair of laws over all of their searches and the fresh draws."""
+        """Every pair of laws by the first metric, over all of their searches and the
+        fresh draws."""
         metric = self.shown_metrics[0]
         runs = {}
         for law in self.plan.laws:
@@ -149,7 +150,10 @@ class SearchResults:
         return searched_names(law, self.trials[law]) if law in self.trials else [law]
 
     def _better_than(self, law: str, when: str) -> int:
-        """How many laws this one is better than in the typical draw, the whole interval of it."""
+        """How many laws this one beats in the same draw, with the whole interval of the ratio.
+
+        `when` is before or after.
+        """
         pairs = self.pairs
         if not len(pairs):
             return 0
@@ -168,6 +172,7 @@ class SearchResults:
         pairs = self.pairs
         own = pairs[(pairs["when"] == "tuning") & (pairs.a == tuned_name(law))]
         own = own[own.metric == self.shown_metrics[0]]
+        # A law that was not searched is its own before and after.
         for end in ("ratio", "ratio_low", "ratio_high"):
             row[end] = float(own[end].iloc[0]) if len(own) else 1.0
         spread = self.spread(law)
@@ -176,7 +181,10 @@ class SearchResults:
         return row
 
     def objective(self, runs: Outcomes, tree: ast.expr) -> Interval:
-        """An objective, with an interval where it is one quantile of one number."""
+        """The value of an objective or statistic, with an interval where it is one quantile.
+
+        NaN ends for anything else, such as a sum.
+        """
         number = evaluate(tree, runs, self.plan.metrics)
         if not isinstance(tree, ast.Call):
             return Interval(number, math.nan, math.nan)
@@ -307,7 +315,11 @@ class SearchResults:
         return pd.DataFrame(rows, columns=["law", "gain", "importance", "low", "high"])
 
     def _importances(self, law: str) -> Iterator[dict[str, float]]:
-        """Of each search's trials without one part of them after the other."""
+        """The importances of gains from each search, PARTS times, each without one part of its
+        trials.
+
+        Searches with too few trials give none.
+        """
         for trials in self.trials[law]:
             for part in range(PARTS):
                 kept = [trial for place, trial in enumerate(trials) if place % PARTS != part]
@@ -346,16 +358,17 @@ def _ends(gain: Gain) -> dict[str, float]:
 
 
 def _range(values: Sequence[float]) -> dict[str, float]:
-    """Mean, least and largest of an importance over searches."""
+    """Mean, least and largest of the importances `values` of one gain."""
     return {"importance": float(np.mean(values)), "low": min(values), "high": max(values)}
 
 
 def _history(law: str, repeat: int, trials: Sequence[GainTrial]) -> Iterator[dict[str, Any]]:
-    """A row for each trial of a search: runs spent so far, and the best value so far."""
+    """A row for each trial of a search: runs spent so far, and the best objective so far."""
     spent, leader = 0, (math.inf, math.inf)
     for trial in trials:
         spent += trial.runs
         if trial.status == FINISHED:
+            # Inequalities come before the objective, as in `trials.best`.
             leader = min(leader, (trial.excess, trial.value))
         yield {
             "law": law,

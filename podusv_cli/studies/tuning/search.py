@@ -79,7 +79,8 @@ class GainSearch:
     def begin(self) -> list[tuple[int, StudyPlan, Unit]]:
         """The first units of the next batch that has to be simulated; none when the budget is used.
 
-        Batches that an earlier session has finished are told to the sampler.
+        A unit comes with its trial's place in the batch. Batches that an earlier session has
+        finished are told to the sampler without being simulated again.
         """
         while (left := self.plan.tune.budget - self.runs_spent) > 0:
             self._ask(left)
@@ -91,15 +92,21 @@ class GainSearch:
         return []
 
     def _first_units(self) -> list[tuple[int, StudyPlan, Unit]]:
-        """The first units of a batch; none where the law refuses all gains, and the batch ends."""
+        """The units of a batch's first draws; none where the law refuses all gains, and the batch
+        ends."""
         draws = self._attempts[0].draws
+        # Refused gains fail at once, in both steps.
         units = self._units(min(self.first, draws)) or self._units(draws)
         if not units:
             self._end()
         return units
 
     def _ask(self, left: int) -> None:
-        """As many trials as the budget has whole ones for; the last one is cut to what is left."""
+        """Ask for as many trials as the budget has whole ones for; the last one is cut to what is
+        left.
+
+        `left` is the budget that is left, in runs.
+        """
         tune = self.plan.tune
         count, draws = min(tune.batch, left // tune.train), tune.train
         if not count:
@@ -109,16 +116,18 @@ class GainSearch:
         ]
 
     def _attempt(self, gains: dict[str, object], draws: int) -> Attempt:
-        """These gains with so many draws to meet; without a plan where the law refuses them."""
+        """A trial of these gains, to meet `draws` draws; without a plan where the law
+        refuses them."""
         taken = with_gains(self.plan.laws[self.law], gains)
         named = {self.law: (self.law, gains)}
         stream = self.plan.stream(self.number)
         return Attempt(gains, draws, self.plan.variant(named, stream, draws) if taken else None, [])
 
     def _known_trials(self) -> list[GainTrial] | None:
-        """The trials of this batch in the file; none for a batch that a smaller budget cut.
+        """The trials of this batch in the file; None where it has to be simulated.
 
-        Raises StorageError where the file has other gains than those asked for.
+        That is so for a batch that is missing or that a smaller budget cut. Raises StorageError
+        where the file has other gains than those asked for.
         """
         kept = [trial for trial in self._kept if trial.batch == self._batch]
         whole = [attempt.draws == self.plan.tune.train for attempt in self._attempts]
@@ -133,7 +142,10 @@ class GainSearch:
         return kept
 
     def _units(self, until: int) -> list[tuple[int, StudyPlan, Unit]]:
-        """The units that take every attempt to so many draws; those refused fail at once."""
+        """The units that take every attempt to `until` draws, with its place in the batch.
+
+        Pruned attempts get none; those that the law refuses fail at once.
+        """
         units = []
         for place, attempt in enumerate(self._attempts):
             unit = Unit(self.law, 0, attempt.draws_met, until - attempt.draws_met)
@@ -153,7 +165,8 @@ class GainSearch:
         return UnitResult(unit, {}, status, nothing, ("the law refuses these gains",) * unit.count)
 
     def take_result(self, place: int, result: UnitResult) -> list[tuple[int, StudyPlan, Unit]]:
-        """Take in a unit; the units that follow once all of its step are there."""
+        """Take in the result of the trial at `place`; the units that follow once all of its step
+        are in."""
         self._attempts[place].results.append(result)
         self._waiting -= 1
         return [] if self._waiting else self._next()
@@ -172,7 +185,9 @@ class GainSearch:
         trials.write(self._folder, self.name, self.trials)
 
     def _is_over(self, attempt: Attempt) -> bool:
-        """Whether a trial is pruned: a sound one of earlier batches is far better."""
+        """Whether a trial is pruned: a sound one of earlier batches is far better on the first
+        draws."""
+        # The very first batch is never pruned, as nothing is known to compare with.
         if not self.trials or attempt.draws_met < self.first:
             return False
         value = self._value(self._first(attempt))
@@ -219,5 +234,5 @@ class GainSearch:
 
 
 def _far(best: float, value: float) -> bool:
-    """Whether a value is worse than the best by more than half of it."""
+    """Whether a value is worse than the best by more than WORSE - 1 times its size."""
     return value > best + (WORSE - 1.0) * abs(best)
