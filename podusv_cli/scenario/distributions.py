@@ -54,21 +54,23 @@ class Bounded(Component):
 
     @lru_cache(maxsize=256)  # noqa: B019  (a value; a draw asks for it again and again)
     def _share_below(self, x: float) -> float:
-        """The share of the whole distribution at or below x, by bisection.
+        """The share of the whole distribution at or below x, by bisection of (0, 1).
 
-        One look at the distribution gives the answers to the next LEVELS questions, whichever
-        way each is answered.
+        One call of `whole`, which is slow for single numbers, gives the answers to the next LEVELS
+        halvings, whichever way each goes.
         """
         low, high = 0.0, 1.0
         for _ in range(HALVINGS // LEVELS):
             edges = _halving_places(low, high)
             below = self.whole(edges[1:-1]) <= x
             first, last = 0, len(below) + 1
+            # Until no float lies between the two ends.
             while last - first > 1 and low < (middle := edges[(first + last) // 2]) < high:
                 if below[(first + last) // 2 - 1]:
                     first, low = (first + last) // 2, float(middle)
                 else:
                     last, high = (first + last) // 2, float(middle)
+        # 1 itself is above every share that is drawn; else the lower end is on the safe side.
         return high if high == 1.0 else low
 
     @model_validator(mode="after")
@@ -132,7 +134,8 @@ def _check_order(name: str, bounds: tuple[float, ...]) -> None:
 
 
 def _corners(name: str, corners: tuple[float, ...]) -> None:
-    """Raises ValueError unless low <= mode <= high and low < high."""
+    """Raises ValueError unless low <= mode <= high and low < high; `name` is the key in
+    messages."""
     low, mode, high = corners
     _check_order(name, corners)
     if not low <= mode <= high:
@@ -150,6 +153,7 @@ def _some(name: str, values: tuple[Any, ...]) -> None:
 def _uniform(bounds: Interval, u: Vector) -> Numbers:
     """A number between the bounds for each `u` (n,) in [0, 1), all alike likely."""
     low, high = bounds
+    # Rounding may take the sum beyond a bound.
     return np.clip(low + u * (high - low), low, high)
 
 
@@ -171,9 +175,11 @@ def _log_uniform(bounds: Interval, u: Vector) -> Numbers:
 
 
 def _triangular(corners: tuple[float, float, float], u: Vector) -> Numbers:
-    """A number for each `u` (n,) in [0, 1) by the inverse of the distribution function."""
+    """A number for each `u` (n,) in [0, 1) by the inverse of the triangle's
+    distribution function."""
     low, mode, high = corners
     width, rise, fall = high - low, mode - low, high - mode
+    # Each branch is a square root: the density rises and falls linearly.
     up, down = low + np.sqrt(u * width * rise), high - np.sqrt((1.0 - u) * width * fall)
     return np.clip(np.where(u * width < rise, up, down), low, high)
 

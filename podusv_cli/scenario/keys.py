@@ -174,6 +174,7 @@ class Key:
         # A section that is left out is its default, whatever its own class would start with.
         given = isinstance(self.default, model)
         default = getattr(self.default, name) if given else field.default
+        # A rule gives its number when the scenario is known; until then it is null.
         if name in model.rules:
             default = None
         return Key(
@@ -189,7 +190,11 @@ class Key:
         )
 
     def item(self, step: str | int) -> Key | None:
-        """The item of a list at a position, or the entry of a mapping of names."""
+        """The item of a list at position `step`, or the entry of a mapping of that name; None if
+        neither.
+
+        NUMBER and NAME stand for any position and any name.
+        """
         is_position = isinstance(step, int) or step == NUMBER
         for member in members(self.annotation):
             parts, types = get_args(member), None
@@ -211,19 +216,27 @@ class Key:
         return None
 
     def _unit_of(self, inner: Any, step: str | int) -> str:
-        """The unit of an item; of "m/s, m/s, rad/s" that at its position in the innermost list."""
+        """The unit of an item at `step`, of type `inner`.
+
+        A unit as "m/s, m/s, rad/s" has one for each position in the innermost list.
+        """
         each = self._inner_unit.split(", ")
         innermost = isinstance(step, int) and get_origin(inner) is not tuple
         return each[int(step) % len(each)] if innermost else self._inner_unit
 
     def of_keys(self, *names: str) -> Key:
-        """This entry of `sweep.vary` (see OF_KEYS), whose numbers are those of the keys `names`."""
+        """This entry of `sweep.vary` (see OF_KEYS), whose numbers are those of the keys `names`.
+
+        Its unit is one that all these keys have; a key may belong to several kinds with several
+        units.
+        """
         home = OF_KEYS[self.path[:-1]]
         places = [(*home, name.rpartition(".")[2]) if home else route(name) for name in names]
         each = [[*self.top.follow(place)] for place in places]
         targets = [key for keys in each for key in keys]
         known = [dict.fromkeys(key.unit or PURE for key in keys) for keys in each]
         units = [unit for unit in known[0] if all(unit in others for others in known)]
+        # Of an open list, items have the type of the key itself.
         several = bool(targets) and get_args(self.annotation)[1:] == (Ellipsis,)
         inner = (targets[0].annotation, Ellipsis) if several else ()
         return replace(
@@ -306,7 +319,7 @@ def limits(field: FieldInfo | None) -> dict[str, Any]:
 
 
 def _metadata(field: FieldInfo) -> Iterator[Any]:
-    """What limits the field, or the number that the field may be beside a word."""
+    """The constraints of a field, also of a number that the field may be beside a word."""
     yield from field.metadata
     for member in get_args(field.annotation):
         if get_origin(member) is Annotated:
@@ -335,7 +348,7 @@ def either(words: tuple[str, ...] | list[str]) -> str:
 
 
 def noun(annotation: Any, *, plural: bool = False) -> str:
-    """What a value is: `a list of 3 numbers`."""
+    """What a value of this type is, in words: `a list of 3 numbers`."""
     parts = sections(annotation)
     others = [
         "a list of these" if parts and _is_list_of(parts, member) else _one(member, plural)
@@ -360,7 +373,7 @@ def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
 
 
 def _one(annotation: Any, plural: bool) -> str:
-    """How one member of an annotation is described to a user: `a list of 2 numbers`."""
+    """How one member of a union is described to a user: `a list of 2 numbers`."""
     parts = get_args(annotation)
     if get_origin(annotation) is Literal:
         return either([str(word) for word in parts])

@@ -35,7 +35,7 @@ def check(root: Node, top: Key, faults: list[Fault]) -> Scenario | None:
 
 
 def with_defaults(key: Key | None, data: Any) -> Any:
-    """The data over the default of its section.
+    """The data over the default of its section, which `key` describes.
 
     Otherwise one key given under `disturbance.b_u` would silently set the others to zero.
     """
@@ -60,6 +60,7 @@ def _faults(root: Node, top: Key, error: ValidationError) -> Iterator[Fault]:
 
 def _is_copied(root: Node, route: Route) -> bool:
     """Whether a value was copied from another section, where it has a message already."""
+    # `controller` is then the first of `controllers`, which has the message.
     if stands_in(root) and route[:1] != ("nominal",):
         return route[:1] == ("controller",)
     if route[:1] not in (("nominal",), ("controllers",)):
@@ -69,7 +70,7 @@ def _is_copied(root: Node, route: Route) -> bool:
 
 
 def _key(top: Key, location: Route) -> Key:
-    """The key at pydantic's location, as far as it is known; members of unions do not count."""
+    """The key at pydantic's location, as far as it is known; tags of unions lead nowhere."""
     key = top
     for step in location:
         key = next(iter(key.inside(step)), key)
@@ -114,7 +115,10 @@ def _several(section: Key, given: Node) -> str:
 
 
 def _elsewhere(section: Key, name: str) -> str:
-    """`; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`."""
+    """Where else a key `name` belongs, as the end of a message; "" where it is unknown everywhere.
+
+    `; K_Pu belongs to kind pid`, or at the top `; did you mean 'controller.K_Pu'?`.
+    """
     if section.path:
         same = section.top.follow(section.path)
         of_kinds = {key.kind: key for key in same} if len(same) > 1 else same[0].kinds
@@ -176,7 +180,10 @@ def _impossible(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _wrong(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
-    """A value of the wrong type or out of range, with what is expected and what was found."""
+    """A value of the wrong type or out of range, with what is expected and what was found.
+
+    `key` describes it; `complaint` is pydantic's.
+    """
     node = follow(root, key.path)[-1]
     if (
         isinstance(node.content, dict) and key.section
@@ -196,6 +203,7 @@ def _hint(node: Node, key: Key) -> str:
         return f"; write {int(node.content)}"
     if node.content is None and key.section:
         return "; it cannot be left out"
+    # Hydrodynamic derivatives of damping are negative.
     if type(node.content) in (int, float) and limits(key.field).get("le") == 0:
         return f"; it is negative here, as it is published with the force: {-node.content:g}?"
     if node.mapping and str in key.types:

@@ -198,9 +198,10 @@ class Scenario(Component):
         )
 
     def in_numbers(self) -> Scenario:
-        """With a number in place of each null that means "from hull and actuator".
+        """The scenario with a number in place of each null that means "from hull and actuator".
 
         Made once when a scenario is loaded, and again where a draw changes what the facts are of.
+        Raises SizingError where no number follows.
         """
         if not self.keys_by_rule():
             return self
@@ -219,7 +220,8 @@ class Scenario(Component):
         )
 
     def keys_by_rule(self) -> list[tuple[str | int, ...]]:
-        """The steps of every key whose number `in_numbers` gave."""
+        """The steps of every key whose number `in_numbers` gave, such as ("controllers", "pid",
+        "K_P")."""
         seas = self.disturbance
         parts: list[tuple[tuple[str | int, ...], Component]] = [
             (("path",), self.path),
@@ -322,7 +324,10 @@ class Scenario(Component):
         return self.time_grid().last_part(self.metrics.steady_fraction)
 
     def passed_by(self, share: float) -> dict[str, float]:
-        """Where this share of the path lies behind the vessel: numbers of the path's `places`."""
+        """How far along the path the vessel is when this `share` (0 to 1) of it lies behind.
+
+        Numbers of the path's `places`, by name.
+        """
         return passed_by(self.path, self.controller, share)
 
     def at_target(self, numbers: Mapping[str, float]) -> bool:
@@ -335,7 +340,7 @@ class Scenario(Component):
         )
 
     def disturbances(self) -> dict[str, Disturbance]:
-        """The disturbance, or each of several, by its key."""
+        """The disturbances by their keys: `disturbance`, or `disturbance[0]`, ... of a list."""
         sea = self.disturbance
         if not isinstance(sea, tuple):
             return {"disturbance": sea}
@@ -376,6 +381,7 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
         for name, base in BASES.items()
     }
     sea: Any = kinds["disturbance"]
+    # Types that are made at run time, which mypy cannot follow.
     annotations = kinds | {
         "disturbance": Summands[sea],  # type: ignore[misc]
         "controllers": GenericAlias(dict, (str, kinds["controller"])),
@@ -393,9 +399,10 @@ def _class(plugins: Plugins, _places: tuple[str, ...]) -> type[Scenario]:
 def _unpickle(
     files: Iterable[tuple[str, str]], data: dict[str, Any], open_choice: bool
 ) -> Scenario:
-    """The scenario that another process pickled; `files` are path and text of plug-ins.
+    """The scenario that another process pickled.
 
-    `open_choice` is for a scenario with several laws, of which none was chosen.
+    `files` are path and text of plug-ins, `data` the scenario as given. `open_choice` says that
+    `controller` is the first of several laws itself, not an equal one.
     """
     made = scenario_class((*(from_file(*one) for one in files), *installed_plugins()))(
         **data

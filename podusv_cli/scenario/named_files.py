@@ -46,8 +46,9 @@ def with_contents(root: Node, top: Key, faults: list[Fault], remarks: list[str])
 
 
 def fill_sections(root: Node, top: Key, faults: list[Fault], fill: Fill) -> Node:
-    """The tree with every section that is a component as `fill` has it."""
+    """The tree with every section that is a component as `fill` makes it; `top` has the keys."""
     default = root.mapping.get("controller")
+    # A law without a kind has that of `controller`.
     usual = {"controllers": default.word("kind")} if default else {}
     for name, entry in root.mapping.items():
         if key := top.keys.get(name):
@@ -59,7 +60,10 @@ def fill_sections(root: Node, top: Key, faults: list[Fault], fill: Fill) -> Node
 def _fill_section(
     node: Node, key: Key, at: Route, fill: Fill, faults: list[Fault], usual: str = ""
 ) -> Node:
-    """A section with what files hold, the sections in it first; `usual` is a kind not given."""
+    """A section with what files hold, the sections in it first.
+
+    `key` describes it, `at` leads to it; `usual` is its kind where it gives none.
+    """
     section = key.kinds.get(node.word("kind") or usual, key)
     if isinstance(node.content, tuple):
         if not (item := key.item(0)) or not item.keys:
@@ -106,7 +110,11 @@ def _under(
     remarks: list[str],
     faults: list[Fault],
 ) -> Node:
-    """A section over the values that another program's file has, in place of the file's name."""
+    """A section over the values that another program's file has, in place of the file's name.
+
+    `key` names the file. `values_of` reads its text: the values, and sentences on what is left out,
+    which are added to `remarks`.
+    """
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):
         return given
@@ -134,7 +142,11 @@ def _as_node(content: Any, mark: Mark) -> Node:
 
 
 def _in_folder(name: str, folder: str, mark: Mark, key: str, faults: list[Fault]) -> str | None:
-    """The text of a file in a folder that podusv finished."""
+    """The text of the file `name` in a folder that podusv finished, or None and a fault.
+
+    `mark` and `key` are where the scenario names the folder.
+    """
+    # The manifest is written last, so without it the folder is unfinished.
     manifest = os.path.join(folder, "manifest.json")
     if not os.path.isfile(manifest) or not os.path.isfile(os.path.join(folder, name)):
         there = os.path.isfile(manifest)
@@ -158,7 +170,10 @@ def without_files(given: Node, section: str, model: type[Component], faults: lis
 
 
 def _over_file(given: Node, section: str, model: type[Component], faults: list[Fault]) -> Node:
-    """A section over the values of the file that its preset is, where it is one."""
+    """A section over the values of the file that its preset is, where it is one.
+
+    `section` is its key and `model` its class. A file that cannot be read makes the section faulty.
+    """
     if not model.presets or not given.word("preset").endswith(YAML):
         return given
     file = given.mapping["preset"]
@@ -167,6 +182,7 @@ def _over_file(given: Node, section: str, model: type[Component], faults: list[F
     base = read(text, path, faults) if text is not None else None
     if base and not base.mapping:
         faults.append(Fault(file.mark, key, f"{path} is no {model.presets.file}: it has no keys"))
+    # The values stand in the tree from here on, so no preset is named any more.
     none = Node("", file.mark)
     rest = replace(given, content={n: e for n, e in given.mapping.items() if n != "preset"})
     if len(faults) > before or not base:
@@ -178,7 +194,10 @@ def _over_file(given: Node, section: str, model: type[Component], faults: list[F
 
 
 def _with_source(whole: Node, base: Node, given: Node) -> Node:
-    """A section over a file with a `source` that names the numbers that are not the file's."""
+    """A section over a file with a `source` that names the numbers that are not the file's.
+
+    `whole` is the merged section, `base` that of the file, `given` that of the scenario.
+    """
     there = {name: plain(entry) for name, entry in base.mapping.items()}
     changed = [n for n, entry in given.mapping.items() if there.get(n) != plain(entry)]
     if not changed or "source" in changed or not base.word("source"):
@@ -191,7 +210,10 @@ def _with_source(whole: Node, base: Node, given: Node) -> Node:
 def _read_in(
     given: Node, section: str, key: str, taker: str, read: Read, form: Form, faults: list[Fault]
 ) -> Node:
-    """The content of the file that one key names, under the key `taker` in place of the name."""
+    """The content of the file that `key` names, under the key `taker` in place of the name.
+
+    `read` reads the file and `form` makes a node of it; both append to `faults`.
+    """
     file = given.mapping.get(key)
     if not file or not isinstance(file.content, str):
         return given

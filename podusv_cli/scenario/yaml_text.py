@@ -70,12 +70,16 @@ OPENING = ("unexpected end of stream", "but got '<stream end>'")
 
 
 def read_bytes(path: str, mark: Mark, key: str, faults: list[Fault]) -> bytes | None:
-    """What a file holds, or None and a fault at `mark`."""
+    """What a file holds, or None and a fault at `mark`, under the key that names the file.
+
+    `path` is a file or a `podusv:` name. The message names it unless `mark` does.
+    """
     named = "" if mark == Mark(path) else f"{quote(path)} "
     try:
         with open(file_of(path), "rb", opener=_nonblocking_opener) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise ValueError("a pipe or device; save it as a file first")
+            # One byte more, which shows that it is too large.
             data = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = str((isinstance(error, OSError) and error.strerror) or error)
@@ -100,6 +104,7 @@ def _guess_path(path: str) -> str:
         near = [file for file in sorted(os.listdir(folder or ".")) if file.endswith(ENDINGS)]
     whole = [os.path.join(folder, name + end) for end in ENDINGS if name + end in near]
     shipped = [name for name in names() if name in (PREFIX + path, f"{PREFIX}{path}.yaml")]
+    # A name without its ending, or of a shipped scenario without its prefix, is not a guess.
     if exact := [*whole, *shipped]:
         return f"; did you mean {quote(exact[0])}?"
     stems = {os.path.splitext(file)[0]: file for file in near}
@@ -161,7 +166,10 @@ def plain_node(text: str, mark: Mark, key: str, faults: list[Fault]) -> Node:
 
 
 def text_node(content: Any, mark: Mark, key: str, faults: list[Fault], *, text: str = "") -> Node:
-    """The node of a scalar; control characters are a fault."""
+    """The node of a scalar; control characters are a fault, as a terminal may obey them.
+
+    `text` is the scalar as written.
+    """
     unfit = [c for c in str(content) if unicodedata.category(c) in ("Cc", "Cs") and c not in "\t\n"]
     if unfit:
         faults.append(Fault(mark, key, f"character U+{ord(unfit[0]):04X} cannot stand in text"))
@@ -193,7 +201,8 @@ def read(
 def _events(text: str) -> Iterator[Any]:
     """The parser's events, by libyaml where it reads the text as PyYAML's own parser does.
 
-    libyaml is twenty times faster; where it stops, PyYAML goes on, whose messages say more.
+    libyaml is twenty times faster. Where it stops with an error, PyYAML goes on behind the events
+    that are out already, since its messages say more.
     """
     given = 0
     if not READ_ELSE.search(text):
@@ -251,7 +260,7 @@ class _Reader:
         return node
 
     def _next(self) -> Any:
-        """The next event of PyYAML, whose errors become _CannotContinue with a place."""
+        """The next event of PyYAML. Raises _CannotContinue, with a place, for its errors."""
         try:
             event: Any = next(self._events)
         except yaml.MarkedYAMLError as error:
@@ -293,7 +302,10 @@ class _Reader:
         self._faults.append(Fault(self._start(event), dotted_key(route), text))
 
     def _node(self, event: Any, route: Route) -> Node:
-        """The tree that begins with `event`, at `route`; aliases, anchors and tags are faults."""
+        """The tree that begins with `event`, at `route`; aliases, anchors and tags are faults.
+
+        Raises _CannotContinue where there are too many values or levels.
+        """
         self._nodes += 1
         if self._nodes > self._most:
             raise _CannotContinue(self._start(event), f"more than {self._most:,} values")
@@ -341,7 +353,10 @@ class _Reader:
         return Node(entries, self._start(event))
 
     def _key(self, event: Any, route: Route, advice: str) -> str | None:
-        """The key, or None after a fault; with an advice it is none."""
+        """The key of a mapping, or None after a fault.
+
+        `advice` is the end of a message where the key shows what was meant, else "".
+        """
         is_word = isinstance(event, yaml.ScalarEvent)
         node = self._node(event, route if is_word else (*route, "?"))
         if is_word and isinstance(node.content, str) and not advice:
@@ -353,7 +368,10 @@ class _Reader:
 
 
 def _decimal_comma(event: Any, before: dict[str, Node]) -> str:
-    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}` or in `{x:1,5}`; else ""."""
+    """`; write a decimal point: 1.5`, for the 5 in `{x: 1,5}` or in `{x:1,5}`; else "".
+
+    `event` is a key and `before` are the entries ahead of it: a comma starts a new entry.
+    """
     name, last = next(reversed(before.items()), ("", None))
     number = (last.text if last else "") or name.rpartition(":")[2]
     fraction = isinstance(event, yaml.ScalarEvent) and event.value.isdigit() and not event.style

@@ -380,8 +380,7 @@ def funnel(curves: Mapping[str, Sequence[Track]]) -> Figure:
     for place, (law, runs) in enumerate(curves.items()):
         color, linestyle, _ = nth_style(place)
         for number, (time, distance) in enumerate(runs):
-            # matplotlib leaves labels that begin with _ out of the legend: one entry a law.
-            label = escaping.figure(law) if not number else "_"
+            label = escaping.figure(law) if not number else "_"  # "_" is not in the legend
             shown = np.maximum(distance, LEAST_DISTANCE)
             axes.plot(time, shown, color=color, linestyle=linestyle, linewidth=0.8, label=label)
     axes.set_yscale("log")
