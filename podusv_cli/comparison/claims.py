@@ -26,7 +26,7 @@ class ParsedClaim:
     given: ast.expr | None = None
 
     def with_labels(self, labels: Mapping[str, str]) -> Self:
-        """The claim with labels in place of its own names for runs."""
+        """The claim with labels in place of its own names for runs; `labels` are by these names."""
         if all(name == label for name, label in labels.items()):
             return self
         expect = with_labels(self.expect, labels)
@@ -78,7 +78,7 @@ def is_timed(claim: Claim) -> bool:
 
 
 def peaks(claims: Sequence[ParsedClaim]) -> dict[str, float]:
-    """Signals of which a claim says how large they become: `max(abs(run.signal)) == number`."""
+    """The sizes that claims say signals become, by signal: `max(abs(run.signal)) == number`."""
     sizes = {}
     for node in (node for parsed in claims for node in ast.walk(parsed.expect)):
         match node:
@@ -106,7 +106,10 @@ def judge(
 def _verdict(
     parsed: ParsedClaim, runs: Mapping[str, ClaimedRun], metrics: Mapping[str, MetricAbout]
 ) -> RunsVerdict:
-    """A claim's verdict: its premise first; an untestable one gets no answer, only numbers."""
+    """A claim's verdict: its premise first; an untestable one gets no answer, only numbers.
+
+    `runs` are by label.
+    """
     evaluation = Evaluation(runs, parsed.claim.tolerance, metrics)
     if parsed.given and (given := evaluation.holds(parsed.given)) is not True:
         doubts = "; ".join(dict.fromkeys(evaluation.doubts))

@@ -54,7 +54,8 @@ def parse(
 ) -> ast.expr:
     """The syntax tree of an expression about these runs; `signals` are those that a run may log.
 
-    It is checked by evaluating it for runs that have all of these. Raises ExpressionError.
+    It is checked by evaluating it for example runs that have all signals and `metrics`. Raises
+    ExpressionError.
     """
     tree = syntax_tree(text, EXAMPLE)
     example = _ExampleRun(signals, metrics)
@@ -119,7 +120,10 @@ class Evaluation(Walk):
     def link(
         self, sign: ast.cmpop, left: ast.expr, a: float, right: ast.expr, b: float
     ) -> Condition:
-        """Whether one number compares so with the next; unknown where they are too close."""
+        """Whether one number compares so with the next; unknown where they are too close.
+
+        `left` and `right` are the nodes of the numbers, for a sentence on why it is unknown.
+        """
         never = a == b == math.inf
         if math.isnan(a) or math.isnan(b):
             return Condition.of([None])
@@ -131,7 +135,7 @@ class Evaluation(Walk):
         return Condition.known_everywhere(self.signs[type(sign)](a, b, self.tolerance))
 
     def _close(self, a: float, b: float) -> bool:
-        """Whether neither is smaller by more than a margin that there is."""
+        """Whether the tolerance covers the difference of a and b, and allows for any at all."""
         apart = below(a, b, self.tolerance) or below(b, a, self.tolerance)
         return not apart and around(max(abs(a), abs(b)), self.tolerance) > 0.0
 
@@ -165,7 +169,8 @@ class Evaluation(Walk):
         return False
 
     def property(self, node: ast.expr) -> Condition:
-        """A check of a run."""
+        """The answer of a check of a run, such as `finished(pid)`; also kept as
+        evidence (1 or 0)."""
         if not isinstance(node, ast.Call):
             refuse(node, f"not a condition; compare numbers, or use one of {', '.join(CHECKS)}")
         name = known_name(function(node), CHECKS, "check")
@@ -216,7 +221,10 @@ class Evaluation(Walk):
         return curve
 
     def _reduce(self, name: str, node: ast.Call) -> float:
-        """A number from a signal, over all times or between two [s]. Raises ExpressionError."""
+        """A number from a signal, over all times or between two [s]; NaN and a doubt where unknown.
+
+        Raises ExpressionError.
+        """
         wanted = " and ".join(["a signal", *filter(None, [SETTINGS.get(name)])])
         count = 1 + (name in SETTINGS)
         if len(node.args) not in (count, count + 2):

@@ -32,9 +32,9 @@ def _bits(array: Vector) -> npt.NDArray[np.int64]:
 
 
 def distances(one: Vector, other: Vector, *, period: float = math.inf) -> Vector:
-    """|one - other|, or the shorter way round a `period`; infinite where one is not finite.
+    """|one - other| in the shape of both, or the shorter way round a `period`.
 
-    0 where both are the same to the last bit.
+    0 where both are the same to the last bit, infinite where one is not finite.
     """
     unequal = differing(one, other)
     with np.errstate(all="ignore"):
@@ -92,7 +92,11 @@ def _ratio(gap: float, whole: float) -> float:
 
 
 def _rank(number: float) -> int:
-    """Position among all floating-point numbers in order; both zeros are at 0."""
+    """Position among all floating-point numbers in order; both zeros are at 0.
+
+    The bits of a positive number, read as an integer, grow with it; a negative one has its sign bit
+    removed.
+    """
     (bits,) = struct.unpack("<q", struct.pack("<d", number))
     return int(bits) if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF)
 
@@ -208,8 +212,8 @@ def _pair_signals(one: Recording, other: Recording) -> Iterator[_Pair]:
 def _shared_times(one: Vector, other: Vector) -> tuple[Vector, Any, Any]:
     """The common times (n,) [s], and their rows in each recording.
 
-    Where logs of one length differ in less than half of their times, these are damaged values on
-    one grid, and the logs are compared row by row.
+    Where logs of one length differ in half of their times or fewer, these are damaged values on one
+    grid, and the logs are compared row by row.
     """
     if len(one) == len(other) and 2 * np.count_nonzero(differing(one, other)) <= len(one):
         return one, slice(None), slice(None)
@@ -222,6 +226,7 @@ def _first(unequal: list[_Pair]) -> Deviation | None:
     places = [(pair, _place_of_maximum(differing(pair.one, pair.other))) for pair in unequal]
     if not places:
         return None
+    # What is constant in time differs from the start: before all rows.
     pair, place = min(places, key=lambda item: -1 if item[0].times is None else item[1][0])
     return _deviation(pair, place)
 
@@ -238,7 +243,7 @@ def _place_of_maximum(array: Any) -> Place:
 
 
 def _deviation(pair: _Pair, place: Place) -> Deviation:
-    """The deviation of two arrays at one place, with the peak of both for comparison."""
+    """The deviation of two arrays at one place, with the largest finite size of both."""
     inner = place if pair.times is None else place[1:]
     index = f"[{','.join(map(str, inner))}]" if inner else ""
     both = np.abs(np.concatenate([pair.one.ravel(), pair.other.ravel()]))

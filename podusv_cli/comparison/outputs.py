@@ -128,7 +128,8 @@ def draw_comparison(
 ) -> dict[str, bytes]:
     """The figures of all runs together by file name: as asked, and as PNGs for the report.
 
-    `names` as `chosen` has them. `workers` processes draw at a time (0: one a core).
+    `names` are those of figures, as `choose_sheets` takes them. `progress` is called with a text
+    and the fraction done. `workers` processes draw at a time (0: one a core).
     """
     # matplotlib is slow to import
     from podusv_cli.figures.drawing import PHONE, choose_sheets, draw_in_parallel
@@ -148,7 +149,7 @@ def as_report(
     provenance: Mapping[str, Any],
     missing: Iterable[object] = (),
 ) -> str:
-    """The HTML report; `figures` as `drawn` gives them."""
+    """The HTML report; `figures` are the files of `draw_comparison`, `missing` what failed."""
     pictures: list[Picture] = []
     if figures:
         from podusv_cli.figures.drawing import PHONE, figures_of  # matplotlib is slow to import

@@ -52,7 +52,7 @@ class Story:
 
 
 def page(story: Story) -> str:
-    """The whole report."""
+    """The whole report as HTML."""
     from markupsafe import Markup  # with jinja2
 
     figures, parts = [*enumerate(story.figures, 1)], _parts(story)
@@ -105,7 +105,7 @@ class Standing(NamedTuple):
 
 
 def _standings(story: Story, rows: Sequence[MetricRow]) -> dict[str, Standing]:
-    """Every run that finished, by label; the rows are those that a reader sees first."""
+    """What the answer says of every run that finished, by label; `rows` come first in the table."""
     best = leaders(story.table, story.metrics, story.unsettled)
     standings = {}
     for label in itertools.compress(story.table.columns, story.table.finished):
@@ -138,10 +138,15 @@ def _by_code(story: Story) -> dict[str, tuple[str, list[Finding]]]:
 def laws(
     tables: Sequence[Sequence[SettingAbout]],
 ) -> list[tuple[SettingAbout, list[SettingAbout | None]]]:
-    """Every key that a law sets otherwise than by default: what it is, and what each law has."""
+    """Every key that any law sets otherwise than by default: what it is, and what each law has.
+
+    `tables` are the settings of each law; None where a law lacks the key.
+    """
     keyed = [{setting.key: setting for setting in table} for table in tables]
+    # Reversed, so that the first law that has a key describes it.
     about = {key: setting for table in reversed(keyed) for key, setting in table.items()}
     keys = dict.fromkeys(setting.key for table in tables for setting in table if setting.changed)
+    # The kind comes first.
     ordered = sorted(keys, key=lambda key: key != "kind")
     return [(about[key], [table.get(key) for table in keyed]) for key in ordered]
 

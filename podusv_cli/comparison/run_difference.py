@@ -88,6 +88,7 @@ def difference(one: RunFolder, other: RunFolder) -> RunDifference:
     """
     entries = [manifest.read(run.path).files[LOG] for run in (one, other)]
     whole = one.has_log and other.has_log
+    # A log has the scenario that made it, also where the file beside it was changed.
     texts = [
         log_reader.resolved_yaml(run.path / LOG) if whole else run.resolved_yaml
         for run in (one, other)

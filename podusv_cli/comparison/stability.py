@@ -28,7 +28,7 @@ def check(theory: Mapping[str, Any], path: Path) -> None:
 
 
 def rows(theories: Mapping[str, Mapping[str, Any]]) -> Iterator[list[str]]:
-    """A row for each run and window; `theories` are the contents of theory.json by label."""
+    """A row of texts for each run and window, under HEAD; `theories` are theory.json by label."""
     for label, theory in theories.items():
         failing = "; ".join(_failing(theory)) or "none"
         for part, window in theory["windows"].items():

@@ -63,7 +63,10 @@ def signals(*names: str) -> Sheet:
 
 
 def grid(count: int, columns: int) -> tuple[Page, list[Axes]]:
-    """A figure with panels over one time, row by row; one alone in the last row fills it."""
+    """A figure with `count` panels over one time, row by row, so many columns of a page wide.
+
+    A panel that is alone in the last row fills it.
+    """
     rows = math.ceil(count / columns)
     figure = new_figure(columns, 0.7 + PANEL_HEIGHT * rows)
     cells = figure.add_gridspec(rows, columns)

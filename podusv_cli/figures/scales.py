@@ -29,7 +29,10 @@ def scaling(runs: Sequence[Shown], span: Span | None = None) -> list[Shown]:
 
 
 def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
-    """The size beyond which an axis is logarithmic, as the peak dwarfs what is usual, or None."""
+    """The size beyond which an axis of signal `name` is logarithmic; None where it is linear.
+
+    That is so where the `peak` dwarfs what is usual; the size is a power of ten.
+    """
     kept = scaling([run for run in runs if run.has(name)])
     usual = max(_usual(run, name) for run in kept)
     if any(run.whole for run in kept):
@@ -38,9 +41,9 @@ def linear_up_to(runs: Sequence[Shown], name: str, peak: float) -> float | None:
 
 
 def _usual(run: Shown, name: str) -> float:
-    """The largest settled value, or a share of the mean size, below which there is only noise.
+    """The usual size of a signal: its largest settled value, or a share of its mean size if larger.
 
-    Of a run that did not get there, the median.
+    Of a run that did not get to its settled part, the median.
     """
     values = run.signal(name)
     counted = slice(*np.searchsorted(run.recording["time"], [run.steady_from, run.counts_to]))
@@ -58,7 +61,8 @@ def mean_size(run: Shown, name: str) -> float:
 
 
 def smallest_distance(runs: Sequence[Shown]) -> float:
-    """The smallest distance [m] worth showing: a step's way, or less where a vessel stays nearer.
+    """The smallest distance [m] worth showing: the way of a step, or less where a vessel stays
+    nearer.
 
     How near a vessel comes in passing depends on where the steps happen to fall.
     """

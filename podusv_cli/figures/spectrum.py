@@ -56,8 +56,9 @@ def spectrum(runs: Sequence[Shown], columns: int) -> Figure:
 
 
 def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> Line2D:
-    """The harmonics of one signal's settled part."""
+    """Draw the rms of each harmonic of one signal's settled part over frequency; the line."""
     rates, power = periodogram(*run.during(name, (run.steady_from, run.counts_to)))
+    # Rate 0, the mean, has no place on a logarithmic axis.
     return axes.plot(rates[1:], np.sqrt(power[1:]), **look)[0]
 
 

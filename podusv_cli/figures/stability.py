@@ -93,7 +93,7 @@ def _stack(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _ultimate(axes: Axes, runs: Sequence[Shown]) -> None:
-    """The bound of V in each part of every run, drawn or, where it is far off, told in words."""
+    """The bound of V in each part of every run: drawn, or put into words where it is far off."""
     largest = max(float(np.max(run.signal("V"))) for run in scaling(runs))
     lines, top = [], largest
     for run in runs:
@@ -124,7 +124,7 @@ def _bounds(run: Shown) -> Iterator[tuple[float, float, float]]:
 
 
 def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
-    """Draw V' and its bound over time; bounds far beyond all rates are left out."""
+    """Draw V' and its bound over time; bounds beyond FAR times all rates are left out."""
     axes.set_ylabel(rf"${V_DOT.symbol}$ [{SUM}/s]")
     runs = [run for run in runs if run.has("V_dot")]
     for run in runs:
@@ -142,7 +142,7 @@ def _rate(axes: Axes, runs: Sequence[Shown]) -> None:
 
 
 def _compress(axes: Axes, settled: float) -> None:
-    """A vertical axis that is logarithmic beyond the settled values, with ticks at some decades."""
+    """Make the vertical axis logarithmic beyond the size `settled`, with ticks at some decades."""
     threshold = 10.0 ** math.ceil(math.log10(settled))
     axes.set_yscale("symlog", linthresh=threshold, linscale=2.0)
     axes.yaxis.set_major_locator(_Decades(threshold))
@@ -174,7 +174,7 @@ def _settled_size(run: Shown, name: str) -> float:
 
 
 def _shares(axes: Axes, run: Shown) -> list[PolyCollection]:
-    """V's terms, stacked, each as its part of V; the layers."""
+    """Draw V's terms, stacked, each as its part of V (0 to 1); the layers, for a legend."""
     time = run.recording["time"]
     terms = np.stack([_means(run.signal(term.name)) for term in TERMS])
     total = terms.sum(axis=0)
@@ -189,4 +189,5 @@ def _means(values: Vector) -> Vector:
     """Means of neighbours in values (n,), at most POINTS of them."""
     width = -(-len(values) // POINTS)
     starts = np.arange(0, len(values), width)
+    # The last group may be smaller.
     return np.asarray(np.add.reduceat(values, starts) / np.diff([*starts, len(values)]))

@@ -44,7 +44,10 @@ WAYPOINT: dict[str, Any] = {**MARK, "marker": "s", "markersize": 5.0, "markerfac
 
 
 def enlargement(runs: Sequence[Shown]) -> float:
-    """How many times larger than life hulls must be drawn to be seen on a map of the whole run."""
+    """How many times larger than life hulls must be drawn to be seen on a map of the whole run.
+
+    A hull is then about a twentieth of the targets' extents.
+    """
     tracks = [target.track() for target in targets(runs)]
     spread = max(float(np.ptp(east) + np.ptp(north)) for east, north in tracks)
     return max(1.0, round(0.05 * spread / max(run.length for run in runs)))
@@ -60,7 +63,7 @@ def map_axes(axes: Axes, east: Span, north: Span) -> None:
 
 
 def hull_of(run: Shown, t: float, scale: float) -> Vector:
-    """Outline of a run's vessel at a time [s], `scale` times as large: columns east, north [m]."""
+    """Outline (5, 2) of a run's vessel at a time [s], `scale` times as large: east, north [m]."""
     x, y, psi = (run.at(t, name) for name in ("x", "y", "psi"))
     ahead, right = (HULL * (scale * run.length, scale * run.about.beam)).T
     north = x + ahead * np.cos(psi) - right * np.sin(psi)
@@ -109,9 +112,11 @@ def trajectory(runs: Sequence[Shown], columns: int) -> Figure:
 def _sheet(
     asides: int, distances: bool, columns: int, shape: float
 ) -> tuple[Page, Axes, list[Axes], Axes | None]:
-    """A figure with a map that is so many times as wide as high, close-ups, and distances.
+    """A figure with a map, `asides` close-ups, and a panel of distances where asked for (else
+    None).
 
-    The map is as wide as its shape asks for: beside the rest, or, where it is wide, above it.
+    `shape` is the map's width over its height: it stands beside the rest, or, where it is wide,
+    above it. `columns` is the width in columns of a page.
     """
     high = columns == 2 and shape < WIDE_MAP
     if high:
@@ -175,7 +180,7 @@ def _own_distance(runs: Sequence[Shown]) -> str:
 
 
 def _between(first: Shown, run: Shown) -> tuple[Vector, Vector]:
-    """Time, and a run's distance from the first one at the same time [m]."""
+    """Time (n,) [s], and a run's distance (n,) [m] from the first one at the same time."""
     t, _ = run.during("x", (0.0, first.end))
     times = first.recording["time"]
     apart = [
@@ -221,7 +226,7 @@ def _draw_hull(axes: Axes, run: Shown, t: float, scale: float) -> None:
 
 
 def _mark_ends(axes: Axes, runs: Sequence[Shown], east: Span, north: Span) -> None:
-    """An x at the last place within the map of every run that did not finish."""
+    """An x at the last place of every run that did not finish, within the map (east, north) [m]."""
     for run in (run for run in runs if not run.whole):
         y, x = run.recording["y"], run.recording["x"]
         inside = (y > east[0]) & (y < east[1]) & (x > north[0]) & (x < north[1])
@@ -247,7 +252,8 @@ class View:
 
 
 def views(runs: Sequence[Shown]) -> list[View]:
-    """Where runs that finished are farthest apart, if anywhere, and the end that all of them have.
+    """The close-ups: where runs that finished are farthest apart, if anywhere, and their common
+    end.
 
     Hulls are shown at one and the same time. Of several targets, the first with its runs. On a path
     that is followed, runs are at other places at one time: shown is the largest deviation from it.
@@ -264,10 +270,12 @@ def views(runs: Sequence[Shown]) -> list[View]:
 
 
 def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle: Vector) -> View:
-    """The runs at a time, with the tracks before and after it."""
+    """The view of the runs at a time `t` [s], about `middle` (2,) [m], with the tracks
+    around it."""
     last = min(run.counts_to for run in runs)
     span = t - LAST_PART * last, min(t + LAST_PART * last, last)
     at = np.array([[run.at(t, name) for name in ("y", "x")] for run in runs])
+    # All hulls are in the view, with some room, unless they are too far apart.
     away = 1.3 * float(np.max(np.hypot(*(at - middle).T)))
     length = max(run.length for run in runs)
     reach = min(max(NEAREST * length, away), FARTHEST * length)
@@ -275,7 +283,7 @@ def _at_once(name: str, t: float, runs: Sequence[Shown], target: Target, middle:
 
 
 def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
-    """Where a run is farthest from its path, once the approach is over."""
+    """The view where a run is farthest from its path, after the approach and until `last` [s]."""
     errors = [np.where(_is_on_leg(run, last), np.abs(run.signal(DEVIATION)), 0.0) for run in runs]
     largest = int(np.argmax([error.max() for error in errors]))
     worst, error = runs[largest], errors[largest]
@@ -287,7 +295,7 @@ def _deviation(runs: Sequence[Shown], target: Target, last: float) -> View:
 
 
 def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
-    """At which instants (rows,), after the approach, the run has come to its leg.
+    """At which instants (rows,), after the approach and until `last` [s], the run is on its leg.
 
     At a change of legs the error begins anew, with up to the radius of acceptance. That is the
     corner's until the vessel crosses the leg, or is as near to it as on half of the leg.
@@ -303,7 +311,8 @@ def _is_on_leg(run: Shown, last: float) -> npt.NDArray[np.bool_]:
 
 
 def _farthest_apart(runs: Sequence[Shown], target: Target, last: float) -> list[View]:
-    """The view of the runs when they fill the largest box; none where that is in the last part."""
+    """The view of the runs when they fill the largest box, up to `last` [s]; none if that is at the
+    end."""
     times = np.linspace(min(run.start for run in runs), last, INSTANTS)
     logs = [run.recording for run in runs]
     tracks = np.array(
@@ -334,7 +343,10 @@ def close_up(axes: Axes, view: View, among: Sequence[Shown]) -> None:
 def _draw_tracks(
     axes: Axes, ahead: Sequence[Target], shown: Sequence[Shown], span: Span, among: Sequence[Shown]
 ) -> None:
-    """Tracks of targets and runs during a time [s]; of equal ones, the first is the broadest."""
+    """Draw tracks of targets and runs during `span` [s]; of equal ones, the first is the broadest.
+
+    `shown` are the runs to draw. Widths go by their place `among` all runs, as in other views.
+    """
     for target in (target for target in ahead if target.in_sight):
         axes.plot(*target.track(span), **target.line_style)
     widths = np.linspace(*BROAD, len(among)) if len(among) > 1 else BROAD[1:]

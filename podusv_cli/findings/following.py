@@ -68,7 +68,9 @@ def legs_too_long(case: Case) -> Sentences:
         return
     start, duration = scenario.start, scenario.simulation.duration
     hops = np.hypot(*np.diff(np.vstack([(start.x, start.y), circles[:, :2]]), axis=0).T)
+    # The start has no circle.
     radii, speed = np.append(0.0, circles[:, 2]), float(case.reference.speed.max())
+    # A leg is over once the vessel is in its circle; overlapping circles leave no way between.
     if np.maximum(hops - radii[:-1] - radii[1:], 0.0).sum() > speed * duration:
         whole = float(hops.sum()) / speed
         yield (
@@ -120,7 +122,7 @@ def station_not_kept(scenario: Scenario, log: Recording) -> Sentences:
 
 
 def _late(missed: bool) -> str:
-    """What a law that is able to arrive lacks."""
+    """What a law that is able to arrive lacks; `missed` where it is past the end of its leg."""
     if missed:
         return (
             "it is past the end of that leg: take a larger path.acceptance, or path.switch: passed"
@@ -129,7 +131,8 @@ def _late(missed: bool) -> str:
 
 
 def _unable(scenario: Scenario) -> list[str]:
-    """Speed and moment that keep a law from arriving: its own, or the hull's."""
+    """Why a law cannot arrive, in sentences: its own limits, or the hull's speed; none
+    if it can."""
     facts, law = scenario.facts, scenario.controller
     speed = median(reference(scenario).speed)
     own = [

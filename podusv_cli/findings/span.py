@@ -17,7 +17,8 @@ def counted_rows(scenario: Scenario, log: Recording) -> Mask:
 
 
 def steady_rows(scenario: Scenario, log: Recording) -> Mask:
-    """The counted rows in the steady window: of the way where a path has an end, else of the time.
+    """The counted rows (n,) in the steady window: of the way where a path has an end, else of the
+    time.
 
     A log that does not come so far on its path has the last part of the time.
     """
