@@ -56,11 +56,12 @@ def nearest_event(claim: ParsedClaim, runs: Mapping[str, PastRun]) -> Event | No
 
 
 def _windows(claim: ParsedClaim) -> Iterator[tuple[str, list[float]]]:
-    """The runs in the numbers of a claim that have a window, each with its start and end [s]."""
+    """Each run in a number of the claim that has a window, with the window's start and end [s]."""
     trees = filter(None, (claim.expect, claim.given))
     for node in (node for tree in trees for node in ast.walk(tree)):
         match node:
             case ast.Call(func=ast.Name(id=name), args=[curve, *rest]) if name in REDUCERS:
+                # Some reducers take a number before the window.
                 edges = rest[1:] if name in SETTINGS else rest
                 if len(edges) == 2:
                     for run in {n.id for n in ast.walk(curve) if isinstance(n, ast.Name)}:

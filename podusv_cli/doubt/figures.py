@@ -60,7 +60,10 @@ def sketches(report: DoubtReport) -> Iterator[Sketch]:
 def specification(
     report: DoubtReport, answer: DoubtAnswer, acting: Sequence[TriedChoice]
 ) -> Figure:
-    """A claim's number over the draws, sorted, with what was drawn below."""
+    """A claim's number over the draws, sorted, with what was drawn below.
+
+    `acting` are the choices that change the number; LANES of them are shown.
+    """
     tried, name = report.tried, answer.verdict.name
     number = answer.number
     numbers = np.array([number.of(world.numbers.get(name, {})) for world in tried.worlds])
@@ -101,10 +104,11 @@ def _lanes(
     numbers: Vector,
     order: Sequence[int],
 ) -> list[int]:
-    """The columns of the draws that explain the turns, then those that the number follows.
+    """The columns of the draws to show: those that explain the turns, then those the number
+    follows.
 
     `numbers` and `order` are (draws,): the claim's number, and the draws from its least to its
-    largest.
+    largest. `acting` are names of choices.
     """
     draws = report.tried.draws
     ranks = np.argsort(np.argsort(numbers))
@@ -121,7 +125,10 @@ def _lanes(
 
 
 def ranges(report: DoubtReport, answer: DoubtAnswer, rows: Sequence[TriedChoice]) -> Figure:
-    """The range of each choice, from its own value to both ends, and where the verdict turns."""
+    """The range of each choice, from its own value to both ends, and where the verdict turns.
+
+    Every range is drawn from -1 to 1 with the own value at 0, whatever its numbers.
+    """
     turns = {
         (t.choice.name, t.value > t.choice.own): t for t in (*answer.turns, *answer.neighbours)
     }
@@ -166,7 +173,7 @@ def ranges(report: DoubtReport, answer: DoubtAnswer, rows: Sequence[TriedChoice]
 def turned_spans(
     shown: TriedChoice, end: float, claim: str, base: Judged
 ) -> Iterator[tuple[float, float]]:
-    """First and last of neighbouring tried values that turn a claim, as parts of the way to an end.
+    """First and last of neighbouring tried values that turn a claim, as parts of the way to `end`.
 
     The parts have the sign of the side; a value alone is both.
     """

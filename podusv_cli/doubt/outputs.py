@@ -44,7 +44,7 @@ class Doubted:
 
 
 def in_words(answer: DoubtAnswer) -> str:
-    """What the verdict hangs on: its word, and how near the nearest place is."""
+    """What the verdict depends on: its word, how near the nearest turn is, and other tasks."""
     nearest = answer.turns[0].share if answer.turns else math.inf
     far = f", {_share(nearest)}" if math.isfinite(nearest) and answer.word == "fragile" else ""
     idle = "" if answer.acted or not answer.word else ": nothing that was moved acts on it"
@@ -165,7 +165,7 @@ def _pictures(report: DoubtReport, extras: Extras) -> list[Picture]:
 
 
 def page(report: DoubtReport, pictures: Sequence[Picture], origin: Mapping[str, Any]) -> str:
-    """The page."""
+    """The report as HTML; `origin` is the provenance of the folder."""
     by_claim = {
         answer.verdict.name: [
             (i, p) for i, p in enumerate(pictures, 1) if p.name.endswith(f"-{answer.verdict.name}")

@@ -29,10 +29,11 @@ def search(
     workers: int = 0,
     progress: Callable[[str, float], None] | None = None,
 ) -> Tried:
-    """Try every choice alone, and draw all at once; shorter after an interrupt.
+    """Try every choice alone, and draw all at once; what is tried is shorter after an interrupt.
 
-    `judge` says what the claims answer in a world. `workers` is the number of processes, 0 for as
-    many as there are cores. `progress` is called with what is tried and its fraction that is done.
+    `claims` are by name, `moving` the choices. `judge` says what the claims answer in a world.
+    `workers` is the number of processes, 0 for as many as there are cores. `progress` is called
+    with what is tried and the fraction done.
     """
     base = judge({})
     numbers = {

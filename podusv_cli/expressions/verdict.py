@@ -74,6 +74,7 @@ class Verdict(ABC):
     def row(self) -> str:
         """The verdict as a row of a table in Markdown."""
         claim, given = self.claim, getattr(self.claim, "given", "")
+        # Only some claims have a premise, those on single runs; a study's have no `given`.
         premise = f", given {markdown_code(given)}" if given else ""
         return (
             f"| {markdown_cell(self.name)} | "

@@ -154,7 +154,7 @@ def steep_waves(case: Case) -> Sentences:
     """Waves break from a seventh of their length on: g T^2/(2 pi)/7 in deep water."""
     for key, part in case.scenario.disturbances().items():
         height, omega = part.sea()
-        # Infinite for a disturbance without waves, whose height is 0.
+        # A disturbance without waves has height 0, and any peak.
         length = 2.0 * math.pi * GRAVITY / omega**2
         if height > BREAKS * length:
             yield At(

@@ -153,6 +153,7 @@ def fast_gain(scenario: Scenario, nu: Vector, loop: Loop) -> str:
         ]
         return min(own, default=np.inf)
 
+    # `min` takes the first of equals, so the loop's own key is sorted first.
     gains = [key for key in type(law).model_fields if isinstance(getattr(law, key), float)]
     return min(
         sorted(gains, key=lambda key: key != loop.key), key=rate_with_halved, default=loop.key

@@ -59,12 +59,15 @@ class Benched:
 def bench(
     wanted: Selection, request: Request, progress: Progress | None = None, *, optimum: bool = False
 ) -> Benched:
-    """Simulate every law in every case and write the leaderboard; `optimum` finds that of each.
+    """Simulate every law in every case and write the leaderboard; `optimum` finds that of each
+    case.
 
-    Raises UsageError (without CasADi, too, if optima are wanted), ScenarioError, LawError before
-    anything is simulated, StorageError, and KeyboardInterrupt; then nothing is written.
+    `progress` is called with what is done and its fraction. Raises UsageError (without CasADi, too,
+    if optima are wanted), ScenarioError, LawError before anything is simulated, StorageError, and
+    KeyboardInterrupt; then nothing is written.
     """
     if optimum:
+        # So that a missing library is told before hours of runs.
         casadi()
     every = list(cases(wanted))
     folder = request.out or RESULTS / "bench"
@@ -72,6 +75,7 @@ def bench(
         extras = writer.extras
         scenarios = [scenario for case in every for scenario in case.laws.values()]
         for position, scenario in enumerate(scenarios, 1):
+            # Before the fork, so that no process compiles it again.
             scenario.ready()
             if progress:
                 progress("compiling, once", position / len(scenarios))
@@ -117,7 +121,7 @@ def _solve_optima(
     progress: Progress | None,
     extras: Extras,
 ) -> Iterator[Least]:
-    """The optima of all cases; what has none is added to `extras`."""
+    """The optima of all cases; one that fails is noted in `extras`. Raises KeyboardInterrupt."""
     wanted, refused = optima.wanted_optima(every, runs)
     extras.missing += [Failure("an optimum for some cases", why) for why in refused]
 

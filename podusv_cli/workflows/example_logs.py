@@ -39,6 +39,7 @@ def _log(single: Scenario) -> str:
     single.ready()
     recording = to_end(single.plan())
     columns = [
+        # A signal with a column for each propeller.
         (recording[name] if place is None else recording[name][:, place]) * factor
         for name, place, factor in COLUMNS.values()
     ]

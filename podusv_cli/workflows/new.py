@@ -109,7 +109,7 @@ class WrittenFiles:
 
 
 def new(what: str, name: str) -> WrittenFiles:
-    """Write the starting files of a part into the current folder.
+    """Write the starting files of a part (`what`, one of PARTS) into the current folder.
 
     Raises UsageError for a name that cannot be one, StorageError where a file exists.
     """

@@ -116,7 +116,7 @@ def plot(runs: Sequence[Path], request: Request, choice: PlotChoice = PlotChoice
 
 
 def _name_members(members: Sequence[Member], labels: Sequence[str]) -> list[Member]:
-    """The runs under the names that are given for them, if any."""
+    """The runs under the names in `labels`, if any. Raises UsageError unless each run has one."""
     if not labels:
         return list(members)
     if len(labels) != len(members) or len({*labels}) < len(labels):
@@ -128,8 +128,13 @@ def _name_members(members: Sequence[Member], labels: Sequence[str]) -> list[Memb
 
 
 def _during(log: Recording, choice: PlotChoice) -> Recording:
-    """The part of a log that is asked for; one that ends before the run does is whole."""
+    """The part of a log that is asked for.
+
+    A part that ends before the run does counts as finished, so that no figure marks its end as a
+    failure.
+    """
     t = log["time"]
+    # The last instant is included.
     first, last = np.searchsorted(t, [choice.since, np.nextafter(choice.until, math.inf)])
     if (first, last) == (0, len(t)):
         return log
@@ -140,8 +145,8 @@ def _during(log: Recording, choice: PlotChoice) -> Recording:
 def _label_members(members: Iterable[Member]) -> list[Member]:
     """Each run folder once, with a label that tells it apart from the others.
 
-    The folder's name, or the scenario's where the folder has none of its own; where several have
-    the same, with their scenario's name, else with the folder around them, else with all of it.
+    The folder's name, or the scenario's where the folder is named by a time; where several have the
+    same, with their scenario's name, else with the folder around them, else with all of it.
     """
     kept = list({_folder(member).resolve(): member for member in members}.values())
     labels = [_short(member) for member in kept]
@@ -165,7 +170,7 @@ def _short(member: Member) -> str:
 
 
 def _empty(runs: Sequence[PastRun], shown: Sequence[Shown]) -> dict[str, str]:
-    """Runs of which nothing can be drawn, and how they ended; UsageError where those are all."""
+    """Runs of which nothing can be drawn, and how they ended. Raises UsageError if none is left."""
     drawable = {run.label for run in shown}
     endings = {
         run.label: run.recording.message or "has a single row"
@@ -212,7 +217,10 @@ def _choose_sheets(
 
 
 def _check_not_finished(out: Path, names: Iterable[str]) -> None:
-    """UsageError where a file to be written belongs to a finished folder, by its manifest."""
+    """Raise UsageError where a file to be written belongs to a finished folder, by its manifest.
+
+    The folder may be `out` or one around it.
+    """
     place = Path(os.path.realpath(out))
     for folder in (place, *place.parents):
         listed = _list_folder(folder)

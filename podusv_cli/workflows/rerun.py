@@ -129,7 +129,10 @@ def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition
 
 
 def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
-    """Simulate the runs of a comparison again and compare each with what there was."""
+    """Simulate the runs of a comparison again and compare each with what there was.
+
+    One that cannot be made is among the failures.
+    """
     again = [
         Member(
             run.path.name,
@@ -166,7 +169,8 @@ def _several(runs: Pairs, request: Request, progress: Progress | None) -> Repeti
 
 @contextmanager
 def _passing(request: Request) -> Iterator[Path]:
-    """A folder that is gone afterwards, for runs that are not to be kept."""
+    """A folder that is gone afterwards, for runs that are not to be kept; else that of
+    `request.out`."""
     if request.out is not None:
         yield request.out.parent
         return

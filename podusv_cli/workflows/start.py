@@ -118,7 +118,7 @@ def start(boat: Boat, out: Path, route: str = "") -> Path:
 
 
 def start_from(preset: str, out: Path, route: str = "") -> Path:
-    """The same for a vessel of podusv whose thrusters are known, too."""
+    """As `start`, for a vessel of podusv whose thrusters are known, too."""
     known = [name for name in preset_names(VESSELS) if name in preset_names(Pods.presets)]
     if preset not in known:
         raise UsageError(unknown_word(f"boat {preset!r}", preset, known))
@@ -127,7 +127,10 @@ def start_from(preset: str, out: Path, route: str = "") -> Path:
 
 
 def _write_new(out: Path, text: str, way: StartingLegs | None) -> Path:
-    """Write a scenario that loads, and its schema. Raises StorageError where `out` exists."""
+    """Write a scenario that loads, and its schema; the scenario's file.
+
+    Raises StorageError where `out` exists, and UsageError where it does not load.
+    """
     if out.exists():
         raise StorageError(f"{out} exists; name another file with --out")
     _check(text, out, way)
@@ -191,7 +194,11 @@ def _hull(boat: Boat, out: Path) -> tuple[Hull, Thrusters]:
 
 
 def _wider(hull: Hull) -> str:
-    """How wide hulls have to be that lie no deeper than that: the depth times the width stays."""
+    """The end of a message: how wide hulls must be that lie no deeper than they are wide.
+
+    Depth times width stays the same for the same mass.
+    """
+    # Rounded up to a centimetre.
     least = math.ceil(100.0 * math.sqrt(hull.draught * hull.narrow)) / 100.0
     return (
         f", or give --hull-beam {least:g} or more: without it, each hull is a tenth of the length "
@@ -254,6 +261,7 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
     storage.make_folder(out.parent)  # the table is read from there
     name = os.path.relpath(words, out.parent)
     file = as_yaml(name) if name.isprintable() else repr(name)
+    # A scenario of two such pods is loaded to read the table as any scenario would.
     alike = [
         f"{{x: -1, y: {y}, table: {file}, n_rate: 4, n_lag: 0.3, angle_limit: 0}}" for y in (-1, 1)
     ]
@@ -326,6 +334,7 @@ def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, 
     vessel, facts = scenario.vessel, scenario.facts
     hull = Hull(vessel.length, vessel.beam, vessel.m, facts.F, speed=facts.U)
     holds = vessel.envelope.speed if vessel.envelope else math.inf
+    # The least of the usual speed, that of the hull's validity, and one that turns within RADIUS.
     speed = float(f"{min(hull.cruise, holds, RADIUS * facts.r_top * hull.length):.2g}")
     way = way or _way_of(hull)
     words = {
@@ -375,7 +384,11 @@ FAST = {  # where that time constant alone would ask for more than full thrust a
 
 
 def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]:
-    """The lines of `vessel`; `numbers` are the estimated derivatives by name, in SI units."""
+    """The lines of the YAML section `vessel`.
+
+    `numbers` are the estimated derivatives by name, in SI units; `known` says if the speed was
+    given.
+    """
     top = f"{hull.top_speed:.3g} m/s at full thrust{'' if known else ' (a guess, Fn 0.4)'}"
     yield "vessel: # `estimated` is no measurement; podusv docs start has the errors to expect"
     yield "  source: estimated from length, beam and mass by podusv start; no number was measured"
@@ -386,12 +399,13 @@ def _vessel(hull: Hull, numbers: dict[str, float], known: bool) -> Iterator[str]
     for name, why in (WHY if numbers["X_uu"] else WHY | FAST).items():
         unit = unit_of(Vessel.model_fields[name])
         yield f"  {name}: {numbers[name]:g} # {unit}, estimated: {why}"
+    # Areas from ahead and from the side [m2].
     front, side = (HEIGHT * hull.length * along for along in (hull.beam, hull.length))
     yield f"  windage: {{A_F: {front:.2g}, A_L: {side:.2g}}} # m2, a guess: 0.1 L high"
 
 
 def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
-    """The lines of `actuator`: a pod for each thruster."""
+    """The lines of the YAML section `actuator`: a pod for each thruster."""
     turning = "fixed" if not thrusters.turn else "turning"
     law = "thrust by a table" if thrusters.table else "so T_nn is the largest thrust [N]"
     yield f"actuator: # {turning} thrusters; n from -1 to 1, {law}"
@@ -405,6 +419,7 @@ def _actuator(hull: Hull, thrusters: Thrusters) -> Iterator[str]:
         angle += ", angle_rate: 1.0, angle_lag: 0.2"
     for lever in thrusters.levers:
         place = f"x: {-AFT * hull.length:.3g}, y: {lever:g}"
+        # n is the part of full speed, -1 to 1. Thrust astern as ahead is a guess.
         force = f"T_nn: {thrusters.thrust:g}, T_nn_astern: {thrusters.thrust:g}"
         force += ", n_max: 1, n_max_astern: 1"
         force = f"table: {thrusters.table}" if thrusters.table else force
@@ -426,6 +441,7 @@ def _study(numbers: dict[str, float]) -> Iterator[str]:
     yield "  printed: [vessel.m] # it was weighed"
     yield "  vary:"
     for name, scatter in SCATTER.items():
+        # A derivative that is 0 cannot be moved by a factor.
         for key in filter(numbers.get, FACTORS[name]):
             low, high = math.exp(-scatter), math.exp(scatter)
             yield f"    vessel.{key}: {{times: {{log_uniform: [{low:.2g}, {high:.2g}]}}}}"

@@ -87,9 +87,9 @@ class Swept:
 def run(config: Config, request: Request, tell: Tell) -> Swept:
     """Simulate what is missing of a study, and judge it once all of it is there.
 
-    `config` is a scenario or the folder of a study. Raises ScenarioError, UsageError where the
-    folder holds another study, StorageError, and KeyboardInterrupt; every unit that was finished is
-    kept.
+    `config` is a scenario or the folder of a study; `tell` is called with the tally after each
+    unit. Raises ScenarioError, UsageError where the folder holds another study, StorageError, and
+    KeyboardInterrupt; every unit that was finished is kept.
     """
     started = datetime.now(UTC)
     made, folder, texts = _plan_study(config, request)
@@ -110,6 +110,7 @@ def _run(store: Store, made: StudyPlan, request: Request, started: datetime, tel
     with executor_for(request, store.folder, made.scenario, store.seal) as executor:
         tally, whole = _march_study(store, made, request, started, executor, tell)
     swept = Swept(store.folder, tally, refused=refusals_of(executor))
+    # The last of several shards to end finds the study whole, and judges it.
     if whole and request.shard != Request().shard:
         whole = _is_whole(store)
         swept = replace(swept, part_is_whole=not whole)
@@ -128,7 +129,10 @@ def _march_study(
     executor: Executor,
     tell: Tell,
 ) -> tuple[StudyTally, bool]:
-    """Simulate what is missing, and note the session; how far it is, and if it is whole."""
+    """Simulate what is missing, and note the session; how far the study is, and if it is whole.
+
+    Raises KeyboardInterrupt with what is kept and how to go on.
+    """
     session = SessionLog(store.folder, request.argv, started, made.scenario.plugged)
     seen = StudyTally(0)
 
@@ -197,8 +201,8 @@ def answer_study(
 ) -> Swept:
     """Judge the runs that are there, and write everything about them.
 
-    With the plan of the study, the logs that it is to keep are made, too.
-    Tables and verdicts come first. An interrupt then costs figures and kept logs, nothing else.
+    With the plan of the study (`made`), the logs that it is to keep are made, too. Tables and
+    verdicts come first, so an interrupt costs only figures and kept logs.
     """
     with interrupts_deferred():
         results = judge_study(store.about, runs)

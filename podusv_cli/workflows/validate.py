@@ -120,7 +120,7 @@ def _tune_faults(loaded: Loaded) -> list[tuple[Route, str]]:
 
 
 def _study(loaded: Loaded, sweep: Sweep) -> list[str]:
-    """How many runs the study has, and which draws the scenario cannot take."""
+    """Lines on the study: how many runs it has, and which draws the scenario cannot take."""
     from podusv_cli.studies.making.estimate import check_fits
     from podusv_cli.studies.making.invalid import check_draws
     from podusv_cli.studies.making.plan import plan
