@@ -56,7 +56,8 @@ def in_words(size: float) -> str:
 
 
 def show(contents: PackedContents) -> None:
-    """What a packed folder has: its kind, code, packages and versions."""
+    """Print what a packed folder has: kind, code, pages, packages, and versions that
+    differ here."""
     sizes = contents.sizes
     count = f"{len(sizes)} files, {in_words(sum(sizes.values()))}"
     facts = f"{contents.kind}, {contents.status}: {count}"

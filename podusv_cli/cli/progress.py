@@ -36,9 +36,10 @@ class Bars(Protocol):
 
 @contextmanager
 def progress_bars(*, wanted: bool) -> Iterator[Bars | None]:
-    """A function to call with a run's name and the fraction done; a bar a run, on stderr.
+    """A function to call with a run's name and the fraction done; it draws a bar a run on stderr.
 
-    None if stderr is no terminal with colours. If the terminal is lost, the bars stop.
+    None where none is `wanted`, or stderr is no terminal with colours. If the terminal is lost, the
+    bars stop.
     """
     if not (wanted and supports_colours(sys.stderr)):
         yield None
@@ -83,9 +84,10 @@ def _stop(bars: Progress) -> None:
 
 
 def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], None] | None:
-    """The bar of what is compiled once, for all runs to come; it appears at once.
+    """A function that shows how much of the code is compiled, once for all runs to come.
 
-    In a pipe, where it is `wanted`, a line on stderr after a while.
+    A bar at once, where there are `bars`. In a pipe, where it is `wanted`, a line on stderr after a
+    while.
     """
     if bars:
         return partial(bars, "compiling, once", patience=0.0)
@@ -93,7 +95,8 @@ def compiling(bars: Bars | None, *, wanted: bool = False) -> Callable[[float], N
 
 
 def _say_once_after(seconds: float, text: str) -> Callable[[float], None]:
-    """A function to call with the fraction done; prints a line where that takes over `seconds`."""
+    """A function to call with the fraction done; prints `text` once where that takes over
+    `seconds`."""
     begins: list[float] = []
 
     def tell(fraction: float) -> None:
@@ -143,7 +146,7 @@ class StudyLine:
         self._show(text)
 
     def _show(self, *parts: str) -> None:
-        """The parts that the terminal has room for."""
+        """Show as many of the parts, from the first on, as the terminal has room for."""
         line = parts[0]
         for part in parts[1:]:
             line = f"{line}, {part}" if len(line) + len(part) + 3 < columns() else line

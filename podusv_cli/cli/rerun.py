@@ -80,7 +80,7 @@ def _verdict(run: Repeated) -> str:
 
 
 def _lines(run: Repeated) -> Iterator[str]:
-    """What differs from the run before: signals, scenario, versions."""
+    """Sentences on what differs from the run before: signals, scenario, versions."""
     difference = run.found
     if difference.log:
         yield from log_in_words(difference.log)

@@ -128,6 +128,7 @@ def _in_order(rank: Ranking) -> str:
     if not rank.same:
         return "changes with the step: " + "; ".join(", ".join(o) for o in rank.orders)
     first = rank.orders[0]
+    # Neighbours with equal numbers get an equals sign between them.
     marks = (" = " if pair in rank.equal else ", " for pair in pairwise(first))
     order = first[0] + "".join(mark + label for mark, label in zip(marks, first[1:], strict=True))
     if len(rank.equal) == len(first) - 1:

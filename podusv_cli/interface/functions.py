@@ -339,7 +339,8 @@ def _open_member(member: Member) -> Run:
 
 
 def _runs_compared(done: comparing.Compared, scenarios: Mapping[str, Scenario]) -> dict[str, Run]:
-    """The runs of a comparison that have a log, by label."""
+    """The runs of a comparison that have a log, by label; `scenarios` are those of runs
+    made now."""
     result = done.result
     return {
         run.label: Run(
@@ -375,7 +376,7 @@ def _file(source: Any) -> Path | None:
 def _items(
     given: Sequence[Any], files: Sequence[Path | None], changes: Changes | None, align: str
 ) -> list[Members]:
-    """What is compared: runs, then measured logs; `files` has the path of each given, if any.
+    """What is compared: runs, then measured logs; `files` has the path of each of `given`, if any.
 
     Raises UsageError for changes where only finished runs are given.
     """

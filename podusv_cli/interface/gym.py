@@ -46,12 +46,14 @@ Observe = Callable[[Moment], Any]
 
 
 def demands(task: EpisodeTask) -> Any:
-    """Demands (tau_u [N], tau_r [N m]), maybe tau_v [N], within the actuator's limits."""
+    """The space of actions: demands within the limits, (tau_u [N], tau_r [N m]), maybe
+    tau_v [N]."""
     return Box(-task.limits, task.limits, dtype=np.float64)
 
 
 def observations(task: EpisodeTask) -> Any:
-    """As `OBSERVED`, or as many numbers as the user's own function gives."""
+    """The space of observations: the usual eight numbers, or as many as the user's
+    function gives."""
     most = task.observed_bounds()
     return Box(-most, most, dtype=np.float64)
 
@@ -148,7 +150,8 @@ class Env(gymnasium.Env[Vector, Vector], EzPickle):
         return task.observation(self._now), reward, dead, cut, {"time": after.time}
 
     def _reward_grown(self, alive: bool) -> float:
-        """What the metric grew by, with a minus."""
+        """What the metric grew by in this period, with a minus; `alive` if all numbers
+        are finite."""
         session, task, before = self.session, self._task, self._gathered
         self._gathered = session.metric(task.metric)
         task.check_reward(self._gathered, alive, session.observe().time)
@@ -192,6 +195,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         self.action_space = batch_space(self.single_action_space, count)
         self.observation_space = batch_space(self.single_observation_space, count)
         self._metrics, grid = task.scenario.probe(), task.scenario.time_grid()
+        # No log: one row, at the start.
         grid = replace(grid, log_every=grid.steps + 1)
         plan = Plan.with_probe(task.scenario.closed_loop(), grid, self._metrics)
         if why := why_alone(plan):
@@ -230,6 +234,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         self._marches = [march for march in self._marches if not march.over]
         dead, cut = np.zeros((2, self.num_envs), bool)
         for march in self._marches:
+            # The demand of this period, in the schedule that stands for the law.
             march.law_table[FIRST : FIRST + len(given)] = given[:, march.places]
             march.advance(march.grid.hold_every)
             going = np.array(march.places)[march.alive]
@@ -243,14 +248,15 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return seen, rewards, dead, cut, info
 
     def _own_rewards(self, before: Moment) -> Vector:
-        """Rewards (environments,) of the user's function, for runs that went on."""
+        """Rewards (environments,) of the user's function, 0 for runs that did not go on."""
         going = [place for march in self._marches for place in march.places]
         rewards = np.zeros(self.num_envs)
         rewards[going] = self._task.reward_gained(before, self._moment())[going]
         return rewards
 
     def _rewards(self) -> Vector:
-        """What runs gained since they were asked last, (environments,)."""
+        """Rewards (environments,): what the metric grew by since it was asked last,
+        with a minus."""
         rewards = np.zeros(self.num_envs)
         for march in self._marches:
             gathered = self._metrics.one(self._task.metric, march.gathered_so_far())
@@ -260,13 +266,18 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return rewards
 
     def _begin_runs(self, places: Sequence[int], seeds: Sequence[int | None]) -> list[SteppedBatch]:
-        """Runs for these environments, in marches."""
+        """Begin runs in the environments `places`, sorted into marches of as many as go side by
+        side.
+
+        `seeds` are numbers of draws, None for a draw that no study has.
+        """
         groups, advance = [], self._sorter.advance
         assert advance is not None
         for place, seed in zip(places, seeds, strict=True):
             loop = self._task.draw_scenario(seed, self.np_random).closed_loop()
             run = BatchRun.of(place, self._plan.like(loop))
             groups.append(self._sorter.sort_in(run.vectors, run))
+        # Incomplete marches, too.
         groups += self._sorter.rest()
         self._gathered[places] = 0.0
         self._demands[:, places] = 0.0
@@ -276,7 +287,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return begun
 
     def _look(self, march: SteppedBatch) -> None:
-        """Take in the next instant of runs; of one that is terminated the last numbers stay."""
+        """Take in the next instant of a march's runs; a terminated run keeps its last finite
+        numbers."""
         places = np.array(march.places)[march.alive]
         self._parts[:, places] = march.view()[:, march.alive]
         self._times[places], self._ends[march.places] = march.time, march.times()

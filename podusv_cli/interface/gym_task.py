@@ -97,11 +97,12 @@ class EpisodeTask:
         self.numbers = self._check_first()
 
     def _check_first(self) -> int:
-        """How many numbers an observation has.
+        """How many numbers an observation has, found by one period in plain Python.
 
         Raises UsageError for a reward that the first period does not define, and for functions that
         do not give numbers.
         """
+        # So that mistakes are told before anything is compiled.
         plain = self.scenario.simulation.model_copy(update={"compiled": False})
         scenario = self.scenario.model_copy(update={"simulation": plain})
         plan = scenario.plan()
@@ -124,10 +125,10 @@ class EpisodeTask:
         return moment(now.time, parts, demand)
 
     def reward_gained(self, before: Moment, now: Moment) -> Vector:
-        """The user's own reward, a number or one for every run. Raises UsageError for none.
+        """The user's own reward between two moments, a number or one for every run.
 
         Where no time is between the moments, as the run is terminated or over, what is not finite
-        counts as 0: nothing was gained.
+        counts as 0: nothing was gained. Raises UsageError for what is no number.
         """
         assert self.own is not None
         with np.errstate(divide="ignore", invalid="ignore"):  # a sentence says so where it matters
@@ -220,7 +221,8 @@ class EpisodeTask:
         return number
 
     def draw_scenario(self, seed: int | None, random: np.random.Generator) -> Scenario:
-        """The scenario with the draw of a study whose number is the seed, or with one of no study.
+        """The scenario with the draw of a study whose number is `seed`; without one, a draw of no
+        study.
 
         Draws of no study are independent, also where those of the study are Sobol' points.
         """
@@ -233,9 +235,9 @@ class EpisodeTask:
         return draw_scenario(self.scenario, sweep.vary, draw)
 
     def check_reward(self, gathered: Vector | float, alive: Flags | bool, time: float) -> None:
-        """Raise UsageError for a metric that is not defined at this time [s].
+        """Raise UsageError for a metric (`gathered`) that is not defined at this time [s].
 
-        It may be infinite for a run whose numbers are not finite any more.
+        It may be infinite for a run that is not `alive`: its numbers are not finite any more.
         """
         if (np.isnan(gathered) | np.isinf(gathered) & alive).any():
             raise UsageError(
@@ -249,7 +251,8 @@ def _finite(
 ) -> Vector:
     """Numbers of a user's function in this shape, also where they are the same for all runs.
 
-    Those of `idle` runs may be none, and are 0 then.
+    `whose` names the function in the message; numbers of `idle` runs may be none, and are 0 then.
+    Raises UsageError.
     """
     try:
         array = np.broadcast_to(numbers(given), shape)

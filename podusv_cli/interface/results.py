@@ -281,7 +281,10 @@ def figure(runs: Mapping[str, Run], names: Sequence[str], columns: int = 2) -> F
 
 
 def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown]) -> Family:
-    """What draws a figure, or signals over time. Raises UsageError."""
+    """The function that draws a named figure, or signals over time. Raises UsageError.
+
+    `shown` are the runs with their looks; those without rows are missing there.
+    """
     from podusv_cli.figures.drawing import figures_of
     from podusv_cli.figures.panels import signals_over_time
 
@@ -301,7 +304,8 @@ def _family(runs: Mapping[str, Run], names: Sequence[str], shown: Sequence[Shown
 
 
 def _html(lines: list[str], runs: Mapping[str, Run], table: str) -> str:
-    """Lines of text over a picture of the trajectories, where there are any, and a table."""
+    """Lines of text over a picture of the trajectories, where there are any, and a
+    table in HTML."""
     said = "".join(f"<div>{escape(line)}</div>" for line in lines if line)
     drawable = {label: run for label, run in runs.items() if len(run.recording["time"]) > 1}
     picture = _picture(drawable) if drawable else ""

@@ -82,9 +82,10 @@ def load_scenario(
     silent: bool = False,
     trust: bool = False,
 ) -> Loaded:
-    """A scenario with its text and the origin of each value, see `load`. Raises ScenarioError.
+    """A scenario with its text and the origin of each value, see `load`; `checks` are made of it.
 
-    Unless it is `silent`, a UserWarning names values that a section loses with its kind.
+    Unless it is `silent`, a UserWarning names values that a section loses with its kind. Raises
+    ScenarioError.
     """
     result = _load_source(source, assignments(changes), checks, plugins.of_files(trust))
     if silent:
