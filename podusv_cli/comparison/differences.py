@@ -50,7 +50,7 @@ def as_text(differing: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, s
 
 
 def _each(tree: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Keys and values of a scenario, with those of the entries of lists."""
+    """Dotted keys and values of a scenario; entries of lists of mappings one by one, `a[0].b`."""
     for key, value in flat(tree):
         if (
             isinstance(value, (list, tuple))

@@ -140,13 +140,17 @@ class Evaluation(Walk):
         return not apart and around(max(abs(a), abs(b)), self.tolerance) > 0.0
 
     def side(self, node: ast.expr) -> float:
-        """A number, kept as evidence; NaN where it is unknown."""
+        """The number of one side, kept as evidence; NaN where it is unknown.
+
+        Raises ExpressionError for a signal over time.
+        """
         doubts, text = len(self.doubts), ast.unparse(node)
         number: Quantity = self.value(node)
         if isinstance(number, Curve):
             refuse(
                 node, f"a signal over time; reduce it to a number with one of {', '.join(REDUCERS)}"
             )
+        # Infinity is a number only where an event never happens.
         if not (math.isfinite(number) or self._never(node)):
             if len(self.doubts) == doubts:
                 self.doubts.append(f"{text} is not a finite number")
@@ -156,7 +160,10 @@ class Evaluation(Walk):
         return number
 
     def _never(self, node: ast.expr) -> bool:
-        """Whether this is the time, or a multiple, of an event that never happens, or a margin."""
+        """Whether the value is the infinite time (or a multiple) of an event that never happens.
+
+        Or an infinite margin, which has no limit.
+        """
         match node:
             case ast.BinOp(left=ast.Constant(), right=part, op=ast.Mult()):
                 return self._never(part)
@@ -189,7 +196,10 @@ class Evaluation(Walk):
         return curves.pointwise(operation, parts)
 
     def quantity(self, node: ast.expr) -> Quantity:
-        """A number, NaN where it is unknown, or a curve. Raises CannotTell for an unknown curve."""
+        """What `run.name` stands for: a metric, NaN where unknown, or a signal over time.
+
+        Raises CannotTell for a signal that is not there, ExpressionError for what has no meaning.
+        """
         match node:
             case ast.Attribute(value=ast.Name(id=label), attr=name):
                 run = self._run(label)
@@ -238,7 +248,7 @@ class Evaluation(Walk):
         return curves.reduce_curve(name, ast.unparse(node), curve, settings, window)
 
     def _or_doubt(self, number: Callable[[], float]) -> float:
-        """The number, or NaN and a doubt."""
+        """The number, or NaN where it cannot be told, with the reason among the doubts."""
         try:
             return number()
         except CannotTell as doubt:
@@ -250,7 +260,7 @@ class Evaluation(Walk):
 
 
 def with_labels(tree: ast.expr, labels: Mapping[str, str]) -> ast.expr:
-    """The expression with labels in place of its own names for runs."""
+    """A copy of the expression with labels in place of its own names for runs, by these names."""
     tree = deepcopy(tree)
     for node in ast.walk(tree):
         # of `run.metric` and `check(run)`; a function may have the name of a run

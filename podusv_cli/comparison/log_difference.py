@@ -179,6 +179,7 @@ def compare(one: Recording, other: Recording) -> LogDifference:
     unequal = [pair for pair in alike if differing(pair.one, pair.other).any()]
     names, others = ((*log.signals, *log.fixed) for log in (one, other))
     endings = {name: (getattr(one, name), getattr(other, name)) for name in ENDINGS}
+    # The first pair is time.
     shared = len(pairs[0].one)
     return LogDifference(
         first=_first(unequal),

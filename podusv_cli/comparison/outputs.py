@@ -78,7 +78,7 @@ def write(writer: RunWriter, result: Result, extras: Extras) -> None:
 
 
 def _forms(result: Result) -> dict[str, Callable[[], bytes]]:
-    """What makes each file, by its name.
+    """A function for each file that makes its content, by the file's name.
 
     Clock readings have a file of their own, so that all others come out the same every time.
     """

@@ -152,7 +152,10 @@ def laws(
 
 
 def _parts(story: Story) -> list[tuple[str, str, str]]:
-    """A row for each part: its name, the first line of what it says of itself, all its values."""
+    """Rows for each part: its name, the first line of what it says of itself, all its values.
+
+    Parts besides the laws are those of the first run.
+    """
     (first, *_), law = story.abouts.values(), "controller"
     parts = {name: (said, name, first) for name, said in first.said.items() if name != law}
     parts |= {

@@ -223,7 +223,7 @@ def _metrics_without_best(
     """Metrics in which no run is marked best.
 
     Measured times vary. Where a law keeps a standoff, being nearer to the target is not better.
-    Smaller margins are worse.
+    Larger margins are better, and the least number is marked.
     """
     both = zip(frame.rows.get("iae", ()), frame.rows.get("iae_e", ()), strict=False)
     standoff = any(iae > beyond for iae, beyond in both)

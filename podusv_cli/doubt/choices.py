@@ -108,7 +108,7 @@ def choices(singles: Singles, doubt: Doubt | None = None) -> list[Choice]:
 
 
 def hulls(singles: Singles, doubt: Doubt) -> Iterator[Choice]:
-    """The choice of a whole hull."""
+    """The choice of a whole hull, by the presets that `doubt.hulls` names; none without any."""
     first = next(iter(singles.values())).vessel.preset
     others = tuple(hull for hull in doubt.hulls if hull != first)
     if others:
@@ -124,7 +124,10 @@ def public(place: Place) -> str:
 
 
 def by_key(singles: Singles) -> dict[str, list[Place]]:
-    """Where each key of the comparison's scenario stands in the runs of its laws."""
+    """Where each key of the comparison's scenario stands in the runs of its laws.
+
+    `singles` are the laws' scenarios by label.
+    """
     known = defaultdict[str, list[Place]](list)
     for label, scenario in singles.items():
         for route, _ in _leaves(scenario):
@@ -217,7 +220,7 @@ def _adds_load(route: Route, own: Any) -> bool:
 
 
 def with_loads(singles: Singles) -> Singles:
-    """The same with calm water as a steady load of 0, which may be another."""
+    """The same scenarios with calm water as a steady load of 0, which may then be moved."""
     calm, steady = Calm(), Step()
     return {
         label: single.model_copy(update={"disturbance": steady})
@@ -244,7 +247,7 @@ def _choice_from_vary(name: str, quantity: Quantity, singles: Singles) -> Choice
 
 
 def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
-    """Where laws know the same of the hull, which moves with it."""
+    """The places where laws know the same numbers of the hull as it has at `places`."""
     hull = [(label, at, ("nominal", *at[1:])) for label, at in places if at[0] == "vessel"]
     return [
         (label, known)
@@ -254,7 +257,10 @@ def _places_laws_know(places: Sequence[Place], singles: Singles) -> list[Place]:
 
 
 def _values(key: Key, own: Any) -> tuple[Any, ...]:
-    """The other words of a word, the next seeds of a seed, half and twice a count."""
+    """The values to try of a word, switch or count: other words, the next seeds, half and twice.
+
+    None for a real number, which has a range.
+    """
     if isinstance(own, bool):
         return (not own,)
     if isinstance(own, int):
@@ -263,7 +269,8 @@ def _values(key: Key, own: Any) -> tuple[Any, ...]:
 
 
 def _beside(places: Sequence[Place], singles: Singles) -> frozenset[str]:
-    """The laws of the same kind that have another value of a law's own number or word."""
+    """The laws of the same kind that have another value at these places of a law; none
+    elsewhere."""
     own = {label for label, _ in places}
     if places[0][1][0] != "controller":
         return frozenset()

@@ -59,7 +59,7 @@ def _is_taken(choice: Choice, taken: set[str]) -> bool:
 
 
 def _own(scenario: Scenario, singles: Singles) -> Iterator[Choice]:
-    """The seed of the draws, and the lengths in what counts as a success."""
+    """Choices of the study itself: the seed of its draws, and the lengths in its success."""
     assert scenario.sweep
     everywhere = tuple((label, ("sweep",)) for label in singles)
     seed = scenario.sweep.seed

@@ -56,7 +56,10 @@ def search(
 
 
 def _results_of(jobs: Sequence[Job], progress: Callable[[float], None], workers: int) -> list[Any]:
-    """The results of jobs up to the first that has none. Raises PodusvError for a failed one."""
+    """The results of jobs, in their order, up to the first without one.
+
+    A job has none where it was interrupted. Raises PodusvError for a failed one.
+    """
     outcomes = run_shares(jobs, progress, workers)
     for outcome in outcomes:
         if outcome.failure and not outcome.interrupted:
@@ -72,6 +75,7 @@ def _explore_choice(
     numbers: Mapping[str, Sequence[ClaimNumber]],
     tell: Callable[[float], None],
 ) -> TriedChoice:
+    """`explore_choice` as a job of a process, which an interrupt ends at once."""
     with interrupts_enabled():
         return explore_choice(choice, judge, base, numbers)
 

@@ -42,9 +42,10 @@ class Draws:
 
 
 def draw_worlds(choices: Sequence[Choice], seed: int, count: int) -> Draws:
-    """Draws of all numbers and rows among the choices but those that make another task.
+    """`count` draws of all numbers and rows among the choices but those that make another task.
 
-    A draw depends on the seed, the choice's name and the draw's number alone.
+    Numbers in which laws of one kind differ stay, too. A draw depends on the seed, the choice's
+    name and the draw's number alone.
     """
     moving = [c for c in choices if (c.range or c.rows) and not (c.task or c.beside)]
     shares = np.array(

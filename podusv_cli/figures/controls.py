@@ -37,7 +37,10 @@ HEIGHTS = {1: 1.25, 2: 1.4}  # inches of a row of panels, by the width in column
     "whole run, the settled part" + PEAKS,
 )
 def controls(runs: Sequence[Shown], columns: int) -> Figure:
-    """Surge force and yaw moment on the hull, and what the law demands where this differs."""
+    """Surge force and yaw moment on the hull, and what the law demands where this differs.
+
+    `columns` is the width in columns of a page: it decides how panels are arranged.
+    """
     spans = _spans(runs)
     loads = (*LOADS, SWAY) if any(run.has(SWAY[1]) for run in runs) else LOADS
     kinds = 2 if any(differ(run, *names) for run in runs for names in loads) else 1

@@ -337,10 +337,12 @@ class _Stamped(Axis, ABC):
             seen = _visible_ticks(self, found) if len(found) else []
             if not any(seen):
                 continue
+            # One tick of the kind is enough: it is moved.
             ticks = self.get_major_ticks(1) if which is self.major else self.get_minor_ticks(1)
             kept = [text for text, shown in zip(texts, seen, strict=True) if shown]
             self.stamp(ticks[0], np.asarray(found, float)[seen], kept, renderer)
         self.label.draw(renderer)
+        # The factor of all numbers, as 1e3.
         self.offsetText.set_text(self.get_major_formatter().get_offset())
         if self.offsetText.get_text():
             self.place_factor()

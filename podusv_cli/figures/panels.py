@@ -102,6 +102,7 @@ def _sheet(
     compressed: bool = False,
     source: str = "",
 ) -> Sheet:
+    """A figure of these signals over time; the arguments are those of `figure` and its family."""
     family = signals_over_time(*signals, scales=scales, compressed=compressed)
     return figure(name, caption=caption, signals=signals, place=place, source=source)(family)
 

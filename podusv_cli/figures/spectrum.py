@@ -63,7 +63,8 @@ def _draw(axes: Axes, run: Shown, name: str, **look: Any) -> Line2D:
 
 
 def _scales(axes: Axes) -> None:
-    """Both axes logarithmic, over some decades below the largest harmonic."""
+    """Make both axes logarithmic, DECADES below the largest harmonic and up to the last one above
+    that."""
     curves = [np.array(line.get_data()) for line in axes.lines]
     top = max((float(np.max(rms, initial=0.0)) for _, rms in curves), default=0.0)
     if np.isfinite(top) and top > 0.0:

@@ -149,7 +149,7 @@ def _sheet(
 
 
 def distances(axes: Axes, runs: Sequence[Shown]) -> None:
-    """How far each run is from the first at the same time, on a logarithmic axis.
+    """Draw how far each run is from the first at the same time, on a logarithmic axis.
 
     On a path that is followed, how far it is from the path; a run alone, from its target.
     """

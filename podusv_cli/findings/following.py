@@ -35,10 +35,11 @@ def _lengths(path: Path) -> Vector:
     remedy="take a smaller acceptance radius, or fewer waypoints",
 )
 def short_leg(case: Case) -> Sentences:
-    """The circles of a leg's two waypoints overlap."""
+    """The circles of acceptance of a leg's two waypoints overlap."""
     path = case.scenario.path
     if not path.circles():
         return
+    # All circles of a path have one radius.
     lengths, radius = _lengths(path), path.circles()[0][2]
     short = np.flatnonzero(lengths < ROOM * radius)
     if short.size:

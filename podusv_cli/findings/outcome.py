@@ -71,7 +71,7 @@ def _windup(scenario: Scenario) -> str:
 
 
 def _switching(scenario: Scenario) -> list[str]:
-    """What makes a demand swing that is not limited for long otherwise."""
+    """What can make a demand swing from limit to limit: delay, noise, a control period."""
     delay, period = scenario.actuator.delay(), scenario.control.period
     return [
         *([f"a command delay of {delay:g} s"] if delay else []),

@@ -280,6 +280,7 @@ def slow_law(case: Case) -> Sentences:
     """The law asks for less speed than the target has."""
     most, speed = case.scenario.controller.most(), median(case.reference.speed)
     if most.speed < speed:
+        # Some laws may exceed U by a small speed near the target.
         nears = f"nears it by {most.creep:g} m/s at most" if most.creep else "never catches up"
         yield (
             f"{most.speed:g} m/s, while the target moves at {speed:.3g} m/s: the law {nears}; take "
@@ -298,6 +299,7 @@ def moment_short(case: Case) -> Sentences:
     """Surge yields to yaw only beyond a moment that the actuator cannot give."""
     moment, actuator = case.scenario.controller.most().moment, case.scenario.actuator
     if math.isfinite(moment):
+        # The settled load (surge, sway, yaw) at rest, without surge.
         got = float(actuator.settled(np.zeros(6), np.array([0.0, moment]))[2])
         if got < ROUNDED * moment:
             yield (

@@ -116,7 +116,7 @@ def _hull(vessel: Vessel) -> Iterator[tuple[str, str]]:
 
 
 def _noise(case: Case) -> Sentences:
-    """Noise of sensors that show nothing but noise."""
+    """Findings on sensors whose noise hides all that they measure."""
     noise, length = case.scenario.measurement.noise_of_each(), case.scenario.vessel.length
     for key, place, unit in (("heading", 2, "rad"), ("yaw_rate", 5, "rad/s")):
         if noise[place] > TURNED:

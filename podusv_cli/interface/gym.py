@@ -321,7 +321,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Vector, Vector, Any], EzPickle):
         return given
 
     def _seeds(self, given: Any) -> Sequence[int | None]:
-        """A seed for every environment. Raises UsageError."""
+        """A draw's number for every environment, None for one of no study. Raises UsageError.
+
+        `given` is None, the first of as many numbers, or one for each.
+        """
         if given is None:
             return [None] * self.num_envs
         if not np.ndim(given):

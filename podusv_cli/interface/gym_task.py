@@ -137,9 +137,9 @@ class EpisodeTask:
         return _finite(given, np.shape(now.time), "reward", now.time, idle)
 
     def observation(self, now: Moment) -> Vector:
-        """What an agent is given of a moment, (numbers,).
+        """What an agent observes of a moment, (numbers,), or (numbers, environments).
 
-        Raises UsageError for no list of numbers.
+        Raises UsageError where the user's function gives no list of numbers.
         """
         if self._observe is None:
             return now.seen.copy()  # of which an agent may make what it likes
@@ -152,7 +152,8 @@ class EpisodeTask:
         return np.array([_finite(part, shape, "observe", now.time) for part in parts])
 
     def _check_reward(self, reward: str) -> str:
-        """The reward's metric. Raises UsageError for one that is not known on the way."""
+        """The reward's metric, if it is gathered during a run. Raises UsageError for any other
+        name."""
         known = gathered_metrics(self.scenario)
         if reward in self.scenario.known_metrics() and reward not in known:
             raise UsageError(

@@ -149,7 +149,7 @@ def _part(scenario: Scenario, at: Route, old: Component, new: Mapping[Route, Any
 
 
 def _with(whole: Any, steps: Route, new: Any) -> Any:
-    """Plain data with another value at a place."""
+    """Plain data (dicts and tuples) with `new` at the place that `steps` lead to; a copy."""
     if not steps:
         return new
     step = steps[0]

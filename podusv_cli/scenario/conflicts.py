@@ -37,7 +37,10 @@ def contradictions(scenario: Scenario) -> list[tuple[str, str]]:
 
 
 def clashes(scenario: Scenario, plans: Mapping[str, Plan]) -> Conflicts:
-    """Laws of which two signals of a run would have one name; nobody asks it of a finished run."""
+    """Laws of which two signals of a run would have one name.
+
+    It takes the plans of a load; a finished run has passed this check.
+    """
     for label, plan in plans.items():
         try:
             scenario.about(plan)

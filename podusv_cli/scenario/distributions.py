@@ -125,7 +125,10 @@ def _halving_places(low: float, high: float) -> Vector:
 
 
 def _check_order(name: str, bounds: tuple[float, ...]) -> None:
-    """Raises ValueError where the first bound is not below the last, or both are too far apart."""
+    """Raises ValueError where the first bound is not below the last, or both are too far apart.
+
+    `name` is the key in messages; the difference has to be finite, as draws are computed with it.
+    """
     low, high = bounds[0], bounds[-1]
     if not low < high:
         raise ValueError(f"{name}: {low:.15g} is not below {high:.15g}")

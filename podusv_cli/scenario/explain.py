@@ -236,7 +236,7 @@ def _meaning(key: Key) -> str:
 
 
 def choices_of(key: Key) -> tuple[str, ...]:
-    """The words that a value may be; of a kind, all that its section has."""
+    """The words that a value may be: presets, kinds of the section, or those of its type."""
     if key.name == "preset" and key.model.presets:
         return preset_names(key.model.presets, key.scenario.plugged)
     if key.name == "kind":

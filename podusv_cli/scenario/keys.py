@@ -140,7 +140,7 @@ class Key:
 
     @cached_property
     def kinds(self) -> dict[str, Key]:
-        """The kinds of this section."""
+        """The kinds of this section as keys, by name; none where it has no kinds."""
         parts = {} if self.section else sections(self.annotation)
         return {
             kind: replace(
@@ -364,7 +364,10 @@ def _is_list_of(parts: dict[str, type[Component]], annotation: Any) -> bool:
 
 
 def _mapping(parts: dict[str, type[Component]], plural: bool) -> str:
-    """How a mapping is described: kinds by name, or the first keys of the part without kinds."""
+    """How a mapping is described: with its kinds by name, or with the first of its keys.
+
+    `parts` are its classes by kind, "" for one without kinds; `plural` for several mappings.
+    """
     mapping = "mappings of keys" if plural else "a mapping of keys"
     if "" not in parts:
         return f"{mapping} with kind {either(list(parts))}"

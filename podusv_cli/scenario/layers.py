@@ -48,7 +48,7 @@ def compose_layers(
 def self_contained(
     text: str, source: str, overrides: Sequence[str], faults: list[Fault], most: int
 ) -> Node | None:
-    """As `compose_layers` for a text of at most `most` values that extends no file."""
+    """As `compose_layers`, for a text of at most `most` values that extends no file."""
     node = _mapping(text, source, faults, most=most)
     if node and (above := node.mapping.get("extends")):
         faults.append(Fault(above.mark, "extends", ELSEWHERE))

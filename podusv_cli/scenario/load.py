@@ -188,8 +188,8 @@ def load_text(
 ) -> Loaded:
     """The scenario of a text; `source` names it in messages and is where its file names start.
 
-    Messages give lines of the text only where `placed`. Raises ScenarioError with everything that
-    is wrong.
+    Messages give lines of the text only where `placed`. The other arguments are those of `load`.
+    Raises ScenarioError with everything that is wrong.
     """
     faults: list[Fault] = []
     root = compose_layers(text, source, overrides, faults, placed=placed)
@@ -255,7 +255,10 @@ def _resolve_plugins(
 def _build_scenario(
     root: Node, known: Plugins, faults: list[Fault], remarks: list[str]
 ) -> tuple[Scenario, Node]:
-    """The scenario of a tree, and the tree with what is filled in; `remarks` as `complete`."""
+    """The scenario of a tree, and the tree with presets, files and defaults filled in.
+
+    `known` are the plug-ins; `remarks` takes sentences as `complete` says. Raises ScenarioError.
+    """
     top, source = keys_of(scenario_class(known)), root.mark.source
     root = complete(root, top, faults, remarks)
     scenario = check(root, top, faults)

@@ -83,7 +83,8 @@ def _is_explained(root: Node, route: Route) -> bool:
 
 
 def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A key that `section` has not, with the key that may be meant or where it belongs."""
+    """A fault for a key that `section` lacks, with the key that may be meant or where
+    it belongs."""
     name = str(complaint["loc"][-1])
     route = (*section.path, name)
     node = follow(root, route)[-1]
@@ -92,6 +93,7 @@ def _unknown_key(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
         or _elsewhere(section, name)
         or did_you_mean(name, section.keys)
     )
+    # Kinds as keys are meant as a list, whatever the key is like.
     several = _several(section, follow(root, section.path)[-1])
     hints = several or f"{hint} (allowed: {', '.join(section.keys)})"
     yield Fault(node.key_mark or node.mark, dotted_key(route), f"unknown key{hints}")
@@ -145,7 +147,7 @@ def _home(name: str, kinds: dict[str, Key]) -> str:
 
 
 def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
-    """A required key that is not there; a missing item is a fault of its list."""
+    """A fault for a required key that is not there; for a missing item, of its list."""
     if isinstance(key.path[-1], int):
         yield from _wrong(root, _key(key.top, complaint["loc"][:-1]), complaint)
     elif not _is_explained(root, key.path):
@@ -154,7 +156,7 @@ def _missing(root: Node, key: Key, complaint: Any) -> Iterator[Fault]:
 
 
 def _no_kind(root: Node, section: Key, complaint: Any) -> Iterator[Fault]:
-    """A section without `kind`; its keys may tell which kind was meant."""
+    """A fault for a section without `kind`; its keys may show which kind was meant."""
     route = (*section.path, "kind")
     if not _is_explained(root, route):
         node = follow(root, section.path)[-1]

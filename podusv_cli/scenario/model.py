@@ -247,7 +247,7 @@ class Scenario(Component):
         return data
 
     def closed_loop(self) -> ClosedLoop:
-        """The closed loop of vessel, path, disturbance, actuator, measurement and law."""
+        """The closed loop of vessel, path, disturbance, actuator, sensors, estimator and law."""
         start = self.start
         return ClosedLoop(
             vessel=self.vessel,
@@ -273,7 +273,7 @@ class Scenario(Component):
         return self.origin.plane if self.origin else None
 
     def time_grid(self) -> TimeGrid:
-        """The instants of a scenario that `conflicts` finds no fault with."""
+        """The steps and logged instants of a scenario whose times `conflicts` has checked."""
         step = self.simulation.step
         steps = whole_steps(self.simulation.duration, step) or 0
         # Beyond the last step only the first is logged; machine code knows no larger numbers.
@@ -290,7 +290,7 @@ class Scenario(Component):
         return {label: single.plan() for label, single in self.singles().items()}
 
     def metrics_of(self, plan: Plan) -> Metrics:
-        """What gathers the numbers of all metrics in such a run."""
+        """The probe that gathers the numbers of all metrics during a run of this plan."""
         return metrics_probe(
             plan,
             known=self.known_metrics(),

@@ -86,7 +86,10 @@ def _fill_section(
 def _read(
     placing: Placing, given: Node, section: str, model: type[Component], faults: list[Fault]
 ) -> Node:
-    """A section of class `model` with what its files hold in place of their names."""
+    """A section of class `model` with what its files hold in place of their names.
+
+    The class says which of its keys name files, and which key takes the content.
+    """
     ways: list[tuple[dict[str, str], Read, Form]] = [
         (model.rows_of, read_text, placing.points),
         (model.texts_of, read_text, _whole),

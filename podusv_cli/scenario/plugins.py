@@ -124,7 +124,8 @@ def _is_foreign(mark: Mark) -> bool:
 
 
 def _resolved_entry(plugin: Plugin, mark: Mark, given: Node | None = None) -> Node:
-    """The plug-in's entry in resolved.yaml."""
+    """The plug-in's entry in resolved.yaml: what the scenario requires (`given`), version and
+    digest."""
     entry = given or Node({}, mark)
     for name in ("version", "sha256"):
         text = getattr(plugin, name)
@@ -222,9 +223,8 @@ def _is_wanted(plugin: Plugin, wanted: Node, faults: list[Fault]) -> bool:
 def used_of(files: Sequence[str], root: Node, faults: list[Fault]) -> tuple[Node, Plugins]:
     """The tree of a finished run, and those of its plug-ins that are at hand.
 
-    The files in its folder are not read, so that looking at it runs nobody's code. Those that
-    the user names (`files`) and installed packages are, where they are the very ones that were
-    used.
+    The files in its folder are not read, so that looking at it runs nobody's code. Those that the
+    user names (`files`) and installed packages count where their digest is that of the run.
     """
     own = root.mapping.get(KEY)
     used = {entry.word("sha256") for entry in own.mapping.values()} if own else set()

@@ -126,7 +126,11 @@ def _sections(root: Node, top: Key, faults: list[Fault]) -> Node:
 
 
 def _without_null(root: Node, section: Route = ()) -> Node:
-    """The tree without what is null: sections that null empties, and entries with free names."""
+    """The tree without nulls that take something out: of entries with names of the user, and
+    sections.
+
+    `section` leads to `root`. Other nulls stay, as values.
+    """
     if section not in BESIDE_NAMED or not root.mapping:
         return root
     entries = {

@@ -281,6 +281,7 @@ class _Reader:
         problem = error.problem or "unreadable"
         known = [text for part, text in SYNTAX.items() if part in problem]
         opened = any(part in problem for part in OPENING)
+        # Where something opened that never ends, its start says more than the end of the file.
         mark = error.context_mark if opened else error.problem_mark
         text = known[0] if known else "not valid YAML: {problem}"
         line = self._text.splitlines()[mark.line : mark.line + 1] if mark else []

@@ -242,7 +242,7 @@ def without_misfits(base: Node, top: Node, faults: list[Fault], at: Route = ()) 
 
 
 def entries_of(key: str, kinds: Sequence[Any]) -> str:
-    """What a list has, by the kinds of its entries, which may be None."""
+    """A sentence on what the list at `key` has; `kinds` are those of its entries, None for none."""
     last = len(kinds) - 1
     kinds_there = ", ".join(kind for kind in kinds if isinstance(kind, str))
     to = f" to {key}[{last}]" if last else ""

@@ -95,7 +95,7 @@ def bench(
 def _simulate_cases(
     every: Sequence[BenchCase], request: Request, progress: Progress | None
 ) -> Iterator[BenchRun]:
-    """The runs of all cases, in order; `progress` hears which share of the cases is done.
+    """The runs of all cases, in order; `progress` is called with the fraction of cases done.
 
     A case whose process ended is tried again law by law, to find the one that ends it.
     """
@@ -144,7 +144,10 @@ def _solve_optima(
 def _run_all(
     every: Sequence[BenchCase], request: Request, advance: Report = lambda position, fraction: None
 ) -> list[Outcome]:
-    """Play cases in processes of their own. Raises KeyboardInterrupt."""
+    """Play cases in processes of their own; `advance` is called with a case's place and fraction.
+
+    Raises KeyboardInterrupt.
+    """
     outcomes = run_all([partial(_play, case) for case in every], advance, request.workers)
     if any(outcome.interrupted for outcome in outcomes):
         raise KeyboardInterrupt("interrupted; nothing was written")

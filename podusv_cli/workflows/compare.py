@@ -106,10 +106,10 @@ class Compared:
 def compare(items: Sequence[Path], request: Request, progress: Progress | None = None) -> Compared:
     """Simulate what is not simulated yet, and compare all runs.
 
-    Each item is a scenario (all its `controllers`, or its one controller), a run folder or the
-    folder of a comparison. The claims are those of the scenarios. After an interrupt the finished
-    runs are compared, without figures; KeyboardInterrupt if there are none. Raises UsageError,
-    ScenarioError, StorageError.
+    Each item is a scenario (all its `controllers`, or its one controller), a run folder, the folder
+    of a comparison, or a log. The claims are those of the scenarios. `progress` is called with a
+    run's label and the fraction done. After an interrupt the finished runs are compared, without
+    figures; KeyboardInterrupt if there are none. Raises UsageError, ScenarioError, StorageError.
     """
     loaded = _to_doubt(items, request) if request.doubt else None
     return compare_gathered(gather(items, request), items, request, progress, loaded)
@@ -193,7 +193,7 @@ def _check_metrics(request: Request, members: Sequence[Member]) -> None:
 
 
 def _keep_apart(items: Sequence[Path], target: Path) -> None:
-    """UsageError where writing the comparison would touch a run that it compares."""
+    """Raise UsageError where writing the comparison would touch a run that it compares."""
     there = Path(os.path.realpath(target))
     for item in items:
         here = Path(os.path.realpath(item))
@@ -359,10 +359,10 @@ def _meanings(plugins: Plugins) -> dict[str, str]:
 
 
 def _with_costs(runs: Sequence[PastRun], made: Mapping[str, Case], extras: Extras) -> list[PastRun]:
-    """The runs; those `made` now with the laws' cost measured here and now, side by side.
+    """The runs, those `made` now with their laws' cost, measured here and now, side by side.
 
     The cost in a run's own metrics was measured at another time, perhaps on another machine, so it
-    is never compared; and a finished run is looked at without its law.
+    is never compared. A finished run gets none, as it is looked at without its law.
     """
     timed = [
         run

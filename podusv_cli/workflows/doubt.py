@@ -56,7 +56,7 @@ def doubt(config: Path, request: Request, progress: Progress | None = None) -> o
 
 
 def doubt_of(loaded: Loaded, request: Request, progress: Progress | None = None) -> outputs.Doubted:
-    """The same for a scenario that is loaded and checked."""
+    """As `doubt`, for a scenario that is loaded and checked and whose claims are on runs."""
     scenario, world = loaded.scenario, comparison(loaded)
     target = request.out or default_folder(RESULTS, scenario.name, resolved_yaml(scenario))
     with interrupts_deferred(), writer_of(request, target) as writer:

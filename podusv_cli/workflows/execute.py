@@ -52,7 +52,7 @@ class Stopwatch:
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
-        """Add what happens inside to `<name>_s`."""
+        """Add the time [s] that passes inside to `<name>_s`."""
         start = time.perf_counter()
         try:
             yield

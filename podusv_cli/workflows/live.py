@@ -267,7 +267,7 @@ class Live:
         return {"margins": {label: margins_of(case) for label, case in cases.items()}}
 
     def report(self, moved: Moved) -> dict[str, Any]:
-        """The report of what is shown, in a folder of results as `podusv compare` makes it."""
+        """The report of what is shown, made as `podusv compare` does it: its file and its HTML."""
         request = Request(
             self.assignments(moved),
             plugins=self.files,

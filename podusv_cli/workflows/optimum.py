@@ -104,10 +104,11 @@ def optimum_of(
     step: float,
     progress: Progress | None = None,
 ) -> Optimum:
-    """The same for a scenario that is loaded already."""
+    """As `optimum`, for a scenario that is loaded already."""
     collocation.casadi()
     scenario = single(loaded, request.controller) if request.controller else loaded.scenario
     wanted = problem(scenario, minimised)
+    # Names of figures and the place are checked before minutes of computing.
     check_figures(scenario)
     target = request.out or free_folder(RESULTS / scenario.name / "optimum")
     size = estimate(scenario, loaded.plan(scenario))

@@ -126,7 +126,7 @@ class _LatexReader:
         return _join(symbols)
 
     def _read_symbol(self) -> _MathSymbol:
-        """The next symbol, group or command."""
+        """The next symbol, group or command; the token is taken."""
         token = self._take()
         if token == "{":
             return _MathSymbol(self._read_rest_of_group())
@@ -184,7 +184,7 @@ class _LatexReader:
         return inside
 
     def _read_words(self) -> str:
-        """What the next braces hold, as it is written."""
+        """What the next braces hold, as it is written; the braces are taken."""
         self._take()
         words = ""
         while self._peek() not in ("}", ""):

@@ -63,7 +63,10 @@ class PlotChoice:
 
 
 def look_of(columns: int, size: str, style: str) -> Look:
-    """The look that is asked for; `size` is WIDTH or WIDTHxHEIGHT in inches. UsageError."""
+    """The look that is asked for: width in columns of a page, or `size`, and the name of a style.
+
+    `size` is WIDTH or WIDTHxHEIGHT in inches, "" for that of the columns. Raises UsageError.
+    """
     if style not in STYLES:
         raise UsageError(unknown_word(f"style {style!r}", style, STYLES))
     if not size:
@@ -193,9 +196,9 @@ LONGER_NAMES: tuple[Callable[[Member], str], ...] = (
 def _choose_sheets(
     asked: Sequence[str], known: Mapping[str, Sheet], shown: Sequence[Shown], signals: Sequence[str]
 ) -> list[Sheet]:
-    """The figures to draw: those that are asked for, or all that the runs have signals for.
+    """The figures to draw: those `asked` for and one of `signals`, or all that the runs can fill.
 
-    Raises UsageError for one that they have no signals for.
+    `known` are all figures by name. Raises UsageError for one that the runs have no signals for.
     """
     fitting = {name: sheet for name, sheet in known.items() if sheet.fits(shown)}
     asked = [*fitting] if ALL in asked else asked
@@ -241,7 +244,10 @@ def _list_folder(folder: Path) -> frozenset[str]:
 
 
 def _put(out: Path, contents: Mapping[str, bytes]) -> list[Path]:
-    """Write files into a folder; those that were there with another content. StorageError."""
+    """Write files into a folder; the paths of those that were there with another content.
+
+    Raises StorageError.
+    """
     files.make_folder(out)
     places = {out / name: content for name, content in contents.items()}
     replaced = [path for path, content in places.items() if _differs(path, content)]

@@ -117,6 +117,7 @@ def _scenario(run: RunFolder, request: Request) -> Scenario:
 
 def _one(runs: Pairs, request: Request, progress: Progress | None) -> Repetition:
     """Simulate one run again and compare it with what there was."""
+    # There is exactly one.
     ((original, scenario),) = runs
     label = original.path.name or str(original.path)
     advance = partial(progress, label) if progress else None

@@ -207,7 +207,11 @@ def _wider(hull: Hull) -> str:
 
 
 def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
-    """A number above 0 (or 0) as in a scenario, with or without a unit. Raises UsageError."""
+    """A number above 0 (or 0, if `zero`) as in a scenario, with or without a unit; in `unit`.
+
+    `name` is the option in messages, `text` what was given. Raises UsageError, also for a number
+    that no boat has.
+    """
     option, plain = f"--{name.replace('_', '-')} {text}", resolve(text.strip())
     number = units.number(plain, unit) if isinstance(plain, str) else plain
     if number is None or isinstance(number, bool):
@@ -225,7 +229,10 @@ def _number(name: str, text: str, unit: str, *, zero: bool = False) -> float:
 
 
 def _thrusters(boat: Boat, out: Path) -> Thrusters:
-    """Thrusters from words as `EXAMPLE` has them. Raises UsageError."""
+    """The thrusters from words as `EXAMPLE` has them, and the angle that they turn by.
+
+    `out` is the scenario's file, from which a table is named. Raises UsageError.
+    """
     match = THRUSTERS.fullmatch(boat.thrusters.strip())
     if not match:
         raise UsageError(f"--thrusters {boat.thrusters}: write them as {EXAMPLE}; or {BY_TABLE}")
@@ -238,6 +245,7 @@ def _thrusters(boat: Boat, out: Path) -> Thrusters:
             f"--thrusters {boat.thrusters}: one at @0, two or four with a lever above 0; {EXAMPLE}"
         )
     if turn > TURN:
+        # A number such as 35 without a unit would be 35 rad.
         degrees = turn <= 90.0 and not units.split_quantity(boat.turn)
         way = f"; write {boat.turn}deg" if degrees else ""
         raise UsageError(f"--turn {boat.turn}: more than 90 deg to either side{way}")
@@ -278,7 +286,10 @@ def _thrust(words: str, given: str, out: Path) -> tuple[float, str]:
 
 
 def _way(route: str, out: Path) -> StartingLegs | None:
-    """The legs of a route beside the scenario `out`; None without one. Raises UsageError."""
+    """The legs of the file `route` as the scenario `out` names it; None without one.
+
+    Raises UsageError for a file that is no route.
+    """
     if not route:
         return None
     if not os.path.isfile(route):
@@ -286,6 +297,7 @@ def _way(route: str, out: Path) -> StartingLegs | None:
     storage.make_folder(out.parent)  # the route is read from there
     file = relative_path(route, out.parent)
     path = as_yaml(file) if file.isprintable() else repr(file)
+    # A small scenario is loaded to read the route as any scenario would.
     text = f"name: boat\nvessel: {{preset: otter}}\nactuator: {{kind: ideal}}\n{BESIDE}".replace(
         "kind: line", f"kind: legs, file: {path}"
     )
@@ -299,6 +311,7 @@ def _way(route: str, out: Path) -> StartingLegs | None:
         lines.append(
             f"origin: {{lat: {scenario.origin.lat:.12g}, lon: {scenario.origin.lon:.12g}}}"
         )
+    # The boat starts at the first waypoint, its bow to the second.
     (x, y), (ahead, right) = points[0], np.subtract(points[1], points[0])
     psi = math.degrees(math.atan2(right, ahead))
     lines.append(f"start: {{x: {x:.10g}, y: {y:.10g}, psi: {psi:.4g} deg}}")
@@ -354,7 +367,7 @@ def _fill_template(title: str, boat: str, study: str, way: StartingLegs | None, 
 
 
 def _way_of(hull: Hull) -> StartingLegs:
-    """Legs for a boat without a route: a few lengths north, east, and south again."""
+    """Legs for a boat without a route: north, east and south again, a few lengths [m] each."""
     long, wide = (float(f"{part * hull.length:.2g}") for part in LEGS)
     points = ((0.0, 0.0), (long, 0.0), (long, wide), (0.0, wide))
     written = ", ".join(f"[{x:g}, {y:g}]" for x, y in points)

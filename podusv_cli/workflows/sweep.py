@@ -165,7 +165,10 @@ def _march_study(
 def _announce(
     folder: Path, made: StudyPlan, request: Request, missing: Gaps, alone: Mapping[str, str]
 ) -> None:
-    """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one."""
+    """Warn of mixed machines, of invalid draws, and of laws whose runs march one by one.
+
+    `missing` counts runs to be made, `alone` says by law why its runs march one by one.
+    """
     if missing and (mixed := mixture(folder)):
         request.warn(mixed)
     if missing and (invalid := check_draws(made)).count:
@@ -181,7 +184,7 @@ def _is_whole(store: Store) -> bool:
 
 
 def _plan_study(config: Config, request: Request) -> tuple[StudyPlan, Path, dict[str, str]]:
-    """A new study, or one that is to be continued: plan, folder, scenario and plug-ins."""
+    """The plan of a study, new or continued, its folder, and the texts that the folder keeps."""
     if there := folder_of(config):
         check_study(there)
     loaded = loaded_for("sweep", NO_SWEEP, config, request, [sweep_faults])
@@ -230,7 +233,10 @@ def answer_study(
 
 
 def report(study: Path, request: Request) -> Swept:
-    """Judge a study anew, of the runs that are there. Raises UsageError where there are none."""
+    """Judge a study anew, of the runs that are there; nothing is simulated.
+
+    Raises UsageError where there are no runs, or none that all laws have met.
+    """
     started = datetime.now(UTC)
     check_study(study)
     with sole_writer(study, TABLES):  # as draws and runs may be added until it is locked

@@ -115,7 +115,7 @@ def _tune_folder(
 
 
 def _load_config(config: Config, request: Request) -> tuple[Loaded, Path]:
-    """The scenario, and the folder of the search."""
+    """The scenario, checked, and the folder of the search. Raises ScenarioError, UsageError."""
     if there := folder_of(config):
         place.check(there)
     loaded = loaded_for("tune", NO_TUNE, config, request, [sweep_faults, tune_faults])

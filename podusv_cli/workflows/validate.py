@@ -44,7 +44,8 @@ class Valid:
     study: Sequence[str] = ()
 
     def lines(self) -> Iterator[str]:
-        """What is said of it."""
+        """Lines on the scenario: laws and steps, time and memory of a run, its study,
+        its findings."""
         scenario = self.loaded.scenario
         laws, steps = ", ".join(scenario.labels()), scenario.time_grid().steps
         yield f"ok ({scenario.name}, {laws}, {steps} steps)"

@@ -41,7 +41,8 @@ def page(
     provenance: Mapping[str, Any],
     optima: Sequence[Least] = (),
 ) -> str:
-    """The page; `made` is `standing.table` of all runs, `with_optima` where there are any."""
+    """The page as HTML; `made` is `standing.table` of all runs, `with_optima` where
+    there are any."""
     laws = list(made.law.unique())
     failed = made[made.status != "finished"]
     counts = {f"{name}s": made[name].nunique() for name in PLACE}
@@ -79,7 +80,8 @@ def _table(made: pd.DataFrame) -> str:
 
 
 def _grids(optima: Sequence[Least]) -> dict[str, Any]:
-    """What the page says of the optima: the finest grid's step, its effect, and their cases."""
+    """What the page says of the optima: the coarsest finest step, its largest effect, how many
+    cases."""
     return {
         "step": f"{max(optimum.step for optimum in optima):.2g}",
         "lowered": f"{max(abs(optimum.lowered) for optimum in optima):.1g}",

@@ -198,7 +198,10 @@ class RunsTable:
                         yield self._unit(position, law, cell, part, status[cell])
 
     def _unit(self, place: int, law: str, cell: int, rows: range, status: Codes) -> UnitResult:
-        """The results of these rows (draws) of a law and cell; `status` has all draws' codes."""
+        """The results of some draws (`rows`) of a law in a cell; `place` is the law's position.
+
+        `status` has the codes of all draws.
+        """
         part = slice(rows.start, rows.stop)
         return UnitResult(
             Unit(law, cell, rows.start, len(rows)),

@@ -34,7 +34,7 @@ class Statistic:
 
     @classmethod
     def of(cls, statistic: str, sample: Sample, level: float) -> Self:
-        """The part that a sample gives."""
+        """The statistic of a sample, with its interval at this level; `statistic` is its text."""
         estimate, low, high = map(float, sample.interval(level))
         return cls(
             statistic,

@@ -154,6 +154,7 @@ def _key(key: str, quantity: Quantity, laws: Mapping[str, Scenario]) -> Iterator
     if section not in PER_RUN and section in Scenario.model_fields:
         yield f"{section} is the same for all runs of a cell; list values of {key} under grid"
         return
+    # Laws without the key would get no draw, so that the study would compare unlike runs.
     lacking = [law for law, single in laws.items() if not has(single, key)]
     if len(lacking) == len(laws):
         near = did_you_mean(key, _numbers(laws))
@@ -319,6 +320,7 @@ def _twice(sweep: Sweep) -> Faults:
     keys = [(name, key) for name, q in sweep.vary.items() for key in q.targets(name)]
     counts, of_rows = Counter(key for _, key in keys), set[str]()
     for name, key in keys:
+        # A table of rows has many keys: one message is enough.
         if name in of_rows:
             continue
         others = [other for other, same in keys if same == key and other != name]
@@ -362,7 +364,7 @@ def _keep(scenario: Scenario, sweep: Sweep) -> Faults:
 
 
 def _claims(scenario: Scenario, sweep: Sweep) -> Faults:
-    """Claims and a condition of success that cannot be read, or not be judged in this design."""
+    """What is wrong with claims and success: unreadable, or not to be judged in this design."""
     if sweep.claims and not sweep.independent:
         remedy = f"`claims: {{{next(iter(sweep.claims))}: null}}`"
         yield (

@@ -188,8 +188,9 @@ class Cluster:
         return True
 
     def _fill(self, units: Units) -> bool:
-        """Hand out units while workers have room; whether any is under way or waits."""
+        """Hand out units while workers have room; whether any unit is under way or waits."""
         self._look()
+        # None: every worker, also one that joins later.
         allowed = frozenset(self._threads) - frozenset(self._refused) if self._refused else None
         while allowed != frozenset() and self._has_room() and (task := self._next(units)):
             self._submit(replace(task, allowed=allowed))
@@ -232,6 +233,7 @@ class Cluster:
 
     def _submit(self, task: UnitTask) -> None:
         """Hand a unit to the cluster; its future is put into `_finished` when it is done."""
+        # Text and numbers alone, see `remote`.
         future = self._client.submit(
             remote.make_unit,
             self._study.text,

@@ -145,7 +145,7 @@ def _machine(session: Mapping[str, Any]) -> str:
 
 
 def gaps(store: Store) -> list[str]:
-    """Which draws are not there, a sentence for all laws and cells that lack the same ones."""
+    """Sentences on the draws that are missing; laws and cells that lack the same ones share one."""
     lacking: dict[str, list[str]] = {}
     covered = store.covered_draws()
     for (law, cell), there in covered.items():

@@ -62,7 +62,7 @@ def _variant(recipe: StudyText, variant: tuple[Any, ...]) -> StudyPlan:
 
 @lru_cache(PLANS)
 def _report(recipe: StudyText) -> Report:
-    """Digests of all that this worker computes with, by what they are digests of."""
+    """All that this worker computes with: versions, and digests of kernels and of the study."""
     made = _plan(recipe)
     facts = {"podusv": podusv_cli.__version__, "Python": platform.python_version()}
     facts |= {name: version(name) for name in PACKAGES}

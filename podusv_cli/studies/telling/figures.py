@@ -91,7 +91,8 @@ def _bands(level: float) -> str:
 
 
 def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
-    """The curves of one metric in one cell, a law each."""
+    """The figure of one metric's distributions in one cell, a curve for each law; none without
+    numbers."""
     values, level = _metric_by_law(results, name, cell), results.level
     if values:
         yield Sketch(
@@ -104,7 +105,7 @@ def _distribution(results: Results, name: str, cell: int) -> Iterator[Sketch]:
 
 
 def _ratios(results: Results, name: str) -> Iterator[Sketch]:
-    """The ratios of one metric between two laws in the same draw."""
+    """The figure of one metric's ratios between two laws in the same draw; none without pairs."""
     pairs, cells, level = results.pairs, results.runs.cells[:MOST_CELLS], results.level
     if len(pairs) and len(rows := pairs[(pairs.metric == name) & pairs.cell.isin(cells)]):
         yield Sketch(
@@ -204,7 +205,7 @@ def _panel(results: Results, law: str, name: str, across: int) -> Vector:
 
 
 def _correlations(results: Results, name: str, cell: int) -> Iterator[Sketch]:
-    """What one metric depends on in one cell, if it depends on anything."""
+    """The figure of what one metric depends on in one cell; none where nothing varies."""
     table = results.sensitivity
     if not len(table):
         return
@@ -313,7 +314,8 @@ def heatmaps(
 ) -> Figure:
     """A number of every cell for each law: columns are the values of x, rows those of y.
 
-    `x` and `y` are grid keys with their values; NaN is a cell without one, inf a failure.
+    `panels` are (rows, columns) by law, NaN for a cell without a number, inf for a failure. `x` and
+    `y` are grid keys with their values; `label` is that of the colour scale.
     """
     height = FRAME + 2.0 * ROW * len(y[1])
     figure = new_figure(COLUMNS, height)

@@ -184,7 +184,7 @@ def _decisive(results: Results, law: str, cell: int) -> list[str]:
 
 
 def _short_of(results: Results, law: str, cell: int, draw: int) -> str:
-    """Why a run that finished is no success: the metrics that decide."""
+    """Why a run that finished is no success: the metrics that success depends on, with values."""
     reasons = [
         f"{name} = {results.runs.metric(law, name)[cell, draw]:.5g}"
         for name in results.runs.success_metrics
@@ -199,7 +199,7 @@ def _pairs(results: Results) -> list[Any]:
 
 
 def _numbers(results: Results) -> list[list[str]]:
-    """Quantiles of the shown metrics, the median with its interval."""
+    """The table of quantiles of the shown metrics as text, the median with its interval."""
     return [
         [
             row["law"],

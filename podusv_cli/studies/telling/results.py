@@ -81,7 +81,7 @@ class Results:
 
     @property
     def preliminary(self) -> str:
-        """How many draws the answer is about, in words; "" where none is missing."""
+        """How many draws the answer is about, as a phrase; "" where no run is missing."""
         if self.made_runs == self.wanted_runs:
             return ""
         draws, laws = int(np.sum(self.runs.common, axis=1).min()), len(self.runs.laws)

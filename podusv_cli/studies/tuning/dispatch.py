@@ -76,10 +76,11 @@ class SearchDriver:
 
 
 def dispatch(searches: Sequence[GainSearch], executor: Executor, tell: Tell) -> StudyTally:
-    """Bring all searches to the end of their budget.
+    """Bring all searches to the end of their budget; the tally of their runs.
 
-    Every batch is on the disk before the next of its search is asked for. Raises PodusvError where
-    a unit cannot be made at all, KeyboardInterrupt after an interrupt; finished batches are kept.
+    `tell` is called after each unit. Every batch is on the disk before the next of its search is
+    asked for. Raises PodusvError where a unit cannot be made at all, KeyboardInterrupt after an
+    interrupt; finished batches are kept.
     """
     driver = SearchDriver(searches, tell)
     finished = executor(driver, driver.take_outcome)

@@ -42,6 +42,7 @@ def _answer(results: SearchResults) -> Iterator[str]:
         return
     best, second = ordered[:2]
     rows: Any = results.searches.to_dict("records")
+    # The pair may stand in the table in either order.
     for row in rows:
         if {row["a"], row["b"]} == {best, second}:
             yield (
@@ -75,7 +76,7 @@ def _remark_unsettled(results: SearchResults) -> Iterator[str]:
 
 
 def _once(results: SearchResults) -> Iterator[str]:
-    """Too few searches or training sets to order laws by."""
+    """A warning where there are too few searches or training sets to order laws by."""
     tune = results.plan.tune
     if len(results.plan.laws) < 2:
         return

@@ -120,6 +120,7 @@ class SearchResults:
     def settles(self, law: str, when: str) -> bool:
         """Whether a law ends at its target in at least half of the fresh draws, before or after."""
         met = self.outcomes_of(law if when == "before" else self.after(law))
+        # Whether a law aims at a target at all is the law's own.
         scenario = self.plan.scenario.model_copy(update={"controller": self.plan.laws[law]})
         ends = [
             not failed and scenario.at_target({name: met.metrics[name][i] for name in met.metrics})
@@ -261,6 +262,7 @@ class SearchResults:
         compared = [
             ("before", {law: law for law in self.plan.laws}),
             ("after", {law: self.after(law) for law in self.plan.laws}),
+            # The tuned law first, so that a ratio below 1 is an improvement.
             *(("tuning", {tuned_name(law): tuned_name(law), law: law}) for law in self.winners),
         ]
         tables = [

@@ -49,7 +49,10 @@ class GainSearch:
     """The search for the gains of a law with one of the tuner's seeds."""
 
     def __init__(self, plan: TunePlan, law: str, number: int, folder: Path) -> None:
-        """Nothing is asked yet. `folder` holds the trials of an earlier session, if any."""
+        """Nothing is asked yet. `number` counts the law's searches; it also seeds the sampler.
+
+        `folder` holds the trials of an earlier session, if any.
+        """
         self.plan, self.law, self.number, self._folder = plan, law, number, folder
         assert plan.scenario.sweep
         seed = [plan.scenario.sweep.seed, number, law]
@@ -172,7 +175,7 @@ class GainSearch:
         return [] if self._waiting else self._next()
 
     def _next(self) -> list[tuple[int, StudyPlan, Unit]]:
-        """The next units: of this batch, or of the one after it."""
+        """The next units: the rest of this batch's draws, or the first of the batch after it."""
         more = self._units(self._attempts[0].draws)
         if more:
             return more

@@ -54,7 +54,7 @@ class LawRatios:
         return float(np.quantile(largest, self.level)) if len(self._off) else 0.0
 
     def table(self) -> pd.DataFrame:
-        """The ratio of every pair with an interval; all intervals hold together."""
+        """The ratio of every pair with an interval; all intervals hold together, at `level`."""
         rows = [
             (
                 *pair,
@@ -85,6 +85,7 @@ class LawRatios:
         if len(self._off) < len(self.pairs) or not self.pairs:
             return float("nan")
         laws = dict.fromkeys(law for pair in self.pairs for law in pair)
+        # In standard deviations: what the better law would lead by, less the width of its interval.
         needed = -np.log(better) / self.samples.std(axis=1) - self._width
         return float(np.mean([np.mean(self._first(law, needed)) for law in laws]))
 

@@ -172,6 +172,7 @@ def space_faults(laws: Mapping[str, Scenario], tune: Tune) -> Iterator[tuple[str
         label, dot, key = name.rpartition(".")
         if name == AROUND or not isinstance(content, Range):
             continue
+        # A name with a dot is one law's; without, it is for all laws.
         named = {label: laws[label]} if dot and label in laws else {} if dot else dict(laws)
         having = {n: single for n, single in named.items() if key in keys(single.controller)}
         if not having:
